@@ -1,0 +1,124 @@
+"""What an effect is: one object that simulator, identifier, report and docs all read.
+
+An effect acts at one of four places between commanded torque and measured rate:
+
+    torque_nm -> DRIVE filters -> J a + C w + K th + LOAD torques + FRICTION sgn(w) = M -> SENSOR filters -> rate
+
+Kernels are compiled functions (see ``kernel`` and ``filter_kernel``). The parameter vector ``p`` that a
+LOAD or FRICTION kernel receives starts with the platform's own J, C, K, followed by the effect's
+parameters in their declared order, so that an effect may lean on the spring it modifies (backlash).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numba
+from numba import types
+
+KERNEL_SIGNATURE = types.float64(
+    types.float64,  # angle_rad
+    types.float64,  # rate_rad_s (FRICTION kernels receive its magnitude)
+    types.float64,  # time_s since the start of the run
+    types.float64,  # torque_nm on the shaft, after the drive
+    types.float64[::1],  # state of this effect
+    types.float64[::1],  # its time derivative, written by the kernel
+    types.float64[::1],  # p: J, C, K, then the effect's own parameters
+)
+FILTER_SIGNATURE = types.float64(
+    types.float64,  # x, the sample that enters
+    types.float64,  # step_s between samples
+    types.float64[::1],  # state of this filter, updated in place
+    types.float64[::1],  # the effect's own parameters
+)
+
+kernel = numba.njit(KERNEL_SIGNATURE, cache=True, error_model="numpy", nogil=True)
+filter_kernel = numba.njit(FILTER_SIGNATURE, cache=True, error_model="numpy", nogil=True)
+
+
+class Place(Enum):
+    """Where an effect acts."""
+
+    DRIVE = "drive"  # a causal filter on the torque
+    LOAD = "load"  # a resisting torque, with internal states if it has memory
+    FRICTION = "friction"  # a level of dry friction: sign, sticking and breakaway are the integrator's
+    SENSOR = "sensor"  # a causal filter on the rate
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How large the motion is: from it an effect proposes where to look for its shape parameters."""
+
+    angle_rad: float
+    rate_rad_s: float
+    torque_nm: float
+    duration_s: float
+    step_s: float
+    natural_frequency_hz: float
+    excitation_hz: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect.
+
+    ``linear`` parameters enter the torque as a factor and are solved for; the others are shape
+    parameters and are searched between ``low`` and ``high``, starting from ``start(scale)``.
+    """
+
+    name: str
+    unit: str  # as result.json prints it, e.g. "N*m"
+    meaning: str
+    linear: bool = False
+    low: float = 0.0
+    high: float = float("inf")
+    suffix: str = ""  # unit suffix of the rig.yaml key, e.g. "nm"
+    start: Callable[[Scale], tuple[float, ...]] | None = None
+
+    @property
+    def key(self) -> str:
+        """Name with its unit, as written in rig.yaml and model.yaml."""
+        return f"{self.name}_{self.suffix}" if self.suffix else self.name
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical effect, described once.
+
+    ``states`` is the number of internal states of a LOAD kernel; a filter's number of states may depend
+    on the step and its parameters and is given by ``filter_states(step_s, values)``.
+    """
+
+    name: str
+    family: str
+    place: Place
+    equation: str
+    source: str
+    meaning: str
+    sign: str
+    parameters: tuple[Parameter, ...]
+    kernel: Any
+    states: int = 0
+    filter_states: Callable[[float, tuple[float, ...]], int] | None = None
+    nests: tuple[str, ...] = ()  # simpler effects that this one contains as a special case
+    never_separable: Mapping[str, str] | None = None  # rival -> why no torque-to-rate data can tell
+    separated_by: str = ""
+
+    def values(self, given: Mapping[str, float]) -> tuple[float, ...]:
+        """Parameter values in declared order from a mapping of name (or key) to value.
+
+        Raises
+        ------
+        KeyError
+            With the missing or unknown names.
+        """
+        by_name = {p.key: p.name for p in self.parameters} | {p.name: p.name for p in self.parameters}
+        unknown = [k for k in given if k not in by_name]
+        resolved = {by_name[k]: float(v) for k, v in given.items() if k in by_name}
+        missing = [p.key for p in self.parameters if p.name not in resolved]
+        if unknown or missing:
+            raise KeyError(f"{self.name}: unknown {unknown}, missing {missing}")
+        return tuple(resolved[p.name] for p in self.parameters)

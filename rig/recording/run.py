@@ -1,0 +1,91 @@
+"""The two containers that every later step reads: a Run and a Recording of several."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+TorqueHold = Literal["band_limited", "zero_order"]
+Use = Literal["auto", "fit", "holdout"]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One stretch of motion, played or recorded; all arrays are one-dimensional and read-only by custom.
+
+    Parameters
+    ----------
+    name
+        What people call it ("0.5 Hz", "run01.npz").
+    time_s
+        Shape (n,), strictly increasing: the instants at which rate and angle were true at the sensor.
+    rate_rad_s, angle_rad
+        Shape (n,) or None. The measured channels, untouched: not filtered, not differenced by us.
+        At least one is present. An angle is an encoder's and absolute.
+    valid
+        Shape (n,). False where a sample was lost, saturated or flagged by the device; the value there
+        may be NaN and is never used.
+    torque_time_s, torque_nm
+        Shape (m,) or None for free motion. Shaft torque from measured current. The two clocks agree;
+        the two grids need not.
+    torque_hold
+        How the torque runs between its samples: "band_limited" (instantaneous samples of a smooth
+        signal) or "zero_order" (each value held until the next).
+    use
+        "fit", "holdout", or "auto" where the identifier may choose.
+    min_rate_rad_s
+        Samples slower than this are left out of the fit and of every error.
+    added_inertia_kg_m2
+        A known inertia that was mounted for this run.
+    frequency_hz
+        The excitation frequency of a sine set, for the per-set table; None otherwise.
+    channels
+        Further measured channels by name, each of shape (n,).
+    """
+
+    name: str
+    time_s: Array
+    valid: NDArray[np.bool_]
+    rate_rad_s: Array | None = None
+    angle_rad: Array | None = None
+    torque_time_s: Array | None = None
+    torque_nm: Array | None = None
+    torque_hold: TorqueHold = "band_limited"
+    use: Use = "auto"
+    min_rate_rad_s: float = 0.0
+    added_inertia_kg_m2: float = 0.0
+    frequency_hz: float | None = None
+    channels: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the run in seconds."""
+        return float(self.time_s[-1] - self.time_s[0])
+
+
+@dataclass(frozen=True)
+class Recording:
+    """All runs of a campaign, with what is needed to read them later.
+
+    Parameters
+    ----------
+    runs
+        In the order they were played.
+    axis
+        "rotary" or "linear": labels and units only.
+    noise
+        One standard deviation of the measured channel (rate if present, else angle), or None where it
+        has to be estimated from the data.
+    info
+        Free text about origin: backend, versions, configuration as read. Never read by the identifier.
+    """
+
+    runs: tuple[Run, ...]
+    axis: Literal["rotary", "linear"] = "rotary"
+    noise: float | None = None
+    info: Mapping[str, Any] = field(default_factory=dict)
