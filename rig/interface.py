@@ -126,14 +126,14 @@ class Rig(ABC):
     def close(self) -> None:
         """Let go of all devices. Safe when not open."""
 
-    def begin_set(self, torque: TorqueOfTime, start_s: float) -> None:
+    def begin_set(self, torque: TorqueOfTime, start_s: float) -> None:  # noqa: B027 (most rigs need no hook)
         """Told before the first tick of a set, which takes place at ``start_s``.
 
         ``torque`` is the excitation as a function of seconds since then. A sampled drive has no use for
         it; an ideal one follows it between the ticks.
         """
 
-    def end_set(self) -> None:
+    def end_set(self) -> None:  # noqa: B027
         """Told after the last tick of a set, whatever ended it."""
 
     @contextmanager

@@ -1,0 +1,72 @@
+"""What every kind of excitation set shares: a name, a length and a torque that depends on time alone."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from rig.recording.run import Use
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+def rise(x: Any) -> Any:
+    """Smooth step from 0 at x <= 0 to 1 at x >= 1, its first two derivatives zero at both ends.
+
+    A torque that jumps is not band-limited, and what happens between its samples would be guesswork.
+    """
+    x = np.clip(x, 0.0, 1.0)
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0))
+
+
+class ExcitationSet(BaseModel):
+    """One stretch of torque, played from rest.
+
+    Parameters
+    ----------
+    name
+        What the report calls it; made from the other keys where absent.
+    duration_s
+        Length; the torque is zero before and after.
+    repeat_scales
+        The set is played again with its torque multiplied by each of these.
+    travel_cap_deg
+        Scale the set down until its predicted travel stays below this, whatever the limits allow.
+    use
+        Whether the run serves the fit or is held out; "auto" leaves it to the identifier.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    name: Annotated[str, Field(max_length=80)] = ""
+    duration_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 10.0
+    repeat_scales: Annotated[tuple[Positive, ...], Field(max_length=20)] = ()
+    travel_cap_deg: Positive | None = None
+    use: Use = "auto"
+
+    @property
+    def title(self) -> str:
+        """The name, or a description of the set where it has none."""
+        return self.name or self.describe()
+
+    @property
+    def sine_hz(self) -> float | None:
+        """The frequency where the set is a single sine, else None."""
+        return None
+
+    @abstractmethod
+    def describe(self) -> str:
+        """A few words that tell the set from its neighbours."""
+
+    @abstractmethod
+    def shape(self, time_s: Any) -> Any:
+        """Torque in N m between 0 and ``duration_s``; a float or an array of any shape."""
+
+    def torque(self, time_s: Any) -> Any:
+        """Torque in N m at seconds since the start of the set; a float or an array of any shape."""
+        inside = (time_s >= 0.0) * (time_s <= self.duration_s)
+        return self.shape(time_s) * inside
