@@ -1,0 +1,129 @@
+"""From the path of a rig.yaml to a checked Config, or one error that lists everything wrong with it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from rig.config.messages import faults_of, place_of, shown
+from rig.config.overrides import apply_override
+from rig.config.root import BACKENDS, Config, name_from_stem
+from rig.config.yaml_text import Document, Fault, KeyPath, parse, read_text
+from rig.errors import ConfigError
+
+MAX_FAULTS_SHOWN = 25
+# Places where the path of a model.yaml may stand for the mapping that it holds.
+INCLUDES: tuple[KeyPath, ...] = (("model",),)
+
+
+@dataclass(frozen=True)
+class LoadedConfig:
+    """A checked configuration and what it was read from.
+
+    ``text`` is the file as read, ``included`` the text of each model.yaml it names, ``overrides`` the
+    ``--set`` texts in order: together they say exactly what was asked.
+    """
+
+    config: Config
+    text: str
+    path: Path
+    overrides: tuple[str, ...] = ()
+    included: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def folder(self) -> Path:
+        """The folder that relative paths in the file start from."""
+        return self.path.parent
+
+
+def load_config(path: str | Path, overrides: Sequence[str] = ()) -> LoadedConfig:
+    """Read, override and check a configuration.
+
+    Raises ConfigError whose message has one line a fault: file, line, key, value, what is allowed.
+    """
+    path = Path(path)
+    text = read_text(path)
+    document = parse(text, str(path))
+    included: dict[str, str] = {}
+    if not isinstance(document.data, dict):
+        raise ConfigError(
+            f"{path}:1: has to be a mapping of keys (backend: ..., recorded: ...), not {shown(document.data)}"
+        )
+    _include_models(document, path.parent, included)
+    for override in overrides:
+        apply_override(document, override)
+    _include_models(document, path.parent, included)
+    config = _validate(document, name_from_stem(path.stem))
+    return LoadedConfig(config, text, path, tuple(overrides), included)
+
+
+def _include_models(document: Document, folder: Path, included: dict[str, str]) -> None:
+    for key in INCLUDES:
+        parent: Any = document.data
+        for part in key[:-1]:
+            parent = parent.get(part) if isinstance(parent, dict) else None
+        if isinstance(parent, dict) and isinstance(parent.get(key[-1]), str):
+            parent[key[-1]] = _included(document, key, folder / parent[key[-1]], included)
+
+
+def _included(document: Document, key: KeyPath, path: Path, included: dict[str, str]) -> Any:
+    """The mapping in a model.yaml, with its places and faults added to ``document``."""
+    try:
+        included[str(path)] = read_text(path)
+        model = parse(included[str(path)], str(path))
+    except ConfigError as error:
+        document.faults.append(Fault(place_of(document, key), key, f"names a model file: {error}"))
+        return {}
+    inside: KeyPath = ()
+    if isinstance(model.data, dict) and list(model.data) == ["model"]:  # pasted together with its key
+        inside, model.data = ("model",), model.data["model"]
+    if not isinstance(model.data, dict):
+        where = place_of(model, ())
+        text = f"has to hold a mapping (inertia_kg_m2: ...), not {shown(model.data)}"
+        document.faults.append(Fault(where, key, text))
+        return {}
+    for path_in_file, place in model.places.items():
+        if path_in_file[: len(inside)] == inside:
+            document.places[key + path_in_file[len(inside) :]] = place
+    for fault in model.faults:
+        document.faults.append(Fault(fault.place, key + fault.path[len(inside) :], fault.text))
+    return model.data
+
+
+def _validate(document: Document, default_name: str) -> Config:
+    data = document.data
+    data.setdefault("name", default_name)
+    _require_backend_section(document)
+    for section in Config.model_fields:
+        if section in data and data[section] is None and section not in ("name", "backend"):
+            data[section] = {}  # `simulated:` with nothing under it means: all defaults
+    config: Config | None = None
+    try:
+        # As JSON, strictly: a list may be a tuple there, but text is no number and true is not 1.
+        config = Config.model_validate_json(json.dumps(data), strict=True)
+    except ValidationError as error:
+        known = {fault.path for fault in document.faults}
+        document.faults += [f for f in faults_of(error, document, Config) if f.path not in known]
+    if document.faults or config is None:
+        raise ConfigError(_listing(document.faults))
+    return config
+
+
+def _require_backend_section(document: Document) -> None:
+    backend = document.data.get("backend")
+    if backend in BACKENDS and backend not in document.data:
+        text = f"is {backend}, so the section `{backend}:` is required: add it"
+        document.faults.append(Fault(place_of(document, ("backend",)), ("backend",), text))
+
+
+def _listing(faults: Sequence[Fault]) -> str:
+    ordered = sorted(faults, key=lambda f: (f.place.source, f.place.line or 0))
+    lines = [str(fault) for fault in ordered[:MAX_FAULTS_SHOWN]]
+    if len(ordered) > MAX_FAULTS_SHOWN:
+        lines.append(f"... and {len(ordered) - MAX_FAULTS_SHOWN} more; mend these first")
+    return "\n".join(lines)

@@ -1,0 +1,77 @@
+"""The `model` section: what the user declares about the platform, or a model.yaml of an earlier campaign."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+import yaml
+from pydantic import Field, field_validator
+
+from rig.config.base import Positive, Section
+from rig.config.effects import EffectsConfig
+from rig.platform import TERMS, Platform
+
+Term = Literal["inertia", "damping", "stiffness"]
+
+
+class ModelConfig(Section):
+    """J a + C w + K th + effects = M. The defaults are the paper's platform (Tab. 1)."""
+
+    inertia_kg_m2: Positive = 0.02
+    damping_nm_s_rad: float = 0.045
+    stiffness_nm_rad: float = 677.3
+    terms: tuple[Term, ...] = TERMS  # type: ignore[assignment]
+    effects: EffectsConfig = Field(default_factory=dict)
+
+    @field_validator("terms")
+    @classmethod
+    def _terms_make_a_model(cls, terms: tuple[Term, ...]) -> tuple[Term, ...]:
+        if len(set(terms)) != len(terms):
+            raise ValueError("a term is listed twice: name each of inertia, damping, stiffness once")
+        if "inertia" not in terms:
+            raise ValueError(
+                "inertia has to stay: without it there is no motion to simulate; leave out others"
+            )
+        return terms
+
+    def platform(self) -> Platform:
+        """The declared platform; a term that is left out is zero."""
+        return Platform(
+            inertia_kg_m2=self.inertia_kg_m2,
+            damping_nm_s_rad=self.damping_nm_s_rad if "damping" in self.terms else 0.0,
+            stiffness_nm_rad=self.stiffness_nm_rad if "stiffness" in self.terms else 0.0,
+            effects=self.effects,
+            terms=tuple(t for t in TERMS if t in self.terms),
+        )
+
+    @classmethod
+    def from_platform(cls, platform: Platform) -> Self:
+        """The section that declares ``platform``. Raises ValueError for values outside bounds."""
+        return cls(
+            inertia_kg_m2=platform.inertia_kg_m2,
+            damping_nm_s_rad=platform.damping_nm_s_rad,
+            stiffness_nm_rad=platform.stiffness_nm_rad,
+            terms=platform.terms,  # type: ignore[arg-type]
+            effects=platform.effects,
+        )
+
+
+def model_yaml(platform: Platform, comment: str = "") -> str:
+    """The text of a model.yaml that `model:` of the next campaign takes as a path or pasted.
+
+    Numbers are written with all their digits, parameters under the keys that carry their units.
+    """
+    section = ModelConfig.from_platform(platform)
+    content = section.model_dump(
+        mode="json", include={"inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"}
+    )
+    content["terms"] = list(section.terms)
+    if platform.effects:
+        from rig import effects  # noqa: PLC0415  compiled kernels: only where there is an effect
+
+        content["effects"] = {
+            name: {p.key: float(section.effects[name][p.name]) for p in effects.get(name).parameters}
+            for name in section.effects
+        }
+    head = "".join(f"# {line}\n" for line in comment.splitlines())
+    return head + yaml.safe_dump(content, sort_keys=False, default_flow_style=False)

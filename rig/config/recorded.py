@@ -1,0 +1,97 @@
+"""The `recorded` section: measurements made elsewhere, their columns and units."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from rig.config.base import NonNegative, Positive, Section
+
+ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+def _check_path(file: str) -> str:
+    # Whoever wrote the file may read any recording on the machine (`../data/run1.csv` is ordinary), and
+    # reading a file as numbers discloses nothing; what is no local path at all is refused here, and what
+    # is no regular file (a pipe that never ends, a device) where it is opened.
+    if "://" in file:
+        raise ValueError("is an address, not a file: download it first and give the path of the copy")
+    if "\0" in file or not file.strip():
+        raise ValueError("is not a path: give a file relative to this yaml, or an absolute path")
+    return file
+
+
+class RecordedRun(Section):
+    """One file, or one stretch of it."""
+
+    file: Annotated[str, Field(max_length=4096)]
+    use: Literal["auto", "fit", "holdout"] = "auto"
+    from_s: float | None = None
+    to_s: float | None = None
+    min_rate_rad_s: NonNegative | None = None
+    added_inertia_kg_m2: NonNegative = 0.0
+
+    _path = field_validator("file")(_check_path)
+
+    @model_validator(mode="after")
+    def _window_is_not_empty(self) -> Self:
+        if self.from_s is not None and self.to_s is not None and self.to_s <= self.from_s:
+            raise ValueError(f"to_s = {self.to_s:g} has to be later than from_s = {self.from_s:g}")
+        return self
+
+
+class Columns(Section):
+    """Names of the columns where they are not the default ones."""
+
+    time: ColumnName | None = None
+    torque: ColumnName | None = None
+    rate: ColumnName | None = None
+    angle: ColumnName | None = None
+    valid: ColumnName | None = None
+
+    @model_validator(mode="after")
+    def _each_column_once(self) -> Self:
+        given = [name for name in (self.time, self.torque, self.rate, self.angle, self.valid) if name]
+        twice = sorted({name for name in given if given.count(name) > 1})
+        if twice:
+            raise ValueError(f"column {twice[0]!r} is used for two quantities: each needs its own")
+        return self
+
+
+class Scale(Section):
+    """Factors from the file's numbers to s, N m, rad/s and rad."""
+
+    time: Positive = 1.0
+    torque: float = 1.0
+    rate: float = 1.0
+    angle: float = 1.0
+
+    @field_validator("torque", "rate", "angle")
+    @classmethod
+    def _not_zero(cls, factor: float) -> float:
+        if factor == 0:
+            raise ValueError("a factor of 0 erases the column: give the factor to SI units, e.g. 0.0174533")
+        return factor
+
+
+class RecordedConfig(Section):
+    """The recordings of a campaign that is not played but read."""
+
+    runs: Annotated[tuple[RecordedRun, ...], Field(min_length=1, max_length=1000)]
+    columns: Columns = Columns()
+    scale: Scale = Scale()
+    axis: Literal["rotary", "linear"] = "rotary"
+    torque_hold: Literal["band_limited", "zero_order"] = "band_limited"
+    noise: Positive | None = None
+    min_rate_rad_s: NonNegative = 0.0
+
+    @model_validator(mode="after")
+    def _something_to_fit(self) -> Self:
+        if all(run.use == "holdout" for run in self.runs):
+            raise ValueError("every run says use: holdout, so nothing is left to fit: mark one use: fit")
+        return self
+
+    def min_rate_of(self, run: RecordedRun) -> float:
+        """The run's own threshold, else the one for all runs, in rad/s."""
+        return self.min_rate_rad_s if run.min_rate_rad_s is None else run.min_rate_rad_s

@@ -1,0 +1,50 @@
+"""The whole of rig.yaml as one frozen value."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator
+
+from rig.config.base import Section
+from rig.config.bench import BenchConfig
+from rig.config.excitation import ExcitationConfig
+from rig.config.identify import IdentifyConfig
+from rig.config.limits import LimitsConfig
+from rig.config.model import ModelConfig
+from rig.config.recorded import RecordedConfig
+from rig.config.simulated import SimulatedConfig
+
+BACKENDS = ("simulated", "bench", "recorded")
+# The name becomes part of a folder's name on any system.
+_NOT_IN_A_NAME = re.compile(r'[\x00-\x1f\x7f/\\<>:"|?*]')
+
+
+class Config(Section):
+    """rig.yaml. ``backend`` and its section are required, all else suits the paper's platform.
+
+    ``simulated`` is always there, for ``--dry-run``.
+    """
+
+    name: Annotated[str, Field(min_length=1, max_length=80)]
+    backend: Literal["simulated", "bench", "recorded"]
+    model: ModelConfig = ModelConfig()
+    limits: LimitsConfig = Field(default_factory=LimitsConfig)
+    excitation: ExcitationConfig = Field(default_factory=ExcitationConfig)
+    simulated: SimulatedConfig = Field(default_factory=SimulatedConfig)
+    bench: BenchConfig | None = None
+    recorded: RecordedConfig | None = None
+    identify: IdentifyConfig = IdentifyConfig()
+
+    @field_validator("name")
+    @classmethod
+    def _name_fits_a_folder(cls, name: str) -> str:
+        if _NOT_IN_A_NAME.search(name) or name != name.strip(" ."):
+            raise ValueError("becomes part of a folder's name: use letters, digits, spaces, - _ . inside it")
+        return name
+
+
+def name_from_stem(stem: str) -> str:
+    """The campaign's name where the file gives none."""
+    return _NOT_IN_A_NAME.sub("_", stem).strip(" .")[:80].strip(" .") or "campaign"
