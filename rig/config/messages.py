@@ -67,12 +67,18 @@ def _data_path(loc: tuple[str | int, ...], kind: str, data: Any) -> KeyPath:
     """``loc`` without the names of union members and validators that pydantic puts in between."""
     path: KeyPath = ()
     for i, part in enumerate(loc):
-        if (isinstance(data, dict) and isinstance(part, str) and part in data) or (isinstance(data, list) and isinstance(part, int) and part < len(data)):
+        if _holds(data, part):
             data = data[part]
         elif not (kind == "missing" and i == len(loc) - 1):
             continue
         path = (*path, part)
     return path
+
+
+def _holds(data: Any, part: str | int) -> bool:
+    if isinstance(part, str):
+        return isinstance(data, dict) and part in data
+    return isinstance(data, list) and part < len(data)
 
 
 def _text(kind: str | None, path: KeyPath, items: list[Any], data: Any, root: type[BaseModel]) -> str:
