@@ -1,0 +1,49 @@
+"""The `excitation` section: which sets are played, how fast, and what to do when one is too large."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import Discriminator, Field, Tag
+
+from rig.config.base import NonNegative, Section
+from rig.excitation import Chirp, FreeDecay, Multisine, RampHoldRelease, Sine
+
+PAPER_SETS: tuple[tuple[float, float], ...] = ((300, 0.5), (300, 1.0), (250, 3.0), (200, 6.0), (150, 9.0))
+
+
+def _kind(value: Any) -> Any:
+    """The kind of a set; a set that does not say is a sine, as all sets of the paper are."""
+    return value.get("kind", "sine") if isinstance(value, Mapping) else getattr(value, "kind", None)
+
+
+AnySet = Annotated[
+    Annotated[Sine, Tag("sine")]
+    | Annotated[RampHoldRelease, Tag("ramp_hold_release")]
+    | Annotated[Multisine, Tag("multisine")]
+    | Annotated[Chirp, Tag("chirp")]
+    | Annotated[FreeDecay, Tag("free_decay")],
+    Discriminator(_kind),
+]
+
+
+def paper_sets() -> tuple[Sine, ...]:
+    """The five sets of Fig. 6."""
+    return tuple(Sine(torque_nm=torque, frequency_hz=hz) for torque, hz in PAPER_SETS)
+
+
+class ExcitationConfig(Section):
+    """What is played.
+
+    ``rest_s`` of zero torque before each set lets the ring of the last one die out: the paper's platform
+    rings at 29 Hz with a time constant of 0.9 s, and a set is taken to start from rest.
+    """
+
+    sample_rate_hz: Annotated[float, Field(ge=10, le=20_000)] = 1000.0
+    sets: Annotated[tuple[AnySet, ...], Field(min_length=1, max_length=200)] = Field(
+        default_factory=paper_sets
+    )
+    rest_s: NonNegative = 12.0
+    scale_to_limits: bool = False
+    margin: Annotated[float, Field(gt=0, le=1)] = 0.95

@@ -1,0 +1,92 @@
+"""The `simulated` section: the rig that stands in for the real one, and the truth it hides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from rig.config.base import NonNegative, Positive, Section
+from rig.config.model import ModelConfig
+
+
+class SimulatedGyro(Section):
+    """A gyroscope by its data sheet; the default noise is the accuracy of the paper's.
+
+    ``delay_s`` is the transport delay from the instant of a sample until its time stamp is taken;
+    together with the group delay of ``bandwidth_hz`` it is subtracted from the time stamps unless
+    ``corrected_delay_s`` says how much of it the driver knows.
+    """
+
+    sample_rate_hz: Annotated[float, Field(ge=10, le=20_000)] = 1000.0
+    noise_deg_s: NonNegative = 0.05
+    bias_deg_s: float = 0.0
+    resolution_deg_s: Positive | None = None
+    full_scale_deg_s: Positive | None = 400.0
+    bandwidth_hz: Positive | None = None
+    delay_s: Annotated[float, Field(ge=0, le=0.1)] = 0.0
+    corrected_delay_s: Annotated[float, Field(ge=0, le=0.1)] | None = None
+
+
+class IdealAmplifier(Section):
+    """The torque asked for, exactly, at every instant between the ticks too."""
+
+    kind: Literal["ideal"] = "ideal"
+
+
+class HoldAmplifier(Section):
+    """A torque drive: each command is rounded to the resolution and held until the next."""
+
+    kind: Literal["hold"]
+    resolution_nm: Positive | None = None
+
+
+class MotorAmplifier(Section):
+    """DC torque motor behind an amplifier, direct or geared (Eq. 6, Fig. 2, 3).
+
+    ``control: current`` closes a current loop of ``bandwidth_hz`` that hides back-EMF until
+    ``voltage_limit_v`` is reached; ``control: voltage`` applies the voltage that would hold the asked
+    torque at standstill, so back-EMF and inductance act fully. All torques are those at the shaft.
+    ``rotor_inertia_kg_m2`` times the square of the gear ratio adds to the platform's inertia.
+    """
+
+    kind: Literal["motor"]
+    control: Literal["current", "voltage"] = "current"
+    bandwidth_hz: Annotated[float, Field(gt=0, le=50_000)] = 1000.0
+    resistance_ohm: Positive = 1.0
+    inductance_h: Positive = 2e-3
+    torque_constant_nm_a: Positive = 6.0
+    voltage_limit_v: Positive = 300.0
+    gear_ratio: Positive = 1.0
+    gear_efficiency: Annotated[float, Field(gt=0, le=1)] = 1.0
+    rotor_inertia_kg_m2: NonNegative = 0.0
+    resolution_nm: Positive | None = None
+
+
+def _kind(value: Any) -> Any:
+    return value.get("kind", "ideal") if isinstance(value, Mapping) else getattr(value, "kind", None)
+
+
+AnyAmplifier = Annotated[
+    Annotated[IdealAmplifier, Tag("ideal")]
+    | Annotated[HoldAmplifier, Tag("hold")]
+    | Annotated[MotorAmplifier, Tag("motor")],
+    Discriminator(_kind),
+]
+
+
+class SimulatedConfig(Section):
+    """The simulated rig. ``platform`` is the truth: the identifier never sees it."""
+
+    platform: ModelConfig = ModelConfig()
+    gyro: SimulatedGyro = SimulatedGyro()
+    amplifier: AnyAmplifier = IdealAmplifier()
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
+
+    @model_validator(mode="after")
+    def _stays_put(self) -> Self:
+        for key in ("damping_nm_s_rad", "stiffness_nm_rad"):
+            if getattr(self.platform, key) < 0:
+                raise ValueError(f"platform.{key} is negative: such a platform runs away by itself")
+        return self
