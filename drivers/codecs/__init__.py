@@ -1,1 +1,4 @@
-"""Wire codecs: pure bytes to values and back, without I/O. Drivers and emulators share them."""
+"""Wire codecs: pure bytes <-> values, without ports, clocks or threads.
+
+Drivers and emulators share them; each is held against packets captured from real devices.
+"""
