@@ -24,19 +24,19 @@ KERNEL_SIGNATURE = types.float64(
     types.float64,  # rate_rad_s (FRICTION kernels receive its magnitude)
     types.float64,  # time_s since the start of the run
     types.float64,  # torque_nm on the shaft, after the drive
-    types.float64[::1],  # state of this effect
-    types.float64[::1],  # its time derivative, written by the kernel
-    types.float64[::1],  # p: J, C, K, then the effect's own parameters
+    types.CPointer(types.float64),  # state of this effect
+    types.CPointer(types.float64),  # its time derivative, written by the kernel
+    types.CPointer(types.float64),  # p: J, C, K, then the effect's own parameters
 )
 FILTER_SIGNATURE = types.float64(
     types.float64,  # x, the sample that enters
     types.float64,  # step_s between samples
-    types.float64[::1],  # state of this filter, updated in place
-    types.float64[::1],  # the effect's own parameters
+    types.CPointer(types.float64),  # state of this filter, updated in place
+    types.CPointer(types.float64),  # the effect's own parameters
 )
 
-kernel = numba.njit(KERNEL_SIGNATURE, cache=True, error_model="numpy", nogil=True)
-filter_kernel = numba.njit(FILTER_SIGNATURE, cache=True, error_model="numpy", nogil=True)
+kernel = numba.cfunc(KERNEL_SIGNATURE, cache=True, error_model="numpy")
+filter_kernel = numba.cfunc(FILTER_SIGNATURE, cache=True, error_model="numpy")
 
 
 class Place(Enum):
@@ -77,6 +77,7 @@ class Parameter:
     high: float = float("inf")
     suffix: str = ""  # unit suffix of the rig.yaml key, e.g. "nm"
     start: Callable[[Scale], tuple[float, ...]] | None = None
+    per_run: bool = False  # takes a value of its own in every run (the phase of a disturbance)
 
     @property
     def key(self) -> str:
@@ -103,6 +104,8 @@ class Effect:
     kernel: Any
     states: int = 0
     filter_states: Callable[[float, tuple[float, ...]], int] | None = None
+    rest_state: Callable[[float, float], tuple[float, ...]] | None = None  # of angle and rate at the start
+    fastest_rad_s: Callable[[tuple[float, ...]], float] | None = None  # of (J, C, K, *values): sets the step
     nests: tuple[str, ...] = ()  # simpler effects that this one contains as a special case
     never_separable: Mapping[str, str] | None = None  # rival -> why no torque-to-rate data can tell
     separated_by: str = ""

@@ -1,0 +1,348 @@
+"""The equation of motion, integrated with located stick and slip events (compiled).
+
+One fine step of length h is a classical fourth-order Runge-Kutta step while the motion keeps its
+direction. Dry friction makes the right-hand side jump where the rate changes sign; smoothing that jump
+moves ten seconds of simulated rate by many sigma however fine the step is, so the instants of
+sticking, breaking away and reversing are found by root search and the step is split there.
+
+Layout of the arrays, so that any set of effects runs through one compiled function:
+``motion`` holds angle, rate, slip direction (-1, 0 stuck, +1) and time; ``z`` the internal states of all
+kernels end to end, ``z_at`` where each kernel's begin; ``p`` the parameter vectors end to end, ``p_at``
+where each begins. LOAD kernels come first, FRICTION kernels from ``loads`` on.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba as nb
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from rig.effects.base import FILTER_SIGNATURE, KERNEL_SIGNATURE
+
+EVENTS_PER_STEP = 12  # more reversals than this in one fine step is chatter: the plant is held stuck
+
+jit = nb.njit(cache=True, error_model="numpy", nogil=True)
+
+
+def addresses(kernels: list[Any]) -> Any:
+    """Where compiled kernels live, as the compiled functions take them, shape (n,)."""
+    return np.array([k.address for k in kernels], dtype=np.int64)
+
+
+@intrinsic
+def _pointer(typingctx: Any, array: Any) -> Any:
+    """Pointer to an array's first element. Passing arrays costs a reference count a call; pointers are free."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return context.make_array(signature.args[0])(context, builder, args[0]).data
+
+    return types.CPointer(array.dtype)(array), codegen
+
+
+@intrinsic
+def _offset(typingctx: Any, pointer: Any, count: Any) -> Any:
+    """Pointer to the element ``count`` behind ``pointer``."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.gep(args[0], [args[1]])
+
+    return pointer(pointer, types.intp), codegen
+
+
+@intrinsic
+def _floats_at(typingctx: Any, address: Any) -> Any:
+    """Pointer to the float64 values at an address."""
+    signature = types.CPointer(types.float64)(types.int64)
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.inttoptr(args[0], ir.DoubleType().as_pointer())
+
+    return signature, codegen
+
+
+@intrinsic
+def _integers_at(typingctx: Any, address: Any) -> Any:
+    """Pointer to the int64 values at an address."""
+    signature = types.CPointer(types.int64)(types.int64)
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.inttoptr(args[0], ir.IntType(64).as_pointer())
+
+    return signature, codegen
+
+
+@intrinsic
+def _call(typingctx: Any, address: Any, th: Any, w: Any, t: Any, m: Any, z: Any, dz: Any, p: Any) -> Any:
+    """Call the kernel at an address."""
+    signature = types.float64(types.int64, *KERNEL_SIGNATURE.args)
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        double = ir.DoubleType()
+        kind = ir.FunctionType(double, [double] * 4 + [double.as_pointer()] * 3)
+        return builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
+
+    return signature, codegen
+
+
+@intrinsic
+def _call_filter(typingctx: Any, address: Any, x: Any, h: Any, s: Any, p: Any) -> Any:
+    """Call the filter kernel at an address."""
+    signature = types.float64(types.int64, *FILTER_SIGNATURE.args)
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        double = ir.DoubleType()
+        kind = ir.FunctionType(double, [double] * 2 + [double.as_pointer()] * 2)
+        return builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
+
+    return signature, codegen
+
+
+@jit
+def _quadratic(m0, m1, m2, x):  # type: ignore[no-untyped-def]
+    """Torque at fraction x of the step, through its values at the start, the middle and the end."""
+    return m0 * (1.0 - x) * (1.0 - 2.0 * x) + m1 * 4.0 * x * (1.0 - x) + m2 * x * (2.0 * x - 1.0)
+
+
+@jit
+def _sum(first, last, th, w, t, m, z, dz, kernels, z_at, p, p_at):  # type: ignore[no-untyped-def]
+    """Sum of the kernels first..last-1; writes their state derivatives."""
+    total = 0.0
+    for k in range(first, last):
+        total += _call(kernels[k], th, w, t, m, _offset(z, z_at[k]), _offset(dz, z_at[k]), _offset(p, p_at[k]))
+    return total
+
+
+@jit
+def _copy(source, target, n):  # type: ignore[no-untyped-def]
+    for i in range(n):
+        target[i] = source[i]
+
+
+@jit
+def _acceleration(th, w, t, m, slip, z, dz, jck, body):  # type: ignore[no-untyped-def]
+    loads, count = body[0], body[1]
+    net = m - jck[1] * w - jck[2] * th
+    if loads > 0:
+        net -= _sum(0, loads, th, w, t, m, z, dz, *body[2:])
+    if slip != 0.0 and count > loads:
+        net -= slip * _sum(loads, count, th, abs(w), t, m, z, dz, *body[2:])
+    return net / jck[0]
+
+
+@jit
+def _rk4(motion, x0, x1, h, m0, m1, m2, n, z, z0, k1, k2, k3, k4, jck, body):  # type: ignore[no-untyped-def]
+    """Advance angle, rate and z from fraction x0 to x1 of the step, the slip direction kept."""
+    dt = (x1 - x0) * h
+    th, w, slip, t = motion[0], motion[1], motion[2], motion[3]
+    begin = _quadratic(m0, m1, m2, x0)
+    middle = _quadratic(m0, m1, m2, 0.5 * (x0 + x1))
+    end = _quadratic(m0, m1, m2, x1)
+    for i in range(n):
+        z0[i] = z[i]
+    a1 = _acceleration(th, w, t, begin, slip, z, k1, jck, body)
+    w2, th2 = w + 0.5 * dt * a1, th + 0.5 * dt * w
+    for i in range(n):
+        z[i] = z0[i] + 0.5 * dt * k1[i]
+    a2 = _acceleration(th2, w2, t + 0.5 * dt, middle, slip, z, k2, jck, body)
+    w3, th3 = w + 0.5 * dt * a2, th + 0.5 * dt * w2
+    for i in range(n):
+        z[i] = z0[i] + 0.5 * dt * k2[i]
+    a3 = _acceleration(th3, w3, t + 0.5 * dt, middle, slip, z, k3, jck, body)
+    w4, th4 = w + dt * a3, th + dt * w3
+    for i in range(n):
+        z[i] = z0[i] + dt * k3[i]
+    a4 = _acceleration(th4, w4, t + dt, end, slip, z, k4, jck, body)
+    motion[0] = th + dt * (w + 2.0 * w2 + 2.0 * w3 + w4) / 6.0
+    motion[1] = w + dt * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
+    motion[3] = t + dt
+    for i in range(n):
+        z[i] = z0[i] + dt * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]) / 6.0
+
+
+@jit
+def _advance_to(motion, saved, zs, x0, x1, h, m0, m1, m2, n, z, w0, k1, k2, k3, k4, jck, body):  # type: ignore[no-untyped-def]
+    """From the saved motion at fraction x0 to x1: sliding, or stuck while internal states go on."""
+    _copy(saved, motion, 4)
+    _copy(zs, z, n)
+    if motion[2] != 0.0:
+        _rk4(motion, x0, x1, h, m0, m1, m2, n, z, w0, k1, k2, k3, k4, jck, body)
+        return
+    motion[1] = 0.0
+    if n == 0:
+        motion[3] += (x1 - x0) * h
+        return
+    # An infinite inertia does not move; the internal states do.
+    _rk4(motion, x0, x1, h, m0, m1, m2, n, z, w0, k1, k2, k3, k4, (np.inf, jck[1], jck[2]), body)
+    motion[0] = saved[0]
+    motion[1] = 0.0
+
+
+@jit
+def _excess(motion, m, z, dz, jck, body):  # type: ignore[no-untyped-def]
+    """Net torque on the platform at rate zero, and by how much it exceeds what friction holds."""
+    loads, count = body[0], body[1]
+    net = m - jck[2] * motion[0] - _sum(0, loads, motion[0], 0.0, motion[3], m, z, dz, *body[2:])
+    return net, abs(net) - _sum(loads, count, motion[0], 0.0, motion[3], m, z, dz, *body[2:])
+
+
+@jit
+def step(motion, n, z, work, saved, h, m0, m1, m2, jck, body):  # type: ignore[no-untyped-def]
+    """One fine step of length h; m0, m1, m2 are the shaft torque at its start, middle and end."""
+    w0, k1, k2, k3, k4, zs = work
+    if body[1] == body[0]:
+        motion[2] = 0.0
+        _rk4(motion, 0.0, 1.0, h, m0, m1, m2, n, z, w0, k1, k2, k3, k4, jck, body)
+        return
+    x = 0.0
+    for _ in range(EVENTS_PER_STEP):
+        if x >= 1.0:
+            return
+        if motion[2] == 0.0:
+            net, excess = _excess(motion, _quadratic(m0, m1, m2, x), z, k1, jck, body)
+            if excess > 0.0:
+                motion[2] = 1.0 if net > 0.0 else -1.0
+                continue
+        _copy(motion, saved, 4)
+        _copy(z, zs, n)
+        slip = motion[2]
+        _advance_to(motion, saved, zs, x, 1.0, h, m0, m1, m2, n, z, w0, k1, k2, k3, k4, jck, body)
+        # What must stay below zero until the step ends: the excess while stuck, the reversal while sliding.
+        if slip == 0.0:
+            f_hi = _excess(motion, m2, z, k1, jck, body)[1]
+            f_lo = _excess(saved, _quadratic(m0, m1, m2, x), zs, k1, jck, body)[1]
+        else:
+            f_hi = -motion[1] * slip
+            f_lo = -saved[1] * slip
+        if f_hi <= 0.0:
+            return
+        lo, hi, side = x, 1.0, 0
+        for _k in range(60):  # regula falsi (Illinois)
+            if hi - lo < 1e-13 or f_hi < 1e-15:
+                break
+            mid = (lo * f_hi - hi * f_lo) / (f_hi - f_lo)
+            if not lo < mid < hi:
+                mid = 0.5 * (lo + hi)
+            _advance_to(motion, saved, zs, x, mid, h, m0, m1, m2, n, z, w0, k1, k2, k3, k4, jck, body)
+            if slip == 0.0:
+                f = _excess(motion, _quadratic(m0, m1, m2, mid), z, k1, jck, body)[1]
+            else:
+                f = -motion[1] * slip
+            if f > 0.0:
+                hi, f_hi = mid, f
+                if side == 1:
+                    f_lo *= 0.5
+                side = 1
+            else:
+                lo, f_lo = mid, f
+                if side == -1:
+                    f_hi *= 0.5
+                side = -1
+        hi = max(hi, min(1.0, x + 1e-9))
+        _advance_to(motion, saved, zs, x, hi, h, m0, m1, m2, n, z, w0, k1, k2, k3, k4, jck, body)
+        motion[1] = 0.0
+        net, excess = _excess(motion, _quadratic(m0, m1, m2, hi), z, k1, jck, body)
+        if slip == 0.0 or excess > 0.0:
+            motion[2] = 1.0 if net > 0.0 else -1.0
+        else:
+            motion[2] = 0.0
+        x = hi
+    if x < 1.0:
+        motion[2] = 0.0
+        _copy(motion, saved, 4)
+        _copy(z, zs, n)
+        _advance_to(motion, saved, zs, x, 1.0, h, m0, m1, m2, n, z, w0, k1, k2, k3, k4, jck, body)
+
+
+@jit
+def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, out):  # type: ignore[no-untyped-def]
+    """Integrate ``len(torque)`` fine steps.
+
+    ``torque`` has shape (n, 3): start, middle, end of each step. ``out`` has shape (n + 1, 3) and takes
+    angle, rate and acceleration at every fine instant, the start included.
+    """
+    n, states = torque.shape[0], len(z)
+    room = np.zeros((8, max(4, states)))
+    work = (
+        _pointer(room[0]), _pointer(room[1]), _pointer(room[2]),
+        _pointer(room[3]), _pointer(room[4]), _pointer(room[5]),
+    )  # fmt: skip
+    saved, dz = _pointer(room[6]), _pointer(room[7])
+    mo, zp = _pointer(motion), _pointer(z)
+    jck = (jck[0], jck[1], jck[2])
+    body = (loads, len(kernels), _pointer(kernels), _pointer(z_at), _pointer(p), _pointer(p_at))
+    t0 = motion[3]
+    for i in range(n + 1):
+        m = torque[i, 0] if i < n else torque[n - 1, 2]
+        a = _acceleration(mo[0], mo[1], mo[3], m, mo[2], zp, dz, jck, body)
+        if mo[2] == 0.0 and len(kernels) > loads:
+            a = 0.0
+        out[i, 0], out[i, 1], out[i, 2] = mo[0], mo[1], a
+        if i < n:
+            step(mo, states, zp, work, saved, h, torque[i, 0], torque[i, 1], torque[i, 2], jck, body)
+            mo[3] = t0 + (i + 1) * h
+            if not abs(mo[0]) < 1e9:  # diverged (or not a number): nothing after it means anything
+                out[i + 1 :, :] = np.nan
+                return room[0, 0]
+    return room[0, 0]  # keeps the scratch alive until the last step
+
+
+@jit
+def run_filter(kernels, x, h, s, s_at, p, p_at):  # type: ignore[no-untyped-def]
+    """Send the samples x (in place) through a chain of filter kernels, one after the other.
+
+    A filter with memory starts as if its first sample had stood there for ever.
+    """
+    for k in range(len(kernels)):
+        sk, pk = _offset(_pointer(s), s_at[k]), _offset(_pointer(p), p_at[k])
+        x0 = x[0] if s_at[k + 1] > s_at[k] else 0.0
+        for i in range(len(x)):
+            x[i] = x0 + _call_filter(kernels[k], x[i] - x0, h, sk, pk)
+    return len(s) + len(p)
+
+
+@jit
+def _chain(x, h, table, first):  # type: ignore[no-untyped-def]
+    """One sample through the chain of filters whose count and addresses stand from table[first] on."""
+    kernels, states, state_at = (
+        _integers_at(table[first + 1]), _floats_at(table[first + 2]), _integers_at(table[first + 3])
+    )  # fmt: skip
+    p, p_at = _floats_at(table[first + 4]), _integers_at(table[first + 5])
+    for k in range(table[first]):
+        x = _call_filter(kernels[k], x, h, _offset(states, state_at[k]), _offset(p, p_at[k]))
+    return x
+
+
+@jit
+def advance(table, values):  # type: ignore[no-untyped-def]
+    """A few fine steps under a torque running linearly from one value to another, drive and sensor included.
+
+    Everything that stays the same comes as addresses in ``table`` (see ``Stepper``): a call takes one
+    microsecond instead of fifty. ``values`` holds the fine step and the torque at start and end; it takes
+    angle, rate, sensed rate and shaft torque, and must hold the shaft torque of the previous call.
+    """
+    motion, states, z, scratch = _floats_at(table[0]), table[1], _floats_at(table[2]), _floats_at(table[3])
+    width, loads, count = max(4, states), table[4], table[5]
+    body = (
+        loads, count, _integers_at(table[6]), _integers_at(table[7]),
+        _floats_at(table[8]), _integers_at(table[9]),
+    )  # fmt: skip
+    constants = _floats_at(table[10])
+    jck = (constants[0], constants[1], constants[2])
+    work = (
+        scratch, _offset(scratch, width), _offset(scratch, 2 * width),
+        _offset(scratch, 3 * width), _offset(scratch, 4 * width), _offset(scratch, 5 * width),
+    )  # fmt: skip
+    saved = _offset(scratch, 6 * width)
+    h, m_start, m_end, steps = values[0], values[1], values[2], table[11]
+    for i in range(steps):
+        shaft = _chain(m_start + (m_end - m_start) * (i + 1) / steps, h, table, 12)
+        begin = values[6]
+        if m_start == m_end and table[12] == 0:
+            begin = m_start  # held: the torque jumps at the start of the step
+        step(motion, states, z, work, saved, h, begin, 0.5 * (begin + shaft), shaft, jck, body)
+        values[3], values[4], values[6] = motion[0], motion[1], shaft
+        values[5] = _chain(motion[1], h, table, 18)

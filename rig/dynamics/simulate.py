@@ -1,0 +1,277 @@
+"""From a platform and a torque to the motion: whole sets at once, or one fine step at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from rig import effects
+from rig.dynamics import integrator
+from rig.dynamics.torque import NO_TORQUE, TorqueSignal
+from rig.effects.base import Effect, Place
+from rig.platform import Platform
+from rig.recording.run import Array
+
+STEP_PHASE_RAD = 0.06  # of the fastest motion in one fine step: 4th order leaves 1e-7 of a frequency
+MAX_SUBSTEPS = 64
+
+
+@lru_cache(maxsize=512)
+def _kernels(
+    names: tuple[str, ...],
+) -> tuple[Any, Any, Any, int, tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Typed kernel lists of a set of effects: loads with frictions, drive, sensor."""
+    by_place: dict[Place, list[Effect]] = {place: [] for place in Place}
+    for name in names:
+        effect = effects.get(name)
+        by_place[effect.place].append(effect)
+    body = by_place[Place.LOAD] + by_place[Place.FRICTION]
+    return (
+        integrator.addresses([e.kernel for e in body]),
+        integrator.addresses([e.kernel for e in by_place[Place.DRIVE]]),
+        integrator.addresses([e.kernel for e in by_place[Place.SENSOR]]),
+        len(by_place[Place.LOAD]),
+        tuple(e.name for e in body),
+        tuple(e.name for e in by_place[Place.DRIVE]),
+        tuple(e.name for e in by_place[Place.SENSOR]),
+    )
+
+
+def _offsets(sizes: Sequence[int]) -> Any:
+    return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+
+
+@dataclass
+class _Filters:
+    """A chain of filter kernels with its parameters; states are made when the step is known."""
+
+    kernels: Any
+    names: tuple[str, ...]
+    values: tuple[tuple[float, ...], ...]
+
+    def arrays(self, step_s: float) -> tuple[Any, Array, Any, Array, Any]:
+        sizes = []
+        for name, values in zip(self.names, self.values, strict=True):
+            count = effects.get(name).filter_states
+            sizes.append(count(step_s, values) if count else 0)
+        s_at, p_at = _offsets(sizes), _offsets([len(v) for v in self.values])
+        p = np.array([x for v in self.values for x in v], dtype=float)
+        return self.kernels, np.zeros(int(s_at[-1])), s_at, p, p_at
+
+    def apply(self, x: Array, step_s: float) -> Array:
+        if not self.names:
+            return x
+        kernels, s, s_at, p, p_at = self.arrays(step_s)
+        out = np.array(x, dtype=float)
+        integrator.run_filter(kernels, out, step_s, s, s_at, p, p_at)
+        return out
+
+
+class Equations:
+    """A platform laid out for the compiled integrator."""
+
+    def __init__(self, platform: Platform) -> None:
+        kernels, drive, sensor, loads, body, drives, sensors = _kernels(tuple(platform.effects))
+        self.jck = np.array([platform.inertia_kg_m2, platform.damping_nm_s_rad, platform.stiffness_nm_rad], dtype=float)
+        values = {name: effects.get(name).values(given) for name, given in platform.effects.items()}
+        self.kernels, self.loads = kernels, loads
+        self.z_at = _offsets([effects.get(name).states for name in body])
+        self.p_at = _offsets([3 + len(values[name]) for name in body])
+        self.p = np.array([x for name in body for x in (*self.jck, *values[name])], dtype=float)
+        self.drive = _Filters(drive, drives, tuple(values[n] for n in drives))
+        self.sensor = _Filters(sensor, sensors, tuple(values[n] for n in sensors))
+        self._values = values
+        self._body = body
+
+    @property
+    def states(self) -> int:
+        """Number of internal states of all effects on the shaft."""
+        return int(self.z_at[-1])
+
+    def rest_states(self, angle_rad: float, rate_rad_s: float) -> Array:
+        """Internal states of a platform that has stood at this angle and moves with this rate, shape (states,)."""
+        z = np.zeros(self.states)
+        for i, name in enumerate(self._body):
+            rest = effects.get(name).rest_state
+            if rest:
+                z[self.z_at[i] : self.z_at[i + 1]] = rest(angle_rad, rate_rad_s)
+        return z
+
+    def fastest_rad_s(self) -> float:
+        """The fastest motion that a fine step has to follow."""
+        j, c, k = self.jck
+        rates = [np.sqrt(abs(k) / j), 0.3 * abs(c) / j]
+        for name, values in self._values.items():
+            fastest = effects.get(name).fastest_rad_s
+            if fastest:
+                rates.append(fastest((j, c, k, *values)))
+        return float(max(rates))
+
+    def substeps(self, sample_s: float) -> int:
+        """Fine steps in one sample period: enough for the fastest motion, at least two."""
+        return int(np.clip(np.ceil(sample_s * self.fastest_rad_s() / STEP_PHASE_RAD), 2, MAX_SUBSTEPS))
+
+    def integrate(self, torque: Array, step_s: float, start: tuple[float, float]) -> Array:
+        """Angle, rate and acceleration, shape (n + 1, 3), under a shaft torque of shape (n, 3)."""
+        state = np.array([start[0], start[1], np.sign(start[1]), 0.0])
+        out = np.empty((len(torque) + 1, 3))
+        integrator.run_steps(
+            state,
+            self.rest_states(*start),
+            step_s,
+            torque,
+            self.jck,
+            self.kernels,
+            self.loads,
+            self.z_at,
+            self.p,
+            self.p_at,
+            out,
+        )
+        return out
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What the platform did at the sample instants; ``sensed_rate_rad_s`` is behind the SENSOR effects."""
+
+    angle_rad: Array
+    rate_rad_s: Array
+    sensed_rate_rad_s: Array
+
+
+class Grid:
+    """The fine time grid of one run, with its torque: made once, simulated many times.
+
+    Parameters
+    ----------
+    time_s
+        Shape (n,), strictly increasing; may be jittered or have gaps.
+    torque
+        The torque asked of the drive, or None for free motion.
+    substeps
+        Fine steps per (median) sample period.
+    """
+
+    def __init__(self, time_s: Array, torque: TorqueSignal | None, substeps: int) -> None:
+        spacing = np.diff(time_s)
+        sample_s = float(np.median(spacing))
+        self.time_s = time_s
+        self.step_s = sample_s / substeps
+        steps = (time_s - time_s[0]) / self.step_s
+        nearest = np.rint(steps).astype(np.int64)
+        self._index = nearest if np.max(np.abs(steps - nearest)) < 1e-4 else None
+        self.n = int(np.ceil(steps[-1] - 1e-4))
+        torque = torque or NO_TORQUE
+        self._held = torque.hold == "zero_order"
+        self._half = torque.on_half_steps(float(time_s[0]), 0.5 * self.step_s, 2 * self.n + 1)
+
+    def shaft_torque(self, equations: Equations) -> Array:
+        """Torque behind the drive effects at start, middle and end of each fine step, shape (n, 3)."""
+        half = equations.drive.apply(self._half, 0.5 * self.step_s)
+        if self._held:
+            mean = 0.5 * (half[0:-1:2] + half[1::2])
+            return np.ascontiguousarray(np.stack([mean, mean, mean], axis=1))
+        return np.ascontiguousarray(np.stack([half[0:-1:2], half[1::2], half[2::2]], axis=1))
+
+    def sample(self, fine: Array, slope: Array) -> Array:
+        """Values at the sample instants from values (and slopes) on the fine grid, shape (n,)."""
+        if self._index is not None:
+            return fine[self._index]
+        t = self.step_s * np.arange(self.n + 1)
+        return np.asarray(CubicHermiteSpline(t, fine, slope)(self.time_s - self.time_s[0]), dtype=float)
+
+    def simulate(self, equations: Equations, start: tuple[float, float]) -> Motion:
+        """Motion at the sample instants from ``start`` (angle_rad, rate_rad_s) at the first one."""
+        fine = equations.integrate(self.shaft_torque(equations), self.step_s, start)
+        angle, rate, acceleration = fine[:, 0], fine[:, 1], fine[:, 2]
+        sampled = self.sample(rate, acceleration)
+        sensed = sampled
+        if equations.sensor.names:
+            late = equations.sensor.apply(rate, self.step_s)
+            sensed = self.sample(late, np.gradient(late, self.step_s))
+        return Motion(self.sample(angle, rate), sampled, sensed)
+
+
+def simulate(
+    platform: Platform,
+    time_s: Array,
+    torque: TorqueSignal | None,
+    start: tuple[float, float] = (0.0, 0.0),
+    substeps: int | None = None,
+) -> Motion:
+    """Motion of a platform over a whole set.
+
+    Parameters
+    ----------
+    time_s
+        Shape (n,): the instants wanted.
+    torque
+        Torque on the same clock, or None for free motion.
+    start
+        Angle in rad and rate in rad/s at ``time_s[0]``.
+    substeps
+        Fine steps a sample; chosen from the platform's fastest motion when left out.
+
+    Raises
+    ------
+    KeyError
+        For an effect or parameter that does not exist.
+    """
+    equations = Equations(platform)
+    if substeps is None:
+        substeps = equations.substeps(float(np.median(np.diff(time_s))))
+    return Grid(time_s, torque, substeps).simulate(equations, start)
+
+
+class Stepper:
+    """The same equations, one fine step at a time: for a rig that is played tick by tick."""
+
+    def __init__(self, platform: Platform, step_s: float) -> None:
+        self.equations = Equations(platform)
+        self.step_s = step_s
+        self.substeps = self.equations.substeps(step_s) if self.equations.fastest_rad_s() > 0 else 1
+        self.reset()
+
+    def reset(self, angle_rad: float = 0.0, rate_rad_s: float = 0.0) -> None:
+        """Put the platform at an angle and a rate, all memory of the past forgotten, time zero."""
+        e = self.equations
+        fine_s = self.step_s / self.substeps
+        motion = np.array([angle_rad, rate_rad_s, np.sign(rate_rad_s), 0.0])
+        z = e.rest_states(angle_rad, rate_rad_s)
+        scratch = np.zeros((7, max(4, e.states)))
+        drive, sensor = e.drive.arrays(fine_s), e.sensor.arrays(fine_s)
+        self._kept = (motion, z, scratch, drive, sensor)  # the table below holds bare addresses of these
+        at = [a.ctypes.data for a in (e.kernels, e.z_at, e.p, e.p_at, e.jck)]
+        table = [
+            motion.ctypes.data,
+            e.states,
+            z.ctypes.data,
+            scratch.ctypes.data,
+            e.loads,
+            len(e.kernels),
+            *at,
+        ]
+        table.append(self.substeps)
+        for chain in (drive, sensor):
+            table += [len(chain[0]), *(a.ctypes.data for a in chain)]
+        self._table = np.array(table, dtype=np.int64)
+        self._values = np.array([fine_s, 0.0, 0.0, angle_rad, rate_rad_s, rate_rad_s, 0.0])
+
+    def advance(self, torque_start_nm: float, torque_end_nm: float) -> tuple[float, float, float, float]:
+        """One step under a torque that runs linearly between two values (equal: held).
+
+        Returns
+        -------
+        angle_rad, rate_rad_s, sensed_rate_rad_s, shaft_torque_nm
+            At the end of the step.
+        """
+        self._values[1], self._values[2] = torque_start_nm, torque_end_nm
+        integrator.advance(self._table, self._values)
+        _, _, _, angle, rate, sensed, shaft = self._values.tolist()
+        return angle, rate, sensed, shaft

@@ -1,0 +1,28 @@
+"""Backlash: a gap around zero in which the spring does not act."""
+
+from __future__ import annotations
+
+from rig.effects.base import Effect, Parameter, Place, Scale, kernel
+
+
+@kernel
+def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
+    return -p[2] * min(max(angle, -p[3]), p[3])
+
+
+def _gaps(scale: Scale) -> tuple[float, ...]:
+    return tuple(scale.angle_rad * f for f in (0.002, 0.01, 0.03, 0.1, 0.3))
+
+
+EFFECT = Effect(
+    name="backlash",
+    family="restoring torque",
+    place=Place.LOAD,
+    equation="T = -K * clip(th, -half_gap, half_gap), so that K acts on th beyond the gap",
+    source="Nordin and Gutman 2002, dead-zone model of backlash",
+    meaning="Play in a coupling or a gear: near zero nothing holds the platform.",
+    sign="The gap is symmetric about the encoder's zero, or about the rest angle of a gyro-only run.",
+    parameters=(Parameter("half_gap", "rad", "half of the play", low=0.0, high=10.0, suffix="rad", start=_gaps),),
+    kernel=_torque,
+    separated_by="from cubic stiffness and cogging: small and large amplitudes",
+)

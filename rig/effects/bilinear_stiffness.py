@@ -1,0 +1,33 @@
+"""Bilinear stiffness: another K on each side of zero."""
+
+from __future__ import annotations
+
+from rig.effects.base import Effect, Parameter, Place, kernel
+
+
+@kernel
+def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
+    return p[3] * max(angle, 0.0)
+
+
+EFFECT = Effect(
+    name="bilinear_stiffness",
+    family="restoring torque",
+    place=Place.LOAD,
+    equation="T = step * max(th, 0)",
+    source="Shaw and Holmes 1983, piecewise linear oscillator",
+    meaning="A support or cable that acts on one side only.",
+    sign="K is the stiffness at negative angle; step is added at positive angle.",
+    parameters=(
+        Parameter(
+            "step",
+            "N*m/rad",
+            "stiffness added at positive angle",
+            linear=True,
+            low=-float("inf"),
+            suffix="nm_rad",
+        ),
+    ),
+    kernel=_torque,
+    separated_by="from quadratic stiffness: small and large amplitudes",
+)

@@ -1,0 +1,40 @@
+"""Cogging: a torque that repeats with the angle."""
+
+from __future__ import annotations
+
+import math
+
+from rig.effects.base import Effect, Parameter, Place, Scale, kernel
+
+
+@kernel
+def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
+    return p[3] * math.sin(p[5] * angle) + p[4] * math.cos(p[5] * angle)
+
+
+def _orders(scale: Scale) -> tuple[float, ...]:
+    # Fewer than half a period over the travel is a polynomial; more than a hundred is noise.
+    lowest = max(1.0, 0.5 * math.pi / scale.angle_rad)
+    highest = min(400.0, 60.0 / scale.angle_rad)
+    if scale.angle_rad > math.pi:
+        return tuple(float(n) for n in range(1, 31))
+    count = 24
+    return tuple(lowest * (highest / lowest) ** (i / (count - 1)) for i in range(count))
+
+
+EFFECT = Effect(
+    name="cogging",
+    family="position-dependent torque",
+    place=Place.LOAD,
+    equation="T = sine * sin(order * th) + cosine * cos(order * th)",
+    source="Hanselman, Brushless Motors, cogging torque as a Fourier series in the angle",
+    meaning="Magnets that prefer some angles to others.",
+    sign="Resisting; the phase is counted from the encoder's zero, or from the rest angle of a gyro-only run.",
+    parameters=(
+        Parameter("sine", "N*m", "sine part", linear=True, low=-float("inf"), suffix="nm"),
+        Parameter("cosine", "N*m", "cosine part", linear=True, low=-float("inf"), suffix="nm"),
+        Parameter("order", "1/rad", "periods a turn", low=0.5, high=2000.0, start=_orders),
+    ),
+    kernel=_torque,
+    separated_by="from backlash and cubic stiffness: several amplitudes, slow motion through the whole travel",
+)

@@ -1,0 +1,29 @@
+"""Cubic stiffness: a spring that hardens or softens with the angle."""
+
+from __future__ import annotations
+
+from rig.effects.base import Effect, Parameter, Place, kernel
+
+
+@kernel
+def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
+    return p[3] * angle * angle * angle
+
+
+EFFECT = Effect(
+    name="cubic_stiffness",
+    family="restoring torque",
+    place=Place.LOAD,
+    equation="T = factor * th^3",
+    source="Duffing 1918; Nayfeh and Mook, Nonlinear Oscillations, chapter 4",
+    meaning="Flexures and cables that stiffen (factor > 0) or soften (factor < 0) with deflection.",
+    sign="Resisting, like K th; the angle is counted from the rest angle at the start of the run.",
+    parameters=(
+        Parameter("factor", "N*m/rad^3", "torque per angle^3", linear=True, low=-float("inf"), suffix="nm_rad3"),
+    ),
+    kernel=_torque,
+    never_separable={
+        "unbalance": "sin and cos of a small angle are polynomials in it; only turning the base tells them apart"
+    },
+    separated_by="from unbalance: turn the platform's base; from backlash: small and large amplitudes",
+)

@@ -1,0 +1,33 @@
+"""Directional damping: another C in each direction."""
+
+from __future__ import annotations
+
+from rig.effects.base import Effect, Parameter, Place, kernel
+
+
+@kernel
+def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
+    return p[3] * max(rate, 0.0)
+
+
+EFFECT = Effect(
+    name="directional_damping",
+    family="friction",
+    place=Place.LOAD,
+    equation="T = step * max(w, 0)",
+    source="asymmetric viscous friction, as observed on electro-mechanical positioning systems",
+    meaning="Seals, worm gears and one-way lubrication: damping differs with the direction.",
+    sign="C is the damping at negative rate; step is added at positive rate.",
+    parameters=(
+        Parameter(
+            "step",
+            "N*m*s/rad",
+            "damping added at positive rate",
+            linear=True,
+            low=-float("inf"),
+            suffix="nm_s_rad",
+        ),
+    ),
+    kernel=_torque,
+    separated_by="from damping: motion in both directions at several speeds",
+)

@@ -1,0 +1,52 @@
+"""Flexible mode: a second inertia that hangs on a spring of its own."""
+
+from __future__ import annotations
+
+import math
+
+from rig.effects.base import Effect, Parameter, Place, Scale, kernel
+
+
+@kernel
+def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
+    natural = 2.0 * math.pi * p[4]
+    pull = natural * natural * (angle - state[0]) + 2.0 * p[5] * natural * (rate - state[1])
+    dstate[0] = state[1]
+    dstate[1] = pull
+    return p[3] * pull
+
+
+def _frequencies(scale: Scale) -> tuple[float, ...]:
+    highest = 0.35 / scale.step_s
+    lowest = max(0.5, 2.0 / scale.duration_s)
+    count = 20
+    return tuple(lowest * (highest / lowest) ** (i / (count - 1)) for i in range(count))
+
+
+EFFECT = Effect(
+    name="flexible_mode",
+    family="structure",
+    place=Place.LOAD,
+    equation="T = inertia * x, x = W^2 (th - q) + 2 ratio W (w - dq/dt), d2q/dt2 = x, W = 2 pi frequency",
+    source="two-inertia system; Ewins, Modal Testing",
+    meaning="A payload or arm on a soft mount: a second resonance.",
+    sign="J is the inertia on the shaft; the second inertia is added by the effect.",
+    parameters=(
+        Parameter("inertia", "kg*m^2", "second inertia", linear=True, suffix="kg_m2"),
+        Parameter(
+            "frequency",
+            "Hz",
+            "its natural frequency on the fixed shaft",
+            low=0.05,
+            high=1e5,
+            suffix="hz",
+            start=_frequencies,
+        ),
+        Parameter("ratio", "1", "its damping ratio", low=1e-4, high=2.0, start=lambda scale: (0.01, 0.05)),
+    ),
+    kernel=_torque,
+    states=2,
+    rest_state=lambda angle, rate: (angle, rate),
+    fastest_rad_s=lambda values: 2.0 * math.pi * values[4] * (1.0 + values[3] / values[0]) ** 0.5,
+    separated_by="from inertia: frequencies on both sides of the mode; a multisine or chirp",
+)

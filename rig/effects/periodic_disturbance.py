@@ -1,0 +1,39 @@
+"""Periodic disturbance: a torque from outside at a frequency of its own."""
+
+from __future__ import annotations
+
+import math
+
+from rig.effects.base import Effect, Parameter, Place, Scale, kernel
+
+
+@kernel
+def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
+    phase = 2.0 * math.pi * p[5] * time
+    return p[3] * math.sin(phase) + p[4] * math.cos(phase)
+
+
+def _frequencies(scale: Scale) -> tuple[float, ...]:
+    # Half a resolution cell apart, up to 100 Hz: a line must not slip through the grid.
+    highest = min(100.0, 0.4 / scale.step_s)
+    count = min(400, max(8, int(2.0 * highest * scale.duration_s / 5.0)))
+    return tuple(0.2 + (highest - 0.2) * i / (count - 1) for i in range(count))
+
+
+EFFECT = Effect(
+    name="periodic_disturbance",
+    family="surroundings",
+    place=Place.LOAD,
+    equation="T = sine * sin(2 pi frequency t) + cosine * cos(2 pi frequency t)",
+    source="a spectral line that is not locked to the excitation",
+    meaning="Pumps, fans, mains hum and neighbours.",
+    sign="Resisting; the phase is free in every run, t counted from its start.",
+    parameters=(
+        Parameter("sine", "N*m", "sine part", linear=True, low=-float("inf"), suffix="nm", per_run=True),
+        Parameter("cosine", "N*m", "cosine part", linear=True, low=-float("inf"), suffix="nm", per_run=True),
+        Parameter("frequency", "Hz", "its frequency", low=0.01, high=1e5, suffix="hz", start=_frequencies),
+    ),
+    kernel=_torque,
+    fastest_rad_s=lambda values: 2.0 * math.pi * values[5],
+    separated_by="from harmonics of friction or stiffness: excite at other frequencies",
+)

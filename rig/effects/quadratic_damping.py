@@ -1,0 +1,24 @@
+"""Quadratic damping: windage."""
+
+from __future__ import annotations
+
+from rig.effects.base import Effect, Parameter, Place, kernel
+
+
+@kernel
+def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
+    return p[3] * rate * abs(rate)
+
+
+EFFECT = Effect(
+    name="quadratic_damping",
+    family="friction",
+    place=Place.LOAD,
+    equation="T = factor * w |w|",
+    source="turbulent drag; ISO 80000-11 drag factor",
+    meaning="Air or oil that is churned: drag grows with the square of the speed.",
+    sign="Resisting: it opposes the rate.",
+    parameters=(Parameter("factor", "N*m*s^2/rad^2", "drag factor", linear=True, suffix="nm_s2_rad2"),),
+    kernel=_torque,
+    separated_by="from damping: repeats at another amplitude, or a free decay",
+)

@@ -1,0 +1,29 @@
+"""Quadratic stiffness: a spring that is not symmetric."""
+
+from __future__ import annotations
+
+from rig.effects.base import Effect, Parameter, Place, kernel
+
+
+@kernel
+def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
+    return p[3] * angle * angle
+
+
+EFFECT = Effect(
+    name="quadratic_stiffness",
+    family="restoring torque",
+    place=Place.LOAD,
+    equation="T = factor * th^2",
+    source="Duffing 1918; Nayfeh and Mook, Nonlinear Oscillations, chapter 4",
+    meaning="Preloaded springs and flexures that are stiffer on one side.",
+    sign="Resisting, like K th; the angle is counted from the rest angle at the start of the run.",
+    parameters=(
+        Parameter("factor", "N*m/rad^2", "torque per angle^2", linear=True, low=-float("inf"), suffix="nm_rad2"),
+    ),
+    kernel=_torque,
+    never_separable={
+        "unbalance": "sin and cos of a small angle are polynomials in it; only turning the base tells them apart"
+    },
+    separated_by="from unbalance: turn the platform's base",
+)

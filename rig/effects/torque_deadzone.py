@@ -1,0 +1,33 @@
+"""Torque dead zone: small torques do not arrive."""
+
+from __future__ import annotations
+
+from rig.effects.base import Effect, Parameter, Place, filter_kernel
+
+
+@filter_kernel
+def _dead(x, step, state, p):  # type: ignore[no-untyped-def]
+    return x - min(max(x, -p[0]), p[0])
+
+
+EFFECT = Effect(
+    name="torque_deadzone",
+    family="drive",
+    place=Place.DRIVE,
+    equation="M = torque - clip(torque, -width, width)",
+    source="PWM dead time, cross-over of the output stage",
+    meaning="The amplifier's dead time swallows small torques.",
+    sign="A magnitude, the same in both directions.",
+    parameters=(
+        Parameter(
+            "width",
+            "N*m",
+            "torque that is lost",
+            low=0.0,
+            suffix="nm",
+            start=lambda scale: tuple(scale.torque_nm * f for f in (0.002, 0.01, 0.03, 0.1)),
+        ),
+    ),
+    kernel=_dead,
+    separated_by="from backlash and Coulomb friction: several frequencies",
+)

@@ -1,0 +1,52 @@
+"""Torque delay: the torque acts later than its time stamp says (or the gyro reports later)."""
+
+from __future__ import annotations
+
+from rig.effects.base import Effect, Parameter, Place, filter_kernel
+
+
+@filter_kernel
+def _delay(x, step, state, p):  # type: ignore[no-untyped-def]
+    """Ring buffer read by a cubic through four samples: right to 1e-7 for the torques of a bench."""
+    late = p[0] / step
+    n = int(late) + 5
+    head = (int(state[n]) + 1) % n
+    state[n] = head
+    state[head] = x
+    first = max(0, int(late) - 1)  # the newest of the four samples
+    u = late - first
+    x0 = state[(head - first) % n]
+    x1 = state[(head - first - 1) % n]
+    x2 = state[(head - first - 2) % n]
+    x3 = state[(head - first - 3) % n]
+    return (
+        x0 * (1.0 - u) * (2.0 - u) * (3.0 - u) / 6.0
+        + x1 * u * (2.0 - u) * (3.0 - u) / 2.0
+        - x2 * u * (1.0 - u) * (3.0 - u) / 2.0
+        + x3 * u * (1.0 - u) * (2.0 - u) / 6.0
+    )
+
+
+EFFECT = Effect(
+    name="torque_delay",
+    family="drive",
+    place=Place.DRIVE,
+    equation="M(t) = torque(t - delay)",
+    source="transport delay of bus, amplifier and sensor; in a torque-to-rate record they are one number",
+    meaning="Time stamps that disagree: bus, amplifier, the gyro's own filter. 1 ms adds K * 1 ms to C.",
+    sign="Positive: the motion follows later than the torque's time stamp.",
+    parameters=(
+        Parameter(
+            "delay",
+            "s",
+            "time by which the torque acts later",
+            low=0.0,
+            high=0.2,
+            suffix="s",
+            start=lambda scale: tuple(scale.step_s * f for f in (0.3, 1.0, 3.0)),
+        ),
+    ),
+    kernel=_delay,
+    filter_states=lambda step_s, values: int(values[0] / step_s) + 6,
+    separated_by="from damping: several frequencies; from a lag: higher frequencies",
+)

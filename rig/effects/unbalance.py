@@ -1,0 +1,33 @@
+"""Unbalance: gravity on a centre of mass off the axis."""
+
+from __future__ import annotations
+
+import math
+
+from rig.effects.base import Effect, Parameter, Place, kernel
+
+
+@kernel
+def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
+    return p[3] * math.sin(angle) + p[4] * math.cos(angle)
+
+
+EFFECT = Effect(
+    name="unbalance",
+    family="position-dependent torque",
+    place=Place.LOAD,
+    equation="T = sine * sin(th) + cosine * cos(th)",
+    source="m g r sin(th + phase), expanded",
+    meaning="The load is not balanced: gravity pulls it towards its lowest point.",
+    sign="Resisting, like K th: sine > 0 where th = 0 hangs down. Within a small travel sine is part of K.",
+    parameters=(
+        Parameter("sine", "N*m", "m g r cos(phase)", linear=True, low=-float("inf"), suffix="nm"),
+        Parameter("cosine", "N*m", "m g r sin(phase)", linear=True, low=-float("inf"), suffix="nm"),
+    ),
+    kernel=_torque,
+    never_separable={
+        "quadratic_stiffness": "within 10 deg cos(th) is 1 - th^2/2; only turning the base tells them apart",
+        "cubic_stiffness": "within 10 deg sin(th) is th - th^3/6; only turning the base tells them apart",
+    },
+    separated_by="turn the platform's base, or swing through a large angle",
+)
