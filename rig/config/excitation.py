@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, field_validator
 
 from rig.config.base import NonNegative, Section
 from rig.excitation import Chirp, FreeDecay, Multisine, RampHoldRelease, Sine
@@ -41,9 +41,15 @@ class ExcitationConfig(Section):
     """
 
     sample_rate_hz: Annotated[float, Field(ge=10, le=20_000)] = 1000.0
-    sets: Annotated[tuple[AnySet, ...], Field(min_length=1, max_length=200)] = Field(
-        default_factory=paper_sets
-    )
+    sets: tuple[AnySet, ...] = Field(default_factory=paper_sets)
     rest_s: NonNegative = 12.0
     scale_to_limits: bool = False
     margin: Annotated[float, Field(gt=0, le=1)] = 0.95
+
+    @field_validator("sets")
+    @classmethod
+    def _one_to_two_hundred(cls, sets: tuple[AnySet, ...]) -> tuple[AnySet, ...]:
+        # After the sets themselves, or one wrong set would also be reported as a list that is too short.
+        if not 1 <= len(sets) <= 200:
+            raise ValueError(f"has {len(sets)} sets: give 1 to 200, or leave the key out for the paper's five")
+        return sets

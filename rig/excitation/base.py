@@ -35,7 +35,7 @@ class ExcitationSet(BaseModel):
     repeat_scales
         The set is played again with its torque multiplied by each of these.
     travel_cap_deg
-        Scale the set down until its predicted travel stays below this, whatever the limits allow.
+        The set is scaled down until its predicted travel stays below this and within all limits.
     use
         Whether the run serves the fit or is held out; "auto" leaves it to the identifier.
     """
