@@ -64,7 +64,8 @@ RATED_CURRENT, ACTUAL_CURRENT, TORQUE_SLOPE = 0x6075, 0x6078, 0x6087
 HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER = 0x1016, 0x1017
 
 _EMERGENCIES = {
-    0x0000: "error reset or no error", 0x1000: "generic error", 0x2310: "continuous over-current, device output",
+    0x0000: "error reset or no error", 0x1000: "generic error",
+    0x2310: "continuous over-current, device output",
     0x2320: "short circuit, device output", 0x2340: "short circuit, motor side", 0x3110: "mains over-voltage",
     0x3120: "mains under-voltage", 0x3210: "DC link over-voltage", 0x3220: "DC link under-voltage",
     0x4210: "over-temperature of the device", 0x4310: "over-temperature of the drive",
@@ -78,8 +79,9 @@ _EMERGENCIES = {
     0xFF01: "maker-specific error 1",
 }  # fmt: skip
 _EMERGENCY_CLASSES = {
-    0x10: "generic error", 0x20: "current", 0x21: "current, device input side", 0x22: "current inside the device",
-    0x23: "current, device output side", 0x30: "voltage", 0x31: "mains voltage", 0x32: "voltage inside the device",
+    0x10: "generic error", 0x20: "current", 0x21: "current, device input side",
+    0x22: "current inside the device", 0x23: "current, device output side", 0x30: "voltage",
+    0x31: "mains voltage", 0x32: "voltage inside the device",
     0x33: "output voltage", 0x40: "temperature", 0x41: "ambient temperature", 0x42: "device temperature",
     0x43: "drive temperature", 0x50: "device hardware", 0x60: "device software", 0x61: "internal software",
     0x62: "user software", 0x63: "data set", 0x70: "additional modules", 0x71: "power", 0x73: "sensor",
@@ -92,11 +94,7 @@ _EMERGENCY_CLASSES = {
 def emergency_in_words(code: int) -> str:
     """An EMCY error code as text: the known code, else its class."""
     exact = _EMERGENCIES.get(code)
-    return (
-        exact
-        or _EMERGENCY_CLASSES.get(code >> 8)
-        or _EMERGENCY_CLASSES.get(code >> 8 & 0xF0, "unknown class")
-    )
+    return exact or _EMERGENCY_CLASSES.get(code >> 8) or _EMERGENCY_CLASSES.get(code >> 8 & 0xF0, "unknown class")
 
 
 def decode_emergency(data: bytes) -> tuple[int, int, bytes]:

@@ -29,7 +29,7 @@ STATUS_ALL_VALID = 0x77
 
 @dataclass(frozen=True)
 class KvhMessage:
-    """One message. ``interleaved`` is format C's float: temperature or magnetic field x, y, z by sequence mod 4."""
+    """One message. ``interleaved`` is format C's float: temperature or a magnetic axis, by sequence mod 4."""
 
     format: str
     rotation: tuple[float, float, float]

@@ -103,8 +103,10 @@ def decode_line(line: bytes) -> CanFrame | Answer | str:
     digits = _ID_DIGITS.get(head)
     if digits is not None:
         return _decode_frame(line, head, digits)
-    if head in _FD_HEADS:
-        return _decode_fd(line, head)
+    return _decode_fd(line, head) if head in _FD_HEADS else _decode_answer(line, head)
+
+
+def _decode_answer(line: bytes, head: int) -> Answer | str:
     if line.endswith(ERROR):
         return Answer("error", line[:-1].decode("ascii", errors="replace"))
     if line in (b"z", b"Z"):

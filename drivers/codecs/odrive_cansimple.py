@@ -40,8 +40,8 @@ AXIS_STATES = {
 AXIS_ERRORS = {
     0x1: "invalid state", 0x40: "motor failed", 0x80: "sensorless estimator failed", 0x100: "encoder failed",
     0x200: "controller failed", 0x800: "watchdog timer expired", 0x1000: "minimum end stop pressed",
-    0x2000: "maximum end stop pressed", 0x4000: "emergency stop requested", 0x20000: "homing without end stop",
-    0x40000: "over temperature", 0x80000: "position unknown",
+    0x2000: "maximum end stop pressed", 0x4000: "emergency stop requested",
+    0x20000: "homing without end stop", 0x40000: "over temperature", 0x80000: "position unknown",
 }  # fmt: skip
 
 _FORMATS = {

@@ -207,10 +207,7 @@ def decode_datagram(packet: bytes) -> Datagram:
     values: dict[str, tuple[int, int, int] | int] = {}
     at = 1
     for name, width in _present(layout):
-        triple = [
-            int.from_bytes(packet[at + k * width : at + (k + 1) * width], "big", signed=True)
-            for k in range(3)
-        ]
+        triple = [int.from_bytes(packet[at + k * width : at + (k + 1) * width], "big", signed=True) for k in range(3)]
         values[name] = (triple[0], triple[1], triple[2])
         values[f"{name}_status"] = packet[at + 3 * width]
         at += 3 * width + 1
@@ -227,7 +224,7 @@ def decode_datagram(packet: bytes) -> Datagram:
 
 
 def encode_datagram(datagram: Datagram, line_ending: bool = False) -> bytes:
-    """The packet as the device would send it; fields that its identifier carries and that are None are zero."""
+    """The packet as the device would send it; carried fields that are None are sent as zero."""
     layout = LAYOUTS[datagram.identifier]
     body = bytearray([datagram.identifier])
     for name, width in _present(layout):

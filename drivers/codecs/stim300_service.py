@@ -82,7 +82,7 @@ def decode_service_answer(raw: bytes) -> ServiceAnswer | None:
 
 @dataclass(frozen=True)
 class UtilityMessage:
-    """A command ("$") or an answer ("#") of utility mode; ``status`` is None for commands and the greeting."""
+    """A command ("$") or an answer ("#") of utility mode; a command and the greeting have no status."""
 
     name: str
     parameters: tuple[str, ...]

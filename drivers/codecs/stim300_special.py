@@ -52,7 +52,7 @@ GYRO_UNITS = {
 
 @dataclass(frozen=True)
 class Stim300Configuration:
-    """What the device says of its own settings (table 5-16); rates of 0 mean external trigger or user-defined."""
+    """The device's own settings (table 5-16); a rate of 0 means external trigger or user-defined."""
 
     revision: str
     firmware: int
@@ -74,9 +74,7 @@ def _payload(packet: bytes, identifiers: tuple[int, ...]) -> bytes:
 def _with_crc(identifier: int, payload: bytes) -> bytes:
     body = bytes([identifier]) + payload
     if len(body) != SPECIAL_LENGTHS[identifier]:
-        raise ValueError(
-            f"0x{identifier:02X} takes {SPECIAL_LENGTHS[identifier] - 1} bytes, got {len(payload)}"
-        )
+        raise ValueError(f"0x{identifier:02X} takes {SPECIAL_LENGTHS[identifier] - 1} bytes, got {len(payload)}")
     ending = b"\r\n" if identifier in SPECIAL_WITH_LINE_ENDING else b""
     return body + datagram_crc(body).to_bytes(4, "big") + ending
 
@@ -93,9 +91,7 @@ def decode_configuration(packet: bytes) -> Stim300Configuration:
     content = b[2] >> 1 & 0xF  # PPS, temperature, inclination, acceleration
     wanted = ("pps" if content & 8 else "", bool(content & 4), bool(content & 2), bool(content & 1))
     identifier = next(
-        i
-        for i, lay in LAYOUTS.items()
-        if (lay.auxiliary, lay.temperature, lay.inclination, lay.acceleration) == wanted
+        i for i, lay in LAYOUTS.items() if (lay.auxiliary, lay.temperature, lay.inclination, lay.acceleration) == wanted
     )
     try:
         return Stim300Configuration(

@@ -80,7 +80,7 @@ def line_checksum_is_right(line: bytes) -> bool:
     return given == (xor8(body) if len(digits) == 2 else crc16_xmodem(body))
 
 
-def _binary_layout(packet: bytes) -> tuple[list[tuple[int, int]], int] | None | int:
+def _binary_layout(packet: bytes) -> tuple[list[tuple[int, int]], int] | int | None:
     """((group, bit) in order, header length), NEED_MORE, or None if a field is unknown."""
     if len(packet) < 2:
         return NEED_MORE
@@ -136,9 +136,7 @@ class VectorNavMessage:
             return ""
         code = int(self.fields[0], 16) if self.fields else 0
         # The maker prints the code in decimal (12 = insufficient baud rate); firmware differs, so try both.
-        return ERRORS.get(
-            int(self.fields[0]) if self.fields[0].isdigit() else code, f"error {self.fields[0]}"
-        )
+        return ERRORS.get(int(self.fields[0]) if self.fields[0].isdigit() else code, f"error {self.fields[0]}")
 
 
 def decode_vectornav(packet: bytes) -> VectorNavMessage:
