@@ -18,7 +18,7 @@ from rig.errors import ConfigError
 
 MAX_FAULTS_SHOWN = 25
 # Places where the path of a model.yaml may stand for the mapping that it holds.
-INCLUDES: tuple[KeyPath, ...] = (("model",),)
+INCLUDES: tuple[KeyPath, ...] = (("model",), ("simulated", "platform"))
 
 
 @dataclass(frozen=True)

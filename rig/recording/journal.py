@@ -59,9 +59,7 @@ class Journal:
     it, a thread writes and forces the data to the disk, and the control loop never waits for either.
     """
 
-    def __init__(
-        self, path: Path, descriptor: int, flush_interval_s: float, clock: Callable[[], float]
-    ) -> None:
+    def __init__(self, path: Path, descriptor: int, flush_interval_s: float, clock: Callable[[], float]) -> None:
         self.path = path
         self._descriptor = descriptor
         self._interval_s = flush_interval_s
@@ -97,13 +95,9 @@ class Journal:
         try:
             descriptor = os.open(path, flags, 0o644)
         except OSError as error:
-            raise JournalError(
-                f"cannot start journal {path}: {error.strerror}; choose another --out"
-            ) from error
+            raise JournalError(f"cannot start journal {path}: {error.strerror}; choose another --out") from error
         journal = cls(path, descriptor, flush_interval_s, clock)
-        journal._pending.append(
-            frame(HEADER, _json({"format": "isp-rig journal", "version": 1} | dict(header)))
-        )
+        journal._pending.append(frame(HEADER, _json({"format": "isp-rig journal", "version": 1} | dict(header))))
         journal.flush()
         return journal
 
@@ -129,9 +123,7 @@ class Journal:
         if not self._in_run:
             raise ValueError("append() outside of a run")
         if kind not in self._columns or block.ndim != 2 or block.shape[1] != len(self._columns[kind]):
-            raise ValueError(
-                f"{kind}: rows of shape {block.shape} do not fit columns {self._columns.get(kind)}"
-            )
+            raise ValueError(f"{kind}: rows of shape {block.shape} do not fit columns {self._columns.get(kind)}")
         self._raise_failure()
         with self._buffer_lock:
             self._rows.setdefault(kind, []).append(block)
@@ -139,9 +131,7 @@ class Journal:
 
     def event(self, time_s: float, text: str, values: Mapping[str, Any] | None = None) -> None:
         """Note something that happened, in or between runs."""
-        self._queue(
-            frame(EVENT, _json({"time_s": float(time_s), "text": text, "values": dict(values or {})}))
-        )
+        self._queue(frame(EVENT, _json({"time_s": float(time_s), "text": text, "values": dict(values or {})})))
         self._flush_if_due()
 
     def end_run(self) -> None:

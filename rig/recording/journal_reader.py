@@ -129,13 +129,9 @@ def read_journal(path: str | Path) -> JournalContents:
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}; check the path") from error
     except (ValueError, TypeError, KeyError, IndexError, struct.error) as error:
-        raise RecordingError(
-            f"{path}: a frame at byte {good} is not what this version writes ({error})"
-        ) from error
+        raise RecordingError(f"{path}: a frame at byte {good} is not what this version writes ({error})") from error
     if header is None:
-        raise RecordingError(
-            f"{path}: not a journal of this program: give the .journal file of a results folder"
-        )
+        raise RecordingError(f"{path}: not a journal of this program: give the .journal file of a results folder")
     return JournalContents(header, tuple(r.done() for r in runs), tuple(events), closed, size - good)
 
 

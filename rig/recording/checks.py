@@ -1,0 +1,124 @@
+"""What a recording has to satisfy before anything is identified from it; every refusal says cause and cure."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.errors import RecordingError
+from rig.recording.consistency import check_angle_against_rate, check_time_unit
+from rig.recording.readers.base import Table
+from rig.recording.run import Array, Run
+
+MIN_SAMPLES = 20
+# No torque, rate, angle or time of a machine in SI units comes near; squares of it would overflow.
+LARGEST_VALUE = 1e12
+
+
+def missing_column(table: Table, quantity: str, names: Sequence[str], *, mapped: bool) -> RecordingError:
+    """The refusal of a file without a needed column: what was looked for, what is there, which is nearest."""
+    there = ", ".join(table.names[:20]) + (", ..." if len(table.names) > 20 else "")
+    near = [n for name in names for n in difflib.get_close_matches(name, table.names, n=1, cutoff=0.5)]
+    wanted = " or ".join(repr(name) for name in names)
+    cure = f"correct recorded.columns.{quantity}" if mapped else f"name it with recorded.columns.{quantity}"
+    hint = f", did you mean {near[0]!r}?" if near else ""
+    return RecordingError(f"{table.path}: has no column {wanted}{hint} (it has: {there}): {cure}")
+
+
+def check_samples(table: Table, columns: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Check lengths and numbers of the columns as stored; gives the mask of valid samples, shape (n,).
+
+    Raises RecordingError.
+    """
+    lengths = {quantity: len(values) for quantity, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        listed = ", ".join(f"{quantity} {count}" for quantity, count in lengths.items())
+        raise RecordingError(
+            f"{table.path}: columns of different length ({listed}): export one value a sample for each"
+        )
+    flags = columns.get("valid")
+    if flags is not None and not np.isfinite(flags).all():
+        at = table.label(int(np.argmin(np.isfinite(flags))))
+        raise RecordingError(f"{table.path}: {at}: valid is empty: write 1 for a good sample, 0 for a lost one")
+    valid = np.ones(lengths["time"], dtype=bool) if flags is None else flags != 0
+    for quantity, values in columns.items():
+        bad = valid & ~(np.abs(values) <= LARGEST_VALUE)
+        if quantity != "valid" and bad.any():
+            i = int(np.argmax(bad))
+            cure = "correct it, delete the row, or mark the row valid = 0"
+            raise RecordingError(
+                f"{table.path}: {table.label(i)}: {quantity} is {values[i]:g} ({bad.sum()} such samples): {cure}"
+            )
+    return valid
+
+
+def check_run(run: Run, path: Path, scales_given: Collection[str] = ()) -> Run:
+    """``run`` itself, once it is known to be fit for identification.
+
+    ``scales_given`` names the quantities whose factor the user stated: a stated time scale is believed.
+    Raises RecordingError.
+    """
+    _check_order(run.time_s, path)
+    _check_own_numbers(run, path)
+    count = int(run.valid.sum())
+    if count < MIN_SAMPLES:
+        raise RecordingError(
+            f"{path}: {count} valid samples, at least {MIN_SAMPLES} are needed: record longer, or widen from_s and to_s"
+        )
+    _check_motion(run, path)
+    agrees = check_angle_against_rate(run, path)
+    if "time" not in scales_given and not agrees:
+        check_time_unit(run, path)
+    return run
+
+
+def _check_order(time_s: Array, path: Path) -> None:
+    step = np.diff(time_s)
+    if (step > 0).all():
+        return
+    i = int(np.argmin(step > 0))
+    before, after = time_s[i], time_s[i + 1]
+    if before == after:
+        raise RecordingError(
+            f"{path}: samples {i} and {i + 1} have the same time {after!s} s ({(step == 0).sum()} such pairs): "
+            "delete the duplicates, or write the time with more digits"
+        )
+    raise RecordingError(
+        f"{path}: time is not sorted: {after!s} s at sample {i + 1} follows {before!s} s "
+        f"({(step < 0).sum()} such steps): sort the rows, or give each recording its own file"
+    )
+
+
+def _check_own_numbers(run: Run, path: Path) -> None:
+    """What ``check_samples`` does for a table, for runs that came as such."""
+    for name, values in (("rate", run.rate_rad_s), ("angle", run.angle_rad)):
+        if values is not None and not np.isfinite(values[run.valid]).all():
+            i = int(np.argmax(run.valid & ~np.isfinite(values)))
+            raise RecordingError(f"{path}: run {run.name!r}: {name} at sample {i} is {values[i]:g} though valid")
+    if run.torque_nm is not None and run.torque_time_s is not None:
+        if not np.isfinite(run.torque_nm).all():
+            raise RecordingError(f"{path}: run {run.name!r}: a torque is not a number: delete those rows")
+        _check_order(run.torque_time_s, path)
+
+
+def _check_motion(run: Run, path: Path) -> None:
+    channel, values = ("rate", run.rate_rad_s) if run.rate_rad_s is not None else ("angle", run.angle_rad)
+    if values is None:
+        raise RecordingError(f"{path}: holds neither rate nor angle: export one of them")
+    if np.ptp(values[run.valid]) > 0:
+        return
+    torque = run.torque_nm
+    if torque is None or not len(torque) or np.ptp(torque) == 0:
+        detail = "and the torque is constant too" if torque is not None else "and there is no torque"
+        raise RecordingError(
+            f"{path}: the {channel} never changes ({values[run.valid][0]:g}) {detail}, so the data determine "
+            "nothing: record a run in which the torque changes and the platform moves"
+        )
+    raise RecordingError(
+        f"{path}: the {channel} never changes ({values[run.valid][0]:g}) though the torque does: check that the "
+        "sensor was connected and that the platform was free to move"
+    )

@@ -1,0 +1,117 @@
+"""Do angle, rate and time agree about what a second and a radian are?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from rig.errors import RecordingError
+from rig.recording.run import Array, Run
+
+# d(angle)/dt over rate -> what that factor usually means, and the cure.
+_KNOWN_FACTORS = (
+    (180 / np.pi, "the angle is in degrees", "recorded.scale.angle: 0.0174533"),
+    (np.pi / 180, "the rate is in degrees per second", "recorded.scale.rate: 0.0174533"),
+    (-1.0, "angle and rate have opposite signs", "recorded.scale.rate: -1 or recorded.scale.angle: -1"),
+    (1e-3, "the time is in milliseconds", "recorded.scale.time: 0.001"),
+    (1e-6, "the time is in microseconds", "recorded.scale.time: 0.000001"),
+    (1e3, "the angle is in thousandths", "recorded.scale.angle: 0.001"),
+    (np.pi / 30, "the rate is in turns per minute", "recorded.scale.rate: 0.10472"),
+    (2 * np.pi, "the rate is in turns per second", "recorded.scale.rate: 6.28319"),
+    (1 / (2 * np.pi), "the angle is in turns", "recorded.scale.angle: 6.28319"),
+)
+SURE_CORRELATION = 0.99  # both channels show the same motion, delays and noise aside
+SURE_DEVIATION = 0.05
+LIKELY_CORRELATION = 0.9
+LIKELY_DEVIATION = 0.3
+# Four samples a second or fewer: no platform with a spring is seen through that.
+SLOWEST_STEP_S = 0.25
+
+
+def angle_over_rate(run: Run) -> tuple[float, float] | None:
+    """Factor and correlation of the angle against the integrated rate, trends (a gyro's bias) removed.
+
+    None where one of them is missing or neither moves.
+    """
+    if run.angle_rad is None or run.rate_rad_s is None:
+        return None
+    good = run.valid & np.isfinite(run.angle_rad) & np.isfinite(run.rate_rad_s)
+    if good.sum() < 10:
+        return None
+    time_s, angle, rate = run.time_s[good], run.angle_rad[good], run.rate_rad_s[good]
+    integral = np.concatenate(([0.0], np.cumsum(np.diff(time_s) * (rate[1:] + rate[:-1]) / 2)))
+    measured, expected = _without_trend(time_s, angle), _without_trend(time_s, integral)
+    power, cross = expected @ expected, measured @ expected
+    norm = np.sqrt(power * (measured @ measured))
+    if not norm > 0:
+        return None
+    return float(cross / power), float(cross / norm)
+
+
+def _without_trend(time_s: Array, values: Array) -> Array:
+    x = (time_s - time_s.mean()) / np.ptp(time_s)
+    y = values - values.mean()
+    result: Array = y - x * ((x @ y) / (x @ x))
+    return result
+
+
+def check_angle_against_rate(run: Run, path: Path) -> bool:
+    """True where angle and rate were seen to agree, False where that cannot be told.
+
+    Raises RecordingError where they disagree by a constant factor, or where the angle wraps.
+    """
+    _check_wrap(run, path)
+    compared = angle_over_rate(run)
+    if compared is None:
+        return False
+    factor, correlation = compared
+    deviation = abs(factor - 1)
+    sure = abs(correlation) > SURE_CORRELATION and deviation > SURE_DEVIATION
+    likely = abs(correlation) > LIKELY_CORRELATION and deviation > LIKELY_DEVIATION
+    if not sure and not likely:
+        return abs(correlation) > LIKELY_CORRELATION
+    meaning, cure = _meaning(factor)
+    raise RecordingError(
+        f"{path}: angle and rate disagree: the angle changes {factor:.4g} times as fast as the rate says; "
+        f"probably {meaning}: set {cure}"
+    )
+
+
+def _meaning(factor: float) -> tuple[str, str]:
+    """What a factor between angle and rate probably comes from, and the key that mends it."""
+    for known, meaning, cure in _KNOWN_FACTORS:
+        if abs(factor / known - 1) < 0.03:
+            return meaning, cure
+    return "one of them is scaled wrongly", f"recorded.scale.rate: {factor:.4g} if the angle is right"
+
+
+def _check_wrap(run: Run, path: Path) -> None:
+    if run.angle_rad is None:
+        return
+    angle = run.angle_rad[run.valid]
+    jump = np.abs(np.diff(angle))
+    largest = float(jump.max(initial=0.0))
+    usual = float(np.quantile(jump, 0.99)) if len(jump) > 100 else largest
+    if abs(largest - 2 * np.pi) < 0.3 and usual < 1.0 and np.ptp(angle) < 7.0:
+        i = int(np.argmax(jump))
+        raise RecordingError(
+            f"{path}: the angle jumps by a whole turn ({angle[i]:.3f} to {angle[i + 1]:.3f} rad, sample {i}): "
+            "unwrap it (numpy.unwrap) before export, or leave the angle out where there is a rate"
+        )
+
+
+def check_time_unit(run: Run, path: Path) -> None:
+    """Raise RecordingError where samples stand so far apart that the time can hardly be in seconds."""
+    step = float(np.median(np.diff(run.time_s)))
+    if step < SLOWEST_STEP_S:
+        return
+    unit, factor = min(
+        (("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9)),
+        key=lambda entry: abs(np.log10(step * entry[1]) + 3),
+    )
+    raise RecordingError(
+        f"{path}: samples stand {step:g} s apart (median), too far to see a platform move: the time looks like "
+        f"{unit}: set recorded.scale.time: {factor:.9f}".rstrip("0")
+        + "; if it is in seconds, say so with recorded.scale.time: 1"
+    )

@@ -1,0 +1,197 @@
+"""From the `recorded` section of a configuration to a Recording whose every run has been checked."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from rig.errors import RecordingError
+from rig.recording.checks import check_run, check_samples, missing_column
+from rig.recording.readers import read_file
+from rig.recording.readers.base import Table
+from rig.recording.run import Array, Recording, Run
+
+if TYPE_CHECKING:
+    from rig.config.load import LoadedConfig
+    from rig.config.recorded import RecordedConfig, RecordedRun
+
+Quantity = Literal["time", "torque", "rate", "angle", "valid"]
+DEG = math.pi / 180
+# Default names, and the factor to SI units that the name itself stands for.
+DEFAULT_NAMES: Mapping[Quantity, Mapping[str, float]] = {
+    "time": {"time_s": 1.0},
+    "torque": {"torque_nm": 1.0},
+    "rate": {"rate_rad_s": 1.0, "rate_deg_s": DEG},
+    "angle": {"angle_rad": 1.0, "angle_deg": DEG},
+    "valid": {"valid": 1.0},
+}
+
+
+def read_recording(loaded: LoadedConfig) -> Recording:
+    """Read and check every run that ``loaded`` names.
+
+    Raises RecordingError that lists what is wrong with every file, each with its cause and cure, and
+    ValueError where the configuration has no `recorded` section.
+    """
+    section = loaded.config.recorded
+    if section is None:
+        raise ValueError("the configuration has no recorded section")
+    runs: list[Run] = []
+    wrong: list[str] = []
+    sources: list[Path] = []
+    for entry in section.runs:
+        path = loaded.folder / Path(entry.file).expanduser()
+        try:
+            found = runs_of_file(path, entry, section)
+        except RecordingError as error:
+            wrong.append(str(error))
+            continue
+        runs += found
+        sources += [path] * len(found)
+    if not wrong:
+        wrong += _leaks(runs, sources)
+    if wrong:
+        raise RecordingError("\n".join(dict.fromkeys(wrong)))
+    info = {"backend": "recorded", "files": [str(path) for path in sources], "config_text": loaded.text}
+    return Recording(_named_apart(runs), axis=section.axis, noise=section.noise, info=info)
+
+
+def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> list[Run]:
+    """The checked runs of one entry: one of a table, as many as were played of our own files.
+
+    Raises RecordingError.
+    """
+    runs: list[Run] = []
+    contents = read_file(path)
+    for content in contents:
+        if isinstance(content, Run):
+            run = _own_run(path, content, entry, section)
+        else:
+            run = _run_of_table(content, entry, section)
+        runs.append(check_run(_window(run, entry, path), path, section.scale.model_fields_set))
+    return runs
+
+
+def _own_run(path: Path, run: Run, entry: RecordedRun, section: RecordedConfig) -> Run:
+    if section.columns.model_fields_set or section.scale.model_fields_set:
+        raise RecordingError(
+            f"{path}: was written by this program, in SI units under its own names: "
+            "leave recorded.columns and recorded.scale out"
+        )
+    return dataclasses.replace(
+        run,
+        use=run.use if entry.use == "auto" else entry.use,
+        min_rate_rad_s=max(run.min_rate_rad_s, section.min_rate_of(entry)),
+        added_inertia_kg_m2=entry.added_inertia_kg_m2 or run.added_inertia_kg_m2,
+    )
+
+
+def _run_of_table(table: Table, entry: RecordedRun, section: RecordedConfig) -> Run:
+    columns = _columns(table, section)
+    valid = check_samples(table, {k: values for k, (_, values) in columns.items()})
+    time_s, rate, angle, torque = (_scaled(columns, section, q) for q in ("time", "rate", "angle", "torque"))
+    assert time_s is not None  # _columns refuses a table without time
+    keep = np.isfinite(time_s)  # a lost sample may have lost its time too
+    has_torque = None if torque is None else keep & np.isfinite(torque)
+    return Run(
+        name=table.path.name,
+        time_s=time_s[keep],
+        valid=valid[keep],
+        rate_rad_s=None if rate is None else rate[keep],
+        angle_rad=None if angle is None else angle[keep],
+        torque_time_s=None if has_torque is None else time_s[has_torque],
+        torque_nm=None if torque is None else torque[has_torque],
+        torque_hold=section.torque_hold,
+        use=entry.use,
+        min_rate_rad_s=section.min_rate_of(entry),
+        added_inertia_kg_m2=entry.added_inertia_kg_m2,
+    )
+
+
+def _columns(table: Table, section: RecordedConfig) -> dict[Quantity, tuple[str, Array]]:
+    """Name and values of every quantity that the file has, as stored."""
+    names: dict[Quantity, str] = {}
+    for quantity, defaults in DEFAULT_NAMES.items():
+        named = getattr(section.columns, quantity)
+        if named is not None and named not in table.names:
+            raise missing_column(table, quantity, [named], mapped=True)
+        name = named or next((n for n in defaults if n in table.names), None)
+        if name is not None:
+            names[quantity] = name
+    if "time" not in names:
+        raise missing_column(table, "time", list(DEFAULT_NAMES["time"]), mapped=False)
+    if "rate" not in names and "angle" not in names:
+        either = [*DEFAULT_NAMES["rate"], *DEFAULT_NAMES["angle"]]
+        raise missing_column(table, "rate", either, mapped=False)
+    values = table.read(list(names.values()))
+    return {quantity: (name, values[name]) for quantity, name in names.items()}
+
+
+def _scaled(columns: Mapping[Quantity, tuple[str, Array]], section: RecordedConfig, quantity: Quantity) -> Array | None:
+    """The column in SI units: by the factor given, else by the one that its name stands for."""
+    if quantity not in columns:
+        return None
+    name, values = columns[quantity]
+    by_name = DEFAULT_NAMES[quantity].get(name, 1.0)
+    given: float = getattr(section.scale, quantity)
+    factor = given if quantity in section.scale.model_fields_set else by_name
+    return values if factor == 1.0 else values * factor
+
+
+def _window(run: Run, entry: RecordedRun, path: Path) -> Run:
+    """The samples between from_s and to_s, both included."""
+    if entry.from_s is None and entry.to_s is None:
+        return run
+    start = -math.inf if entry.from_s is None else entry.from_s
+    end = math.inf if entry.to_s is None else entry.to_s
+    keep = (run.time_s >= start) & (run.time_s <= end)
+    if not keep.any():
+        raise RecordingError(
+            f"{path}: no sample between from_s = {start:g} and to_s = {end:g}: "
+            f"the file runs from {run.time_s.min():g} to {run.time_s.max():g} s"
+        )
+    cut = None
+    if run.torque_time_s is not None:
+        cut = (run.torque_time_s >= start) & (run.torque_time_s <= end)
+    return dataclasses.replace(
+        run,
+        time_s=run.time_s[keep],
+        valid=run.valid[keep],
+        rate_rad_s=None if run.rate_rad_s is None else run.rate_rad_s[keep],
+        angle_rad=None if run.angle_rad is None else run.angle_rad[keep],
+        torque_time_s=None if cut is None or run.torque_time_s is None else run.torque_time_s[cut],
+        torque_nm=None if cut is None or run.torque_nm is None else run.torque_nm[cut],
+        channels={name: values[keep] for name, values in run.channels.items()},
+    )
+
+
+def _leaks(runs: Sequence[Run], sources: Sequence[Path]) -> list[str]:
+    """Stretches of one file that are both fitted and held out: their error would prove nothing."""
+    wrong: list[str] = []
+    for i, one in enumerate(runs):
+        for j, other in enumerate(runs):
+            if one.use != "fit" or other.use != "holdout" or sources[i] != sources[j] or one.name != other.name:
+                continue
+            start, end = max(one.time_s[0], other.time_s[0]), min(one.time_s[-1], other.time_s[-1])
+            if start < end:
+                wrong.append(
+                    f"{sources[i]}: {start:g} to {end:g} s is both use: fit and use: holdout: "
+                    "set from_s and to_s so that the stretches do not overlap"
+                )
+    return wrong
+
+
+def _named_apart(runs: Sequence[Run]) -> tuple[Run, ...]:
+    """Runs with names of their own, so that a table of them can be read."""
+    names = [run.name for run in runs]
+    return tuple(
+        run
+        if names.count(run.name) == 1
+        else dataclasses.replace(run, name=f"{run.name} #{names[:i].count(run.name) + 1}")
+        for i, run in enumerate(runs)
+    )

@@ -1,0 +1,80 @@
+"""Readers of recordings, one a format, found by suffix; a new one is a new file and a line in ``_BY_SUFFIX``."""
+
+from __future__ import annotations
+
+import stat
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+
+from rig.errors import RecordingError
+from rig.recording.readers.base import Table
+from rig.recording.run import Run
+
+MAX_FILE_BYTES = 2 * 1024**3
+
+# Longest first where one suffix ends another. The modules load when asked for: SciPy and HDF5 are slow to import.
+_BY_SUFFIX = {
+    ".csv.gz": "csv_text",
+    ".csv": "csv_text",
+    ".npz": "npz",
+    ".mat": "mat",
+    ".hdf5": "h5",
+    ".h5": "h5",
+    ".journal": "raw_journal",
+}
+
+
+def suffixes() -> tuple[str, ...]:
+    """Every suffix that can be read."""
+    return tuple(sorted(_BY_SUFFIX))
+
+
+def read_file(path: Path) -> Sequence[Table | Run]:
+    """What the file holds: tables of named columns, or runs where this program wrote it.
+
+    Raises RecordingError with cause and cure.
+    """
+    _check_is_file(path)
+    suffix = next((s for s in _BY_SUFFIX if path.name.lower().endswith(s)), None)
+    if suffix is None:
+        raise RecordingError(
+            f"{path}: the suffix {path.suffix!r} is no format known here: export it as one of {', '.join(suffixes())}"
+        )
+    reader = import_module(f"rig.recording.readers.{_BY_SUFFIX[suffix]}")
+    contents: Sequence[Table | Run] = reader.read(path)
+    return contents
+
+
+def _check_is_file(path: Path) -> None:
+    try:
+        status = path.stat()
+    except FileNotFoundError:
+        raise RecordingError(
+            f"{path}: no such file: `file` is relative to the yaml; correct it or give an absolute path"
+            + _neighbours(path)
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise RecordingError(f"{path}: cannot be opened: {reason}; check path and permissions") from error
+    if stat.S_ISDIR(status.st_mode):
+        raise RecordingError(f"{path}: is a folder: name one file of it for each run")
+    if not stat.S_ISREG(status.st_mode):
+        # A pipe may never end and a device may never answer.
+        raise RecordingError(f"{path}: is no regular file (a pipe or device): save the data to a file first")
+    if status.st_size == 0:
+        raise RecordingError(f"{path}: the file is empty: export the recording again")
+    if status.st_size > MAX_FILE_BYTES:
+        raise RecordingError(
+            f"{path}: {status.st_size / 1024**3:.1f} GiB, at most {MAX_FILE_BYTES / 1024**3:.0f} GiB are read: "
+            "cut it into runs or lower its sample rate"
+        )
+
+
+def _neighbours(path: Path) -> str:
+    """Recordings that do stand in that folder, at most five."""
+    try:
+        found = sorted(p.name for p in path.parent.iterdir() if p.name.lower().endswith(tuple(_BY_SUFFIX)))
+    except OSError:
+        return f"; the folder {path.parent} is not there either"
+    return f"; there are: {', '.join(found[:5])}" if found else ""

@@ -1,0 +1,65 @@
+"""HDF5: our own recording.h5, or datasets of one group with a column each."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from rig.errors import RecordingError
+from rig.recording import hdf5
+from rig.recording.readers.base import MAX_SAMPLES, Table, read_each, too_long
+from rig.recording.run import Run
+
+_DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError)
+
+
+def read(path: Path) -> Sequence[Table | Run]:
+    """The runs of our own file, else one table of all datasets. Raises RecordingError where unreadable."""
+    try:
+        with h5py.File(path, "r") as file:
+            ours = file.attrs.get("format") == hdf5.FORMAT
+            datasets = {} if ours else _datasets(file)
+    except _DAMAGE as error:
+        raise RecordingError(f"{path}: is no HDF5 file that can be read ({error}): export it again") from error
+    if ours:
+        return hdf5.read_recording_h5(path).runs
+    if not datasets:
+        raise RecordingError(f"{path}: holds no datasets: write time_s, torque_nm, rate_rad_s as datasets")
+    return [Table(path, tuple(datasets), read_each(path, lambda name: _array(path, name, datasets[name])))]
+
+
+def _datasets(file: h5py.File) -> dict[str, str]:
+    """Column name -> path in the file: the last part of the path where that is unique, else all of it.
+
+    Links are not followed: a link may lead into another file.
+    """
+    paths: list[str] = []
+
+    def visit(path: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and not path.startswith("#refs#"):  # MATLAB keeps cells there
+            paths.append(path)
+
+    file.visititems(visit)
+    leaves = Counter(path.rpartition("/")[2] for path in paths)
+    return {leaf if leaves[leaf := path.rpartition("/")[2]] == 1 else path: path for path in paths}
+
+
+def _array(path: Path, name: str, inner: str) -> Any:
+    try:
+        with h5py.File(path, "r") as file:
+            dataset = file[inner]
+            if dataset.external or dataset.is_virtual:
+                raise RecordingError(
+                    f"{path}: {name!r} keeps its values in another file: copy them into this one (h5repack)"
+                )
+            count = int(np.prod(dataset.shape or (0,), dtype=object))
+            if count * max(1, dataset.dtype.itemsize) > 16 * MAX_SAMPLES:
+                raise too_long(path, count)
+            return dataset[()]
+    except _DAMAGE as error:
+        raise RecordingError(f"{path}: dataset {name!r} is damaged ({error}): export it again") from error
