@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
-from typing import Annotated
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import AfterValidator
+
+if TYPE_CHECKING:
+    from rig.effects import Effect, Parameter
 
 EffectValues = Mapping[str, Mapping[str, float]]
 
@@ -19,43 +23,71 @@ def unknown(kind: str, word: str, allowed: Iterable[str]) -> str:
     return f"unknown {kind} {word[:60]!r}{hint} (known: {', '.join(known)})"
 
 
-def check_effect_names(names: Iterable[str]) -> None:
-    """Raise ValueError naming every effect that does not exist, with the nearest one that does."""
+class KeyFaults(ValueError):
+    """Several things wrong inside one value, each with the path of its key below that value."""
+
+    def __init__(self, faults: Sequence[tuple[tuple[str | int, ...], str]]) -> None:
+        super().__init__("; ".join(text for _, text in faults))
+        self.faults = tuple(faults)
+
+
+def check_effect_names(names: Sequence[str]) -> None:
+    """Raise KeyFaults naming every effect of a list that does not exist, with the nearest one that does."""
     from rig import effects  # noqa: PLC0415  compiled kernels: not paid for by a config that names no effect
 
     known = effects.names()
-    wrong = [unknown("effect", name, known) for name in names if name not in known]
+    wrong = [((i,), unknown("effect", name, known)) for i, name in enumerate(names) if name not in known]
     if wrong:
-        raise ValueError("; ".join(wrong))
+        raise KeyFaults(wrong)
 
 
 def check_effects(given: EffectValues) -> EffectValues:
     """Check effect names, parameter keys and bounds; keys come back as the parameters' plain names.
 
-    Raises ValueError that lists everything wrong at once.
+    Raises KeyFaults with everything wrong at once.
     """
     if not given:
         return given
-    check_effect_names(given)
-    from rig import effects  # noqa: PLC0415
+    from rig import effects  # noqa: PLC0415  as above
 
-    wrong: list[str] = []
-    checked: dict[str, dict[str, float]] = {}
+    known = effects.names()
+    wrong: list[tuple[tuple[str | int, ...], str]] = []
+    checked: dict[str, Mapping[str, float]] = {}
     for name, values in given.items():
-        effect = effects.get(name)
-        by_key = {p.name: p for p in effect.parameters} | {p.key: p for p in effect.parameters}
-        keys = [p.key for p in effect.parameters]
-        wrong += [f"{name}: {unknown('parameter', k, keys)}" for k in values if k not in by_key]
-        found = {by_key[k].name: v for k, v in values.items() if k in by_key}
-        for p in effect.parameters:
-            if p.name not in found:
-                wrong.append(f"{name}: {p.key} is missing ({p.meaning}, in {p.unit or 'no unit'})")
-            elif not p.low <= found[p.name] <= p.high:
-                wrong.append(f"{name}: {p.key} = {found[p.name]:g} is outside {p.low:g} to {p.high:g}")
-        checked[name] = {p.name: found[p.name] for p in effect.parameters if p.name in found}
+        if name in known:
+            checked[name], faults = _check_values(effects.get(name), values)
+            wrong += [((name, *key), text) for key, text in faults]
+        else:
+            wrong.append(((name,), unknown("effect", name, known)))
     if wrong:
-        raise ValueError("; ".join(wrong))
+        raise KeyFaults(wrong)
     return checked
+
+
+def _check_values(
+    effect: Effect, values: Mapping[str, float]
+) -> tuple[dict[str, float], list[tuple[tuple[str, ...], str]]]:
+    by_key = {p.name: p for p in effect.parameters} | {p.key: p for p in effect.parameters}
+    keys = [p.key for p in effect.parameters]
+    wrong: list[tuple[tuple[str, ...], str]] = []
+    wrong += [((k,), unknown("parameter", k, keys)) for k in values if k not in by_key]
+    written = {by_key[k].name: k for k in values if k in by_key}
+    for p in effect.parameters:
+        if p.name not in written:
+            wrong.append(((), f"parameter {p.key} is missing ({p.meaning}, in {p.unit or 'no unit'}): add it"))
+            continue
+        value = values[written[p.name]]
+        if not p.low <= value <= p.high:
+            wrong.append(((written[p.name],), f"{value:g} is not allowed: has to be {_range(p)}"))
+    return {p.name: values[written[p.name]] for p in effect.parameters if p.name in written}, wrong
+
+
+def _range(parameter: Parameter) -> str:
+    if math.isinf(parameter.high):
+        return f"at least {parameter.low:g}"
+    if math.isinf(parameter.low):
+        return f"at most {parameter.high:g}"
+    return f"{parameter.low:g} to {parameter.high:g}"
 
 
 EffectsConfig = Annotated[Mapping[str, Mapping[str, float]], AfterValidator(check_effects)]

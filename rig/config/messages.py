@@ -9,15 +9,15 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ValidationError
 
-from rig.config.effects import unknown
+from rig.config.effects import KeyFaults, unknown
 from rig.config.yaml_text import Document, Fault, KeyPath, Place
 
 _WANTED = {
     "float_type": "a number",
     "float_parsing": "a number",
-    "int_type": "a whole number",
+    "int_type": "a whole number, without point or exponent",
     "int_parsing": "a whole number",
-    "int_from_float": "a whole number",
+    "int_from_float": "a whole number, without point or exponent",
     "string_type": 'text (a number, true or null as text needs "quotes")',
     "bool_type": "true or false (on, off, yes and no are plain text here)",
     "bool_parsing": "true or false (on, off, yes and no are plain text here)",
@@ -49,10 +49,15 @@ def faults_of(error: ValidationError, document: Document, root: type[BaseModel])
         path = _data_path(item["loc"], item["type"], document.data)
         single = item["type"] if item["type"] in ("missing", "extra_forbidden") else None
         grouped.setdefault((path, single), []).append(item)
-    return [
-        Fault(place_of(document, path), path, _text(kind, path, items, document.data, root))
-        for (path, kind), items in grouped.items()
-    ]
+    faults: list[Fault] = []
+    for (path, kind), items in grouped.items():
+        inner = [i["ctx"]["error"] for i in items if isinstance(i.get("ctx", {}).get("error"), KeyFaults)]
+        if inner:
+            texts = [((*path, *key), text) for error in inner for key, text in error.faults]
+        else:
+            texts = [(path, _text(kind, path, items, document.data, root))]
+        faults += [Fault(place_of(document, where), where, text) for where, text in texts]
+    return faults
 
 
 def place_of(document: Document, path: KeyPath) -> Place:
@@ -90,6 +95,9 @@ def _text(kind: str | None, path: KeyPath, items: list[Any], data: Any, root: ty
     own = [i["ctx"]["error"] for i in items if i["type"] in ("value_error", "assertion_error")]
     if own:
         return "; ".join(dict.fromkeys(str(e) for e in own))
+    if items[0]["type"] == "union_tag_invalid":
+        kinds = [tag.strip("' ") for tag in items[0]["ctx"]["expected_tags"].split(",")]
+        return unknown("kind", str(items[0]["ctx"]["tag"]), kinds)
     wanted = list(dict.fromkeys(_wanted(item) for item in items))
     return f"{shown(_at(data, path))} is not allowed: has to be {' or '.join(wanted)}"
 
@@ -103,6 +111,10 @@ def _wanted(item: Any) -> str:
 def shown(value: Any) -> str:
     """A value as the person wrote it, cut to a readable length."""
     text = {None: "nothing (null)", True: "true", False: "false"}.get(value) if _is_plain(value) else None
+    if isinstance(value, dict) and value:
+        text = f"a mapping of {', '.join(str(k) for k in value)}"
+    elif isinstance(value, list) and value:
+        text = f"a list of {len(value)}"
     text = text or repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
 

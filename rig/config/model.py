@@ -29,9 +29,7 @@ class ModelConfig(Section):
         if len(set(terms)) != len(terms):
             raise ValueError("a term is listed twice: name each of inertia, damping, stiffness once")
         if "inertia" not in terms:
-            raise ValueError(
-                "inertia has to stay: without it there is no motion to simulate; leave out others"
-            )
+            raise ValueError("inertia has to stay: without it there is no motion to simulate; leave out others")
         return terms
 
     def platform(self) -> Platform:
@@ -62,9 +60,7 @@ def model_yaml(platform: Platform, comment: str = "") -> str:
     Numbers are written with all their digits, parameters under the keys that carry their units.
     """
     section = ModelConfig.from_platform(platform)
-    content = section.model_dump(
-        mode="json", include={"inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"}
-    )
+    content = section.model_dump(mode="json", include={"inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"})
     content["terms"] = list(section.terms)
     if platform.effects:
         from rig import effects  # noqa: PLC0415  compiled kernels: only where there is an effect

@@ -43,8 +43,11 @@ def _put(document: Document, parts: Sequence[str], value: Any, source: str) -> K
         if isinstance(container, list):
             step = _index(container, part, path, source)
         elif not isinstance(container, dict):
+            raise ConfigError(f"{source}: {dotted(path)} is the value {container!r:.60}, it has no key {part!r}")
+        elif part.isdecimal() and part not in container:
             raise ConfigError(
-                f"{source}: {dotted(path)} is the value {container!r:.60}, it has no key {part!r}"
+                f"{source}: {dotted(path) or 'the file'} is no list written there, so it has no item {part}: "
+                f"give the whole list, e.g. --set '{dotted(path)}=[...]'"
             )
         path = (*path, step)
         if i == len(parts) - 1:

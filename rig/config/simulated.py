@@ -24,7 +24,7 @@ class SimulatedGyro(Section):
     bias_deg_s: float = 0.0
     resolution_deg_s: Positive | None = None
     full_scale_deg_s: Positive | None = 400.0
-    bandwidth_hz: Positive | None = None
+    bandwidth_hz: Annotated[float, Field(gt=0, le=2000)] | None = None
     delay_s: Annotated[float, Field(ge=0, le=0.1)] = 0.0
     corrected_delay_s: Annotated[float, Field(ge=0, le=0.1)] | None = None
 

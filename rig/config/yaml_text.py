@@ -91,9 +91,7 @@ def read_text(path: Path) -> str:
         if path.is_dir():
             raise ConfigError(f"{path}: is a folder: give the yaml file in it")
         if not path.exists():
-            raise ConfigError(
-                f"{path}: no such file: check the name and the folder you are in ({Path.cwd()})"
-            )
+            raise ConfigError(f"{path}: no such file: check the name and the folder you are in ({Path.cwd()})")
         if not path.is_file():
             raise ConfigError(f"{path}: is no regular file (a device or pipe): give a yaml file")
         with path.open("rb") as file:
@@ -135,9 +133,7 @@ def parse(text: str, source: str, *, lines: bool = True) -> Document:
     except yaml.YAMLError as error:
         raise ConfigError(f"{source}: not YAML: {error}; save it as plain UTF-8 text") from error
     except RecursionError as error:
-        raise ConfigError(
-            f"{source}: nested too deeply: a configuration has at most {MAX_DEPTH} levels"
-        ) from error
+        raise ConfigError(f"{source}: nested too deeply: a configuration has at most {MAX_DEPTH} levels") from error
     finally:
         if loader is not None:
             loader.dispose()
@@ -174,9 +170,7 @@ class _Walk:
             return [self.value(item, (*path, i), depth + 1) for i, item in enumerate(node.value)]
         if isinstance(node, ScalarNode):
             return self._scalar(node, place, path)
-        self._fault(
-            place, path, f"tag {node.tag[:60]!r} is not allowed: write plain mappings, lists and values"
-        )
+        self._fault(place, path, f"tag {node.tag[:60]!r} is not allowed: write plain mappings, lists and values")
         return None
 
     def _place(self, node: Node) -> Place:
