@@ -96,6 +96,11 @@ class Rig(ABC):
         """One standard deviation of a gyro sample where the gyro's data sheet gives it, else None."""
         return None
 
+    @property
+    def rate_full_scale_rad_s(self) -> float | None:
+        """The largest rate that the gyro can report, known before anything is opened; None for no limit."""
+        return None
+
     @abstractmethod
     def open(self) -> None:
         """Contact all devices; no torque. Raises one DeviceFault that lists everything that failed."""

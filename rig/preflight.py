@@ -86,8 +86,8 @@ _UNITS = (("travel", "deg"), ("rate", "deg/s"), ("torque", "N m"))
 
 
 def _rounded_down(value: float) -> str:
-    """Four figures that do not exceed the value: what is printed must itself pass."""
-    digits = max(0, 3 - math.floor(math.log10(value)))
+    """Five figures that do not exceed the value: what is printed must itself pass."""
+    digits = max(0, 4 - math.floor(math.log10(value)))
     return f"{math.floor(value * 10**digits) / 10**digits:.{digits}f}"
 
 

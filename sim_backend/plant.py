@@ -1,0 +1,124 @@
+"""The simulated platform: the rig's own equation of motion, advanced one stretch of torque at a time.
+
+The integrator is that of ``rig.dynamics``: fourth-order Runge-Kutta on a fine step, stick and slip located
+as events. The torque enters on half steps, so that a continuous excitation is followed as a parabola and a
+held one is exact; drive and sensor effects of the hidden truth sit in between, as in ``rig.dynamics.Grid``.
+A call goes through bare addresses, as in ``rig.dynamics.Stepper``: passing the arrays would cost more than
+the steps themselves.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rig.dynamics import Equations, integrator
+from rig.platform import Platform
+from rig.recording.run import Array
+from sim_backend.motor import MotorState, motor_torque
+
+ANGLE, RATE, SENSED, TORQUE = range(4)  # columns of what Plant.follow and its like return
+RK4_PHASE_RAD = 0.03  # of the fastest motion in one fine step: leaves (0.03)^4 / 120, 7e-9, of a frequency
+FOLLOW, HOLD, MOTOR = range(3)
+_DRIVE, _SENSOR = 12, 18  # where the filter chains begin in the table of addresses
+
+
+@integrator.jit
+def _fine_steps(table, values, torque, motor, n, mode, out):  # type: ignore[no-untyped-def]
+    """n fine steps; ``values`` holds the fine step, the asked torque and the shaft torque that was reached.
+
+    ``torque`` has the half steps to follow, shape (2 n,). ``out`` takes rows of angle, rate, rate behind the
+    sensor and torque asked of the drive effects.
+    """
+    at, of = integrator._floats_at, integrator._offset
+    motion, states, z, scratch = at(table[0]), table[1], at(table[2]), at(table[3])
+    width = max(4, states)
+    body = (
+        table[4], table[5], integrator._integers_at(table[6]), integrator._integers_at(table[7]),
+        at(table[8]), integrator._integers_at(table[9]),
+    )  # fmt: skip
+    constants = at(table[10])
+    jck = (constants[0], constants[1], constants[2])
+    work = (
+        scratch, of(scratch, width), of(scratch, 2 * width),
+        of(scratch, 3 * width), of(scratch, 4 * width), of(scratch, 5 * width),
+    )  # fmt: skip
+    saved = of(scratch, 6 * width)
+    h = values[0]
+    for i in range(n):
+        begin = values[2]
+        if mode == FOLLOW:
+            asked = torque[2 * i + 1]
+            middle = integrator._chain(torque[2 * i], 0.5 * h, table, _DRIVE)
+            end = integrator._chain(asked, 0.5 * h, table, _DRIVE)
+        else:
+            asked = values[1] if mode == HOLD else motor_torque(motor, values[1], motion[1], h)
+            first = integrator._chain(asked, 0.5 * h, table, _DRIVE)
+            begin = 0.5 * (first + integrator._chain(asked, 0.5 * h, table, _DRIVE))
+            middle = begin
+            end = begin
+        values[2] = end
+        integrator.step(motion, states, z, work, saved, h, begin, middle, end, jck, body)
+        out[i, 0] = motion[0]
+        out[i, 1] = motion[1]
+        out[i, 2] = integrator._chain(motion[1], h, table, _SENSOR)
+        out[i, 3] = asked
+
+
+_NOTHING = np.zeros(8)
+
+
+class Plant:
+    """A platform that is advanced by whole fine steps from rest.
+
+    Parameters
+    ----------
+    platform
+        The truth.
+    coarsest_step_s
+        The fine step is this divided by a whole number, small enough for the fastest motion.
+    phase_rad
+        How far the fastest motion turns in a fine step.
+    """
+
+    def __init__(self, platform: Platform, coarsest_step_s: float, phase_rad: float = RK4_PHASE_RAD) -> None:
+        e = Equations(platform)
+        self.parts = int(np.ceil(max(1.0, coarsest_step_s * e.fastest_rad_s() / phase_rad) - 1e-9))
+        self.step_s = coarsest_step_s / self.parts
+        self._values = np.array([self.step_s, 0.0, 0.0])
+        self._out: Array = np.zeros((64, 4))
+        motion, z, scratch = np.zeros(4), e.rest_states(0.0, 0.0), np.zeros((7, max(4, e.states)))
+        drive, sensor = e.drive.arrays(0.5 * self.step_s), e.sensor.arrays(self.step_s)
+        self._kept = (e, motion, z, scratch, drive, sensor)  # the table holds bare addresses of these
+        table: list[Any] = [motion.ctypes.data, e.states, z.ctypes.data, scratch.ctypes.data]
+        table += [e.loads, len(e.kernels)]
+        table += [a.ctypes.data for a in (e.kernels, e.z_at, e.p, e.p_at, e.jck)]
+        table.append(0)
+        for chain in (drive, sensor):
+            table += [len(chain[0]), *(a.ctypes.data for a in chain)]
+        self._table = np.array(table, dtype=np.int64)
+
+    def _advance(self, torque: Array, motor: MotorState, n: int, mode: int) -> Array:
+        if n > len(self._out):
+            self._out = np.zeros((n, 4))
+        _fine_steps(self._table, self._values, torque, motor, n, mode, self._out)
+        return self._out
+
+    def follow(self, torque_nm: Array) -> Array:
+        """Advance under a smooth torque given at every half step after the present instant, shape (2 n,).
+
+        Returns rows of angle, rate, rate behind the sensor effects and torque asked for at the end of each
+        fine step, shape (n or more, 4); valid until the next call.
+        """
+        return self._advance(torque_nm, _NOTHING, len(torque_nm) // 2, FOLLOW)
+
+    def hold(self, torque_nm: float, n: int) -> Array:
+        """Advance n fine steps under a constant torque; rows as from ``follow``."""
+        self._values[1] = torque_nm
+        return self._advance(_NOTHING, _NOTHING, n, HOLD)
+
+    def drive(self, torque_nm: float, n: int, motor: MotorState) -> Array:
+        """Advance n fine steps behind a motor asked for a torque; the fourth column is its mean torque."""
+        self._values[1] = torque_nm
+        return self._advance(_NOTHING, motor, n, MOTOR)
