@@ -1,0 +1,208 @@
+"""Every malformed rig.yaml is refused with its place, its cause and its cure."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from rig.config.load import load_config
+from rig.errors import ConfigError
+
+RUNS = "backend: recorded\nrecorded:\n  runs:\n    - file: run1.csv\n"  # four lines
+BOMB = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{chr(b)}: &{chr(b)} [{', '.join([f'*{chr(b - 1)}'] * 10)}]\n" for b in range(ord("b"), ord("j"))
+)
+
+# text of the file, then what its message has to say: place, cause, cure
+CASES = {
+    "no backend": ("recorded:\n  runs: [{file: a.csv}]\n", "backend", "required and missing", "add it"),
+    "unknown backend": ("backend: simulatd\n", ":1: backend", "'simulatd'", "'simulated', 'bench' or 'recorded'"),
+    "backend without section": ("backend: recorded\n", ":1: backend", "section `recorded:`", "add it"),
+    "simulated without section": ("backend: simulated\n", ":1: backend", "section `simulated:`", "add it"),
+    "empty backend section": ("backend: recorded\nrecorded:\n", ":2: recorded.runs", "missing", "add it"),
+    "no runs": ("backend: recorded\nrecorded: {runs: []}\n", ":2: recorded.runs", "[]", "at least 1"),
+    "unknown section": (RUNS + "identfy: {}\n", ":5: identfy", "unknown key", "did you mean 'identify'"),
+    "unknown key": (RUNS + "identify:\n  sed: 3\n", ":6: identify.sed", "unknown key", "did you mean 'seed'"),
+    "unknown key of a run": (
+        RUNS + "      usee: fit\n",
+        ":5: recorded.runs.0.usee",
+        "unknown key",
+        "did you mean 'use'",
+    ),
+    "wrong word": (RUNS + "      use: train\n", ":5: recorded.runs.0.use", "'train'", "'fit' or 'holdout'"),
+    "text for a number": (RUNS + "      from_s: soon\n", ":5: recorded.runs.0.from_s", "'soon'", "a number"),
+    "decimal comma": (RUNS + "      from_s: 0,5\n", ":5: recorded.runs.0.from_s", "'0,5'", "a number"),
+    "sexagesimal time": (RUNS + "      from_s: 1:30\n", ":5: recorded.runs.0.from_s", "'1:30'", "a number"),
+    "quoted number": (RUNS + '      from_s: "3"\n', ":5: recorded.runs.0.from_s", "'3'", "a number"),
+    "true for a number": (RUNS + "      from_s: true\n", ":5: recorded.runs.0.from_s", "true", "a number"),
+    "on for true": (RUNS + "identify: {genetic: {elitism: on}}", "elitism", "'on'", "true or false"),
+    "number for text": ("backend: recorded\nrecorded: {runs: [{file: 7}]}", "runs.0.file", "7", "text"),
+    "half an individual": (RUNS + "identify: {genetic: {population: 10.5}}", "population", "10.5", "whole number"),
+    "probability of two": (
+        RUNS + "identify: {genetic: {mutation_probability: 2}}",
+        ":5: identify.genetic.mutation_probability",
+        "2 is not allowed",
+        "at most 1",
+    ),
+    "no inertia": (RUNS + "model: {inertia_kg_m2: 0}", ":5: model.inertia_kg_m2", "0 is not", "more than 0"),
+    "NaN": (RUNS + "identify: {j_dec: .nan}", ":5: identify.j_dec", ".nan", "finite number"),
+    "infinity": (RUNS + "identify: {lowpass_hz: .inf}", ":5: identify.lowpass_hz", ".inf", "finite number"),
+    "overflow": (RUNS + "identify: {lowpass_hz: 1e999}", ":5: identify.lowpass_hz", "1e999", "finite number"),
+    "endless integer": (RUNS + f"identify: {{seed: {'9' * 5000}}}", ":5: identify.seed", "9999", "number"),
+    "list for a mapping": (RUNS + "identify: [1, 2]", ":5: identify", "a list of 2", "mapping of keys"),
+    "mapping for a list": (
+        "backend: recorded\nrecorded: {runs: {file: a.csv}}",
+        ":2: recorded.runs",
+        "mapping",
+        "a list",
+    ),
+    "term twice": (RUNS + "model: {terms: [inertia, inertia]}", ":5: model.terms", "twice", "once"),
+    "no inertia term": (RUNS + "model: {terms: [damping]}", ":5: model.terms", "inertia has to stay", "leave out"),
+    "unknown effect": (
+        RUNS + "model:\n  effects:\n    coulomb_frictoin: {level_nm: 1}",
+        ":7: model.effects.coulomb_frictoin",
+        "unknown effect",
+        "did you mean 'coulomb_friction'",
+    ),
+    "unknown candidate": (
+        RUNS + "identify:\n  candidates:\n    - backlash\n    - stribek_friction",
+        ":8: identify.candidates.1",
+        "unknown effect",
+        "did you mean 'stribeck_friction'",
+    ),
+    "unknown effect parameter": (
+        RUNS + "model:\n  effects:\n    coulomb_friction:\n      levle_nm: 1",
+        ":8: model.effects.coulomb_friction.levle_nm",
+        "unknown parameter",
+        "did you mean 'level_nm'",
+    ),
+    "missing effect parameter": (
+        RUNS + "model:\n  effects:\n    coulomb_friction: {}",
+        ":7: model.effects.coulomb_friction",
+        "level_nm is missing",
+        "add it",
+    ),
+    "negative friction": (
+        RUNS + "model:\n  effects:\n    coulomb_friction: {level_nm: -1}",
+        ":7: model.effects.coulomb_friction.level_nm",
+        "-1 is not allowed",
+        "at least 0",
+    ),
+    "window backwards": (RUNS + "      from_s: 3\n      to_s: 2", ":4: recorded.runs.0", "to_s = 2", "later than"),
+    "nothing to fit": (RUNS + "      use: holdout", "recorded", "nothing is left to fit", "mark one use: fit"),
+    "zero scale": (RUNS + "  scale: {torque: 0}", ":5: recorded.scale.torque", "erases", "factor to SI"),
+    "column used twice": (
+        RUNS + "  columns: {rate: a, angle: a}",
+        ":5: recorded.columns",
+        "two quantities",
+        "its own",
+    ),
+    "address for a path": (
+        "backend: recorded\nrecorded: {runs: [{file: 'https://a.b/c.csv'}]}",
+        "runs.0.file",
+        "an address, not a file",
+        "download it first",
+    ),
+    "name with a path": (RUNS + "name: ../../etc", ":5: name", "folder's name", "letters, digits"),
+    "duplicate key": (RUNS + "name: a\nname: b", ":6: name", "stands twice (first on line 5)", "keep one"),
+    "bad indentation": ("backend: recorded\n recorded: 1", ":2:", "not YAML", "indentation"),
+    "tab": ("backend: recorded\nrecorded:\n\truns: 1", ":3:", "not YAML", "spaces, never with tabs"),
+    "unclosed bracket": ("backend: [recorded", ":1:", "not YAML", "brackets"),
+    "glob for a path": ("backend: recorded\nrecorded: {runs: [{file: *.csv}]}", ":2:", "not YAML", "quotes"),
+    "two documents": ("backend: recorded\n---\na: 1", "not YAML", "another document", "check"),
+    "python tag": (RUNS + "name: !!python/object/apply:os.system [ls]", ":5: name", "tag", "plain mappings"),
+    "binary tag": (RUNS + "name: !!binary aGk=", ":5: name", "tag", "plain value"),
+    "merge key": ("x: &x {a: 1}\nbackend: recorded\nrecorded:\n  <<: *x", ":4: recorded", "merge keys", "write"),
+    "list as a key": ("? [a, b]\n: 1\nbackend: recorded", ":1", "key has to be plain text", "not a list"),
+    "alias bomb": (BOMB, ":", "expands to more than", "write the values out"),
+    "alias inside itself": ("a: &a [*a]", ":1", "alias inside itself", "write the values out"),
+    "deep nesting": ("a: " + "[" * 5000, "rig.yaml", "nested too deeply", "at most 40 levels"),
+    "rather deep nesting": ("a: " + "[" * 60 + "]" * 60, ":1", "40 levels", "write the values out"),
+    "not a mapping": ("- a\n- b", ":1", "mapping of keys", "backend: ..."),
+    "only a comment": ("# nothing\n", ":1", "mapping of keys", "backend: ..."),
+    "empty": ("", "rig.yaml", "is empty", "`backend:`"),
+    "control character": ("backend: a\x07", "rig.yaml", "not YAML", "UTF-8"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_malformed_config_is_refused_with_cause_and_cure(tmp_path: Path, case: str) -> None:
+    text, place, cause, cure = CASES[case]
+    path = tmp_path / "rig.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError) as error:
+        load_config(path)
+    message = str(error.value)
+    assert str(path) in message
+    assert place in message.replace(str(tmp_path), "")
+    assert cause in message
+    assert cure in message
+    assert error.value.exit_code == 2
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(ConfigError) as error:
+        load_config(path)
+    assert str(path) in str(error.value)
+    return str(error.value)
+
+
+def test_a_missing_file_says_where_it_looked(tmp_path: Path) -> None:
+    assert "no such file: check the name and the folder you are in" in refusal(tmp_path / "gone.yaml")
+
+
+def test_a_folder_is_no_config(tmp_path: Path) -> None:
+    assert "is a folder: give the yaml file in it" in refusal(tmp_path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
+def test_a_pipe_is_refused_instead_of_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.yaml")
+    assert "no regular file" in refusal(tmp_path / "pipe.yaml")
+
+
+def test_bytes_that_are_no_text_are_named_by_line(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_bytes(b"backend: recorded\nname: \xff\xfe\n")
+    message = refusal(path)
+    assert ":2: byte 0xff is not UTF-8" in message
+    assert "save the file as UTF-8" in message
+
+
+def test_a_huge_file_is_refused_unread(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_bytes(b"# padding\n" * 100_000)
+    message = refusal(path)
+    assert "larger than" in message and "recorded.runs" in message
+
+
+def test_long_strings_behind_aliases_do_not_fill_the_memory(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(f"a: &a {'x' * 100_000}\nb: [{', '.join(['*a'] * 5000)}]\n")
+    began = time.perf_counter()
+    assert "expands to more than" in refusal(path)
+    assert time.perf_counter() - began < 5
+
+
+def test_everything_wrong_is_said_at_once_in_the_order_of_the_lines(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(RUNS + "identify:\n  sed: 3\n  j_dec: -1\nmodel: {inertia_kg_m2: x}\nname: a\nname: b\n")
+    lines = refusal(path).splitlines()
+    assert [line.removeprefix(str(path)).split(":")[1] for line in lines] == ["6", "7", "8", "10"]
+
+
+def test_a_long_list_of_faults_is_cut(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(RUNS + "".join(f"wrong{i}: 1\n" for i in range(100)))
+    lines = refusal(path).splitlines()
+    assert len(lines) == 26
+    assert lines[-1] == "... and 75 more; mend these first"
+
+
+def test_a_long_value_is_cut_in_the_message(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(RUNS + f"identify: {{seed: {'x' * 10_000}}}\n")
+    assert len(refusal(path)) < 500
