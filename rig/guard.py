@@ -1,0 +1,270 @@
+"""The guard: looks at every tick before and after its exchange, and says when to stop.
+
+A pure state machine: no clock, no device. Each limit is one small check, so that a new one is a class and
+a line in ``CHECKS``. The first broken limit is the verdict; taking the torque off is the sequencer's.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from rig.config.limits import LimitsConfig
+from rig.interface import GyroSample, TorqueSample
+
+BOUND_SIGMAS = 3.0  # of the drift of an integrated rate that counts as travel
+MEASURED_TORQUE_EXCESS = 1.05  # a drive's own torque reading may overshoot the limit by so much
+
+
+@dataclass(frozen=True)
+class Trip:
+    """A broken limit: which, by how much, when (seconds since the start of the set) and what to do."""
+
+    limit: str
+    value: float
+    allowed: float
+    unit: str
+    time_s: float
+    what_to_do: str
+
+    def __str__(self) -> str:
+        return (
+            f"{self.limit}: {self.value:.4g} {self.unit} at {self.time_s:.3f} s, allowed is {self.allowed:.4g} "
+            f"{self.unit}. {self.what_to_do}"
+        )
+
+
+class Rest(NamedTuple):
+    """What the gyro read at rest before a set: its bias, how sure that is, and the noise of one sample."""
+
+    bias_rad_s: float = 0.0
+    bias_sigma_rad_s: float = 0.0
+    noise_rad_s: float = 0.0
+
+
+class Tick(NamedTuple):
+    """One tick as the guard sees it; times on the sequencer's clock."""
+
+    now_s: float
+    late_s: float
+    period_s: float
+    torque_nm: float
+    gyro: Sequence[GyroSample]
+    torque: Sequence[TorqueSample]
+    channels: Mapping[str, float]
+
+
+class Check(ABC):
+    """One limit. ``start_s`` is the instant that times of trips count from."""
+
+    def __init__(self, limits: LimitsConfig) -> None:
+        self._limits = limits
+        self._start_s = 0.0
+
+    def begin(self, start_s: float, rest: Rest) -> None:
+        """A set begins, from rest."""
+        self._start_s = start_s
+
+    @abstractmethod
+    def look(self, tick: Tick) -> Trip | None:
+        """The verdict on one tick."""
+
+    def _trip(self, limit: str, value: float, allowed: float, unit: str, time_s: float, what_to_do: str) -> Trip:
+        return Trip(limit, value, allowed, unit, time_s - self._start_s, what_to_do)
+
+
+class MissedTicks(Check):
+    """Ticks in a row whose deadline was missed by a whole period."""
+
+    def __init__(self, limits: LimitsConfig) -> None:
+        super().__init__(limits)
+        self._in_a_row = 0
+
+    def begin(self, start_s: float, rest: Rest) -> None:
+        """Count from zero."""
+        super().begin(start_s, rest)
+        self._in_a_row = 0
+
+    def look(self, tick: Tick) -> Trip | None:
+        """Count this tick's missed periods."""
+        missed = int(tick.late_s / tick.period_s + 1e-9)
+        self._in_a_row = self._in_a_row + missed if missed else 0
+        if self._in_a_row <= self._limits.missed_ticks:
+            return None
+        return self._trip(
+            "missed ticks in a row (limits.missed_ticks)", self._in_a_row, self._limits.missed_ticks, "ticks",
+            tick.now_s, "This machine does not keep up: lower excitation.sample_rate_hz or free the processor.",
+        )  # fmt: skip
+
+
+class StaleGyro(Check):
+    """No valid sample for too long."""
+
+    def begin(self, start_s: float, rest: Rest) -> None:
+        """The set begins with a fresh gyro."""
+        super().begin(start_s, rest)
+        self._last_s = start_s
+
+    def look(self, tick: Tick) -> Trip | None:
+        """Age of the newest valid sample."""
+        for time_s, _, valid in tick.gyro:
+            if valid and time_s > self._last_s:
+                self._last_s = time_s
+        age_ms = (tick.now_s - self._last_s) * 1e3
+        if age_ms <= self._limits.stale_gyro_ms + tick.period_s * 1e3:
+            return None
+        return self._trip(
+            "gyro stale (limits.stale_gyro_ms)", age_ms, self._limits.stale_gyro_ms, "ms", tick.now_s,
+            "No valid gyro sample arrived: check the cable and supply, and whether the rate left the full scale.",
+        )  # fmt: skip
+
+
+class FrozenGyro(Check):
+    """Bit-identical samples for too long: a sensor that hangs goes on reporting its last value."""
+
+    def begin(self, start_s: float, rest: Rest) -> None:
+        """Nothing seen yet."""
+        super().begin(start_s, rest)
+        self._value = math.nan
+        self._since_s = start_s
+
+    def look(self, tick: Tick) -> Trip | None:
+        """How long the value has not changed."""
+        allowed_ms = self._limits.frozen_gyro_ms
+        if allowed_ms is None:
+            return None
+        for time_s, rate, _ in tick.gyro:
+            if rate != self._value:
+                self._value, self._since_s = rate, time_s
+            elif (time_s - self._since_s) * 1e3 > allowed_ms:
+                return self._trip(
+                    "gyro frozen (limits.frozen_gyro_ms)", (time_s - self._since_s) * 1e3, allowed_ms,
+                    "ms without a change", time_s,
+                    "Restart the gyro. A simulated gyro without noise needs limits.frozen_gyro_ms: null.",
+                )  # fmt: skip
+        return None
+
+
+class Rate(Check):
+    """The measured rate, a clipped sample counting with its full-scale value."""
+
+    def look(self, tick: Tick) -> Trip | None:
+        """Every sample of this tick."""
+        allowed = self._limits.rate_deg_s
+        for time_s, rate, valid in tick.gyro:
+            rate_deg_s = abs(math.degrees(rate))
+            if rate_deg_s > allowed or (not valid and rate_deg_s >= allowed * (1.0 - 1e-9)):
+                return self._trip(
+                    "rate (limits.rate_deg_s)", rate_deg_s, allowed, "deg/s", time_s,
+                    "Lower torque_nm; rig check says how far.",
+                )  # fmt: skip
+        return None
+
+
+class Travel(Check):
+    """Angle from rest: the rate less its resting bias, integrated, plus what the drift may amount to."""
+
+    def begin(self, start_s: float, rest: Rest) -> None:
+        """From rest, at angle zero."""
+        super().begin(start_s, rest)
+        self._rest = rest
+        self._angle_rad = 0.0
+        self._last: tuple[float, float] | None = None
+
+    def look(self, tick: Tick) -> Trip | None:
+        """Integrate this tick's valid samples (trapezoids, across gaps too) and compare."""
+        rest = self._rest
+        for time_s, rate_rad_s, valid in tick.gyro:
+            if not valid:
+                continue
+            rate = rate_rad_s - rest.bias_rad_s
+            if self._last is not None and time_s > self._last[0]:
+                step_s = time_s - self._last[0]
+                self._angle_rad += 0.5 * (rate + self._last[1]) * step_s
+                elapsed_s = time_s - self._start_s
+                drift = rest.bias_sigma_rad_s * elapsed_s
+                walk = rest.noise_rad_s * math.sqrt(max(0.0, step_s * elapsed_s))
+                bound_deg = BOUND_SIGMAS * math.degrees(math.hypot(drift, walk))
+                travel_deg = abs(math.degrees(self._angle_rad)) + bound_deg
+                if travel_deg > self._limits.travel_deg:
+                    return self._trip(
+                        f"travel (limits.travel_deg; {bound_deg:.2g} deg of it is what the gyro may have "
+                        "drifted)",
+                        travel_deg, self._limits.travel_deg, "deg", time_s,
+                        "Lower torque_nm or excitation.margin; the declared model may be too stiff.",
+                    )  # fmt: skip
+            self._last = (time_s, rate)
+        return None
+
+
+class MeasuredTorque(Check):
+    """What the drive says it applied."""
+
+    def look(self, tick: Tick) -> Trip | None:
+        """Every torque sample of this tick."""
+        allowed = self._limits.torque_nm
+        for time_s, torque_nm in tick.torque:
+            if not abs(torque_nm) <= allowed * MEASURED_TORQUE_EXCESS:
+                return self._trip(
+                    "applied torque (limits.torque_nm)", abs(torque_nm), allowed, "N m", time_s,
+                    "The drive applied more than it was asked for: check its torque units and rated torque.",
+                )  # fmt: skip
+        return None
+
+
+CHECKS: tuple[type[Check], ...] = (MissedTicks, StaleGyro, FrozenGyro, Rate, Travel, MeasuredTorque)
+
+
+class Guard:
+    """All checks of one campaign.
+
+    Parameters
+    ----------
+    limits
+        The `limits` section.
+    checks
+        Further checks beside ``CHECKS``, for what only some rigs report.
+    """
+
+    def __init__(self, limits: LimitsConfig, checks: Sequence[Check] = ()) -> None:
+        self._torque_nm = limits.torque_nm
+        self._stall_s = limits.stall_ms / 1e3
+        self._checks = (*(check(limits) for check in CHECKS), *checks)
+        self._start_s = 0.0
+        self.begin(0.0, Rest())
+
+    def begin(self, start_s: float, rest: Rest) -> None:
+        """A set, or a rest, begins at ``start_s`` from standstill."""
+        self._start_s = start_s
+        for check in self._checks:
+            check.begin(start_s, rest)
+
+    def permit(self, torque_nm: float, now_s: float, late_s: float) -> Trip | None:
+        """The verdict on a torque before it is sent: nothing is sent after a stall, nor beyond the limit.
+
+        A stall is a tick that comes far too late: a stopped process, a device that blocked, a clock that
+        jumped. A torque that is not a number is never permitted.
+        """
+        if late_s > self._stall_s:
+            return Trip(
+                "stall or clock jump (limits.stall_ms)", late_s * 1e3, self._stall_s * 1e3, "ms late",
+                now_s - self._start_s,
+                "Nothing resumes after a stall: find what stopped this program, then start anew.",
+            )  # fmt: skip
+        if abs(torque_nm) <= self._torque_nm:
+            return None
+        return Trip(
+            "torque (limits.torque_nm)", abs(torque_nm), self._torque_nm, "N m", now_s - self._start_s,
+            "It was not sent. Lower torque_nm of this set.",
+        )  # fmt: skip
+
+    def look(self, tick: Tick) -> Trip | None:
+        """The first broken limit of a tick, or None."""
+        for check in self._checks:
+            trip = check.look(tick)
+            if trip is not None:
+                return trip
+        return None

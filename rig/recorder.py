@@ -1,0 +1,150 @@
+"""Collects what one set measured, by the time stamps of the samples, and writes it to the journal as it comes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.excitation import PlannedSet
+from rig.guard import Tick
+from rig.recording.journal import Journal
+from rig.recording.run import Array, Run, TorqueHold
+
+JOURNAL_TICKS = 25  # ticks between hand-overs to the journal, which buffers again: far below 100 ms at 1 kHz
+EDGE_S = 1e-6  # rounding of time stamps at the ends of a set
+
+
+@dataclass(frozen=True)
+class SetStatistics:
+    """How a set went.
+
+    Parameters
+    ----------
+    late_s
+        Shape (ticks,): how late each tick was played.
+    missed_ticks
+        Deadlines that passed without a tick.
+    drops
+        Gyro samples that arrived invalid.
+    complete
+        False where the set was cut short.
+    """
+
+    name: str
+    late_s: Array
+    missed_ticks: int
+    drops: int
+    peak_torque_nm: float
+    complete: bool
+
+
+class SetRecorder:
+    """One set while it plays. Times are kept in seconds since ``start_s``."""
+
+    def __init__(self, planned: PlannedSet, start_s: float, torque_hold: TorqueHold, journal: Journal | None) -> None:
+        self._planned = planned
+        self._start_s = start_s
+        self._end_s = planned.duration_s + EDGE_S
+        self._torque_hold = torque_hold
+        self._journal = journal
+        self._open = False
+        self._samples: list[tuple[float, float, bool]] = []
+        self._commands: list[tuple[float, float, float]] = []
+        self._ticks: list[tuple[float, ...]] = []
+        self._channel_names: tuple[str, ...] = ()
+        self._written = [0, 0, 0]
+        self.late_max_s = 0.0
+        self.missed_ticks = 0
+        self.drops = 0
+        self.peak_torque_nm = 0.0
+
+    def take(self, tick: Tick) -> None:
+        """Keep what this tick brought, as far as it belongs to the set."""
+        start, end = self._start_s, self._end_s
+        for time_s, rate, valid in tick.gyro:
+            at = time_s - start
+            if -EDGE_S <= at <= end:
+                self._samples.append((at, rate, valid))
+                if not valid:
+                    self.drops += 1
+        for time_s, torque in tick.torque:
+            at = time_s - start
+            if -EDGE_S <= at <= end:
+                self._commands.append((at, torque, tick.torque_nm))
+                self.peak_torque_nm = max(self.peak_torque_nm, abs(torque))
+        if not self._ticks and tick.channels:
+            self._channel_names = tuple(tick.channels)
+        late = tick.late_s
+        if tick.now_s - start <= end:
+            readings = [tick.channels[name] for name in self._channel_names] if self._channel_names else ()
+            self._ticks.append((tick.now_s - start, late, *readings))
+            self.late_max_s = max(self.late_max_s, late)
+            if late >= tick.period_s:
+                self.missed_ticks += int(late / tick.period_s + 1e-9)
+        if self._journal is not None and len(self._ticks) - self._written[2] >= JOURNAL_TICKS:
+            self.write()
+
+    def write(self) -> None:
+        """Hand what is new to the journal. Raises JournalError where that cannot be written."""
+        if self._journal is None:
+            return
+        if not self._open:
+            meta = {
+                "use": self._planned.use,
+                "torque_hold": self._torque_hold,
+                "frequency_hz": self._planned.frequency_hz,
+                "scale": self._planned.scale,
+            }
+            columns = {"ticks": ("time_s", "late_s", *self._channel_names)}
+            self._journal.begin_run(self._planned.name, meta, columns)
+            self._open = True
+        tables = (("samples", self._samples), ("commands", self._commands), ("ticks", self._ticks))
+        for i, (kind, rows) in enumerate(tables):
+            if len(rows) > self._written[i]:
+                self._journal.append(kind, np.array(rows[self._written[i] :], dtype=float))
+                self._written[i] = len(rows)
+
+    def close(self) -> None:
+        """Write the rest and end the run in the journal."""
+        self.write()
+        if self._journal is not None and self._open:
+            self._journal.end_run()
+
+    def statistics(self, complete: bool) -> SetStatistics:
+        """How the set went."""
+        late = np.array([row[1] for row in self._ticks])
+        return SetStatistics(self._planned.name, late, self.missed_ticks, self.drops, self.peak_torque_nm, complete)
+
+    def run(self) -> Run | None:
+        """The set as a Run, or None where fewer than two samples arrived.
+
+        Time stamps that run backwards are dropped: a device that repeats itself must not spoil the record.
+        """
+        samples = _increasing(np.array(self._samples, dtype=float).reshape(-1, 3))
+        commands = _increasing(np.array(self._commands, dtype=float).reshape(-1, 3))
+        if len(samples) < 2 or len(commands) < 1:
+            return None
+        time_s = samples[:, 0].copy()
+        ticks = np.array(self._ticks, dtype=float)
+        channels = {name: np.interp(time_s, ticks[:, 0], ticks[:, 2 + i]) for i, name in enumerate(self._channel_names)}
+        return Run(
+            name=self._planned.name,
+            time_s=time_s,
+            valid=samples[:, 2] > 0.5,
+            rate_rad_s=samples[:, 1].copy(),
+            torque_time_s=commands[:, 0].copy(),
+            torque_nm=commands[:, 1].copy(),
+            torque_hold=self._torque_hold,
+            use=self._planned.use,
+            frequency_hz=self._planned.frequency_hz,
+            channels=channels,
+        )
+
+
+def _increasing(rows: Array) -> Array:
+    """Rows whose first column is later than that of every row before."""
+    if len(rows) < 2:
+        return rows
+    newest = np.maximum.accumulate(rows[:, 0])
+    return rows[np.concatenate([[True], rows[1:, 0] > newest[:-1]])]

@@ -1,0 +1,260 @@
+"""The sequencer: plays the planned sets on a rig, tick by tick against absolute deadlines.
+
+It knows neither the kind of rig nor the kind of clock. Torque is computed from the time of the tick, never
+from its number, so a late tick sends the torque that belongs to its instant and a missed one is skipped.
+Every way out takes the torque off first, then disarms, then closes; what was recorded is kept.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import math
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from rig.clock import Clock
+from rig.errors import Aborted, DeviceFault, RigError, SafetyTrip
+from rig.excitation import PlannedSet
+from rig.guard import Guard, Rest, Tick, Trip
+from rig.interface import Rig
+from rig.recorder import SetRecorder, SetStatistics
+from rig.recording.journal import Journal
+from rig.recording.run import Recording, Run
+
+SETTLE_S = 0.5  # zero torque before the first set: the gyro's bias is read here
+TAIL_S = 0.05  # zero torque after a set, for samples still on their way
+REST_PERIOD_S = 0.01  # ticks of zero torque may be slower; they still feed the drive's watchdog
+BIAS_WINDOW_S = 1.0  # of a rest, at its end
+PROGRESS_S = 0.1
+
+
+class Progress(NamedTuple):
+    """Where a set stands."""
+
+    name: str
+    time_s: float
+    duration_s: float
+    late_max_s: float
+    missed_ticks: int
+    drops: int
+    peak_torque_nm: float
+
+
+class Observer:
+    """Told how the campaign goes; each method may be overridden and has to be quick."""
+
+    def set_begins(self, planned: PlannedSet, number: int, count: int) -> None:
+        """Set ``number`` of ``count`` (from 1) is about to play."""
+
+    def progress(self, progress: Progress) -> None:
+        """About ten times a second while a set plays."""
+
+    def set_ends(self, statistics: SetStatistics) -> None:
+        """A set is over, complete or not."""
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What came of playing: all runs so far, how each set went, and the error that ended it early, if any."""
+
+    recording: Recording
+    statistics: tuple[SetStatistics, ...]
+    cause: RigError | None = None
+
+    @property
+    def aborted(self) -> bool:
+        """Whether the campaign ended before its last set was complete."""
+        return self.cause is not None
+
+
+class Sequencer:
+    """Plays sets on a rig.
+
+    Parameters
+    ----------
+    rig, clock, guard
+        The rig to play on, the clock that its samples are stamped by, and what to watch.
+    sample_rate_hz
+        Ticks a second while a set plays.
+    rest_s
+        Zero torque between sets.
+    journal
+        Where samples go as they come, or None.
+    stop
+        Asked every tick; a text means: stop now, for this reason. Set by a signal handler, say.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        clock: Clock,
+        guard: Guard,
+        *,
+        sample_rate_hz: float,
+        rest_s: float,
+        journal: Journal | None = None,
+        observer: Observer | None = None,
+        stop: Callable[[], str | None] = lambda: None,
+    ) -> None:
+        self._rig = rig
+        self._clock = clock
+        self._guard = guard
+        self._period_s = 1.0 / sample_rate_hz
+        self._rest_s = rest_s
+        self._journal = journal
+        self._observer = observer or Observer()
+        self._stop = stop
+        self._runs: list[Run] = []
+        self._statistics: list[SetStatistics] = []
+        self._still: deque[tuple[float, float]] = deque()
+
+    def play(self, sets: Sequence[PlannedSet]) -> Campaign:
+        """Play all sets; returns what was recorded, also after a trip, a fault or Ctrl-C (see ``cause``).
+
+        Any other exception passes through once torque is off; the journal then has the samples.
+        """
+        cause: RigError | None = None
+        try:
+            with _without_collector(), self._rig.opened(), self._rig.armed():
+                self._guard.begin(self._clock.now_s(), Rest())
+                self._zero(SETTLE_S, REST_PERIOD_S)
+                for number, planned in enumerate(sets, 1):
+                    if number > 1:
+                        self._zero(self._rest_s, REST_PERIOD_S)
+                    self._observer.set_begins(planned, number, len(sets))
+                    self._play_set(planned)
+        except KeyboardInterrupt:
+            cause = Aborted("Stopped by Ctrl-C: torque is off; what was recorded until then is kept.")
+        except RigError as error:
+            cause = _with_context(error)
+        if cause is not None and self._journal is not None:
+            with contextlib.suppress(RigError):
+                self._journal.event(self._clock.now_s(), str(cause), {"aborted": True})
+        info = {"backend": str(self._rig.statement()), "aborted": str(cause) if cause else None}
+        recording = Recording(tuple(self._runs), noise=self._rig.noise_rad_s, info=info)
+        return Campaign(recording, tuple(self._statistics), cause)
+
+    def _play_set(self, planned: PlannedSet) -> None:
+        start_s = self._clock.now_s() + self._period_s
+        self._guard.begin(start_s, self._resting())
+        recorder = SetRecorder(planned, start_s, self._rig.torque_hold, self._journal)
+        complete = False
+        try:
+            self._rig.begin_set(planned.torque, start_s)
+            self._ticks(planned, recorder, start_s)
+            self._zero(TAIL_S, self._period_s, recorder)
+            complete = True
+        except BaseException:
+            with contextlib.suppress(RigError):  # the fault that is under way is the one to report
+                self._rig.torque_off()
+            raise
+        finally:
+            self._rig.end_set()
+            self._keep(recorder, complete)
+
+    def _ticks(self, planned: PlannedSet, recorder: SetRecorder, start_s: float) -> None:
+        """The set itself: from its first tick to the one that takes the torque off."""
+        period_s, duration_s = self._period_s, planned.duration_s
+        tick, told_s, playing = 0, -math.inf, True
+        while playing:
+            deadline_s = start_s + tick * period_s
+            now_s = self._clock.wait_until(deadline_s)
+            at_s = now_s - start_s
+            playing = at_s < duration_s - 1e-6
+            torque_nm = float(planned.torque(at_s)) if playing else 0.0
+            late_s = now_s - deadline_s
+            self._exchange(now_s, late_s, period_s, torque_nm, recorder)
+            tick += 1 + int(late_s / period_s + 1e-9)
+            if at_s - told_s >= PROGRESS_S:
+                told_s = at_s
+                self._tell(planned, recorder, at_s)
+
+    def _exchange(
+        self, now_s: float, late_s: float, period_s: float, torque_nm: float, recorder: SetRecorder | None
+    ) -> Tick:
+        """One tick: permission, exchange, record, verdict."""
+        reason = self._stop()
+        if reason is not None:
+            raise Aborted(f"{reason}: torque is off; what was recorded until then is kept.")
+        trip = self._guard.permit(torque_nm, now_s, late_s)
+        if trip is not None:
+            raise self._tripped(trip)
+        reply = self._rig.exchange(now_s, torque_nm)
+        tick = Tick(now_s, late_s, period_s, torque_nm, reply.gyro, reply.torque, reply.channels)
+        if recorder is not None:
+            recorder.take(tick)
+        trip = self._guard.look(tick)
+        if trip is not None:
+            raise self._tripped(trip)
+        return tick
+
+    def _tripped(self, trip: Trip) -> SafetyTrip:
+        with contextlib.suppress(RigError):
+            self._rig.torque_off()  # the shortest road: before anything is formatted or written
+        return SafetyTrip(f"Torque is off. Tripped on {trip}")
+
+    def _zero(self, duration_s: float, period_s: float, recorder: SetRecorder | None = None) -> None:
+        """Zero torque for a while, guarded, the gyro listened to for its bias."""
+        begin_s = self._clock.now_s()
+        deadline_s = begin_s
+        still = self._still
+        if recorder is None:
+            still.clear()
+        while deadline_s < begin_s + duration_s - 1e-9:
+            deadline_s += period_s
+            now_s = self._clock.wait_until(deadline_s)
+            late_s = now_s - deadline_s
+            tick = self._exchange(now_s, late_s, period_s, 0.0, recorder)
+            deadline_s += period_s * int(late_s / period_s + 1e-9)
+            still.extend((time_s, rate) for time_s, rate, valid in tick.gyro if valid)
+            while still and still[0][0] < now_s - BIAS_WINDOW_S:
+                still.popleft()
+
+    def _resting(self) -> Rest:
+        """Bias of the gyro over the end of the last rest, and how sure it is."""
+        rates = np.array([rate for _, rate in self._still])
+        if len(rates) < 2:
+            return Rest()
+        noise = float(rates.std())
+        return Rest(float(rates.mean()), noise / math.sqrt(len(rates)), noise)
+
+    def _tell(self, planned: PlannedSet, recorder: SetRecorder, at_s: float) -> None:
+        r = recorder
+        told = (r.late_max_s, r.missed_ticks, r.drops, r.peak_torque_nm)
+        self._observer.progress(Progress(planned.name, at_s, planned.duration_s, *told))
+
+    def _keep(self, recorder: SetRecorder, complete: bool) -> None:
+        """Keep the run; a journal that fails on the way out of an error must not hide that error."""
+        run = recorder.run()
+        if run is not None:
+            self._runs.append(run)
+        statistics = recorder.statistics(complete)
+        self._statistics.append(statistics)
+        self._observer.set_ends(statistics)
+        with contextlib.nullcontext() if complete else contextlib.suppress(RigError):
+            recorder.close()
+
+
+def _with_context(error: RigError) -> RigError:
+    """A fault while disarming after another error: both matter, the fault decides the exit code."""
+    earlier = error.__context__
+    if isinstance(error, DeviceFault) and isinstance(earlier, (RigError, KeyboardInterrupt)):
+        return DeviceFault(f"{error} This happened on the way out of: {earlier or 'Ctrl-C'}")
+    return error
+
+
+@contextlib.contextmanager
+def _without_collector() -> Iterator[None]:
+    """A pause of the garbage collector is a missed tick; nothing in the loop makes reference cycles."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
