@@ -22,7 +22,7 @@ LARGEST_VALUE = 1e12
 def missing_column(table: Table, quantity: str, names: Sequence[str], *, mapped: bool) -> RecordingError:
     """The refusal of a file without a needed column: what was looked for, what is there, which is nearest."""
     there = ", ".join(table.names[:20]) + (", ..." if len(table.names) > 20 else "")
-    near = [n for name in names for n in difflib.get_close_matches(name, table.names, n=1, cutoff=0.5)]
+    near = [n for name in names for n in difflib.get_close_matches(name, table.names, n=1, cutoff=0.6)]
     wanted = " or ".join(repr(name) for name in names)
     cure = f"correct recorded.columns.{quantity}" if mapped else f"name it with recorded.columns.{quantity}"
     hint = f", did you mean {near[0]!r}?" if near else ""

@@ -165,3 +165,9 @@ def test_a_term_left_out_is_zero_in_the_platform(tmp_path: Path) -> None:
     platform = load(tmp_path, SMALLEST + "model: {terms: [inertia, damping]}\n").config.model.platform()
     assert platform.stiffness_nm_rad == 0.0
     assert platform.terms == ("inertia", "damping")
+
+
+def test_the_example_for_a_recording_of_ones_own_is_a_good_config() -> None:
+    loaded = load_config(Path(__file__).parents[3] / "examples" / "recorded.yaml")
+    assert loaded.config.recorded is not None
+    assert loaded.config.recorded.runs[0].file == "my_recording.csv"

@@ -1,0 +1,383 @@
+"""Every recording that cannot be read or trusted is refused with its cause and its cure."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import os
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+
+from rig.errors import RecordingError
+from rig.recording.journal import Journal
+from rig.recording.readers import mat
+from tests.rig.recording.support import csv_of, motion, read
+
+Columns = dict[str, Any]
+
+
+def changed(**columns: Any) -> Columns:
+    return motion() | columns
+
+
+def without(*names: str) -> Columns:
+    return {name: values for name, values in motion().items() if name not in names}
+
+
+def with_value(column: str, index: int, value: float) -> Columns:
+    columns = motion()
+    columns[column] = columns[column].copy()
+    columns[column][index] = value
+    return columns
+
+
+T = motion()["time_s"]
+
+# columns of run.npz, keys of `recorded`, keys of the run, then what the message has to say: cause, cure
+ARRAYS: dict[str, tuple[Columns, str, str, str, str]] = {
+    "no time": (without("time_s"), "", "", "no column 'time_s'", "recorded.columns.time"),
+    "neither rate nor angle": (
+        without("rate_rad_s", "angle_rad"),
+        "",
+        "",
+        "no column 'rate_rad_s' or 'rate_deg_s' or 'angle_rad' or 'angle_deg' (it has: time_s, torque_nm)",
+        "recorded.columns.rate",
+    ),
+    "misspelt time": (
+        {"times": T, **without("time_s")},
+        "",
+        "",
+        "no column 'time_s', did you mean 'times'?",
+        "recorded.columns.time",
+    ),
+    "mapped column missing": (
+        motion(),
+        "  columns: {torque: torque}\n",
+        "",
+        "no column 'torque', did you mean 'torque_nm'?",
+        "correct recorded.columns.torque",
+    ),
+    "NaN": (with_value("torque_nm", 7, np.nan), "", "", "index 7: torque is nan", "mark the row valid = 0"),
+    "infinite": (with_value("rate_rad_s", 9, -np.inf), "", "", "index 9: rate is -inf", "delete the row"),
+    "NaN in time": (with_value("time_s", 3, np.nan), "", "", "index 3: time is nan", "correct it"),
+    "absurd value": (with_value("rate_rad_s", 9, 1e300), "", "", "rate is 1e+300", "correct it"),
+    "unsorted time": (with_value("time_s", 5, 0.0015), "", "", "time is not sorted", "sort the rows"),
+    "duplicate time": (with_value("time_s", 5, 0.004), "", "", "samples 4 and 5 have the same time", "more digits"),
+    "time in ms": (changed(time_s=T * 1e3), "", "", "time is in milliseconds", "recorded.scale.time: 0.001"),
+    "time in ms, rate only": (
+        {k: v for k, v in changed(time_s=T * 1e3).items() if k != "angle_rad"},
+        "",
+        "",
+        "the time looks like milliseconds",
+        "recorded.scale.time: 0.001; if it is in seconds, say so",
+    ),
+    "time in us, rate only": (
+        {k: v for k, v in changed(time_s=T * 1e6).items() if k != "angle_rad"},
+        "",
+        "",
+        "the time looks like microseconds",
+        "recorded.scale.time: 0.000001",
+    ),
+    "two samples": (
+        {k: v[:2] for k, v in motion().items()},
+        "",
+        "",
+        "2 valid samples, at least 20",
+        "record longer",
+    ),
+    "no samples": ({k: v[:0] for k, v in motion().items()}, "", "", "0 valid samples", "record longer"),
+    "all samples lost": (changed(valid=np.zeros(500)), "", "", "0 valid samples", "record longer"),
+    "nothing happens": (
+        {"time_s": T, "torque_nm": np.full(500, 2.0), "rate_rad_s": np.full(500, 0.3)},
+        "",
+        "",
+        "the rate never changes (0.3) and the torque is constant too",
+        "record a run in which the torque changes",
+    ),
+    "stuck sensor": (
+        {**without("angle_rad"), "rate_rad_s": np.zeros(500)},
+        "",
+        "",
+        "the rate never changes (0) though the torque does",
+        "check that the sensor was connected",
+    ),
+    "at rest without torque": (
+        {"time_s": T, "angle_rad": np.zeros(500)},
+        "",
+        "",
+        "the angle never changes (0) and there is no torque",
+        "record a run",
+    ),
+    "angle in degrees": (
+        changed(angle_rad=np.degrees(motion()["angle_rad"])),
+        "",
+        "",
+        "57.3 times as fast as the rate says; probably the angle is in degrees",
+        "recorded.scale.angle: 0.0174533",
+    ),
+    "rate in degrees": (
+        changed(rate_rad_s=np.degrees(motion()["rate_rad_s"])),
+        "",
+        "",
+        "the rate is in degrees per second",
+        "recorded.scale.rate: 0.0174533",
+    ),
+    "rate reversed": (
+        changed(rate_rad_s=-motion()["rate_rad_s"]),
+        "",
+        "",
+        "opposite signs",
+        "recorded.scale.rate: -1",
+    ),
+    "rate in rpm": (
+        changed(rate_rad_s=motion()["rate_rad_s"] * 30 / np.pi),
+        "",
+        "",
+        "turns per minute",
+        "recorded.scale.rate: 0.10472",
+    ),
+    "rate off by 1.3": (
+        changed(rate_rad_s=motion()["rate_rad_s"] / 1.3),
+        "",
+        "",
+        "1.3 times as fast",
+        "recorded.scale.rate: 1.3",
+    ),
+    "angle wraps": (
+        changed(angle_rad=np.mod(30 * T + np.pi, 2 * np.pi) - np.pi, rate_rad_s=np.full(500, 30.0) + T),
+        "",
+        "",
+        "jumps by a whole turn",
+        "unwrap it",
+    ),
+    "columns of different length": (
+        changed(torque_nm=np.ones(499)),
+        "",
+        "",
+        "different length (time 500, torque 499, rate 500, angle 500)",
+        "one value a sample",
+    ),
+    "complex": (changed(torque_nm=np.ones(500) * 1j), "", "", "complex numbers", "save its real part"),
+    "text array": (changed(torque_nm=np.array(["1.0"] * 500)), "", "", "not numbers", "save it as numbers"),
+    "structured": (
+        changed(torque_nm=np.zeros(500, dtype=[("a", float), ("b", float)])),
+        "",
+        "",
+        "a structure of a, b",
+        "its own array",
+    ),
+    "two-dimensional": (changed(torque_nm=np.ones((500, 3))), "", "", "shape (500, 3)", "an array of its own"),
+    "single number": (changed(torque_nm=np.float64(1)), "", "", "a single number", "one value a sample"),
+    "window outside": (
+        motion(),
+        "",
+        "      from_s: 3\n",
+        "no sample between from_s = 3",
+        "the file runs from 0 to 0.499 s",
+    ),
+    "window too narrow": (motion(), "", "      to_s: 0.005\n", "6 valid samples", "widen from_s and to_s"),
+    "valid is NaN": (changed(valid=np.full(500, np.nan)), "", "", "valid is empty", "write 1 for a good sample"),
+}
+
+
+def refusal(folder: Path, file: str, options: str = "", entry: str = "") -> str:
+    with pytest.raises(RecordingError) as error:
+        read(folder, file, options, entry)
+    assert error.value.exit_code == 2
+    assert file in str(error.value)
+    return str(error.value)
+
+
+@pytest.mark.parametrize("case", ARRAYS)
+def test_arrays_that_cannot_be_trusted_are_refused(tmp_path: Path, case: str) -> None:
+    columns, options, entry, cause, cure = ARRAYS[case]
+    np.savez(tmp_path / "run.npz", **columns)
+    message = refusal(tmp_path, "run.npz", options, entry)
+    assert cause in message
+    assert cure in message
+
+
+GOOD = csv_of(motion())
+LINES = GOOD.splitlines()
+
+
+def line_replaced(number: int, text: str) -> str:
+    return "\n".join([*LINES[: number - 1], text, *LINES[number:]])
+
+
+# text of run.csv, then cause and cure
+TEXTS = {
+    "text in a number": (line_replaced(7, "0.005,oops,2,0"), "line 7, column 'torque_nm': 'oops'", "valid"),
+    "row of units": (line_replaced(2, "s,Nm,rad/s,rad"), "line 2, column 'time_s': 's'", "a row of units?"),
+    "underscore": (line_replaced(7, "0.005,1_000,2,0"), "line 7, column 'torque_nm': '1_000'", "correct it"),
+    "empty field": (line_replaced(7, "0.005,,2,0"), "line 7: torque is nan", "mark the row valid = 0"),
+    "cut row": (GOOD[: GOOD.rindex(",")], "line 501 has 3 fields where the header names 4", "may be cut"),
+    "row too long": (line_replaced(7, "0.005,1,2,0,9"), "line 7 has 5 fields", "complete or delete"),
+    "decimal commas between commas": (
+        GOOD.replace(",", ";").replace(".", ",").replace(";", ",").replace("time_s;", "time_s,"),
+        "fields where the header names 4",
+        "separate the columns by semicolons",
+    ),
+    "no header": ("\n".join(LINES[1:]), "line 1 holds numbers where the header", "names the columns"),
+    "only a header": (LINES[0] + "\n", "only a header, no data", "export the recording again"),
+    "only comments": ("# a\n# b\n", "holds no data", "a header line"),
+    "column twice": (
+        GOOD.replace("angle_rad", "rate_rad_s"),
+        "names 'rate_rad_s' twice",
+        "rename one",
+    ),
+    "endless line": ("time_s," + "x" * 100_000, "longer than 65536 characters", "one sample a line"),
+    "wrong delimiter": (GOOD.replace(",", "|"), "has no column 'time_s'", "recorded.columns.time"),
+}
+
+
+@pytest.mark.parametrize("case", TEXTS)
+def test_text_that_cannot_be_trusted_is_refused(tmp_path: Path, case: str) -> None:
+    text, cause, cure = TEXTS[case]
+    (tmp_path / "run.csv").write_text(text)
+    message = refusal(tmp_path, "run.csv")
+    assert cause in message
+    assert cure in message
+
+
+def test_the_line_is_right_behind_comments_and_blank_lines(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text("# made by hand\n\n" + line_replaced(7, "0.005,,2,0"))
+    assert "line 9: torque is nan" in refusal(tmp_path, "run.csv")
+
+
+def npy(values: Any) -> bytes:
+    file = io.BytesIO()
+    np.save(file, values)
+    return file.getvalue()
+
+
+def object_array(path: Path) -> None:
+    np.savez(path, **changed(torque_nm=np.array([{}] * 500, dtype=object)))
+
+
+def announced_array(path: Path) -> None:
+    """A few bytes whose header announces a terabyte."""
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (137438953472,), }"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("time_s.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header)
+        archive.writestr("rate_rad_s.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header)
+
+
+def cut_npz(path: Path) -> None:
+    np.savez(path, **motion())
+    path.write_bytes(path.read_bytes()[:3000])
+
+
+def flipped_npz(path: Path) -> None:
+    np.savez(path, **motion())
+    data = bytearray(path.read_bytes())
+    data[1000] ^= 0xFF
+    path.write_bytes(bytes(data))
+
+
+def compressed_mat_bomb(path: Path) -> None:
+    packer = zlib.compressobj()
+    packed = b"".join(packer.compress(bytes(1 << 20)) for _ in range(3)) + packer.flush()
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+    path.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
+
+
+def gzip_cut(path: Path) -> None:
+    path.write_bytes(gzip.compress(GOOD.encode())[:2000])
+
+
+def h5_elsewhere(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        for name, values in without("angle_rad").items():
+            file[name] = values
+        file.create_dataset("angle_rad", (500,), "f8", external=[("/etc/passwd", 0, 4000)])
+
+
+def h5_link_elsewhere(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        file["time_s"] = T
+        file["rate_rad_s"] = h5py.ExternalLink("other.h5", "/rate_rad_s")
+    with h5py.File(path.with_name("other.h5"), "w") as other:
+        other["rate_rad_s"] = motion()["rate_rad_s"]
+
+
+FILES: dict[str, tuple[str, Callable[[Path], Any], str, str]] = {
+    "empty": ("run.csv", lambda p: p.write_bytes(b""), "the file is empty", "export the recording again"),
+    "folder": ("run.csv", lambda p: p.mkdir(), "is a folder", "name one file of it"),
+    "unknown suffix": ("run.xlsx", lambda p: p.write_bytes(b"PK"), "'.xlsx' is no format known", ".csv, .csv.gz"),
+    "binary in a csv": ("run.csv", lambda p: p.write_bytes(bytes(range(256))), "is not text", "as CSV"),
+    "no gzip": ("run.csv.gz", lambda p: p.write_text(GOOD), "cannot be read", "export the file again"),
+    "cut gzip": ("run.csv.gz", gzip_cut, "ended before the end-of-stream", "export the file again"),
+    "no npz": ("run.npz", lambda p: p.write_text(GOOD), "is no .npz archive", "numpy.savez"),
+    "npy named npz": ("run.npz", lambda p: p.write_bytes(npy(T)), "is no .npz archive", "numpy.savez"),
+    "cut npz": ("run.npz", cut_npz, "is no .npz archive", "numpy.savez"),
+    "damaged npz": ("run.npz", flipped_npz, "is damaged", "export the file again"),
+    "npz without arrays": ("run.npz", np.savez, "holds no arrays", "numpy.savez"),
+    "npz of objects": ("run.npz", object_array, "never loaded (they can run code)", "save it as numbers"),
+    "npz that announces a terabyte": ("run.npz", announced_array, "137438953472 samples", "cut it into runs"),
+    "no mat": ("run.mat", lambda p: p.write_text(GOOD), "is no .mat file", "'-v7'"),
+    "mat bomb": ("run.mat", compressed_mat_bomb, "unpacks to more than", "save fewer variables"),
+    "empty mat": ("run.mat", lambda p: scipy.io.savemat(p, {}), "holds no variables", "as vectors"),
+    "no hdf5": ("run.h5", lambda p: p.write_text(GOOD), "is no HDF5 file", "export it again"),
+    "empty hdf5": ("run.h5", lambda p: h5py.File(p, "w").close(), "holds no datasets", "write time_s"),
+    "hdf5 with values elsewhere": ("run.h5", h5_elsewhere, "keeps its values in another file", "copy them"),
+    "hdf5 that links elsewhere": ("run.h5", h5_link_elsewhere, "no column 'rate_rad_s'", "recorded.columns"),
+    "no journal": ("run.journal", lambda p: p.write_text(GOOD), "not a journal", "results folder"),
+    "journal without samples": (
+        "run.journal",
+        lambda p: Journal.create(p, {}).close(),
+        "no run in it has a sample",
+        "play it again",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", FILES)
+def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path, case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    name, make, cause, cure = FILES[case]
+    monkeypatch.setattr(mat, "MAX_UNPACKED_BYTES", 2 << 20)
+    make(tmp_path / name)
+    message = refusal(tmp_path, name)
+    assert cause in message
+    assert cure in message
+
+
+def test_a_missing_file_lists_what_is_there(tmp_path: Path) -> None:
+    (tmp_path / "run1.csv").write_text(GOOD)
+    message = refusal(tmp_path, "run2.csv")
+    assert "no such file" in message
+    assert "there are: run1.csv" in message
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
+def test_a_pipe_is_refused_instead_of_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "run.csv")
+    assert "no regular file (a pipe or device): save the data to a file first" in refusal(tmp_path, "run.csv")
+
+
+def test_a_device_is_refused(tmp_path: Path) -> None:
+    if not Path("/dev/zero").exists():
+        pytest.skip("no /dev/zero on this system")
+    assert "no regular file" in refusal(tmp_path, "/dev/zero")
+
+
+def test_all_wrong_files_are_said_at_once(tmp_path: Path) -> None:
+    message = refusal(tmp_path, "a.csv", entry="    - file: b.csv\n    - file: c.txt\n")
+    assert [line.split(": ")[0].rpartition("/")[2] for line in message.splitlines()] == ["a.csv", "b.csv", "c.txt"]
+
+
+def test_a_stretch_cannot_be_fitted_and_held_out(tmp_path: Path) -> None:
+    np.savez(tmp_path / "run.npz", **motion())
+    entry = "      use: fit\n      to_s: 0.3\n    - {file: run.npz, use: holdout, from_s: 0.2}\n"
+    message = refusal(tmp_path, "run.npz", entry=entry)
+    assert "0.2 to 0.3 s is both use: fit and use: holdout" in message
+    assert "do not overlap" in message
