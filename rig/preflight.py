@@ -68,7 +68,7 @@ class Prediction:
     def sentence(self) -> str:
         """One line for the operator."""
         told = (
-            f"{self.planned.name}: {self.peaks.torque_nm:.1f} N m would travel {self.peaks.travel_deg:.1f} deg "
+            f"{self.planned.name}: {self.peaks.torque_nm:.1f} N m would travel {self.peaks.travel_deg:.2f} deg "
             f"at up to {self.peaks.rate_deg_s:.0f} deg/s"
         )
         if self.passes:

@@ -84,7 +84,9 @@ class Plant:
 
     def __init__(self, platform: Platform, coarsest_step_s: float, phase_rad: float = RK4_PHASE_RAD) -> None:
         e = Equations(platform)
-        self.parts = int(np.ceil(max(1.0, coarsest_step_s * e.fastest_rad_s() / phase_rad) - 1e-9))
+        needed = coarsest_step_s * e.fastest_rad_s() / phase_rad
+        # A power of two, so that grids that halve each other nest and a held torque changes on all of them.
+        self.parts = 1 << max(0, int(np.ceil(np.log2(needed) - 1e-9))) if needed > 1.0 else 1
         self.step_s = coarsest_step_s / self.parts
         self._values = np.array([self.step_s, 0.0, 0.0])
         self._out: Array = np.zeros((64, 4))
