@@ -30,6 +30,7 @@ EFFECT = Effect(
         Parameter("speed", "rad/s", "Stribeck speed (w_s)", low=1e-4, suffix="rad_s", start=_speeds),
     ),
     kernel=_level,
+    ordered=(("coulomb", "static"),),
     nests=("coulomb_friction",),
     separated_by="from Coulomb friction: sets that linger at low speed; a slow ramp, hold and release",
 )

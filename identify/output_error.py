@@ -1,0 +1,349 @@
+"""Output error: the model simulated, compared with what the sensor really measured.
+
+Each run is simulated in shots. One shot over a whole run is the maximum-likelihood fit for white sensor
+noise; shorter shots, each with a start state of its own, keep a model that is still wrong close to the
+data (multiple shooting). Sensitivities are differences of simulations; start states, gyro bias and
+global parameters are solved together, start states eliminated first (Gauss-Newton with Levenberg's damping).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from identify.regression import Structure
+from identify.traces import Trace
+from rig import effects
+from rig.dynamics import Equations, Grid, TorqueSignal
+from rig.dynamics.simulate import MAX_SUBSTEPS
+from rig.platform import TERMS, Platform
+from rig.recording.run import Array
+
+Name = tuple[str, ...]
+FIELD = {"inertia": "inertia_kg_m2", "damping": "damping_nm_s_rad", "stiffness": "stiffness_nm_rad"}
+STEP = 1e-6  # relative step of the differences: simulations repeat to 1e-13
+
+
+def names_of(structure: Structure) -> tuple[Name, ...]:
+    """All parameters of a structure: terms, then every parameter of every effect."""
+    out: list[Name] = [(t,) for t in TERMS if t in structure.terms]
+    for name in structure.effects:
+        out += [(name, p.name) for p in effects.get(name).parameters]
+    return tuple(out)
+
+
+def bounds_of(name: Name) -> tuple[float, float]:
+    """Bounds of a parameter: inertia is positive, damping and stiffness are free, effects say their own."""
+    if len(name) == 1:
+        return (1e-12, np.inf) if name[0] == "inertia" else (-np.inf, np.inf)
+    parameter = next(p for p in effects.get(name[0]).parameters if p.name == name[1])
+    return parameter.low, parameter.high
+
+
+def platform_of(structure: Structure, names: Sequence[Name], values: Array, added: float = 0.0) -> Platform:
+    """The platform that a parameter vector stands for."""
+    terms = {"inertia": 0.0, "damping": 0.0, "stiffness": 0.0}
+    held: dict[str, dict[str, float]] = {name: {} for name in structure.effects}
+    for name, value in zip(names, values, strict=True):
+        if len(name) == 1:
+            terms[name[0]] = float(value)
+        else:
+            held[name[0]][name[1]] = float(value)
+    return Platform(
+        terms["inertia"] + added, terms["damping"], terms["stiffness"], held, structure.terms
+    )
+
+
+@dataclass
+class Shots:
+    """One run as the simulator sees it: its fine grid, its shots and their start states."""
+
+    trace: Trace
+    grid: Grid
+    first: Any  # sample number at which each shot begins, (s,)
+    starts: Array  # angle and rate there, (s, 2)
+    bias: float = 0.0
+    weight: Any = field(default=None)  # (n,) boolean: samples that count
+
+    @property
+    def edges(self) -> list[tuple[int, int]]:
+        """First sample and one past the last of each shot."""
+        ends = [*self.first[1:].tolist(), len(self.trace.measured)]
+        return list(zip(self.first.tolist(), ends, strict=True))
+
+
+def make_shots(trace: Trace, substeps: int, length: int | None, use: Any = None) -> Shots:
+    """Cut a run into shots of ``length`` samples (None: one), started from the smoothed measurement."""
+    n = len(trace.measured)
+    time = trace.run.time_s[0] + trace.step_s * np.arange(n)
+    first = np.arange(0, n, length) if length else np.array([0])
+    if length and len(first) > 1 and n - first[-1] < length // 2:
+        first = first[:-1]
+    angle, rate, _, _, _ = trace.fine
+    ratio = (len(angle) - 1) // (n - 1)
+    starts = np.stack([angle[first * ratio], rate[first * ratio]], axis=1)
+    weight = trace.keep if use is None else trace.keep & use
+    return Shots(trace, Grid(time, trace.torque, substeps), first, starts, trace.bias, weight)
+
+
+def predict(shots: Shots, equations: Equations, starts: Array, bias: float) -> Array:
+    """The measured channel as the model gives it, shape (n,)."""
+    grid = shots.grid
+    torque = grid.shaft_torque(equations)
+    ratio = round(shots.trace.step_s / grid.step_s)
+    n = len(shots.trace.measured)
+    rate = shots.trace.channel == "rate"
+    fine = equations.integrate_shots(torque, grid.step_s, shots.first * ratio, starts)
+    if rate and equations.sensor.names:
+        return np.asarray(equations.sensor.apply(fine[:, 1], grid.step_s)[: n * ratio : ratio] + bias)
+    out = fine[: n * ratio : ratio, 1 if rate else 0]
+    return out + bias if rate else out
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted output-error model.
+
+    Attributes
+    ----------
+    sigma
+        Root mean square of measured minus simulated over the samples that count.
+    information
+        Normal matrix of the global parameters, start states and bias eliminated, for unit noise.
+    """
+
+    structure: Structure
+    names: tuple[Name, ...]
+    values: Array
+    sigma: float
+    count: int
+    information: Array
+    shots: tuple[Shots, ...]
+    converged: bool
+
+    def platform(self, added: float = 0.0) -> Platform:
+        """The fitted platform."""
+        return platform_of(self.structure, self.names, self.values, added)
+
+    def residuals(self) -> list[Array]:
+        """Measured minus simulated, one array a run."""
+        out = []
+        for s in self.shots:
+            equations = Equations(self.platform(s.trace.run.added_inertia_kg_m2))
+            out.append(s.trace.measured - predict(s, equations, s.starts, s.bias))
+        return out
+
+
+@dataclass
+class _Normal:
+    """One run's share of the normal equations; start states and bias eliminated, with the way back."""
+
+    a: Array
+    b: Array
+    rss: float
+    count: int
+    back: Callable[[Array], tuple[Array, float]]
+
+
+def _linearise(s: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any) -> _Normal:
+    added = s.trace.run.added_inertia_kg_m2
+    rate = s.trace.channel == "rate"
+
+    def run(values: Array, starts: Array) -> Array:
+        return predict(s, Equations(platform_of(structure, names, values, added)), starts, s.bias)
+
+    base = run(x, s.starts)
+    residual = s.trace.measured - base
+    columns = np.zeros((len(base), len(x)))
+    for i in range(len(x)):
+        if fixed[i]:
+            continue
+        h = STEP * scale[i]
+        low, high = bounds_of(names[i])
+        h = -h if x[i] + h > high else h
+        moved = x.copy()
+        moved[i] += h
+        columns[:, i] = (run(moved, s.starts) - base) / h
+    span = np.maximum(np.max(np.abs(s.trace.fine[0])), 1e-9), np.maximum(np.max(np.abs(s.trace.fine[1])), 1e-9)
+    state = np.zeros((len(base), 2))
+    for k in range(2):
+        moved = s.starts.copy()
+        moved[:, k] += STEP * 10.0 * span[k]
+        state[:, k] = (run(x, moved) - base) / (STEP * 10.0 * span[k])
+    return _eliminate(s, columns, state, residual, rate)
+
+
+def _eliminate(s: Shots, columns: Array, state: Array, residual: Array, rate: bool) -> _Normal:
+    p = columns.shape[1]
+    wide = np.column_stack([columns, np.ones(len(residual))]) if rate else columns
+    a, b = np.zeros((wide.shape[1],) * 2), np.zeros(wide.shape[1])
+    rss, count = 0.0, 0
+    kept = []
+    for begin, end in s.edges:
+        mask = s.weight[begin:end]
+        w, z, r = wide[begin:end][mask], state[begin:end][mask], residual[begin:end][mask]
+        zz = z.T @ z
+        scale = np.sqrt(np.maximum(np.diag(zz), 1e-300))
+        inverse = np.linalg.pinv(zz / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
+        zw, zr = z.T @ w, z.T @ r
+        a += w.T @ w - zw.T @ inverse @ zw
+        b += w.T @ r - zw.T @ inverse @ zr
+        rss += float(r @ r)
+        count += len(r)
+        kept.append((inverse, zw, zr))
+    if rate:
+        pivot = max(a[p, p], 1e-300)
+        column, right = a[:p, p].copy(), b[p]
+        a, b = a[:p, :p] - np.outer(column, column) / pivot, b[:p] - column * right / pivot
+
+    def back(dx: Array) -> tuple[Array, float]:
+        bias = float((right - column @ dx) / pivot) if rate else 0.0
+        full = np.append(dx, bias) if rate else dx
+        return np.array([inv @ (zr - zw @ full) for inv, zw, zr in kept]), bias
+
+    return _Normal(a, b, rss, count, back)
+
+
+def _total(parts: Sequence[_Normal]) -> tuple[Array, Array, float, int]:
+    return (
+        np.sum([q.a for q in parts], axis=0), np.sum([q.b for q in parts], axis=0),
+        sum(q.rss for q in parts), sum(q.count for q in parts),
+    )  # fmt: skip
+
+
+def refine(
+    traces: Sequence[Trace],
+    structure: Structure,
+    start: Mapping[Name, float],
+    shot_s: float | None = None,
+    iterations: int = 12,
+    use: Sequence[Any] | None = None,
+    carry: Sequence[Shots] | None = None,
+    fixed: Sequence[Name] = (),
+    tolerance: float = 1e-4,
+) -> Estimate:
+    """Fit all parameters of a structure by output error.
+
+    Parameters
+    ----------
+    start
+        A value for every parameter in ``names_of(structure)``.
+    shot_s
+        Length of a shot in seconds; None simulates each run in one go.
+    use
+        One boolean array a run: samples that count (None: all usable ones).
+    carry
+        Shots of an earlier estimate whose start states to begin from, where their layout agrees.
+    fixed
+        Parameters that stay at their start value.
+    tolerance
+        Stop when the sum of squares falls by less than this share of itself times 1e-2, or when no
+        parameter moves by more than this many of its standard errors.
+    """
+    names = names_of(structure)
+    x = np.array([start[name] for name in names])
+    still = np.array([name in fixed for name in names])
+    shots = _shots_for(traces, structure, names, x, shot_s, use, carry)
+    workers = ThreadPoolExecutor(2)
+    try:
+        return _levenberg(workers, shots, structure, names, x, still, iterations, tolerance)
+    finally:
+        workers.shutdown()
+
+
+def _shots_for(
+    traces: Sequence[Trace], structure: Structure, names: Sequence[Name], x: Array,
+    shot_s: float | None, use: Sequence[Any] | None, carry: Sequence[Shots] | None,
+) -> list[Shots]:  # fmt: skip
+    out = []
+    for i, trace in enumerate(traces):
+        equations = Equations(platform_of(structure, names, x, trace.run.added_inertia_kg_m2))
+        substeps = min(MAX_SUBSTEPS, equations.substeps(trace.step_s))
+        length = None if shot_s is None else max(8, round(shot_s / trace.step_s))
+        shots = make_shots(trace, substeps, length, None if use is None else use[i])
+        if carry is not None and len(carry[i].first) == len(shots.first):
+            shots.starts, shots.bias = carry[i].starts.copy(), carry[i].bias
+        out.append(shots)
+    return out
+
+
+def _levenberg(
+    workers: ThreadPoolExecutor, shots: list[Shots], structure: Structure, names: tuple[Name, ...],
+    x: Array, still: Any, iterations: int, tolerance: float,
+) -> Estimate:  # fmt: skip
+    scale = np.where(np.abs(x) > 0, np.abs(x), 1.0)
+    low = np.array([bounds_of(n)[0] for n in names])
+    high = np.array([bounds_of(n)[1] for n in names])
+    damping, converged = 1e-6, False
+    parts = list(workers.map(lambda s: _linearise(s, structure, names, x, scale, still), shots))
+    a, b, rss, count = _total(parts)
+    for _ in range(iterations):
+        step = None
+        for _try in range(8):
+            size = np.sqrt(np.maximum(np.diag(a), 1e-300))
+            free = ~still
+            scaled = (a / np.outer(size, size))[np.ix_(free, free)]
+            dx = np.zeros(len(x))
+            dx[free] = np.linalg.lstsq(
+                scaled + damping * np.eye(int(free.sum())), (b / size)[free], rcond=1e-14
+            )[0] / size[free]  # fmt: skip
+            new = ordered(names, np.clip(x + dx, low, high))
+            moved = [q.back(new - x) for q in parts]
+            trial = [_moved(s, m) for s, m in zip(shots, moved, strict=True)]
+            trial_rss = sum(workers.map(lambda s, new=new: _rss(s, structure, names, new), trial))
+            if np.isfinite(trial_rss) and trial_rss <= rss * (1.0 + 1e-12):
+                step = new
+                break
+            damping = max(damping * 30.0, 1e-5)
+        if step is None:
+            converged = True
+            break
+        sigma = np.sqrt(rss / max(count, 1))
+        small = bool(np.all(np.abs(step - x) * np.sqrt(np.maximum(np.diag(a), 0.0)) <= tolerance * 30.0 * sigma))
+        flat = rss - trial_rss < 1e-2 * tolerance * rss
+        x, shots, damping = step, trial, max(damping / 30.0, 1e-9)
+        parts = list(workers.map(lambda s, x=x: _linearise(s, structure, names, x, scale, still), shots))
+        a, b, rss, count = _total(parts)
+        if small or flat:
+            converged = True
+            break
+    return Estimate(
+        structure, names, x, float(np.sqrt(rss / max(count, 1))), count, a, tuple(shots), converged
+    )
+
+
+def ordered(names: Sequence[Name], values: Array) -> Array:
+    """Values with every pair that an effect declares as ordered put in order (static is at least coulomb)."""
+    index = {name: i for i, name in enumerate(names)}
+    out = values.copy()
+    for effect in {n[0] for n in names if len(n) == 2}:
+        for smaller, larger in effects.get(effect).ordered:
+            i, k = index[(effect, smaller)], index[(effect, larger)]
+            if out[i] > out[k]:
+                out[i] = out[k] = 0.5 * (out[i] + out[k])
+    return out
+
+
+def _moved(s: Shots, by: tuple[Array, float]) -> Shots:
+    return Shots(s.trace, s.grid, s.first, s.starts + by[0], s.bias + by[1], s.weight)
+
+
+def _rss(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> float:
+    added = s.trace.run.added_inertia_kg_m2
+    r = (s.trace.measured - predict(s, Equations(platform_of(structure, names, x, added)), s.starts, s.bias))[s.weight]
+    return float(r @ r)
+
+
+def evaluate(estimate: Estimate, traces: Sequence[Trace], use: Sequence[Any] | None = None) -> Estimate:
+    """The same parameters on other runs: only start states and biases are fitted there."""
+    start = dict(zip(estimate.names, estimate.values.tolist(), strict=True))
+    return refine(traces, estimate.structure, start, None, 6, use, fixed=estimate.names)
+
+
+def torque_signal(trace: Trace) -> TorqueSignal | None:
+    """The torque behind a trace."""
+    return trace.torque

@@ -1,0 +1,283 @@
+"""White-residual regression: J, C, K and the gains of all effects in one linear solve, shapes searched around it.
+
+For a given denominator D (see ``prefilter``) the prefiltered equation is linear in J, C, K and in the gains
+of the effects; the start state of every stretch and the gyro's bias are nuisances, projected out. D is
+rebuilt from the estimate and the solve repeated until it stands still (Steiglitz-McBride).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from identify.prefilter import Denominator, Prefilter
+from identify.traces import UPSAMPLING, Trace
+from rig import effects
+from rig.effects.base import Place
+from rig.platform import TERMS
+from rig.recording.run import Array
+
+Shapes = Mapping[str, tuple[float, ...]]
+Label = tuple[str, ...]
+ITERATIONS = 4
+UNIT = {"inertia": -3, "damping": -2, "stiffness": -1}
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Which terms and effects a model has, whatever their values."""
+
+    terms: tuple[str, ...] = TERMS
+    effects: tuple[str, ...] = ()
+
+    def plus(self, name: str) -> Structure:
+        """With one effect more."""
+        return replace(self, effects=(*self.effects, name))
+
+    def minus(self, name: str) -> Structure:
+        """With one effect or term less."""
+        return replace(
+            self,
+            terms=tuple(t for t in self.terms if t != name),
+            effects=tuple(e for e in self.effects if e != name),
+        )
+
+    def labels(self, runs: int) -> tuple[Label, ...]:
+        """What the columns of the regression are called; a gain per run has the run's number behind it."""
+        out: list[Label] = [(t,) for t in TERMS if t in self.terms]
+        for name in self.effects:
+            for parameter in effects.get(name).parameters:
+                if parameter.linear and parameter.per_run:
+                    out += [(name, parameter.name, str(r)) for r in range(runs)]
+                elif parameter.linear:
+                    out.append((name, parameter.name))
+        return tuple(out)
+
+
+def shape_values(name: str, values: Mapping[str, float]) -> tuple[float, ...]:
+    """Shape parameters of an effect in declared order."""
+    return tuple(float(values[p.name]) for p in effects.get(name).parameters if not p.linear)
+
+
+@dataclass(frozen=True)
+class Block:
+    """One stretch of one run, prefiltered: target = columns @ x + nuisances @ n + white noise."""
+
+    columns: Array  # (m, p)
+    nuisances: Array  # (m, 2 or 3)
+    target: Array  # (m,)
+    rows: Any  # sample numbers, (m,)
+    trace: int
+
+    @cached_property
+    def projected(self) -> tuple[Array, Array]:
+        """Columns and target with the nuisances taken out."""
+        q = np.linalg.qr(self.nuisances)[0]
+        both = np.column_stack([self.columns, self.target])
+        both = both - q @ (q.T @ both)
+        return both[:, :-1], both[:, -1]
+
+
+class Regression:
+    """The columns of one structure over a set of traces.
+
+    Parameters
+    ----------
+    traces
+        The runs, prepared.
+    structure
+        Terms and effects of the model.
+    torque_free
+        No torque was measured: inertia is fixed at one, all else is per inertia.
+    """
+
+    def __init__(self, traces: Sequence[Trace], structure: Structure) -> None:
+        self.traces = traces
+        self.structure = structure
+        self.torque_free = all(t.torque is None for t in traces)
+        labels = structure.labels(len(traces))
+        self.labels = tuple(x for x in labels if not (self.torque_free and x == ("inertia",)))
+
+    def blocks(self, denominator: Denominator, shapes: Shapes) -> list[Block]:
+        """All stretches of all traces, prefiltered."""
+        filters: dict[float, Prefilter] = {}
+        out = []
+        for i, trace in enumerate(self.traces):
+            pre = filters.setdefault(trace.step_s, Prefilter(denominator, trace.step_s))
+            for stretch in trace.stretches:
+                out.append(self._block(pre, i, trace, stretch, shapes))
+        return out
+
+    def _block(
+        self, pre: Prefilter, number: int, trace: Trace, stretch: tuple[int, int], shapes: Shapes
+    ) -> Block:
+        first, last = stretch
+        rate = trace.channel == "rate"
+        out = 1 if rate else 0  # which response carries a torque into the units of the measured channel
+        d = pre.denominator
+        m = last - first + 1
+
+        def through(pieces: Array, upsampling: int) -> Array:
+            return pre.respond(pieces, first, last, upsampling)[:, out]
+
+        y = trace.measured[first : last + 1]
+        low = pre.respond(trace.measured_pieces, first, last)
+        base = {
+            "stiffness": low[:, 0],
+            "damping": low[:, 1],
+            "inertia": (y - d.damping * low[:, 1] - d.stiffness * low[:, 0]) / d.inertia,
+        }
+        drive = tuple(
+            (name, tuple(shapes[name])) for name in self.structure.effects
+            if effects.get(name).place is Place.DRIVE
+        )  # fmt: skip
+        torque = trace.torque_pieces(drive)
+        target = np.zeros(m) if torque is None else through(*torque)
+        if trace.run.added_inertia_kg_m2:
+            target = target - trace.run.added_inertia_kg_m2 * base["inertia"]
+        columns: dict[Label, Array] = {}
+        for term in TERMS:
+            if term in self.structure.terms:
+                columns[(term,)] = base[term].copy()
+        self._add_effects(columns, through, number, trace, shapes, m)
+        if self.torque_free:
+            target = target - columns.pop(("inertia",))
+        free = pre.free(m)
+        nuisances = np.column_stack([free, np.ones(m)]) if rate else free
+        rows = np.nonzero(trace.keep[first : last + 1])[0]
+        matrix = np.column_stack([columns[x] for x in self.labels])
+        return Block(matrix[rows], nuisances[rows], target[rows], rows + first, number)
+
+    def _add_effects(
+        self, columns: dict[Label, Array], through: Any, number: int, trace: Trace, shapes: Shapes, m: int
+    ) -> None:
+        for name in self.structure.effects:
+            effect = effects.get(name)
+            if effect.place in (Place.DRIVE, Place.SENSOR):
+                continue
+            shape = tuple(shapes.get(name, ()))
+            for i, parameter in enumerate(effect.parameters):
+                if not parameter.linear:
+                    continue
+                pieces = trace.effect_pieces(effect, shape, i)
+                column = np.zeros(m) if pieces is None else through(pieces, UPSAMPLING)
+                if parameter.per_run:
+                    for r in range(len(self.traces)):
+                        columns[(name, parameter.name, str(r))] = column if r == number else np.zeros(m)
+                else:
+                    columns[(name, parameter.name)] = column
+            for term, unit in UNIT.items():  # backlash takes its torque from the platform's own spring
+                pieces = trace.effect_pieces(effect, shape, unit) if (term,) in columns else None
+                if pieces is not None:
+                    columns[(term,)] = columns[(term,)] + through(pieces, UPSAMPLING)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A solved regression.
+
+    Attributes
+    ----------
+    values
+        Linear parameters by label.
+    sigma
+        Root mean square of the residual in units of the measured channel, divided by the gain of the
+        prefilter (its logarithmic mean over frequency), so that solutions with different rho compare.
+    """
+
+    structure: Structure
+    shapes: Shapes
+    labels: tuple[Label, ...]
+    values: Array
+    denominator: Denominator
+    rho: float
+    sigma: float
+    rms: float
+    count: int
+    information: Array
+    platform: tuple[float, float, float]
+
+    def value(self, *label: str) -> float:
+        """One linear parameter; zero where the model does not have it."""
+        return float(self.values[self.labels.index(label)]) if label in self.labels else 0.0
+
+
+def gram(blocks: Sequence[Block], use: Any = None) -> tuple[Array, Array, float, int]:
+    """Normal matrix, right-hand side, squared target and count, nuisances projected out.
+
+    ``use`` maps a block to the rows that count (a boolean mask), or None for all.
+    """
+    total: tuple[Array, Array, float, int] | None = None
+    for block in blocks:
+        x, y = block.projected
+        if use is not None:
+            mask = use(block)
+            x, y = x[mask], y[mask]
+        part = (x.T @ x, x.T @ y, float(y @ y), len(y))
+        total = part if total is None else (
+            total[0] + part[0], total[1] + part[1], total[2] + part[2], total[3] + part[3]
+        )  # fmt: skip
+    assert total is not None
+    return total
+
+
+def solve(a: Array, b: Array) -> Array:
+    """Least squares from normal equations, columns scaled; the direction that nothing determines stays zero."""
+    scale = np.sqrt(np.maximum(np.diag(a), 1e-300))
+    scaled = a / np.outer(scale, scale)
+    return np.asarray(np.linalg.lstsq(scaled, b / scale, rcond=1e-13)[0] / scale)
+
+
+def log_gain(platform: tuple[float, float, float], denominator: Denominator, step_s: float) -> float:
+    """Mean over frequency of log |A / D|: what the prefilter does to white noise in the measured channel."""
+    w = 2.0 * np.pi * (np.arange(2048) + 0.5) / 2048 * 0.5 / step_s
+    j, c, k = platform
+    a = (k - j * w * w) ** 2 + (c * w) ** 2
+    d = (denominator.stiffness - denominator.inertia * w * w) ** 2 + (denominator.damping * w) ** 2
+    return float(0.5 * np.mean(np.log(np.maximum(a, 1e-300) / d)))
+
+
+def fit(
+    regression: Regression,
+    shapes: Shapes,
+    start: tuple[float, float, float],
+    rho: float,
+    iterations: int = ITERATIONS,
+    use: Any = None,
+) -> Solution:
+    """Solve at a fixed rho and fixed shapes, the denominator rebuilt from the estimate ``iterations`` times.
+
+    ``start`` are J, C, K of the first denominator.
+    """
+    platform = start
+    rate = regression.traces[0].channel == "rate"
+    for k in range(max(1, iterations)):
+        denominator = Denominator.of(*platform, rho, rate)
+        blocks = regression.blocks(denominator, shapes)
+        a, b, c, n = gram(blocks, use)
+        x = solve(a, b)
+        found = dict(zip(regression.labels, x, strict=True))
+        inertia = 1.0 if regression.torque_free else float(found.get(("inertia",), 0.0))
+        new = (inertia, float(found.get(("damping",), 0.0)), float(found.get(("stiffness",), 0.0)))
+        if new[0] <= 0.0:  # nothing to filter with: keep the last usable denominator
+            new = (platform[0], max(new[1], 0.0), max(new[2], 0.0))
+        change = abs(new[0] / platform[0] - 1.0) + abs(new[2] - platform[2]) / max(abs(platform[2]), 1e-9)
+        platform = new
+        if k > 0 and change < 1e-7:
+            break
+    rss = max(c - float(b @ x), 0.0)
+    if rss < 1e-6 * c:  # the difference of two large numbers: take it from the residual itself
+        rss = sum(
+            float(np.sum((y - m @ x)[slice(None) if use is None else use(block)] ** 2))
+            for block, (m, y) in ((bl, bl.projected) for bl in blocks)
+        )
+    rms = float(np.sqrt(rss / max(n, 1)))
+    gain = log_gain(platform, denominator, regression.traces[0].step_s)
+    return Solution(
+        regression.structure, dict(shapes), regression.labels, x, denominator, rho,
+        rms / np.exp(gain), rms, n, a, platform,
+    )  # fmt: skip

@@ -1,0 +1,166 @@
+"""What an identification found: plain values, read by result.json, model.yaml, the summary and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from rig.recording.run import Array
+
+UNITS = {
+    "rotary": {"inertia": "kg*m^2", "damping": "N*m*s/rad", "stiffness": "N*m/rad", "torque": "N*m", "rate": "rad/s"},
+    "linear": {"inertia": "kg", "damping": "N*s/m", "stiffness": "N/m", "torque": "N", "rate": "m/s"},
+}
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """A number that the data determine, with its uncertainty."""
+
+    value: float
+    std_error: float
+    ci95: tuple[float, float]
+    unit: str
+    max_error_percent: float | None = None  # Eq. 15 against identify.reference
+
+
+@dataclass(frozen=True)
+class NotReported:
+    """A parameter that stands in no table, and why."""
+
+    name: str  # "stiffness", or "stribeck_friction.speed"
+    reason: str
+
+
+@dataclass(frozen=True)
+class Errors:
+    """How far a model is from the data; None where it cannot be said (no torque, no held-out samples)."""
+
+    residual_rms_torque: float | None
+    holdout_rate_rms: float | None  # free run against the measured rate (angle, for an encoder), held-out samples
+    holdout_fit_percent: float | None  # 100 (1 - |error| / |signal - mean|)
+    residual_torque_relative: float | None
+    holdout_torque_relative: float | None
+    lowpass_hz: float | None  # cut-off of the zero-phase low-pass behind the torque figures
+
+
+@dataclass(frozen=True)
+class ModelResult:
+    """One model: the declared one (before) or the one with what was added and dropped (after)."""
+
+    parameters: Mapping[str, ParameterEstimate]
+    effect_parameters: Mapping[str, Mapping[str, ParameterEstimate]]
+    error: Errors
+    dropped: tuple[NotReported, ...] = ()
+    not_determined: tuple[NotReported, ...] = ()
+    correlation: Mapping[str, float] = field(default_factory=dict)  # "inertia, stiffness" -> -0.98
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect that was tried on the model as it then stood."""
+
+    effect: str
+    round: int
+    delta_bic: float  # BIC with it minus BIC without: negative is better
+    holdout_rate_rms: float | None
+    status: str  # "added", "rival", "no better", "not tried further", ...
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the model lacked."""
+
+    effects: tuple[str, ...]
+    confusable_with: Mapping[str, tuple[str, ...]]
+    never_separable: Mapping[str, str]  # "actuator_lag / sensor_lag" -> why
+    unexplained_fraction: float
+    unexplained: bool
+    candidates: tuple[Candidate, ...]
+    sentences: tuple[str, ...]  # the verdict in words, one finding each
+    contribution: Mapping[str, float] = field(default_factory=dict)  # effect -> error without it / error with it
+
+
+@dataclass(frozen=True)
+class GeneticRun:
+    """How the genetic algorithm went (Eq. 12-14)."""
+
+    name: str  # the set, or "all sets"
+    parameters: Mapping[str, float]  # best individual, before any polish
+    closed_form: Mapping[str, float]
+    gap_percent: Mapping[str, float]  # best individual against the closed form
+    objective: float
+    j_dec: float
+    restarts: int
+    accepted: bool
+    history: Array  # best objective of every generation of the last repeat
+    roulette_only: Mapping[str, float]  # Eq. 13 without elitism
+    plain_objective: Mapping[str, float]  # e(k) as plain equation error
+
+
+@dataclass(frozen=True)
+class SetResult:
+    """One set (run) fitted for itself with the effects of the final model."""
+
+    name: str
+    frequency_hz: float | None
+    parameters: Mapping[str, ParameterEstimate]
+    objective: float
+    restarts: int
+    accepted: bool
+    identifiable: tuple[str, ...]
+    advice: str
+    genetic: GeneticRun | None = None
+
+
+@dataclass(frozen=True)
+class RunTraces:
+    """What the report draws of one run; all of shape (n,) and thinned nowhere."""
+
+    name: str
+    time_s: Array
+    measured: Array
+    channel: Literal["rate", "angle"]
+    keep: Array  # 1.0 where the sample counts
+    simulated_before: Array
+    simulated_after: Array
+    torque_residual_before: Array | None  # N m, behind the low-pass
+    torque_residual_after: Array | None
+    angle_rad: Array
+    rate_rad_s: Array
+    torque_nm: Array | None
+    holdout: Array  # 1.0 where the sample was held out
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """What no model can go below."""
+
+    residual_rms_torque: float | None
+    holdout_rate_rms: float
+    source: Literal["given", "estimated"]
+
+
+@dataclass(frozen=True)
+class Identification:
+    """Everything that came out of one recording."""
+
+    accepted: bool
+    reasons: tuple[str, ...]  # why not accepted, and what to run next
+    axis: Literal["rotary", "linear"]
+    before: ModelResult
+    verdict: Verdict
+    after: ModelResult | None
+    noise_floor: NoiseFloor
+    per_set: tuple[SetResult, ...]
+    joint: GeneticRun | None
+    traces: tuple[RunTraces, ...]
+    holdout_note: str
+    max_error_percent: Mapping[str, float] | None = None  # Eq. 15 over the sets
+    aborted: bool = False
+
+    @property
+    def final(self) -> ModelResult:
+        """The model that stands at the end."""
+        return self.after or self.before

@@ -1,0 +1,281 @@
+"""A run made ready for the fit: uniform time, the measured channel, smoothed motion, usable stretches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal
+
+import numba as nb
+import numpy as np
+from scipy import signal
+from scipy.interpolate import CubicSpline
+
+from identify.prefilter import held_pieces, linear_pieces, smooth_pieces
+from rig import effects
+from rig.dynamics import TorqueSignal
+from rig.dynamics.integrator import _call, _pointer, addresses, run_filter
+from rig.effects.base import Effect, Place
+from rig.recording.run import Array, Run
+
+UPSAMPLING = 4  # nonlinear torques have corners between samples
+SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than it tells
+LONGEST_FILL = 25  # missing samples that a spline may bridge
+STEP_PHASE_RAD = 0.06
+
+
+def noise_of(values: Array) -> float:
+    """One standard deviation of the white part of a signal, from the upper half of its spectrum.
+
+    The median of the periodogram there, over ln 2, is blind to lines and to a signal below; a third
+    difference first takes away what a steep low-frequency signal would leak.
+    """
+    if len(values) < 64:
+        return float(np.std(np.diff(values, 3)) / np.sqrt(20.0))
+    d = np.diff(values, 3)
+    spectrum = np.abs(np.fft.rfft(d * signal.windows.hann(len(d), sym=False))) ** 2
+    f = np.arange(len(spectrum)) / len(spectrum)  # of Nyquist
+    gain = (2.0 * np.sin(0.5 * np.pi * f)) ** 6
+    upper = (f > 0.5) & (f < 0.98)
+    level = np.median(spectrum[upper] / gain[upper]) / np.log(2.0)
+    return float(np.sqrt(level / (0.375 * len(d))))
+
+
+def bandwidth_of(values: Array, step_s: float) -> float:
+    """Highest frequency in Hz at which a signal stands clearly above its noise."""
+    nyquist = 0.5 / step_s
+    f, power = signal.welch(values, 1.0 / step_s, nperseg=min(len(values), 1024), detrend="linear")
+    floor = 2.0 * noise_of(values) ** 2 * step_s + 1e-300
+    above = np.nonzero(power > 12.0 * floor)[0]
+    highest = f[above[-1]] if len(above) else 0.05 * nyquist
+    return float(np.clip(1.5 * highest, 0.02 * nyquist, 0.8 * nyquist))
+
+
+@nb.njit(cache=True, error_model="numpy", nogil=True)
+def _along(kernel, angle, rate, time, torque, step, z, substeps, p, friction, soft, out):  # type: ignore[no-untyped-def]
+    """An effect's torque along a given motion; its states by the midpoint rule."""
+    n = len(angle)
+    states = len(z)
+    dz, mid = np.zeros(max(1, states)), np.zeros(max(1, states))
+    zz = np.zeros(max(1, states))
+    zz[:states] = z
+    pz, pd, pm, pp = _pointer(zz), _pointer(dz), _pointer(mid), _pointer(p)
+    h = step / substeps
+    for i in range(n):
+        w = rate[i]
+        if friction:
+            s = w / soft if abs(w) < soft else np.sign(w)
+            out[i] = s * _call(kernel, angle[i], abs(w), time[i], torque[i], pz, pd, pp)
+        else:
+            out[i] = _call(kernel, angle[i], w, time[i], torque[i], pz, pd, pp)
+        if states > 0 and i < n - 1:
+            for k in range(substeps):
+                u, v = k / substeps, (k + 0.5) / substeps
+                a0 = angle[i] + u * (angle[i + 1] - angle[i])
+                w0 = rate[i] + u * (rate[i + 1] - rate[i])
+                a1 = angle[i] + v * (angle[i + 1] - angle[i])
+                w1 = rate[i] + v * (rate[i + 1] - rate[i])
+                t = time[i] + u * step
+                _call(kernel, a0, w0, t, torque[i], pz, pd, pp)
+                for j in range(states):
+                    mid[j] = zz[j] + 0.5 * h * dz[j]
+                _call(kernel, a1, w1, t, torque[i], pm, pd, pp)
+                for j in range(states):
+                    zz[j] += h * dz[j]
+
+
+@dataclass
+class Trace:
+    """One run on a uniform grid of n samples.
+
+    Attributes
+    ----------
+    channel
+        "rate" (gyro) or "angle" (encoder): what is predicted, and whose noise is white.
+    measured
+        Shape (n,): that channel, small gaps bridged (they carry no weight).
+    keep
+        Shape (n,): samples that count.
+    stretches
+        First and last sample of each contiguous usable stretch; its start state is free.
+    """
+
+    run: Run
+    channel: Literal["rate", "angle"]
+    step_s: float
+    measured: Array
+    keep: Any
+    stretches: list[tuple[int, int]]
+    torque: TorqueSignal | None
+    noise: float
+    bias: float = 0.0
+    _series: dict[Any, Any] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """Number of samples that count."""
+        return int(np.sum(self.keep))
+
+    @cached_property
+    def measured_pieces(self) -> Array:
+        """The measured channel as a cubic spline."""
+        return smooth_pieces(self.measured, self.step_s)
+
+    @cached_property
+    def cutoff_hz(self) -> float:
+        """Cut-off of the zero-phase low-pass behind ``fine``."""
+        return bandwidth_of(self.measured, self.step_s)
+
+    @cached_property
+    def fine(self) -> tuple[Array, Array, Array, Array, float]:
+        """Angle, rate, time and torque, upsampled and smoothed, and the noise left in the rate."""
+        nyquist = 0.5 / self.step_s
+        wn = self.cutoff_hz / nyquist
+        y = self.measured - (self.bias if self.channel == "rate" else 0.0)
+        if wn < 0.8:
+            sos = signal.butter(3, wn, output="sos")
+            y = signal.sosfiltfilt(sos, y, padlen=min(len(y) - 1, int(10.0 / wn)))
+        t = self.step_s * np.arange(len(y))
+        fine_t = self.step_s / UPSAMPLING * np.arange((len(y) - 1) * UPSAMPLING + 1)
+        spline = CubicSpline(t, y)
+        if self.channel == "rate":
+            angle, rate = spline.antiderivative()(fine_t), spline(fine_t)
+            left = self.noise * np.sqrt(min(1.0, wn))
+            if self.run.angle_rad is not None:
+                angle = angle + np.median(np.interp(t + self.run.time_s[0], self.run.time_s, self.run.angle_rad) - angle[::UPSAMPLING])
+        else:
+            angle, rate = spline(fine_t), spline.derivative()(fine_t)
+            left = self.noise * 2.0 * np.pi * self.cutoff_hz / np.sqrt(3.0) * np.sqrt(min(1.0, wn))
+        torque = np.zeros_like(fine_t) if self.torque is None else self.torque.at(fine_t + self.run.time_s[0])
+        return angle, rate, fine_t, torque, float(left)
+
+    def torque_pieces(self, drive: tuple[tuple[str, tuple[float, ...]], ...]) -> tuple[Array, int] | None:
+        """Torque behind the given drive effects as polynomials, and how many of them a sample holds."""
+        if self.torque is None:
+            return None
+        key = ("torque", drive)
+        if key not in self._series:
+            self._series[key] = self._make_torque(drive)
+        return self._series[key]  # type: ignore[no-any-return]
+
+    def _make_torque(self, drive: tuple[tuple[str, tuple[float, ...]], ...]) -> tuple[Array, int]:
+        assert self.torque is not None
+        n = len(self.measured)
+        start = float(self.run.time_s[0])
+        held = self.torque.hold == "zero_order"
+        if not drive and not held:
+            return smooth_pieces(self.torque.at(start + self.step_s * np.arange(n)), self.step_s), 1
+        fine = self.step_s / UPSAMPLING
+        count = (n - 1) * UPSAMPLING
+        x = self.torque.on_half_steps(start, fine, count + 1)
+        for name, values in drive:
+            effect = effects.get(name)
+            size = effect.filter_states(fine, values) if effect.filter_states else 0
+            run_filter(
+                addresses([effect.kernel]), x, fine, np.zeros(size), np.array([0, size]),
+                np.array(values), np.array([0, len(values)]),
+            )  # fmt: skip
+        return (held_pieces(x[:count]) if held else linear_pieces(x, fine)), UPSAMPLING
+
+    def effect_pieces(self, effect: Effect, shape: tuple[float, ...], unit: int) -> Array | None:
+        """Torque of an effect with one linear parameter (or J, C, K: unit -3, -2, -1) at one, the rest at zero.
+
+        ``shape`` are the values of its shape parameters in declared order. None where that torque is zero.
+        """
+        key = (effect.name, shape, unit)
+        if key not in self._series:
+            if len(self._series) > 400:
+                self._series.clear()
+            self._series[key] = self._make_effect(effect, shape, unit)
+        return self._series[key]  # type: ignore[no-any-return]
+
+    def _make_effect(self, effect: Effect, shape: tuple[float, ...], unit: int) -> Array | None:
+        angle, rate, time, torque, left = self.fine
+        p = np.zeros(3 + len(effect.parameters))
+        shapes = iter(shape)
+        for i, parameter in enumerate(effect.parameters):
+            p[3 + i] = (1.0 if i == unit else 0.0) if parameter.linear else next(shapes)
+        if unit < 0:
+            p[3 + unit] = 1.0
+        z = np.array(effect.rest_state(angle[0], rate[0]) if effect.rest_state else np.zeros(effect.states), dtype=float)
+        fine = self.step_s / UPSAMPLING
+        substeps = 1
+        if effect.states and effect.fastest_rad_s:
+            full = (1.0, 0.0, 0.0, *(v if v else 1e-12 for v in p[3:]))
+            substeps = int(np.clip(np.ceil(fine * effect.fastest_rad_s(full) / STEP_PHASE_RAD), 1, 40))
+        out = np.empty_like(angle)
+        _along(
+            effect.kernel.address, angle, rate, time, torque, fine, z, substeps, p,
+            effect.place is Place.FRICTION, max(2.0 * left, 1e-12), out,
+        )  # fmt: skip
+        if not np.any(out):
+            return None
+        return linear_pieces(np.nan_to_num(out, posinf=0.0, neginf=0.0), fine)
+
+
+def _channel(run: Run) -> Literal["rate", "angle"]:
+    """The channel whose noise is the sensor's own: a rate that is a differenced angle is not one."""
+    if run.rate_rad_s is None:
+        return "angle"
+    if run.angle_rad is None:
+        return "rate"
+    step = float(np.median(np.diff(run.time_s)))
+    ok = run.valid & np.isfinite(run.rate_rad_s) & np.isfinite(run.angle_rad)
+    differenced = noise_of(np.diff(run.angle_rad[ok])) / step
+    return "rate" if noise_of(run.rate_rad_s[ok]) < 0.3 * differenced else "angle"
+
+
+def prepare(run: Run, noise: float | None = None) -> Trace:
+    """Lay a run on a uniform grid and find its usable stretches.
+
+    Parameters
+    ----------
+    noise
+        One standard deviation of the measured channel; estimated where None.
+    """
+    channel = _channel(run)
+    values = run.rate_rad_s if channel == "rate" else run.angle_rad
+    assert values is not None
+    good = run.valid & np.isfinite(values)
+    time = run.time_s - run.time_s[0]
+    spacing = np.diff(time)
+    step = float(np.median(spacing))
+    index = np.rint(time / step).astype(np.int64)
+    if np.max(np.abs(time / step - index)) < 0.02 * min(1.0, step / 1e-9):
+        step = float(time[-1] / index[-1])
+    n = int(index[-1]) + 1
+    grid = step * np.arange(n)
+    filled = np.asarray(CubicSpline(time[good], values[good])(grid), dtype=float)
+    keep = np.zeros(n, dtype=bool)
+    on_grid = good & (np.abs(time - step * index) < 0.5 * step)
+    keep[index[on_grid]] = True
+    gaps = _gaps(keep)
+    broken = np.zeros(n, dtype=bool)
+    for first, last in gaps:
+        if last - first + 1 > LONGEST_FILL:
+            broken[first : last + 1] = True
+    broken |= (grid < time[good][0] - 0.5 * step) | (grid > time[good][-1] + 0.5 * step)
+    torque = None
+    if run.torque_nm is not None and run.torque_time_s is not None:
+        torque = TorqueSignal(run.torque_time_s, run.torque_nm, run.torque_hold)
+    trace = Trace(
+        run, channel, step, filled, keep, [], torque, noise if noise is not None else noise_of(filled[~broken])
+    )
+    if run.min_rate_rad_s > 0.0:
+        slow = np.abs(trace.fine[1][::UPSAMPLING]) <= run.min_rate_rad_s
+        broken |= slow
+    trace.keep = keep & ~broken
+    trace.stretches = [
+        (a, b) for a, b in _gaps(broken) if b - a + 1 >= SHORTEST_STRETCH
+    ]
+    inside = np.zeros(n, dtype=bool)
+    for a, b in trace.stretches:
+        inside[a : b + 1] = True
+    trace.keep &= inside
+    return trace
+
+
+def _gaps(flags: Any) -> list[tuple[int, int]]:
+    """First and last index of every stretch of False."""
+    edges = np.diff(np.concatenate([[1], np.asarray(flags, dtype=np.int8), [1]]))
+    return list(zip(np.nonzero(edges == -1)[0].tolist(), (np.nonzero(edges == 1)[0] - 1).tolist(), strict=True))
