@@ -1,0 +1,175 @@
+"""The emulated bench: platform, gyroscope on one pseudo terminal, CAN adapter with a drive on another.
+
+One thread, woken by bytes from the host and by the gyro's own clock. Torque changes take effect at the
+instant their frame was read; the platform is then integrated up to each gyro sample.
+"""
+
+from __future__ import annotations
+
+import select
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from drivers.codecs.lawicel import CanFrame
+from rig.config.root import Config
+from rig.errors import ConfigError
+from sim_backend.emulators.adapter import LawicelAdapter
+from sim_backend.emulators.device import EmulatedDrive, Event
+from sim_backend.emulators.drive import Cia402Drive
+from sim_backend.emulators.gyro import GYROS, AnyGyro, GyroSettings, flat_low_pass
+from sim_backend.emulators.odrive import OdriveAxis
+from sim_backend.emulators.pty_port import PtyPort
+from sim_backend.emulators.world import World
+
+WORLD_STEPS_PER_SAMPLE = 5
+LONGEST_SLEEP_S = 0.002
+DEFAULT_BAUD, DEFAULT_RATE_HZ = 921_600, 2000.0
+
+
+def _make_gyro(config: Config) -> AnyGyro:
+    assert config.bench is not None
+    gyro, truth = config.bench.gyroscope, config.simulated.gyro
+    if gyro.device not in GYROS:
+        raise ConfigError(f"bench.gyroscope.device: {gyro.device!r} has no emulator; emulated are {', '.join(GYROS)}")
+    return GYROS[gyro.device](
+        GyroSettings(
+            sample_rate_hz=gyro.sample_rate_hz or DEFAULT_RATE_HZ,
+            baud=gyro.baud or DEFAULT_BAUD,
+            axis=gyro.axis,
+            invert=gyro.invert,
+            noise_deg_s=truth.noise_deg_s,
+            bias_deg_s=truth.bias_deg_s,
+            drift_ppm=config.bench.emulator.gyro_drift_ppm,
+            start_up_s=config.bench.emulator.start_up_s,
+            seed=config.simulated.seed,
+            settings=gyro.settings,
+        )
+    )
+
+
+def _make_cia402(config: Config) -> EmulatedDrive:
+    assert config.bench is not None
+    e = config.bench.emulator
+    return Cia402Drive(config.bench.amplifier.node, e.rated_torque_nm, e.peak_torque_nm)
+
+
+def _make_odrive(config: Config) -> EmulatedDrive:
+    assert config.bench is not None
+    amplifier = config.bench.amplifier
+    constant = float(amplifier.settings.get("torque_constant_nm_a", 1.0) or 1.0)
+    peak = config.bench.emulator.peak_torque_nm
+    return OdriveAxis(amplifier.node, peak, constant, amplifier.watchdog_ms * 1e-3)
+
+
+DRIVES: dict[str, Callable[[Config], EmulatedDrive]] = {"cia402": _make_cia402, "odrive": _make_odrive}
+"""Emulated drives by the name of the driver that commands them."""
+
+
+def _make_drive(config: Config) -> EmulatedDrive:
+    assert config.bench is not None
+    device = config.bench.amplifier.device
+    if device not in DRIVES:
+        raise ConfigError(f"bench.amplifier.device: {device!r} has no emulator; emulated are {', '.join(DRIVES)}")
+    return DRIVES[device](config)
+
+
+class EmulatedBench:
+    """Both devices and the platform between them.
+
+    Parameters
+    ----------
+    config
+        A whole configuration with a `bench` section; truth and noise come from its `simulated` section.
+    on_event
+        Called with every event of the drive, as it happens.
+    clock
+        The host's monotonic clock in seconds.
+
+    Raises
+    ------
+    ConfigError
+        If the devices named there have no emulator.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        on_event: Callable[[Event], None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        if config.bench is None:
+            raise ConfigError("there is no `bench` section to emulate: add one that names the devices")
+        self._gyro, self._drive = _make_gyro(config), _make_drive(config)
+        emulator = config.bench.emulator
+        rate_hz = config.bench.gyroscope.sample_rate_hz or DEFAULT_RATE_HZ
+        self._period_s = 1.0 / rate_hz / (1.0 + emulator.gyro_drift_ppm * 1e-6)
+        self._delay_s = emulator.drive_delay_ms * 1e-3
+        self._sign = (-1.0 if config.bench.amplifier.invert else 1.0) * config.bench.amplifier.gear_ratio
+        self._on_event, self._clock = on_event, clock
+        step_s = self._period_s / WORLD_STEPS_PER_SAMPLE
+        self._kernel = flat_low_pass(self._gyro.group_delay_s, self._gyro.filter_hz, step_s)
+        self._window = np.zeros(2 * len(self._kernel))
+        self._slot = 0
+        self._adapter = LawicelAdapter(self._from_host, clock)
+        self.gyro_port, self.can_port = PtyPort(), PtyPort()
+        self._now_s = self._start_s = clock() + 0.05
+        self._world = World(config.simulated.platform.platform(), self._start_s, step_s)
+        self._samples = 0
+        self._shaft_nm = 0.0
+
+    def _from_host(self, frame: CanFrame) -> None:
+        self._drive.receive(frame, self._now_s)
+
+    def run(self, stop: Callable[[], bool]) -> None:
+        """Emulate until ``stop()``, asked at least every 2 ms."""
+        gyro, can = self.gyro_port.fileno(), self.can_port.fileno()
+        lag_s = self._gyro.latency_s + self._gyro.transmission_s
+        while not stop():
+            due_s = self._start_s + (self._samples + 1) * self._period_s + lag_s
+            wait_s = min(max(due_s - self._clock(), 0.0), LONGEST_SLEEP_S)
+            readable = select.select([can, gyro], [], [], wait_s)[0]
+            self._now_s = self._clock()
+            if can in readable:
+                answer = self._adapter.feed(self.can_port.read())
+                self._serve_drive(answer)
+            else:
+                self._serve_drive(b"")
+            if gyro in readable:
+                self._gyro.command(self.gyro_port.read())
+            self._send_samples(lag_s)
+
+    def _serve_drive(self, answer: bytes) -> None:
+        now_s = self._now_s
+        self._drive.tick(now_s)
+        shaft_nm = self._sign * self._drive.torque_nm
+        if shaft_nm != self._shaft_nm:
+            self._shaft_nm = shaft_nm
+            self._world.change_torque(now_s + self._delay_s, shaft_nm)
+        out = answer + b"".join(self._adapter.to_host(frame) for frame in self._drive.take_frames())
+        if out:
+            self.can_port.write(out)
+        for event in self._drive.take_events(now_s):
+            self._on_event(event)
+
+    def _send_samples(self, lag_s: float) -> None:
+        while self._start_s + (self._samples + 1) * self._period_s + lag_s <= self._now_s:
+            for _ in range(WORLD_STEPS_PER_SAMPLE):
+                self._remember(self._world.step())
+            self._samples += 1
+            self.gyro_port.write(self._gyro.sample(self._filtered()))
+
+    def _remember(self, rate_rad_s: float) -> None:
+        # Written twice, so that the last len(kernel) values always stand side by side.
+        n = len(self._kernel)
+        self._window[self._slot] = self._window[self._slot + n] = rate_rad_s
+        self._slot = (self._slot + 1) % n
+
+    def _filtered(self) -> float:
+        return float(self._kernel @ self._window[self._slot : self._slot + len(self._kernel)])
+
+    def close(self) -> None:
+        """Unplug both devices."""
+        self.gyro_port.close()
+        self.can_port.close()

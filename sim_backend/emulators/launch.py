@@ -1,0 +1,106 @@
+"""Start the emulators in a process of their own, hand out their ports, and always stop them."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from rig.config.root import Config
+from rig.errors import DeviceFault
+
+START_TIMEOUT_S = 60.0
+STOP_TIMEOUT_S = 3.0
+
+
+@dataclass(frozen=True)
+class Emulators:
+    """Running emulators: their ports and what their drive has done so far."""
+
+    gyro: str
+    can: str
+    process: subprocess.Popen[bytes]
+
+    def events(self) -> list[dict[str, object]]:
+        """Events since the last call, oldest first; never waits."""
+        lines = b""
+        assert self.process.stdout is not None
+        descriptor = self.process.stdout.fileno()
+        while select.select([descriptor], [], [], 0)[0]:
+            part = os.read(descriptor, 65_536)
+            if not part:
+                break
+            lines += part
+            while not lines.endswith(b"\n"):
+                lines += os.read(descriptor, 65_536)
+        return [json.loads(line) for line in lines.splitlines()]
+
+
+def on_emulated_ports(config: Config, emulators: Emulators) -> Config:
+    """The same configuration with the emulators' ports in the place of those in the file."""
+    assert config.bench is not None
+    gyroscope = config.bench.gyroscope.model_copy(update={"port": emulators.gyro})
+    can = config.bench.amplifier.can.model_copy(
+        update={"interface": "slcan_bulk", "channel": emulators.can, "options": {}}
+    )
+    amplifier = config.bench.amplifier.model_copy(update={"can": can})
+    bench = config.bench.model_copy(update={"gyroscope": gyroscope, "amplifier": amplifier})
+    return config.model_copy(update={"bench": bench})
+
+
+@contextmanager
+def started(config: Config) -> Iterator[Emulators]:
+    """Emulators of the devices in ``config.bench``; stopped on every way out.
+
+    Raises
+    ------
+    DeviceFault
+        If they do not come up, with what they said.
+    """
+    process = subprocess.Popen(
+        [sys.executable, "-m", "sim_backend.emulators.process"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        bufsize=0,
+        start_new_session=True,  # Ctrl-C concerns the campaign: the drive stays there to be switched off
+    )
+    try:
+        yield _listening(process, config)
+    finally:
+        _stop(process)
+
+
+def _listening(process: subprocess.Popen[bytes], config: Config) -> Emulators:
+    assert process.stdin is not None and process.stdout is not None and process.stderr is not None
+    process.stdin.write(config.model_dump_json().encode())
+    process.stdin.close()
+    deadline = time.monotonic() + START_TIMEOUT_S
+    while time.monotonic() < deadline:
+        if select.select([process.stdout], [], [], 0.1)[0]:
+            line = process.stdout.readline()
+            if line:
+                ports = json.loads(line)
+                return Emulators(ports["gyro"], ports["can"], process)
+            break
+    process.kill()
+    said = process.stderr.read().decode(errors="replace").strip()
+    raise DeviceFault(f"the emulators did not start: {said[-2000:] or 'they said nothing'}")
+
+
+def _stop(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.wait(STOP_TIMEOUT_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    for stream in (process.stdout, process.stderr):
+        if stream is not None:
+            stream.close()

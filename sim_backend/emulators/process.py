@@ -1,0 +1,72 @@
+"""The emulators' own process: ``python -m sim_backend.emulators.process`` with a configuration on stdin."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+from types import FrameType
+
+from rig import realtime
+from rig.config.root import Config
+from rig.errors import RigError
+from sim_backend.emulators.bench import EmulatedBench
+from sim_backend.emulators.device import Event
+
+PRIORITY_ABOVE_THE_LOOP = 5
+
+
+def _say(line: dict[str, object]) -> None:
+    sys.stdout.write(json.dumps(line) + "\n")
+    sys.stdout.flush()
+
+
+def run_emulators(config: Config) -> None:
+    """Emulate the devices of the configuration's `bench` section until SIGINT or SIGTERM.
+
+    Prints one JSON line with the ports, then one for each event of the drive.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such section, or a device without emulator.
+    """
+    stopping = False
+
+    def stop(_signal: int, _frame: FrameType | None) -> None:
+        nonlocal stopping
+        stopping = True
+
+    def tell(event: Event) -> None:
+        nonlocal stopping
+        try:
+            _say(event.as_json())
+        except OSError:
+            stopping = True  # nobody listens any more
+
+    bench = EmulatedBench(config, tell)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
+    assert config.bench is not None
+    priority = config.bench.real_time.priority
+    realtime.acquire(priority + PRIORITY_ABOVE_THE_LOOP if priority else 0, lock_memory=False)
+    try:
+        _say({"event": "listening", "gyro": bench.gyro_port.path, "can": bench.can_port.path})
+        bench.run(lambda: stopping)
+    finally:
+        bench.close()
+        realtime.release()
+
+
+def main() -> int:
+    """Read the configuration as JSON from stdin and emulate; errors go to stderr as plain text."""
+    try:
+        run_emulators(Config.model_validate_json(sys.stdin.read()))
+    except RigError as problem:
+        sys.stderr.write(f"{problem}\n")
+        return problem.exit_code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

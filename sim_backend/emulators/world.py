@@ -1,0 +1,57 @@
+"""The platform in real time: torque that changes at any instant, rate at the instants of the gyro."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from rig.platform import Platform
+from sim_backend.plant import RATE, SENSED, Plant
+
+
+class World:
+    """A plant on a fixed grid of host time, driven by a torque that is held between changes.
+
+    A change within a step counts by its share of the step, so that the impulse on the shaft is exact
+    wherever on the grid it falls.
+
+    Parameters
+    ----------
+    platform
+        The truth, with the effects that nobody declared.
+    start_s
+        Host time of the first grid point; the platform is at rest there.
+    step_s
+        Grid spacing in seconds of host time.
+    """
+
+    def __init__(self, platform: Platform, start_s: float, step_s: float) -> None:
+        self._plant = Plant(platform, step_s)
+        self._parts = self._plant.parts
+        self._start_s = start_s
+        self._step_s = step_s
+        self._at = 0
+        self._torque_nm = 0.0
+        self._changes: deque[tuple[float, float]] = deque()
+        self.rate_rad_s = 0.0
+        self.sensed_rad_s = 0.0
+        self._plant.hold(0.0, self._parts)  # compiles, or loads what was compiled, before time counts
+
+    def change_torque(self, time_s: float, torque_nm: float) -> None:
+        """The torque from ``time_s`` on; calls come in the order of their times."""
+        self._changes.append((time_s, torque_nm))
+
+    def step(self) -> float:
+        """Advance by one grid step; the rate behind the sensor effects at its end, in rad/s."""
+        begin_s = self._start_s + self._at * self._step_s
+        end_s = begin_s + self._step_s
+        mean_nm = self._torque_nm
+        while self._changes and self._changes[0][0] < end_s:
+            time_s, torque_nm = self._changes.popleft()
+            share = (end_s - max(time_s, begin_s)) / self._step_s
+            mean_nm += (torque_nm - self._torque_nm) * share
+            self._torque_nm = torque_nm
+        rows = self._plant.hold(mean_nm, self._parts)
+        self._at += 1
+        last = rows[self._parts - 1]
+        self.rate_rad_s, self.sensed_rad_s = float(last[RATE]), float(last[SENSED])
+        return self.sensed_rad_s
