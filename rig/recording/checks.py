@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from rig.errors import RecordingError
 from rig.recording.consistency import check_angle_against_rate, check_time_unit
 from rig.recording.readers.base import Table
-from rig.recording.run import Array, Run
+from rig.recording.run import Array, Run, TorqueHold, Use
 
 MIN_SAMPLES = 20
 # No torque, rate, angle or time of a machine in SI units comes near; squares of it would overflow.
@@ -62,6 +63,7 @@ def check_run(run: Run, path: Path, scales_given: Collection[str] = ()) -> Run:
     ``scales_given`` names the quantities whose factor the user stated: a stated time scale is believed.
     Raises RecordingError.
     """
+    _check_fields(run, path)
     _check_order(run.time_s, path)
     _check_own_numbers(run, path)
     count = int(run.valid.sum())
@@ -91,6 +93,19 @@ def _check_order(time_s: Array, path: Path) -> None:
         f"{path}: time is not sorted: {after!s} s at sample {i + 1} follows {before!s} s "
         f"({(step < 0).sum()} such steps): sort the rows, or give each recording its own file"
     )
+
+
+def _check_fields(run: Run, path: Path) -> None:
+    """Lengths and words of a run that was read as such: the file may have been changed since it was written."""
+    sampled = (run.valid, run.rate_rad_s, run.angle_rad, *run.channels.values())
+    lengths = {array.shape for array in sampled if array is not None} | {run.time_s.shape}
+    torque = {array.shape for array in (run.torque_time_s, run.torque_nm) if array is not None}
+    known = run.use in get_args(Use) and run.torque_hold in get_args(TorqueHold)
+    numbers = (run.min_rate_rad_s, run.added_inertia_kg_m2, run.frequency_hz or 0.0)
+    if len(lengths) > 1 or len(torque) > 1 or run.time_s.ndim != 1:
+        raise RecordingError(f"{path}: run {run.name!r}: columns of different length: export it again")
+    if (run.torque_nm is None) != (run.torque_time_s is None) or not known or not np.isfinite(numbers).all():
+        raise RecordingError(f"{path}: run {run.name!r} was changed after it was written: export it again")
 
 
 def _check_own_numbers(run: Run, path: Path) -> None:

@@ -24,7 +24,8 @@ FORMAT = "isp-rig recording"
 VERSION = 1
 _ARRAYS = ("time_s", "valid", "rate_rad_s", "angle_rad", "torque_time_s", "torque_nm")
 _VALUES = ("name", "torque_hold", "use", "min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz")
-_DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError)
+# What h5py raises over a damaged file; a link that leads nowhere reads as None.
+_DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError)
 
 
 def write_recording_h5(path: str | Path, recording: Recording, journal: JournalContents | None = None) -> None:

@@ -15,7 +15,7 @@ from rig.recording import hdf5
 from rig.recording.readers.base import MAX_SAMPLES, Table, read_each, too_long
 from rig.recording.run import Run
 
-_DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError)
+_DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, MemoryError)
 
 
 def read(path: Path) -> Sequence[Table | Run]:

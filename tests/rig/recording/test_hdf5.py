@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -92,6 +93,25 @@ def test_columns_make_no_sense_for_our_own_file(tmp_path: Path) -> None:
     write_recording_h5(tmp_path / "recording.h5", recording())
     with pytest.raises(RecordingError, match=r"SI units under its own names: leave recorded\.columns"):
         read(tmp_path, "recording.h5", "  scale: {torque: 2}\n")
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        ({"use": "maybe"}, "was changed after it was written"),
+        ({"torque_hold": "?"}, "was changed after it was written"),
+        ({"frequency_hz": float("nan")}, "was changed after it was written"),
+        ({"torque_time_s": None}, "was changed after it was written"),
+        ({"rate_rad_s": np.ones(3)}, "columns of different length"),
+        ({"rate_rad_s": np.full(2000, np.nan)}, "rate at sample 0 is nan though valid"),
+        ({"torque_nm": np.full(2000, np.inf)}, "a torque is not a number"),
+    ],
+)
+def test_our_own_file_is_checked_like_any_other(tmp_path: Path, change: dict[str, Any], cause: str) -> None:
+    run = replace(recording().runs[0], **change)
+    write_recording_h5(tmp_path / "recording.h5", Recording((run,)))
+    with pytest.raises(RecordingError, match=cause):
+        read(tmp_path, "recording.h5")
 
 
 def test_an_existing_file_is_never_overwritten(tmp_path: Path) -> None:
