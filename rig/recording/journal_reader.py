@@ -128,9 +128,12 @@ def read_journal(path: str | Path) -> JournalContents:
                 good = position
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}; check the path") from error
-    except (ValueError, TypeError, KeyError, IndexError, struct.error) as error:
-        raise RecordingError(f"{path}: a frame at byte {good} is not what this version writes ({error})") from error
-    if header is None:
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError, struct.error) as error:
+        raise RecordingError(
+            f"{path}: the frame at byte {good} is not what this version writes ({error}): "
+            "read it with the version that wrote it"
+        ) from error
+    if not isinstance(header, dict):
         raise RecordingError(f"{path}: not a journal of this program: give the .journal file of a results folder")
     return JournalContents(header, tuple(r.done() for r in runs), tuple(events), closed, size - good)
 

@@ -45,8 +45,9 @@ def read_recording(loaded: LoadedConfig) -> Recording:
     wrong: list[str] = []
     sources: list[Path] = []
     for entry in section.runs:
-        path = loaded.folder / Path(entry.file).expanduser()
+        path = loaded.folder / Path(entry.file)
         try:
+            path = _expanded(loaded.folder, entry.file)
             found = runs_of_file(path, entry, section)
         except RecordingError as error:
             wrong.append(str(error))
@@ -59,6 +60,13 @@ def read_recording(loaded: LoadedConfig) -> Recording:
         raise RecordingError("\n".join(dict.fromkeys(wrong)))
     info = {"backend": "recorded", "files": [str(path) for path in sources], "config_text": loaded.text}
     return Recording(_named_apart(runs), axis=section.axis, noise=section.noise, info=info)
+
+
+def _expanded(folder: Path, file: str) -> Path:
+    try:
+        return folder / Path(file).expanduser()
+    except RuntimeError as error:
+        raise RecordingError(f"{file}: ~ means no home folder here ({error}): give the whole path") from error
 
 
 def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> list[Run]:

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from rig.config.load import load_config
+from rig.errors import RecordingError
 from rig.recording.load import read_recording
 from rig.recording.run import Recording
 
@@ -36,3 +38,12 @@ def read(folder: Path, file: str, options: str = "", entry: str = "") -> Recordi
     yaml = folder / "rig.yaml"
     yaml.write_text(f"backend: recorded\nrecorded:\n{options}  runs:\n    - file: {file}\n{entry}")
     return read_recording(load_config(yaml))
+
+
+def refusal(folder: Path, file: str, options: str = "", entry: str = "") -> str:
+    """The message with which a recording is refused; it names the file and means exit code 2."""
+    with pytest.raises(RecordingError) as error:
+        read(folder, file, options, entry)
+    assert error.value.exit_code == 2
+    assert file in str(error.value)
+    return str(error.value)

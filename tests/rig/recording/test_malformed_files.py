@@ -1,4 +1,4 @@
-"""Every recording that cannot be read or trusted is refused with its cause and its cure."""
+"""Every file that cannot be read is refused with its cause and its cure."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ import numpy as np
 import pytest
 import scipy.io
 
-from rig.errors import RecordingError
-from rig.recording.journal import Journal
+from rig.recording.journal import HEADER, RUN, Journal, frame
 from rig.recording.readers import mat
-from tests.rig.recording.support import csv_of, motion, read
+from tests.rig.recording.support import csv_of, motion, refusal
 
 Columns = dict[str, Any]
 
@@ -33,179 +32,7 @@ def without(*names: str) -> Columns:
     return {name: values for name, values in motion().items() if name not in names}
 
 
-def with_value(column: str, index: int, value: float) -> Columns:
-    columns = motion()
-    columns[column] = columns[column].copy()
-    columns[column][index] = value
-    return columns
-
-
 T = motion()["time_s"]
-
-# columns of run.npz, keys of `recorded`, keys of the run, then what the message has to say: cause, cure
-ARRAYS: dict[str, tuple[Columns, str, str, str, str]] = {
-    "no time": (without("time_s"), "", "", "no column 'time_s'", "recorded.columns.time"),
-    "neither rate nor angle": (
-        without("rate_rad_s", "angle_rad"),
-        "",
-        "",
-        "no column 'rate_rad_s' or 'rate_deg_s' or 'angle_rad' or 'angle_deg' (it has: time_s, torque_nm)",
-        "recorded.columns.rate",
-    ),
-    "misspelt time": (
-        {"times": T, **without("time_s")},
-        "",
-        "",
-        "no column 'time_s', did you mean 'times'?",
-        "recorded.columns.time",
-    ),
-    "mapped column missing": (
-        motion(),
-        "  columns: {torque: torque}\n",
-        "",
-        "no column 'torque', did you mean 'torque_nm'?",
-        "correct recorded.columns.torque",
-    ),
-    "NaN": (with_value("torque_nm", 7, np.nan), "", "", "index 7: torque is nan", "mark the row valid = 0"),
-    "infinite": (with_value("rate_rad_s", 9, -np.inf), "", "", "index 9: rate is -inf", "delete the row"),
-    "NaN in time": (with_value("time_s", 3, np.nan), "", "", "index 3: time is nan", "correct it"),
-    "absurd value": (with_value("rate_rad_s", 9, 1e300), "", "", "rate is 1e+300", "correct it"),
-    "unsorted time": (with_value("time_s", 5, 0.0015), "", "", "time is not sorted", "sort the rows"),
-    "duplicate time": (with_value("time_s", 5, 0.004), "", "", "samples 4 and 5 have the same time", "more digits"),
-    "time in ms": (changed(time_s=T * 1e3), "", "", "time is in milliseconds", "recorded.scale.time: 0.001"),
-    "time in ms, rate only": (
-        {k: v for k, v in changed(time_s=T * 1e3).items() if k != "angle_rad"},
-        "",
-        "",
-        "the time looks like milliseconds",
-        "recorded.scale.time: 0.001; if it is in seconds, say so",
-    ),
-    "time in us, rate only": (
-        {k: v for k, v in changed(time_s=T * 1e6).items() if k != "angle_rad"},
-        "",
-        "",
-        "the time looks like microseconds",
-        "recorded.scale.time: 0.000001",
-    ),
-    "two samples": (
-        {k: v[:2] for k, v in motion().items()},
-        "",
-        "",
-        "2 valid samples, at least 20",
-        "record longer",
-    ),
-    "no samples": ({k: v[:0] for k, v in motion().items()}, "", "", "0 valid samples", "record longer"),
-    "all samples lost": (changed(valid=np.zeros(500)), "", "", "0 valid samples", "record longer"),
-    "nothing happens": (
-        {"time_s": T, "torque_nm": np.full(500, 2.0), "rate_rad_s": np.full(500, 0.3)},
-        "",
-        "",
-        "the rate never changes (0.3) and the torque is constant too",
-        "record a run in which the torque changes",
-    ),
-    "stuck sensor": (
-        {**without("angle_rad"), "rate_rad_s": np.zeros(500)},
-        "",
-        "",
-        "the rate never changes (0) though the torque does",
-        "check that the sensor was connected",
-    ),
-    "at rest without torque": (
-        {"time_s": T, "angle_rad": np.zeros(500)},
-        "",
-        "",
-        "the angle never changes (0) and there is no torque",
-        "record a run",
-    ),
-    "angle in degrees": (
-        changed(angle_rad=np.degrees(motion()["angle_rad"])),
-        "",
-        "",
-        "57.3 times as fast as the rate says; probably the angle is in degrees",
-        "recorded.scale.angle: 0.0174533",
-    ),
-    "rate in degrees": (
-        changed(rate_rad_s=np.degrees(motion()["rate_rad_s"])),
-        "",
-        "",
-        "the rate is in degrees per second",
-        "recorded.scale.rate: 0.0174533",
-    ),
-    "rate reversed": (
-        changed(rate_rad_s=-motion()["rate_rad_s"]),
-        "",
-        "",
-        "opposite signs",
-        "recorded.scale.rate: -1",
-    ),
-    "rate in rpm": (
-        changed(rate_rad_s=motion()["rate_rad_s"] * 30 / np.pi),
-        "",
-        "",
-        "turns per minute",
-        "recorded.scale.rate: 0.10472",
-    ),
-    "rate off by 1.3": (
-        changed(rate_rad_s=motion()["rate_rad_s"] / 1.3),
-        "",
-        "",
-        "1.3 times as fast",
-        "recorded.scale.rate: 1.3",
-    ),
-    "angle wraps": (
-        changed(angle_rad=np.mod(30 * T + np.pi, 2 * np.pi) - np.pi, rate_rad_s=np.full(500, 30.0) + T),
-        "",
-        "",
-        "jumps by a whole turn",
-        "unwrap it",
-    ),
-    "columns of different length": (
-        changed(torque_nm=np.ones(499)),
-        "",
-        "",
-        "different length (time 500, torque 499, rate 500, angle 500)",
-        "one value a sample",
-    ),
-    "complex": (changed(torque_nm=np.ones(500) * 1j), "", "", "complex numbers", "save its real part"),
-    "text array": (changed(torque_nm=np.array(["1.0"] * 500)), "", "", "not numbers", "save it as numbers"),
-    "structured": (
-        changed(torque_nm=np.zeros(500, dtype=[("a", float), ("b", float)])),
-        "",
-        "",
-        "a structure of a, b",
-        "its own array",
-    ),
-    "two-dimensional": (changed(torque_nm=np.ones((500, 3))), "", "", "shape (500, 3)", "an array of its own"),
-    "single number": (changed(torque_nm=np.float64(1)), "", "", "a single number", "one value a sample"),
-    "window outside": (
-        motion(),
-        "",
-        "      from_s: 3\n",
-        "no sample between from_s = 3",
-        "the file runs from 0 to 0.499 s",
-    ),
-    "window too narrow": (motion(), "", "      to_s: 0.005\n", "6 valid samples", "widen from_s and to_s"),
-    "valid is NaN": (changed(valid=np.full(500, np.nan)), "", "", "valid is empty", "write 1 for a good sample"),
-}
-
-
-def refusal(folder: Path, file: str, options: str = "", entry: str = "") -> str:
-    with pytest.raises(RecordingError) as error:
-        read(folder, file, options, entry)
-    assert error.value.exit_code == 2
-    assert file in str(error.value)
-    return str(error.value)
-
-
-@pytest.mark.parametrize("case", ARRAYS)
-def test_arrays_that_cannot_be_trusted_are_refused(tmp_path: Path, case: str) -> None:
-    columns, options, entry, cause, cure = ARRAYS[case]
-    np.savez(tmp_path / "run.npz", **columns)
-    message = refusal(tmp_path, "run.npz", options, entry)
-    assert cause in message
-    assert cure in message
-
-
 GOOD = csv_of(motion())
 LINES = GOOD.splitlines()
 
@@ -310,6 +137,14 @@ def h5_link_elsewhere(path: Path) -> None:
         other["rate_rad_s"] = motion()["rate_rad_s"]
 
 
+def foreign_journal(path: Path) -> None:
+    """Sound frames with other contents than ours."""
+    journal = Journal.create(path, {})
+    journal.begin_run("r", {}, {"samples": ("t", "w")})
+    journal.append("samples", (0.0, 1.0))
+    journal.close()
+
+
 FILES: dict[str, tuple[str, Callable[[Path], Any], str, str]] = {
     "empty": ("run.csv", lambda p: p.write_bytes(b""), "the file is empty", "export the recording again"),
     "folder": ("run.csv", lambda p: p.mkdir(), "is a folder", "name one file of it"),
@@ -332,6 +167,19 @@ FILES: dict[str, tuple[str, Callable[[Path], Any], str, str]] = {
     "hdf5 with values elsewhere": ("run.h5", h5_elsewhere, "keeps its values in another file", "copy them"),
     "hdf5 that links elsewhere": ("run.h5", h5_link_elsewhere, "no column 'rate_rad_s'", "recorded.columns"),
     "no journal": ("run.journal", lambda p: p.write_text(GOOD), "not a journal", "results folder"),
+    "header that is a list": (
+        "run.journal",
+        lambda p: p.write_bytes(frame(HEADER, b"[]")),
+        "not a journal",
+        "results folder",
+    ),
+    "frame that is no JSON": (
+        "run.journal",
+        lambda p: p.write_bytes(frame(HEADER, b"{}") + frame(RUN, b"[" * 100_000)),
+        "not what this version writes",
+        "the version that wrote it",
+    ),
+    "journal of another program": ("run.journal", foreign_journal, "not what this version writes", "wrote it"),
     "journal without samples": (
         "run.journal",
         lambda p: Journal.create(p, {}).close(),
@@ -368,6 +216,12 @@ def test_a_device_is_refused(tmp_path: Path) -> None:
     if not Path("/dev/zero").exists():
         pytest.skip("no /dev/zero on this system")
     assert "no regular file" in refusal(tmp_path, "/dev/zero")
+
+
+def test_a_home_that_does_not_exist_is_said(tmp_path: Path) -> None:
+    message = refusal(tmp_path, "~no-such-user-here/run.csv")
+    assert "~ means no home folder" in message
+    assert "give the whole path" in message
 
 
 def test_all_wrong_files_are_said_at_once(tmp_path: Path) -> None:
