@@ -22,11 +22,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
-from rig.recording.run import Array, TorqueHold
+from rig.recording.run import TorqueHold
 
-TorqueOfTime = Callable[[Array], Array]  # seconds since the start of the set -> N m, same shape
+TorqueOfTime = Callable[[Any], Any]  # seconds since the start of the set (float or array) -> N m, same shape
 NO_CHANNELS: Mapping[str, float] = {}
 
 

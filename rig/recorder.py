@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,7 +100,11 @@ class SetRecorder:
             columns = {"ticks": ("time_s", "late_s", *self._channel_names)}
             self._journal.begin_run(self._planned.name, meta, columns)
             self._open = True
-        tables = (("samples", self._samples), ("commands", self._commands), ("ticks", self._ticks))
+        tables: tuple[tuple[str, Sequence[tuple[float, ...]]], ...] = (
+            ("samples", self._samples),
+            ("commands", self._commands),
+            ("ticks", self._ticks),
+        )
         for i, (kind, rows) in enumerate(tables):
             if len(rows) > self._written[i]:
                 self._journal.append(kind, np.array(rows[self._written[i] :], dtype=float))

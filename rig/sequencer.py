@@ -119,6 +119,7 @@ class Sequencer:
         Any other exception passes through once torque is off; the journal then has the samples.
         """
         cause: RigError | None = None
+        self._runs, self._statistics = [], []
         try:
             with _without_collector(), self._rig.opened(), self._rig.armed():
                 self._guard.begin(self._clock.now_s(), Rest())

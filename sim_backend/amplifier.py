@@ -78,7 +78,7 @@ class Ideal(Amplifier):
         if not self._block_first <= at <= at + 2 * n <= self._block_first + len(self._block):
             assert self._torque is not None
             count = np.arange(at, at + max(BLOCK, 2 * n))
-            self._block = np.asarray(self._torque(0.5 * self._step_s * count), dtype=float)
+            self._block = np.asarray(self._torque(0.5 * self._step_s * count), dtype=np.float64)
             self._block_first = at
         skip = at - self._block_first
         return self._block[skip : skip + 2 * n]
