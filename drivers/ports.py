@@ -19,6 +19,7 @@ from rig.errors import DeviceFault
 
 POSIX = sys.platform != "win32"
 _BULK = 65_536
+_ONE_READ = 2048
 
 
 class BytePort(Protocol):
@@ -92,8 +93,15 @@ class SerialPort:
         """Everything that has arrived; never waits."""
         if self._fd is None:
             return self._read_through_pyserial()
+        data = part = self._read_once(self._fd)
+        while len(part) >= _ONE_READ:  # a tty hands out at most 4095 bytes at a time
+            part = self._read_once(self._fd)
+            data += part
+        return data
+
+    def _read_once(self, fd: int) -> bytes:
         try:
-            data = os.read(self._fd, _BULK)
+            data = os.read(fd, _BULK)
         except BlockingIOError:
             return b""
         except OSError as problem:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Sequence
 from typing import Any
 
 import can
@@ -166,20 +167,32 @@ class SlcanBulkBus(can.BusABC):
         can.CanOperationError
             If an earlier frame was refused or stayed unanswered, or the adapter is stalled or gone.
         """
-        line = lawicel.encode_frame(
-            CanFrame(
-                msg.arbitration_id, bytes(msg.data), msg.is_extended_id, msg.is_remote_frame, msg.dlc
-            )
-        )
+        frame = CanFrame(msg.arbitration_id, bytes(msg.data), msg.is_extended_id, msg.is_remote_frame, msg.dlc)
+        self.send_lines((frame,), 0.1 if timeout is None else timeout)
+
+    def send_lines(self, frames: Sequence[CanFrame], timeout: float = 0.1, urgent: bool = False) -> None:
+        """Hand over several frames in one write: what belongs to one tick leaves in one go.
+
+        ``urgent`` ends whatever half a line a write that was interrupted may have left in the adapter.
+
+        Raises
+        ------
+        can.CanOperationError
+            As ``send`` does.
+        """
+        lines = b"".join(map(lawicel.encode_frame, frames))
         try:
-            self._port.write(line, 0.1 if timeout is None else timeout)
+            self._port.write(lawicel.OK + lines if urgent else lines, timeout)
             self._take(self._port.read())
         except DeviceFault as problem:
             raise CanOperationError(str(problem)) from None
+        self._count_unanswered(len(frames))
+
+    def _count_unanswered(self, frames: int) -> None:
         now = time.monotonic()
         if not self._unanswered:
             self._last_answer_s = now
-        self._unanswered += 1
+        self._unanswered += frames
         if self._answers_frames and now - self._last_answer_s > self._answer_timeout_s:
             raise CanOperationError(
                 f"{self._port.name}: {self._unanswered} frames unanswered for "

@@ -1,0 +1,75 @@
+"""What every amplifier driver gives to the bench."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+from drivers.can_link import CanLink, Heard
+from drivers.codecs.lawicel import CanFrame
+from rig.config.bench import AmplifierConfig
+
+
+class Amplifier(ABC):
+    """A servo amplifier on CAN that takes torque.
+
+    Torques here are those at the shaft; the driver knows gear and sign. A sign of life for the drive's
+    watchdog goes out in ``frames`` and in ``arm`` only, both of which run in the control loop: nothing
+    here starts a thread or a periodic task, so a loop that hangs looks dead to the drive.
+    """
+
+    label = "amplifier"
+
+    def __init__(self, config: AmplifierConfig) -> None:
+        self.config = config
+        self._to_motor = (-1.0 if config.invert else 1.0) / config.gear_ratio
+
+    def motor_nm(self, shaft_nm: float) -> float:
+        """Torque the motor has to make for this torque at the shaft."""
+        return shaft_nm * self._to_motor
+
+    def shaft_nm(self, motor_nm: float) -> float:
+        """Torque at the shaft from this torque of the motor."""
+        return motor_nm / self._to_motor
+
+    @property
+    @abstractmethod
+    def peak_torque_nm(self) -> float | None:
+        """The most that the drive gives at the shaft, once contacted; None where it does not say."""
+
+    @property
+    @abstractmethod
+    def actual_torque_nm(self) -> float | None:
+        """Torque at the shaft as the drive last reported it; None where it does not."""
+
+    @abstractmethod
+    def contact(self, link: CanLink) -> list[str]:
+        """Find the drive, set it up, no torque; notes for the operator. Raises DeviceFault."""
+
+    @abstractmethod
+    def arm(self, link: CanLink) -> None:
+        """Enable at zero torque with the watchdog running. Raises DeviceFault."""
+
+    @abstractmethod
+    def frames(self, torque_nm: float, now_s: float) -> list[CanFrame]:
+        """Everything to send in a tick that passed its checks: torque, and what feeds the watchdog."""
+
+    @abstractmethod
+    def sent_torque_nm(self, frame: CanFrame) -> float | None:
+        """Torque at the shaft that a frame of ours commands, read back from its bytes; None if none."""
+
+    @abstractmethod
+    def receive(self, heard: Heard) -> None:
+        """Take note of a frame from the bus."""
+
+    @abstractmethod
+    def check(self, now_s: float) -> None:
+        """Raise DeviceFault if the drive has left operation, reported an emergency or fallen silent."""
+
+    @abstractmethod
+    def off_frames(self) -> Sequence[CanFrame]:
+        """The shortest road to zero torque."""
+
+    @abstractmethod
+    def disarm(self, link: CanLink) -> None:
+        """Zero torque, disable, and read back that it is off. Raises DeviceFault where it is not."""

@@ -1,0 +1,167 @@
+"""The CAN side of an amplifier: frames out in one go, frames in without a thread, one sentence when it fails.
+
+python-can reads through a background thread (``Notifier``) that dies of its first error; a control loop
+that polls sees every error where it happens and needs no lock. While somebody waits here, ``idle`` is
+called, so that other ports do not overflow meanwhile.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import can
+
+from drivers.codecs.lawicel import CanFrame
+from drivers.slcan import SlcanBulkBus
+from rig.config.bench import CanConfig
+from rig.errors import ConfigError, DeviceFault
+
+POLL_INTERVAL_S = 0.0005
+MOST_FRAMES_A_POLL = 10_000
+SEND_TIMEOUT_S = 0.005
+
+
+class Heard(NamedTuple):
+    """A frame that arrived, with the host time at which it was read."""
+
+    time_s: float
+    frame: CanFrame
+
+
+Record = Callable[[float, bool, CanFrame], None]
+"""(time_s, was sent by us, frame): called for every frame that crosses the wire."""
+
+
+class CanLink:
+    """A bus as amplifier drivers see it.
+
+    Parameters
+    ----------
+    bus
+        An open python-can bus.
+    clock
+        Host time in seconds.
+    """
+
+    def __init__(self, bus: can.BusABC, clock: Callable[[], float] = time.monotonic) -> None:
+        self._bus = bus
+        self.clock = clock
+        self._lines = bus.send_lines if isinstance(bus, SlcanBulkBus) else None
+        self.name = str(bus.channel_info)
+        self.record: Record | None = None
+        self.idle: Callable[[], None] = lambda: None
+        self.listeners: list[Callable[[Heard], None]] = []
+
+    def send(self, frames: Sequence[CanFrame], urgent: bool = False) -> float:
+        """Send all frames; the host time at which the last one had been handed over.
+
+        Raises
+        ------
+        DeviceFault
+            If the adapter refuses, stalls or is gone.
+        """
+        try:
+            if self._lines is not None:
+                self._lines(frames, SEND_TIMEOUT_S, urgent)
+            else:
+                for frame in frames:
+                    self._bus.send(_message(frame), SEND_TIMEOUT_S)
+        except can.CanError as problem:
+            raise DeviceFault(f"CAN on {self.name}: {problem}") from None
+        now_s = self.clock()
+        if self.record is not None:
+            for frame in frames:
+                self.record(now_s, True, frame)
+        return now_s
+
+    def poll(self) -> list[Heard]:
+        """Frames that have arrived, handed to every listener too; never waits."""
+        heard: list[Heard] = []
+        try:
+            while len(heard) < MOST_FRAMES_A_POLL:
+                message = self._bus.recv(0)
+                if message is None:
+                    break
+                if not message.is_error_frame:
+                    heard.append(Heard(self.clock(), _frame(message)))
+        except can.CanError as problem:
+            raise DeviceFault(f"CAN on {self.name}: {problem}") from None
+        for item in heard:
+            if self.record is not None:
+                self.record(item.time_s, False, item.frame)
+            for listener in self.listeners:
+                listener(item)
+        return heard
+
+    def wait(self, timeout_s: float, until: Callable[[], bool], every: Callable[[], None] | None = None) -> bool:
+        """Poll until the condition holds; False when the time is over. ``every`` runs between polls."""
+        deadline = self.clock() + timeout_s
+        while True:
+            self.poll()
+            if until():
+                return True
+            if self.clock() >= deadline:
+                return False
+            self.idle()
+            if every is not None:
+                every()
+            time.sleep(POLL_INTERVAL_S)
+
+    def close(self) -> None:
+        """Shut the bus down; safe twice."""
+        self._bus.shutdown()
+
+
+def _message(frame: CanFrame) -> can.Message:
+    return can.Message(
+        arbitration_id=frame.identifier,
+        is_extended_id=frame.extended,
+        is_remote_frame=frame.remote,
+        is_fd=frame.fd,
+        bitrate_switch=frame.fd,
+        data=None if frame.remote else frame.data,
+        dlc=frame.length if frame.remote else None,
+    )
+
+
+def _frame(message: can.Message) -> CanFrame:
+    return CanFrame(
+        message.arbitration_id,
+        bytes(message.data),
+        message.is_extended_id,
+        message.is_remote_frame,
+        message.dlc,
+        -1,
+        message.is_fd,
+    )
+
+
+def open_bus(config: CanConfig) -> can.BusABC:
+    """The bus that the configuration names.
+
+    Raises
+    ------
+    ConfigError
+        If python-can has no such interface or it does not take these options.
+    DeviceFault
+        If the adapter cannot be opened.
+    """
+    if config.channel is None:
+        raise ConfigError(
+            "bench.amplifier.can.channel is empty: name the adapter's port (`rig devices` lists them) "
+            "or run with --emulate"
+        )
+    options: dict[str, Any] = {"bitrate": config.bitrate, **config.options}
+    try:
+        if config.interface == "slcan_bulk":
+            options.setdefault("tty_baudrate", config.tty_baud)
+            return SlcanBulkBus(config.channel, **options)
+        return can.Bus(channel=config.channel, interface=config.interface, **options)
+    except can.CanInterfaceNotImplementedError as problem:
+        raise ConfigError(f"bench.amplifier.can.interface: {config.interface!r}: {problem}") from None
+    except (ValueError, TypeError) as problem:
+        raise ConfigError(f"bench.amplifier.can: {problem}") from None
+    except (can.CanError, OSError) as problem:
+        raise DeviceFault(f"CAN adapter {config.interface} on {config.channel}: {problem}") from None

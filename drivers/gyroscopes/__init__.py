@@ -1,0 +1,31 @@
+"""Gyroscopes: one file a device, one line here."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from drivers.gyroscopes.base import Gyroscope
+from rig.config.bench import GyroscopeConfig
+from rig.errors import ConfigError
+
+DRIVERS = {
+    "stim300": "drivers.gyroscopes.stim300:Stim300",
+    "vectornav": "drivers.gyroscopes.vectornav:VectorNav",
+    "kvh1750": "drivers.gyroscopes.kvh1750:Kvh1750",
+}
+"""`bench.gyroscope.device` -> class. Modules are imported when they are wanted."""
+
+
+def make_gyroscope(config: GyroscopeConfig) -> Gyroscope:
+    """The driver that the configuration names.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such driver, or it does not accept its settings.
+    """
+    if config.device not in DRIVERS:
+        raise ConfigError(f"bench.gyroscope.device: no driver called {config.device!r}; there are {', '.join(DRIVERS)}")
+    module, _, name = DRIVERS[config.device].partition(":")
+    driver: Gyroscope = getattr(import_module(module), name)(config)
+    return driver

@@ -1,0 +1,203 @@
+"""What every gyroscope driver shares: counting, time at the source, lost and invalid samples.
+
+A driver of a new device gives its packet matcher, says how a packet becomes a ``Reading``, and states
+its rate, delay and noise; see docs/devices/new-gyroscope.md. It does no I/O: bytes with the time at which
+they were read go in, samples come out, so that a capture replays to the same samples.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections import deque
+from typing import NamedTuple
+
+from drivers.codecs.framing import Matcher, StreamFramer
+from drivers.gyroscopes.source_clock import SourceClock
+from rig.config.bench import GyroscopeConfig
+from rig.interface import GyroSample
+
+AXES = "xyz"
+BITS_PER_BYTE = 10  # start, eight data bits, stop
+MOST_LOST_MARKED = 20_000  # ten seconds at 2 kHz: more is a new start, not a gap
+
+
+class Reading(NamedTuple):
+    """One sample as the device sent it.
+
+    ``number`` is the device's running number (modulo ``Gyroscope.count_modulus``), or None where it has
+    none; ``latency_s`` the time from the sample to the first bit on the wire, where the device says so.
+    """
+
+    number: int | None
+    rate_rad_s: float
+    valid: bool
+    latency_s: float = 0.0
+
+
+class Tally:
+    """What came through so far, and why some of it is not used."""
+
+    def __init__(self) -> None:
+        self.received = 0
+        self.lost = 0
+        self.invalid = 0
+        self.last_reason = ""
+        self.recent_rates: deque[float] = deque(maxlen=4000)
+
+
+class Gyroscope(ABC):
+    """A gyroscope's protocol.
+
+    Parameters
+    ----------
+    config
+        The `bench.gyroscope` section.
+    matcher
+        How its packets are found in the stream.
+    sample_rate_hz, baud
+        As the device is set.
+    """
+
+    label = "gyroscope"
+    default_baud = 921_600
+    default_rate_hz = 1000.0
+    count_modulus = 0
+    """The device's counter wraps here; 0 where it does not, or there is none."""
+
+    def __init__(self, config: GyroscopeConfig, matcher: Matcher) -> None:
+        self.config = config
+        self.baud = config.baud or self.default_baud
+        self.sample_rate_hz = config.sample_rate_hz or self.default_rate_hz
+        self.axis = AXES.index(config.axis)
+        self.sign = -1.0 if config.invert else 1.0
+        self.framer = StreamFramer(matcher)
+        self.clock = SourceClock(1.0 / (self.sample_rate_hz * self.counts_per_sample))
+        self.tally = Tally()
+        self.said: list[str] = []
+        self._count: int | None = None
+
+    @property
+    def counts_per_sample(self) -> int:
+        """How far the device's counter moves between two datagrams."""
+        return 1
+
+    @property
+    @abstractmethod
+    def delay_s(self) -> float:
+        """From the motion to the instant that the clock gives a sample: group delay of the filter."""
+
+    @property
+    def full_scale_rad_s(self) -> float:
+        """Readings above this are invalid."""
+        return math.inf
+
+    @property
+    def noise_rad_s(self) -> float | None:
+        """One standard deviation of a sample, where the data sheet gives it."""
+        return None
+
+    @abstractmethod
+    def decode(self, packet: bytes) -> Reading | None:
+        """The sample in a packet, or None for a packet without one (put what it said into ``said``)."""
+
+    def greeting(self) -> bytes:
+        """What to send to make the device introduce itself; b"" for nothing."""
+        return b""
+
+    def objections(self) -> list[str]:
+        """What the device said of itself that contradicts the configuration; empty when all fits."""
+        return []
+
+    def explain_silence(self, raw: bytes) -> str:
+        """Why these bytes hold no packet, in words that lead to the cure."""
+        return f"{len(raw)} bytes but no packet of a {self.label} at {self.baud} baud: check the baud rate"
+
+    def feed(self, data: bytes, read_at_s: float) -> list[GyroSample]:
+        """Samples that became complete with these bytes, lost ones included as invalid NaN.
+
+        Parameters
+        ----------
+        read_at_s
+            Host time at which the bytes were there.
+        """
+        readings: list[tuple[Reading, float]] = []
+        packets = self.framer.feed(data)
+        behind = self.framer.pending_bytes
+        for _, packet in reversed(packets):
+            reading = self.decode(packet)
+            # What still arrived behind a packet in this read came after it, at the speed of the line.
+            on_wire_s = (len(packet) + behind) * BITS_PER_BYTE / self.baud
+            behind += len(packet)
+            if reading is not None:
+                readings.append((reading, read_at_s - on_wire_s - reading.latency_s))
+        return self._stamp(readings[::-1])
+
+    def _stamp(self, readings: list[tuple[Reading, float]]) -> list[GyroSample]:
+        if not readings:
+            return []
+        counts = self._unwrap([reading.number for reading, _ in readings], readings[-1][1])
+        samples: list[GyroSample] = []
+        for count, (reading, taken_at_s) in zip(counts, readings, strict=True):
+            self._mark_lost(count, samples)
+            self.clock.observe(count, taken_at_s)
+            samples.append(self._sample(count, reading))
+            self._count = count
+        return samples
+
+    def _sample(self, count: int, reading: Reading) -> GyroSample:
+        rate = self.sign * reading.rate_rad_s
+        valid = reading.valid and abs(rate) <= self.full_scale_rad_s
+        if reading.valid and not valid:
+            self.tally.last_reason = (
+                f"rate of {math.degrees(rate):.0f} deg/s beyond the full scale of "
+                f"{math.degrees(self.full_scale_rad_s):.0f} deg/s"
+            )
+        self.tally.received += 1
+        self.tally.invalid += not valid
+        if valid:
+            self.tally.recent_rates.append(rate)
+        return GyroSample(self.clock.host_time_s(count) - self.delay_s, rate, valid)
+
+    def _mark_lost(self, count: int, samples: list[GyroSample]) -> None:
+        if self._count is None:
+            return
+        step = self.counts_per_sample
+        missing = min((count - self._count) // step - 1, MOST_LOST_MARKED)
+        self.tally.lost += max(missing, 0)
+        for k in range(missing):
+            at = self._count + (k + 1) * step
+            samples.append(GyroSample(self.clock.host_time_s(at) - self.delay_s, math.nan, False))
+
+    def _unwrap(self, counts: list[int | None], last_taken_at_s: float) -> list[int]:
+        """Counters of one read as running numbers.
+
+        A counter that wraps after 128 ms cannot tell a gap from none; the last datagram of a bulk read is
+        fresh, so its time shows how many turns are missing.
+        """
+        step, modulus = self.counts_per_sample, self.count_modulus
+        previous, unwrapped, gap_at = self._count, [], 0
+        for k, raw in enumerate(counts):
+            if previous is None:
+                value = raw or 0
+            elif raw is None:
+                value = previous + step
+            elif modulus:
+                value = previous + ((raw - previous) % modulus or modulus)
+            else:
+                value = raw
+            if previous is not None and value - previous != step and not gap_at:
+                gap_at = k
+            unwrapped.append(value)
+            previous = value
+        if self._count is None or not modulus or not self.clock.settled:
+            return unwrapped
+        late_s = last_taken_at_s - self.clock.host_time_s(unwrapped[-1])
+        turns = max(round(late_s / (modulus * self.clock.period_s)), 0)
+        return [value + turns * modulus if k >= gap_at else value for k, value in enumerate(unwrapped)]
+
+    def restart(self) -> None:
+        """Forget the count and the clock: the device was switched off and on, or its port reopened."""
+        self.framer.flush()
+        self.clock = SourceClock(self.clock.period_s)
+        self._count = None
