@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -226,9 +226,3 @@ def model_hint(platform: Platform) -> str:
             "drifting. Lower the torque, shorten duration_s, or declare model.stiffness_nm_rad if there is one."
         )
     return ""
-
-
-def scaled_prediction(p: Prediction) -> Prediction:
-    """The forecast of the set as it will be played once scaled (linear in proportion)."""
-    found = Peaks(*(value * p.scale for value in p.peaks))
-    return replace(p, planned=p.planned.scaled(p.scale), peaks=found, scale=1.0)

@@ -82,9 +82,7 @@ def test_scaled_sets_reach_the_margin_and_no_further() -> None:
 
 
 def test_a_set_that_fits_is_never_scaled_up() -> None:
-    quiet = ExcitationConfig.model_validate(
-        {"scale_to_limits": True, "sets": [{"torque_nm": 10, "frequency_hz": 1}]}
-    )
+    quiet = ExcitationConfig.model_validate({"scale_to_limits": True, "sets": [{"torque_nm": 10, "frequency_hz": 1}]})
     assert plan(PAPER, quiet, LimitsConfig())[0].scale == 1.0
 
 
