@@ -1,0 +1,58 @@
+"""The bench's clock: absolute deadlines, and an ear on the gyro while it waits.
+
+A datagram is stamped when it arrives, not when the next tick looks for it. Otherwise the beat between the
+gyro's clock and the ticks moves every time stamp by up to a tick.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+STOP_LISTENING_S = 80e-6  # before the deadline: serving a datagram takes about 20 us
+
+
+class BenchClock:
+    """The host's monotonic clock for a sequencer.
+
+    Parameters
+    ----------
+    listen
+        Waits at most so many seconds for the gyro and takes in what has arrived; True if something has.
+    spin_s
+        Looked at the clock instead of asleep for so long before each deadline.
+    on_reading
+        Told every reading that is handed out, for the capture.
+    """
+
+    def __init__(
+        self,
+        listen: Callable[[float], bool],
+        spin_s: float = 0.0,
+        on_reading: Callable[[float], None] | None = None,
+    ) -> None:
+        self._listen = listen
+        self._spin_s = spin_s
+        self._on_reading = on_reading
+
+    def now_s(self) -> float:
+        """Seconds on ``time.monotonic``."""
+        return self._told(time.monotonic())
+
+    def _told(self, time_s: float) -> float:
+        if self._on_reading is not None:
+            self._on_reading(time_s)
+        return time_s
+
+    def wait_until(self, deadline_s: float) -> float:
+        """Listen, sleep, then spin, until the deadline."""
+        listen_until_s = deadline_s - max(STOP_LISTENING_S, self._spin_s)
+        while (left_s := listen_until_s - time.monotonic()) > 0.0:
+            self._listen(left_s)
+        asleep_s = deadline_s - self._spin_s - time.monotonic()
+        if asleep_s > 0.0:
+            time.sleep(asleep_s)
+        now_s = time.monotonic()
+        while now_s < deadline_s:
+            now_s = time.monotonic()
+        return self._told(now_s)

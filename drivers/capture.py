@@ -1,0 +1,174 @@
+"""Raw capture: every byte of the gyro and every CAN frame with its time, append-only, replayable.
+
+    file   = "ISPRAW1\\n", records
+    record = kind (1 byte), time (float64, s), length (u32), payload        (little-endian)
+    kinds  = G gyro bytes read · g gyro bytes sent · R frame received · S frame sent ·
+             T tick (payload: torque asked for) · C clock reading · M mark (JSON)
+
+What was flushed survives a kill; a record that was cut off ends the reading, nothing before it is lost.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from drivers.codecs.lawicel import CanFrame
+from rig.errors import Aborted, RecordingError
+
+MAGIC = b"ISPRAW1\n"
+FILE_NAME = "wire.cap"
+GYRO_READ, GYRO_SENT, CAN_READ, CAN_SENT = b"G"[0], b"g"[0], b"R"[0], b"S"[0]
+TICK, CLOCK, MARK = b"T"[0], b"C"[0], b"M"[0]
+FLUSH_INTERVAL_S = 0.05
+LONGEST_PAYLOAD = 1 << 24
+
+_HEAD = struct.Struct("<BdI")
+_CAN_HEAD = struct.Struct("<IBB")
+_TORQUE = struct.Struct("<d")
+_EXTENDED, _REMOTE, _FD = 1, 2, 4
+
+
+class Entry(NamedTuple):
+    """One record."""
+
+    kind: int
+    time_s: float
+    payload: bytes
+
+
+def pack_frame(frame: CanFrame) -> bytes:
+    """A CAN frame as the payload of a record."""
+    flags = _EXTENDED * frame.extended | _REMOTE * frame.remote | _FD * frame.fd
+    length = frame.length if frame.remote else len(frame.data)
+    return _CAN_HEAD.pack(frame.identifier, flags, length) + frame.data
+
+
+def unpack_frame(payload: bytes) -> CanFrame:
+    """The CAN frame in a record."""
+    identifier, flags, length = _CAN_HEAD.unpack_from(payload)
+    data = payload[_CAN_HEAD.size :]
+    return CanFrame(identifier, data, bool(flags & _EXTENDED), bool(flags & _REMOTE), length, -1, bool(flags & _FD))
+
+
+class Capture:
+    """Writer. Records are gathered in memory and written at most 50 ms later, without a thread.
+
+    Raises
+    ------
+    Aborted
+        If the file cannot be made, or (from ``flush``) the disk takes no more.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / FILE_NAME
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+            self._descriptor = os.open(self.path, flags, 0o644)
+        except OSError as problem:
+            raise Aborted(f"cannot write the raw capture {self.path}: {problem.strerror}") from None
+        self._pending = bytearray(MAGIC)
+        self._flushed_at_s = 0.0
+        self._open = True
+
+    def _add(self, kind: int, time_s: float, payload: bytes) -> None:
+        self._pending += _HEAD.pack(kind, time_s, len(payload))
+        self._pending += payload
+
+    def gyro_read(self, time_s: float, data: bytes) -> None:
+        """Bytes that came from the gyro, and when they were there."""
+        self._add(GYRO_READ, time_s, data)
+
+    def gyro_sent(self, time_s: float, data: bytes) -> None:
+        """Bytes sent to the gyro."""
+        self._add(GYRO_SENT, time_s, data)
+
+    def can(self, time_s: float, sent: bool, frame: CanFrame) -> None:
+        """A frame that crossed the bus; fits ``CanLink.record``."""
+        self._add(CAN_SENT if sent else CAN_READ, time_s, pack_frame(frame))
+
+    def tick(self, now_s: float, torque_nm: float) -> None:
+        """An exchange is complete: what stands before belongs to it."""
+        self._add(TICK, now_s, _TORQUE.pack(torque_nm))
+
+    def clock(self, time_s: float) -> None:
+        """What the clock said to the sequencer."""
+        self._add(CLOCK, time_s, b"")
+
+    def mark(self, time_s: float, what: str, values: Mapping[str, Any] | None = None) -> None:
+        """A step in the life of the rig."""
+        self._add(MARK, time_s, json.dumps({"mark": what, **(values or {})}).encode())
+
+    def flush_if_due(self, now_s: float) -> None:
+        """Write what is pending if the last time was long enough ago."""
+        if now_s - self._flushed_at_s >= FLUSH_INTERVAL_S:
+            self._flushed_at_s = now_s
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what is pending."""
+        if not self._open:
+            return
+        try:
+            while self._pending:
+                del self._pending[: os.write(self._descriptor, self._pending)]
+        except OSError as problem:
+            self._open = False  # once is enough: the way out must not stumble over it again
+            os.close(self._descriptor)
+            raise Aborted(f"the raw capture {self.path} cannot be written: {problem.strerror}") from None
+
+    def close(self) -> None:
+        """Write the rest and close; safe twice."""
+        if self._open:
+            self.flush()
+            self._open = False
+            os.close(self._descriptor)
+
+
+def read_capture(path: Path) -> Iterator[Entry]:
+    """Records of a capture in order; ends quietly where the last one was cut off.
+
+    Raises
+    ------
+    RecordingError
+        If the file is missing or not a capture.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as problem:
+        raise RecordingError(f"cannot read the raw capture {path}: {problem.strerror}") from None
+    if not data.startswith(MAGIC):
+        raise RecordingError(f"{path} is not a raw capture: it does not begin with {MAGIC!r}")
+    at = len(MAGIC)
+    while at + _HEAD.size <= len(data):
+        kind, time_s, length = _HEAD.unpack_from(data, at)
+        start = at + _HEAD.size
+        if length > LONGEST_PAYLOAD or start + length > len(data):
+            return
+        yield Entry(kind, time_s, data[start : start + length])
+        at = start + length
+
+
+def export(path: Path) -> tuple[Path, Path]:
+    """Beside the capture: ``gyro.bin``, the gyro's bytes as they came, and ``can.log`` in candump's format."""
+    gyro, log = path.with_name("gyro.bin"), path.with_name("can.log")
+    with gyro.open("wb") as stream, log.open("w", encoding="ascii") as lines:
+        for entry in read_capture(path):
+            if entry.kind == GYRO_READ:
+                stream.write(entry.payload)
+            elif entry.kind in (CAN_READ, CAN_SENT):
+                lines.write(_candump_line(entry))
+    return gyro, log
+
+
+def _candump_line(entry: Entry) -> str:
+    frame = unpack_frame(entry.payload)
+    identifier = f"{frame.identifier:08X}" if frame.extended else f"{frame.identifier:03X}"
+    data = f"R{frame.length}" if frame.remote else frame.data.hex().upper()
+    direction = "T" if entry.kind == CAN_SENT else "R"
+    return f"({entry.time_s:.6f}) can0 {identifier}{'##1' if frame.fd else '#'}{data} {direction}\n"

@@ -1,0 +1,168 @@
+"""A gyroscope on its port: bytes read and stamped, captured, decoded; and what came of the first contact."""
+
+from __future__ import annotations
+
+import math
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from drivers.capture import Capture
+from drivers.gyroscopes.base import Gyroscope
+from drivers.ports import BytePort
+from rig.errors import DeviceFault
+from rig.interface import GyroSample
+
+RAW_KEPT = 4096
+LEAST_SHARE_RECEIVED = 0.5
+
+
+@dataclass(frozen=True)
+class GyroReport:
+    """What a gyroscope did so far, for `rig check` and the report."""
+
+    label: str
+    received: int
+    lost: int
+    invalid: int
+    dropped_bytes: int
+    rate_hz: float
+    noise_deg_s: float
+    drift_ppm: float
+    said: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return (
+            f"{self.label}: {self.rate_hz:.1f} samples/s, noise {self.noise_deg_s:.3g} deg/s, clock "
+            f"{self.drift_ppm:+.1f} ppm, {self.received} received, {self.lost} lost, {self.invalid} invalid, "
+            f"{self.dropped_bytes} stray bytes"
+        )
+
+
+class GyroLine:
+    """Joins a driver and a port.
+
+    Parameters
+    ----------
+    gyroscope, port
+        The protocol, and where its bytes come from.
+    capture
+        Where the bytes are kept, or None.
+    clock
+        Host time in seconds.
+    """
+
+    def __init__(
+        self,
+        gyroscope: Gyroscope,
+        port: BytePort,
+        capture: Capture | None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.gyroscope = gyroscope
+        self._port = port
+        self._capture = capture
+        self._clock = clock
+        self._chunks: list[tuple[float, bytes]] = []
+        self._raw = bytearray()
+        self._first_s: float | None = None
+        self._last_s = 0.0
+        self.fault: DeviceFault | None = None
+
+    def greet(self) -> None:
+        """Discard what lay in the buffers of the system, and ask the device to introduce itself."""
+        self._port.read()
+        greeting = self.gyroscope.greeting()
+        if greeting:
+            self._port.write(greeting)
+            if self._capture is not None:
+                self._capture.gyro_sent(self._clock(), greeting)
+
+    def listen(self, timeout_s: float) -> bool:
+        """Wait for bytes at most so long and take them in; a vanished port is kept for ``collect``."""
+        if self.fault is not None:
+            time.sleep(timeout_s)
+            return False
+        try:
+            if not self._port.wait_readable(timeout_s):
+                return False
+            return self._take()
+        except DeviceFault as fault:
+            self.fault = fault
+            return False
+
+    def _take(self) -> bool:
+        data = self._port.read()
+        if not data:
+            return False
+        now_s = self._clock()
+        self._chunks.append((now_s, data))
+        if self._capture is not None:
+            self._capture.gyro_read(now_s, data)
+        return True
+
+    def collect(self) -> list[GyroSample]:
+        """Samples since the last call. Raises DeviceFault once the port has vanished."""
+        if self.fault is None:
+            try:
+                self._take()
+            except DeviceFault as fault:
+                self.fault = fault
+        if self.fault is not None:
+            raise self.fault
+        chunks, self._chunks = self._chunks, []
+        samples: list[GyroSample] = []
+        for read_at_s, data in chunks:
+            samples += self.feed(data, read_at_s)
+        return samples
+
+    def feed(self, data: bytes, read_at_s: float) -> list[GyroSample]:
+        """Decode bytes that were read at this time."""
+        if self._first_s is None:
+            self._first_s = read_at_s
+        self._last_s = read_at_s
+        if len(self._raw) < RAW_KEPT:
+            self._raw += data
+        return self.gyroscope.feed(data, read_at_s)
+
+    def problems(self, listened_s: float) -> list[str]:
+        """Why this gyroscope cannot be used, after listening to it for so long; empty when all is well."""
+        if self.fault is not None:
+            return [str(self.fault)]
+        gyro, where = self.gyroscope, f"{self.gyroscope.label} on {self._port.name}"
+        if not self._raw:
+            return [f"{where}: no byte in {listened_s:.1f} s: check its supply, the cable (RS-422 pairs) and the port"]
+        tally = gyro.tally
+        if not tally.received:
+            return [f"{where}: {gyro.explain_silence(bytes(self._raw))}"]
+        found = [f"{where}: {objection}" for objection in gyro.objections()]
+        if tally.received < LEAST_SHARE_RECEIVED * gyro.sample_rate_hz * listened_s:
+            found.append(
+                f"{where}: {tally.received / listened_s:.0f} samples/s instead of {gyro.sample_rate_hz:g}: set "
+                "bench.gyroscope.sample_rate_hz to what the device sends"
+            )
+        if not tally.recent_rates:
+            found.append(f"{where}: no valid sample ({tally.last_reason or 'no reason given'})")
+        return found
+
+    def report(self) -> GyroReport:
+        """How it has been doing."""
+        gyro, tally = self.gyroscope, self.gyroscope.tally
+        span_s = self._last_s - (self._first_s or 0.0)
+        rates = list(tally.recent_rates)
+        return GyroReport(
+            label=gyro.label,
+            received=tally.received,
+            lost=tally.lost,
+            invalid=tally.invalid,
+            dropped_bytes=gyro.framer.dropped_bytes,
+            rate_hz=tally.received / span_s if span_s > 0 else 0.0,
+            noise_deg_s=math.degrees(statistics.stdev(rates)) if len(rates) > 2 else 0.0,
+            drift_ppm=gyro.clock.drift_ppm,
+            said=tuple(gyro.said[-10:]),
+        )
+
+    def close(self) -> None:
+        """Let go of the port."""
+        self._port.close()
