@@ -22,6 +22,8 @@ from drivers.codecs.lawicel import Answer, CanFrame, LawicelDecoder
 from drivers.ports import BytePort, SerialPort
 from rig.errors import DeviceFault
 
+QUIET_S = 0.05  # an adapter that has said nothing for so long has said all
+
 
 class SlcanBulkBus(can.BusABC):
     """CAN bus behind a Lawicel adapter.
@@ -81,11 +83,11 @@ class SlcanBulkBus(can.BusABC):
         super().__init__(channel=self._port.name, **kwargs)
 
     def _start(self, bitrate: int, listen_only: bool, timestamps: bool) -> None:
-        self._port.write(b"\r\r\r")  # ends whatever half a command an earlier program left behind
-        self._ask("C", may_refuse=True)  # refused where the channel is closed already
-        self._port.wait_readable(0.0)
-        self._port.read()
-        self._decoder = LawicelDecoder()
+        # Ends whatever half a command an earlier program left behind, and closes the channel if it is open;
+        # the answers to that mean nothing and are waited out.
+        self._port.write(b"\r\r\rC\r")
+        while self._port.wait_readable(QUIET_S):
+            self._port.read()
         self._ask(lawicel.BIT_RATE_CODES[bitrate])
         self._ask("Z1" if timestamps else "Z0", may_refuse=not timestamps)
         self._ask("L" if listen_only else "O")
@@ -181,12 +183,12 @@ class SlcanBulkBus(can.BusABC):
             As ``send`` does.
         """
         lines = b"".join(map(lawicel.encode_frame, frames))
+        self._count_unanswered(len(frames))  # before the write: a fast adapter answers during it
         try:
             self._port.write(lawicel.OK + lines if urgent else lines, timeout)
             self._take(self._port.read())
         except DeviceFault as problem:
             raise CanOperationError(str(problem)) from None
-        self._count_unanswered(len(frames))
 
     def _count_unanswered(self, frames: int) -> None:
         now = time.monotonic()

@@ -7,12 +7,15 @@ gives offset and drift. So one late read, or a thousand, do not move a sample in
 
 from __future__ import annotations
 
-from collections import deque
+import numpy as np
 
 BLOCK_S = 0.25
 BLOCKS_KEPT = 240
 DRIFT_LIMIT = 1e-3
 MIN_BLOCKS_FOR_DRIFT = 4
+TRIMS = 2
+TRIM_FLOOR_S = 30e-6
+TRIM_DEVIATIONS = 4.0  # median absolute deviations above the median: a block in which every read was late
 
 
 class SourceClock:
@@ -26,11 +29,15 @@ class SourceClock:
 
     def __init__(self, period_s: float) -> None:
         self.period_s = period_s
-        self._blocks: deque[tuple[float, float]] = deque(maxlen=BLOCKS_KEPT)
+        self._source_s = np.empty(BLOCKS_KEPT)
+        self._excess_s = np.empty(BLOCKS_KEPT)  # host minus source time, relative to the first offset
+        self._blocks = 0
         self._block_end_s: float | None = None
-        self._best: tuple[float, float] | None = None
+        self._best_s = np.inf
+        self._best_at_s = 0.0
         self._origin_s = 0.0
         self._offset_s = 0.0
+        self._base_s = 0.0
         self._drift = 0.0
 
     @property
@@ -41,42 +48,51 @@ class SourceClock:
     @property
     def settled(self) -> bool:
         """True once offset and drift rest on a second of data."""
-        return len(self._blocks) >= MIN_BLOCKS_FOR_DRIFT
+        return self._blocks >= MIN_BLOCKS_FOR_DRIFT
 
     def observe(self, count: int, taken_at_s: float) -> None:
         """A sample of this (unwrapped) count was taken at the latest at ``taken_at_s`` of the host."""
         source_s = count * self.period_s
         if self._block_end_s is None:
             self._origin_s = source_s
-            self._offset_s = taken_at_s - source_s
+            self._offset_s = self._base_s = taken_at_s - source_s
             self._block_end_s = source_s + BLOCK_S
-        excess = taken_at_s - self.host_time_s(count)
-        if self._best is None or excess < self._best[0]:
-            self._best = (excess, source_s)
-            if not self._blocks and excess < 0.0:
-                self._offset_s += excess  # before the first block is full, follow at once
-                self._best = (0.0, source_s)
+        excess_s = taken_at_s - source_s - self._base_s - self._drift * (source_s - self._origin_s)
+        if excess_s < self._best_s:
+            self._best_s, self._best_at_s = excess_s, source_s
+            if not self._blocks:
+                self._offset_s = self._base_s + excess_s  # before the first block is full, follow at once
         if source_s >= self._block_end_s:
             self._close_block(source_s)
 
     def _close_block(self, source_s: float) -> None:
-        assert self._best is not None
-        excess, at_s = self._best
-        host_s = self._offset_s + at_s + self._drift * (at_s - self._origin_s) + excess
-        self._blocks.append((at_s, host_s - at_s))
+        slot = self._blocks % BLOCKS_KEPT
+        self._source_s[slot] = self._best_at_s - self._origin_s
+        self._excess_s[slot] = self._best_s + self._drift * (self._best_at_s - self._origin_s)
+        self._blocks += 1
         self._block_end_s = source_s + BLOCK_S
-        self._best = None
+        self._best_s = np.inf
         self._fit()
 
     def _fit(self) -> None:
-        n = len(self._blocks)
-        mean_x = sum(x for x, _ in self._blocks) / n
-        mean_y = sum(y for _, y in self._blocks) / n
-        if n >= MIN_BLOCKS_FOR_DRIFT:
-            sxx = sum((x - mean_x) ** 2 for x, _ in self._blocks)
-            sxy = sum((x - mean_x) * (y - mean_y) for x, y in self._blocks)
-            self._drift = max(-DRIFT_LIMIT, min(DRIFT_LIMIT, sxy / sxx))
-        self._offset_s = mean_y - self._drift * (mean_x - self._origin_s)
+        n = min(self._blocks, BLOCKS_KEPT)
+        x, y = self._source_s[:n], self._excess_s[:n]
+        if n < MIN_BLOCKS_FOR_DRIFT:
+            self._offset_s = self._base_s + float(y.min())
+            return
+        drift, level = self._drift, 0.0
+        for _ in range(TRIMS):
+            residual = y - drift * x
+            middle = float(np.median(residual))
+            spread = float(np.median(np.abs(residual - middle)))
+            use = residual <= middle + max(TRIM_FLOOR_S, TRIM_DEVIATIONS * spread)
+            xu, yu = x[use], y[use]
+            mean_x, mean_y = float(xu.mean()), float(yu.mean())
+            centred = xu - mean_x
+            drift = float(centred @ (yu - mean_y)) / max(float(centred @ centred), 1e-12)
+            drift = max(-DRIFT_LIMIT, min(DRIFT_LIMIT, drift))
+            level = mean_y - drift * mean_x
+        self._drift, self._offset_s = drift, self._base_s + level
 
     def host_time_s(self, count: int) -> float:
         """Host time at which the sample of this count was taken."""
