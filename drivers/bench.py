@@ -114,7 +114,9 @@ class BenchRig(Rig):
     # -- contact ---------------------------------------------------------------------------------
 
     def open(self) -> None:
-        """Contact both devices and settle the gyro's clock; every failure is listed at once.
+        """Real-time priority as far as granted; both devices contacted, the gyro's clock settled.
+
+        Every failure is listed at once.
 
         Raises
         ------
@@ -123,6 +125,9 @@ class BenchRig(Rig):
         ConfigError
             If a port is not named.
         """
+        # Before a device is contacted: locking the memory takes half a second, in which a buffer overflows.
+        real_time = self._config.real_time
+        self._grant = realtime.acquire(real_time.priority, real_time.lock_memory)
         if self._raw_folder is not None:
             self._capture = Capture(self._raw_folder)
             self._mark("config", {"bench": self._config.model_dump(mode="json")})
@@ -132,6 +137,7 @@ class BenchRig(Rig):
             while self._time() - begin_s < self._config.settle_s:
                 self._listen(CONTACT_TIME_S)
                 self._gather(faults)
+            self._line.note_noise()
             faults += [DeviceFault(text) for text in self._line.problems(self._time() - begin_s)]
         if faults:
             raise _together(faults)
@@ -181,11 +187,9 @@ class BenchRig(Rig):
     # -- torque ----------------------------------------------------------------------------------
 
     def arm(self) -> None:
-        """Real-time priority as far as granted, then the drive enabled at zero torque."""
+        """The drive enabled at zero torque, its watchdog running."""
         if self._link is None:
             raise DeviceFault("the bench is armed before it is open: open it first")
-        real_time = self._config.real_time
-        self._grant = realtime.acquire(real_time.priority, real_time.lock_memory)
         self._armed = True
         self.amplifier.arm(self._link)
         self._gather([])
@@ -218,7 +222,7 @@ class BenchRig(Rig):
             self._link.send(self.amplifier.off_frames(), urgent=True)
 
     def disarm(self) -> None:
-        """Zero torque, disable, verify; back to ordinary scheduling whatever happens."""
+        """Zero torque, disable, verify by reading back."""
         if not self._armed or self._link is None:
             return
         self._armed = False
@@ -230,8 +234,6 @@ class BenchRig(Rig):
                 f"the drive could not be shown to be off: {fault} Its own watchdog cuts the torque "
                 f"{self._config.amplifier.watchdog_ms} ms after the last frame; check before you go near."
             ) from None
-        finally:
-            realtime.release()
 
     def close(self) -> None:
         """Let go of both ports and finish the capture; safe twice."""
@@ -241,6 +243,8 @@ class BenchRig(Rig):
                     device.close()
         finally:
             self._link = None
+            if self._grant is not None:
+                realtime.release()
             if self._capture is not None:
                 self._capture.close()
                 export(self._capture.path)
@@ -264,7 +268,7 @@ class BenchRig(Rig):
         return BenchReport(
             self._line.report(),
             tuple(self._notes),
-            str(self._grant) if self._grant is not None else "not armed yet",
+            str(self._grant) if self._grant is not None else "not open yet",
             tuple(text for _, text in emergencies),
         )
 

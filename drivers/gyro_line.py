@@ -69,6 +69,12 @@ class GyroLine:
         self._first_s: float | None = None
         self._last_s = 0.0
         self.fault: DeviceFault | None = None
+        self._noise_deg_s = 0.0
+
+    def note_noise(self) -> None:
+        """Take the scatter of the last two seconds as the noise: call it while nothing moves."""
+        rates = list(self.gyroscope.tally.recent_rates)
+        self._noise_deg_s = math.degrees(statistics.stdev(rates)) if len(rates) > 2 else 0.0
 
     def greet(self) -> None:
         """Discard what lay in the buffers of the system, and ask the device to introduce itself."""
@@ -150,7 +156,6 @@ class GyroLine:
         """How it has been doing."""
         gyro, tally = self.gyroscope, self.gyroscope.tally
         span_s = self._last_s - (self._first_s or 0.0)
-        rates = list(tally.recent_rates)
         return GyroReport(
             label=gyro.label,
             received=tally.received,
@@ -158,7 +163,7 @@ class GyroLine:
             invalid=tally.invalid,
             dropped_bytes=gyro.framer.dropped_bytes,
             rate_hz=tally.received / span_s if span_s > 0 else 0.0,
-            noise_deg_s=math.degrees(statistics.stdev(rates)) if len(rates) > 2 else 0.0,
+            noise_deg_s=self._noise_deg_s,
             drift_ppm=gyro.clock.drift_ppm,
             said=tuple(gyro.said[-10:]),
         )

@@ -203,6 +203,7 @@ class Cia402(Amplifier):
         assert self._objects is not None, "contact the drive first"
         s = self.settings
         self._new_emergency = ""
+        self._watch(self._objects)
         link.send([CanFrame(0, bytes([NMT_START, self.config.node])), self._host_beat])
         if self._objects.read(cia402.STATUSWORD) and self._refresh(link) is State.FAULT:
             self._reset_fault(link)
@@ -278,6 +279,8 @@ class Cia402(Amplifier):
                 "told to disable: PRESS THE EMERGENCY STOP and check the drive"
             )
         link.send([CanFrame(0, bytes([NMT_PRE_OPERATIONAL, self.config.node]))])
+        # It is off and was seen to be: stop watching, or it would report a fault when we fall silent.
+        self._objects.write(cia402.HEARTBEAT_CONSUMER, 1, 0, 4)
 
     # -- the tick --------------------------------------------------------------------------------
 

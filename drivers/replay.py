@@ -1,0 +1,195 @@
+"""Replay: a raw capture in the place of the devices, through the same drivers, to the same samples.
+
+``ReplayRig`` is a Rig and ``ReplayClock`` a clock: a sequencer that plays the same sets on them does, tick by
+tick, what it did on the bench.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from drivers import capture
+from drivers.amplifiers import make_amplifier
+from drivers.bench import answer
+from drivers.can_link import CanLink, Heard
+from drivers.capture import Entry, read_capture, unpack_frame
+from drivers.codecs.lawicel import CanFrame
+from drivers.gyroscopes import make_gyroscope
+from rig.config.bench import BenchConfig
+from rig.errors import RecordingError
+from rig.interface import Exchange, GyroSample, Rig, Statement, Torque, TorqueSample
+from rig.recording.run import TorqueHold
+
+
+class ReplayLink(CanLink):
+    """What the drive said, handed out in the order in which it was heard; what is sent goes nowhere."""
+
+    def __init__(self, take: Callable[[], CanFrame | None], clock: Callable[[], float]) -> None:
+        self._take_frame = take
+        self.clock = clock
+        self.name = "replay"
+        self.record = None
+        self.idle = lambda: None
+        self.listeners = []
+
+    def send(self, frames: Sequence[CanFrame], urgent: bool = False) -> float:
+        """Nothing is sent."""
+        return self.clock()
+
+    def poll(self) -> list[Heard]:
+        """The next frame of this stage of the capture."""
+        frame = self._take_frame()
+        if frame is None:
+            return []
+        heard = Heard(self.clock(), frame)
+        for listener in self.listeners:
+            listener(heard)
+        return [heard]
+
+    def wait(self, timeout_s: float, until: Callable[[], bool], every: Callable[[], None] | None = None) -> bool:
+        """Frames until the condition holds, or the stage has no more of them."""
+        while not until():
+            if not self.poll():
+                return False
+        return True
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+class ReplayClock:
+    """Gives out the readings that the bench's clock gave out."""
+
+    def __init__(self, readings: Sequence[float]) -> None:
+        self._readings = list(reversed(readings))
+
+    def now_s(self) -> float:
+        """The next reading. Raises RecordingError when the capture is at its end."""
+        if not self._readings:
+            raise RecordingError("the raw capture ends here: the campaign that it holds was cut short")
+        return self._readings.pop()
+
+    def wait_until(self, deadline_s: float) -> float:
+        """The next reading: the waiting is long over."""
+        return self.now_s()
+
+
+class ReplayRig(Rig):
+    """A rig whose devices are a capture.
+
+    Parameters
+    ----------
+    path
+        The capture (``raw/wire.cap``).
+
+    Raises
+    ------
+    RecordingError
+        If it is missing, or holds no configuration.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._entries = list(read_capture(path))
+        self.config = _config(self._entries, path)
+        self.gyroscope = make_gyroscope(self.config.gyroscope)
+        self.amplifier = make_amplifier(self.config.amplifier)
+        self.clock = ReplayClock([e.time_s for e in self._entries if e.kind == capture.CLOCK])
+        self._at = 0
+        self._time_s = self._entries[0].time_s
+        self._path = path
+        self._link = ReplayLink(self._next_frame, lambda: self._time_s)
+
+    def statement(self) -> Statement:
+        """Torque is SIMULATED: nothing moves."""
+        return Statement(Torque.SIMULATED, (f"replay of {self._path}",))
+
+    @property
+    def torque_hold(self) -> TorqueHold:
+        """As on the bench."""
+        return "zero_order"
+
+    @property
+    def noise_rad_s(self) -> float | None:
+        """As on the bench."""
+        return self.gyroscope.noise_rad_s
+
+    @property
+    def rate_full_scale_rad_s(self) -> float | None:
+        """As on the bench."""
+        return self.gyroscope.full_scale_rad_s
+
+    def _is_mark(self, entry: Entry, what: str) -> bool:
+        return entry.kind == capture.MARK and json.loads(entry.payload)["mark"] == what
+
+    def _next_frame(self) -> CanFrame | None:
+        """The next frame heard before the next step in the life of the rig; gyro bytes on the way are fed."""
+        while self._at < len(self._entries):
+            entry = self._entries[self._at]
+            if entry.kind == capture.MARK and not self._is_mark(entry, "config"):
+                return None
+            self._at += 1
+            self._time_s = entry.time_s
+            if entry.kind == capture.GYRO_READ:
+                self.gyroscope.feed(entry.payload, entry.time_s)
+            elif entry.kind == capture.CAN_READ:
+                return unpack_frame(entry.payload)
+        return None
+
+    def _finish_stage(self, mark: str) -> None:
+        """Everything up to the mark that ends this stage."""
+        while self._next_frame() is not None:
+            continue
+        if self._at >= len(self._entries) or not self._is_mark(self._entries[self._at], mark):
+            raise RecordingError(f"{self._path} ends before the bench was {mark}: nothing was played")
+        self._at += 1
+
+    def open(self) -> None:
+        """Let the drivers hear what they heard."""
+        self.amplifier.contact(self._link)
+        self._finish_stage("opened")
+
+    def arm(self) -> None:
+        """As ``open``."""
+        self.amplifier.arm(self._link)
+        self._finish_stage("armed")
+
+    def exchange(self, now_s: float, torque_nm: float) -> Exchange:
+        """The next tick of the capture. Raises RecordingError when there is none."""
+        gyro: list[GyroSample] = []
+        sent: list[TorqueSample] = []
+        heard, sent_s = False, 0.0
+        while self._at < len(self._entries):
+            entry = self._entries[self._at]
+            self._at += 1
+            if entry.kind == capture.GYRO_READ:
+                gyro += self.gyroscope.feed(entry.payload, entry.time_s)
+            elif entry.kind == capture.CAN_READ:
+                heard = True
+                self.amplifier.receive(Heard(entry.time_s, unpack_frame(entry.payload)))
+            elif entry.kind == capture.CAN_SENT:
+                sent_s = entry.time_s
+                nm = self.amplifier.sent_torque_nm(unpack_frame(entry.payload))
+                sent += [] if nm is None else [TorqueSample(sent_s, nm)]
+            elif entry.kind == capture.TICK:
+                return answer(self.config, self.amplifier, gyro, sent, heard, sent_s)
+        raise RecordingError(f"{self._path} ends here: the campaign that it holds was cut short")
+
+    def torque_off(self) -> None:
+        """There is no torque."""
+
+    def disarm(self) -> None:
+        """There is nothing to disable."""
+
+    def close(self) -> None:
+        """There is nothing to close."""
+
+
+def _config(entries: Sequence[Entry], path: Path) -> BenchConfig:
+    for entry in entries:
+        if entry.kind == capture.MARK:
+            values = json.loads(entry.payload)
+            if values.get("mark") == "config":
+                return BenchConfig.model_validate(values["bench"])
+    raise RecordingError(f"{path} holds no configuration: it was cut before the devices were contacted")
