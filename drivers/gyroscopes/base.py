@@ -64,6 +64,8 @@ class Gyroscope(ABC):
     default_rate_hz = 1000.0
     count_modulus = 0
     """The device's counter wraps here; 0 where it does not, or there is none."""
+    answers_replace_samples = False
+    """True where an answer of the device is sent in the place of a sample, which is then not lost."""
 
     def __init__(self, config: GyroscopeConfig, matcher: Matcher) -> None:
         self.config = config
@@ -76,6 +78,7 @@ class Gyroscope(ABC):
         self.tally = Tally()
         self.said: list[str] = []
         self._count: int | None = None
+        self._replaced = 0
 
     @property
     def counts_per_sample(self) -> int:
@@ -129,7 +132,9 @@ class Gyroscope(ABC):
             # What still arrived behind a packet in this read came after it, at the speed of the line.
             on_wire_s = (len(packet) + behind) * BITS_PER_BYTE / self.baud
             behind += len(packet)
-            if reading is not None:
+            if reading is None:
+                self._replaced += self.answers_replace_samples
+            else:
                 readings.append((reading, read_at_s - on_wire_s - reading.latency_s))
         return self._stamp(readings[::-1])
 
@@ -164,7 +169,11 @@ class Gyroscope(ABC):
             return
         step = self.counts_per_sample
         missing = min((count - self._count) // step - 1, MOST_LOST_MARKED)
-        self.tally.lost += max(missing, 0)
+        if missing <= 0:
+            return
+        excused = min(missing, self._replaced)
+        self._replaced -= excused
+        self.tally.lost += missing - excused
         for k in range(missing):
             at = self._count + (k + 1) * step
             samples.append(GyroSample(self.clock.host_time_s(at) - self.delay_s, math.nan, False))

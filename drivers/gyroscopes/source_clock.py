@@ -12,10 +12,10 @@ import numpy as np
 BLOCK_S = 0.25
 BLOCKS_KEPT = 240
 DRIFT_LIMIT = 1e-3
-MIN_BLOCKS_FOR_DRIFT = 4
+MIN_BLOCKS_FOR_DRIFT = 6
 TRIMS = 2
 TRIM_FLOOR_S = 30e-6
-TRIM_DEVIATIONS = 4.0  # median absolute deviations above the median: a block in which every read was late
+TRIM_DEVIATIONS = 4.0  # from the median: blocks in which every read was late, or a latency was misreported
 
 
 class SourceClock:
@@ -47,7 +47,7 @@ class SourceClock:
 
     @property
     def settled(self) -> bool:
-        """True once offset and drift rest on a second of data."""
+        """True once offset and drift rest on enough data."""
         return self._blocks >= MIN_BLOCKS_FOR_DRIFT
 
     def observe(self, count: int, taken_at_s: float) -> None:
@@ -80,12 +80,15 @@ class SourceClock:
         if n < MIN_BLOCKS_FOR_DRIFT:
             self._offset_s = self._base_s + float(y.min())
             return
-        drift, level = self._drift, 0.0
+        half = n // 2
+        # Median slope across half the span: a start that a few outliers cannot pull.
+        drift = float(np.median((y[n - half :] - y[:half]) / (x[n - half :] - x[:half])))
+        level = 0.0
         for _ in range(TRIMS):
             residual = y - drift * x
             middle = float(np.median(residual))
             spread = float(np.median(np.abs(residual - middle)))
-            use = residual <= middle + max(TRIM_FLOOR_S, TRIM_DEVIATIONS * spread)
+            use = np.abs(residual - middle) <= max(TRIM_FLOOR_S, TRIM_DEVIATIONS * spread)
             xu, yu = x[use], y[use]
             mean_x, mean_y = float(xu.mean()), float(yu.mean())
             centred = xu - mean_x

@@ -38,6 +38,7 @@ class Stim300(Gyroscope):
     default_baud = 921_600
     default_rate_hz = 2000.0
     count_modulus = 256
+    answers_replace_samples = True
 
     def __init__(self, config: GyroscopeConfig) -> None:
         self.settings = read_settings(Stim300Settings, config.settings, "bench.gyroscope.settings")
@@ -142,7 +143,7 @@ class Stim300(Gyroscope):
 
     def explain_silence(self, raw: bytes) -> str:
         """Why bytes come but no datagram: usually another datagram type is configured."""
-        for ending in (False, True):
+        for ending in (True, False):  # without would also fit a stream with line endings
             for identifier in wire.LAYOUTS:
                 found = StreamFramer(wire.datagram_matcher((identifier,), ending, special=False)).feed(raw)
                 if len(found) >= 3:
