@@ -145,7 +145,8 @@ class Gyroscope(ABC):
         samples: list[GyroSample] = []
         for count, (reading, taken_at_s) in zip(counts, readings, strict=True):
             self._mark_lost(count, samples)
-            self.clock.observe(count, taken_at_s)
+            if reading.valid or not self.clock.started:  # a device that starts up misreports its latency
+                self.clock.observe(count, taken_at_s)
             samples.append(self._sample(count, reading))
             self._count = count
         return samples

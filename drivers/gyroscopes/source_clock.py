@@ -46,6 +46,11 @@ class SourceClock:
         return self._drift * 1e6
 
     @property
+    def started(self) -> bool:
+        """True once anything was observed."""
+        return self._block_end_s is not None
+
+    @property
     def settled(self) -> bool:
         """True once offset and drift rest on enough data."""
         return self._blocks >= MIN_BLOCKS_FOR_DRIFT
