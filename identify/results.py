@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from rig.platform import Platform
 from rig.recording.run import Array
 
 UNITS = {
@@ -55,6 +56,7 @@ class ModelResult:
     dropped: tuple[NotReported, ...] = ()
     not_determined: tuple[NotReported, ...] = ()
     correlation: Mapping[str, float] = field(default_factory=dict)  # "inertia, stiffness" -> -0.98
+    platform: Platform | None = None  # what was simulated, numbers included that stand in no table: for model.yaml
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,7 @@ class GeneticRun:
     history: Array  # best objective of every generation of the last repeat
     roulette_only: Mapping[str, float]  # Eq. 13 without elitism
     plain_objective: Mapping[str, float]  # e(k) as plain equation error
+    closed_form_objective: float | None = None
 
 
 @dataclass(frozen=True)
