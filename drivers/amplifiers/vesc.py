@@ -1,0 +1,143 @@
+"""VESC over CAN: motor current in mA; the torque constant has to be declared.
+
+Frames have 29-bit identifiers command << 8 | id and big-endian payloads (vedderb/bldc, comm_can). Its own
+timeout (1000 ms as delivered, app settings) is the drive-side watchdog: set it in VESC Tool to what
+``watchdog_ms`` says; CAN cannot read it, so ``timeout_is_set`` has to confirm it.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from typing import Annotated
+
+from pydantic import Field
+
+from drivers.amplifiers.base import Amplifier
+from drivers.can_link import CanLink, Heard
+from drivers.codecs.lawicel import CanFrame
+from drivers.settings import Settings, read_settings
+from rig.config.bench import AmplifierConfig
+from rig.errors import ConfigError, DeviceFault
+
+SET_CURRENT, STATUS = 1, 9
+STATUS_TIMEOUT_S = 0.5
+SILENT_S = 0.25
+ZERO_CURRENT_A = 0.5
+
+
+def encode_current(current_a: float) -> bytes:
+    """Payload of SET_CURRENT."""
+    return struct.pack(">i", round(current_a * 1000.0))
+
+
+def decode_status(data: bytes) -> tuple[float, float, float]:
+    """(electrical rpm, motor current in A, duty cycle) of a STATUS frame.
+
+    Raises
+    ------
+    ValueError
+        If the payload is not eight bytes long.
+    """
+    if len(data) != 8:
+        raise ValueError(f"VESC status of {len(data)} bytes, 8 expected: {data.hex()}")
+    erpm, current, duty = struct.unpack(">ihh", data)
+    return float(erpm), current / 10.0, duty / 1000.0
+
+
+class VescSettings(Settings):
+    """``torque_constant_nm_a`` of the motor and ``peak_current_a`` of the controller are declared."""
+
+    torque_constant_nm_a: Annotated[float, Field(gt=0)]
+    peak_current_a: Annotated[float, Field(gt=0)]
+    timeout_is_set: bool = False
+
+
+class Vesc(Amplifier):
+    """One controller."""
+
+    def __init__(self, config: AmplifierConfig) -> None:
+        super().__init__(config)
+        self.settings = read_settings(VescSettings, config.settings, "bench.amplifier.settings")
+        if not self.settings.timeout_is_set:
+            raise ConfigError(
+                "bench.amplifier.settings.timeout_is_set: set the VESC's timeout to "
+                f"{config.watchdog_ms} ms in VESC Tool (App Settings), then say true here; without it the motor "
+                "goes on for a second after this computer has died"
+            )
+        self.label = f"VESC, id {config.node}"
+        self._current_id = SET_CURRENT << 8 | config.node
+        self._status_id = STATUS << 8 | config.node
+        self._current_a: float | None = None
+        self._heard_s: float | None = None
+        self._armed = False
+
+    @property
+    def peak_torque_nm(self) -> float | None:
+        """From declared current and constant, at the shaft."""
+        return abs(self.shaft_nm(self.settings.peak_current_a * self.settings.torque_constant_nm_a))
+
+    @property
+    def actual_torque_nm(self) -> float | None:
+        """From the reported current, at the shaft."""
+        if self._current_a is None:
+            return None
+        return self.shaft_nm(self._current_a * self.settings.torque_constant_nm_a)
+
+    def _command(self, current_a: float) -> CanFrame:
+        return CanFrame(self._current_id, encode_current(current_a), extended=True)
+
+    def contact(self, link: CanLink) -> list[str]:
+        """Hear its status frames."""
+        if self.receive not in link.listeners:
+            link.listeners.append(self.receive)
+        if not link.wait(STATUS_TIMEOUT_S, lambda: self._heard_s is not None):
+            raise DeviceFault(
+                f"{self.label} sends no status: switch on CAN status 1 in VESC Tool, check id and bit rate"
+            )
+        return [f"peak {self.peak_torque_nm:.4g} N m as declared, time-out set by hand"]
+
+    def arm(self, link: CanLink) -> None:
+        """There is no enable: zero current from now on."""
+        link.send([self._command(0.0)])
+        self._armed = True
+
+    def frames(self, torque_nm: float, now_s: float) -> list[CanFrame]:
+        """The current, which feeds the time-out."""
+        s = self.settings
+        current_a = self.motor_nm(torque_nm) / s.torque_constant_nm_a
+        return [self._command(max(-s.peak_current_a, min(s.peak_current_a, current_a)))]
+
+    def sent_torque_nm(self, frame: CanFrame) -> float | None:
+        """From a current frame of ours."""
+        if frame.identifier != self._current_id:
+            return None
+        milliamperes: int = struct.unpack(">i", frame.data)[0]
+        return self.shaft_nm(milliamperes * 1e-3 * self.settings.torque_constant_nm_a)
+
+    def receive(self, heard: Heard) -> None:
+        """Status frames."""
+        if heard.frame.identifier == self._status_id and heard.frame.extended and len(heard.frame.data) == 8:
+            self._heard_s = heard.time_s
+            self._current_a = decode_status(heard.frame.data)[1]
+
+    def check(self, now_s: float) -> None:
+        """Silence; a VESC reports no faults on CAN."""
+        if self._armed and self._heard_s is not None and now_s - self._heard_s > SILENT_S:
+            raise DeviceFault(f"{self.label} is silent for {(now_s - self._heard_s) * 1e3:.0f} ms: check its supply")
+
+    def off_frames(self) -> Sequence[CanFrame]:
+        """Zero current."""
+        return [self._command(0.0)]
+
+    def disarm(self, link: CanLink) -> None:
+        """Zero current, and the current seen to be gone."""
+        self._armed = False
+        link.send(self.off_frames(), urgent=True)
+        asked_s = link.clock()
+        off = link.wait(
+            STATUS_TIMEOUT_S,
+            lambda: (self._heard_s or 0.0) > asked_s and abs(self._current_a or 0.0) < ZERO_CURRENT_A,
+        )
+        if not off:
+            raise DeviceFault(f"{self.label} does not report zero current: PRESS THE EMERGENCY STOP")
