@@ -18,7 +18,7 @@ import numpy as np
 from identify.regression import Structure
 from identify.traces import Trace
 from rig import effects
-from rig.dynamics import Equations, Grid, TorqueSignal
+from rig.dynamics import Equations, Grid
 from rig.dynamics.simulate import MAX_SUBSTEPS
 from rig.platform import TERMS, Platform
 from rig.recording.run import Array
@@ -28,11 +28,12 @@ FIELD = {"inertia": "inertia_kg_m2", "damping": "damping_nm_s_rad", "stiffness":
 STEP = 1e-6  # relative step of the differences: simulations repeat to 1e-13
 
 
-def names_of(structure: Structure) -> tuple[Name, ...]:
-    """All parameters of a structure: terms, then every parameter of every effect."""
+def names_of(structure: Structure, runs: int) -> tuple[Name, ...]:
+    """All parameters of a structure: terms, then every parameter of every effect (per run where it is one)."""
     out: list[Name] = [(t,) for t in TERMS if t in structure.terms]
     for name in structure.effects:
-        out += [(name, p.name) for p in effects.get(name).parameters]
+        for p in effects.get(name).parameters:
+            out += [(name, p.name, str(r)) for r in range(runs)] if p.per_run else [(name, p.name)]
     return tuple(out)
 
 
@@ -44,14 +45,16 @@ def bounds_of(name: Name) -> tuple[float, float]:
     return parameter.low, parameter.high
 
 
-def platform_of(structure: Structure, names: Sequence[Name], values: Array, added: float = 0.0) -> Platform:
-    """The platform that a parameter vector stands for."""
+def platform_of(
+    structure: Structure, names: Sequence[Name], values: Array, run: int = 0, added: float = 0.0
+) -> Platform:
+    """The platform that a parameter vector stands for in one run."""
     terms = {"inertia": 0.0, "damping": 0.0, "stiffness": 0.0}
     held: dict[str, dict[str, float]] = {name: {} for name in structure.effects}
     for name, value in zip(names, values, strict=True):
         if len(name) == 1:
             terms[name[0]] = float(value)
-        else:
+        elif len(name) == 2 or int(name[2]) == run:
             held[name[0]][name[1]] = float(value)
     return Platform(
         terms["inertia"] + added, terms["damping"], terms["stiffness"], held, structure.terms
@@ -70,6 +73,21 @@ class Shots:
     weight: Any = field(default=None)  # (n,) boolean: samples that count
 
     @property
+    def number(self) -> int:
+        """Which run of the recording it is."""
+        return self.trace.number
+
+    @property
+    def added(self) -> float:
+        """Known inertia mounted for this run."""
+        return self.trace.run.added_inertia_kg_m2
+
+    @property
+    def active(self) -> Any:
+        """Which shots hold samples that count; the others are not simulated."""
+        return np.array([bool(np.any(self.weight[a:b])) for a, b in self.edges])
+
+    @property
     def edges(self) -> list[tuple[int, int]]:
         """First sample and one past the last of each shot."""
         ends = [*self.first[1:].tolist(), len(self.trace.measured)]
@@ -79,15 +97,19 @@ class Shots:
 def make_shots(trace: Trace, substeps: int, length: int | None, use: Any = None) -> Shots:
     """Cut a run into shots of ``length`` samples (None: one), started from the smoothed measurement."""
     n = len(trace.measured)
-    time = trace.run.time_s[0] + trace.step_s * np.arange(n)
-    first = np.arange(0, n, length) if length else np.array([0])
-    if length and len(first) > 1 and n - first[-1] < length // 2:
-        first = first[:-1]
+    time = trace.start_s + trace.step_s * np.arange(n)
+    begins = [0]  # every usable stretch begins anew: what happened in between is not to be predicted
+    for a, b in trace.stretches:
+        inside = np.arange(a, b + 1, length) if length else np.array([a])
+        if length and len(inside) > 1 and b + 1 - inside[-1] < length // 2:
+            inside = inside[:-1]
+        begins += inside.tolist()
+    first = np.unique(np.array(begins))
     angle, rate, _, _, _ = trace.fine
     ratio = (len(angle) - 1) // (n - 1)
     starts = np.stack([angle[first * ratio], rate[first * ratio]], axis=1)
     weight = trace.keep if use is None else trace.keep & use
-    return Shots(trace, Grid(time, trace.torque, substeps), first, starts, trace.bias, weight)
+    return Shots(trace, Grid(time, trace.torque, substeps), first, starts, 0.0, weight)
 
 
 def predict(shots: Shots, equations: Equations, starts: Array, bias: float) -> Array:
@@ -97,7 +119,12 @@ def predict(shots: Shots, equations: Equations, starts: Array, bias: float) -> A
     ratio = round(shots.trace.step_s / grid.step_s)
     n = len(shots.trace.measured)
     rate = shots.trace.channel == "rate"
-    fine = equations.integrate_shots(torque, grid.step_s, shots.first * ratio, starts)
+    active = [
+        (a * ratio, min(b, n - 1) * ratio if b == n else b * ratio)
+        for (a, b), on in zip(shots.edges, shots.active, strict=True)
+        if on
+    ]
+    fine = equations.integrate_shots(torque, grid.step_s, active, starts[shots.active], shots.trace.offset_s)
     if rate and equations.sensor.names:
         return np.asarray(equations.sensor.apply(fine[:, 1], grid.step_s)[: n * ratio : ratio] + bias)
     out = fine[: n * ratio : ratio, 1 if rate else 0]
@@ -125,17 +152,17 @@ class Estimate:
     shots: tuple[Shots, ...]
     converged: bool
 
-    def platform(self, added: float = 0.0) -> Platform:
-        """The fitted platform."""
-        return platform_of(self.structure, self.names, self.values, added)
+    def platform(self, run: int = 0, added: float = 0.0) -> Platform:
+        """The fitted platform, as it stood in one run."""
+        return platform_of(self.structure, self.names, self.values, run, added)
+
+    def simulated(self) -> list[Array]:
+        """The measured channel as the model gives it, one array a run."""
+        return [predict(s, Equations(self.platform(s.number, s.added)), s.starts, s.bias) for s in self.shots]
 
     def residuals(self) -> list[Array]:
         """Measured minus simulated, one array a run."""
-        out = []
-        for s in self.shots:
-            equations = Equations(self.platform(s.trace.run.added_inertia_kg_m2))
-            out.append(s.trace.measured - predict(s, equations, s.starts, s.bias))
-        return out
+        return [s.trace.measured - y for s, y in zip(self.shots, self.simulated(), strict=True)]
 
 
 @dataclass
@@ -150,17 +177,14 @@ class _Normal:
 
 
 def _linearise(s: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any) -> _Normal:
-    added = s.trace.run.added_inertia_kg_m2
-    rate = s.trace.channel == "rate"
-
     def run(values: Array, starts: Array) -> Array:
-        return predict(s, Equations(platform_of(structure, names, values, added)), starts, s.bias)
+        return predict(s, Equations(platform_of(structure, names, values, s.number, s.added)), starts, s.bias)
 
     base = run(x, s.starts)
     residual = s.trace.measured - base
     columns = np.zeros((len(base), len(x)))
     for i in range(len(x)):
-        if fixed[i]:
+        if fixed[i] or (len(names[i]) == 3 and int(names[i][2]) != s.number):
             continue
         h = STEP * scale[i]
         low, high = bounds_of(names[i])
@@ -174,11 +198,15 @@ def _linearise(s: Shots, structure: Structure, names: Sequence[Name], x: Array, 
         moved = s.starts.copy()
         moved[:, k] += STEP * 10.0 * span[k]
         state[:, k] = (run(x, moved) - base) / (STEP * 10.0 * span[k])
-    return _eliminate(s, columns, state, residual, rate)
+    return _eliminate(s, columns, state, residual, s.trace.biased)
 
 
 def _eliminate(s: Shots, columns: Array, state: Array, residual: Array, rate: bool) -> _Normal:
     p = columns.shape[1]
+    used = s.weight
+    if not (np.all(np.isfinite(columns[used])) and np.all(np.isfinite(state[used])) and np.all(np.isfinite(residual[used]))):
+        # The simulation ran away: nothing can be said from here.
+        return _Normal(np.zeros((p, p)), np.zeros(p), np.inf, int(np.sum(used)), lambda dx: (0.0 * s.starts, 0.0))
     wide = np.column_stack([columns, np.ones(len(residual))]) if rate else columns
     a, b = np.zeros((wide.shape[1],) * 2), np.zeros(wide.shape[1])
     rss, count = 0.0, 0
@@ -244,7 +272,7 @@ def refine(
         Stop when the sum of squares falls by less than this share of itself times 1e-2, or when no
         parameter moves by more than this many of its standard errors.
     """
-    names = names_of(structure)
+    names = names_of(structure, 1 + max(t.number for t in traces))
     x = np.array([start[name] for name in names])
     still = np.array([name in fixed for name in names])
     shots = _shots_for(traces, structure, names, x, shot_s, use, carry)
@@ -261,7 +289,7 @@ def _shots_for(
 ) -> list[Shots]:  # fmt: skip
     out = []
     for i, trace in enumerate(traces):
-        equations = Equations(platform_of(structure, names, x, trace.run.added_inertia_kg_m2))
+        equations = Equations(platform_of(structure, names, x, trace.number, trace.run.added_inertia_kg_m2))
         substeps = min(MAX_SUBSTEPS, equations.substeps(trace.step_s))
         length = None if shot_s is None else max(8, round(shot_s / trace.step_s))
         shots = make_shots(trace, substeps, length, None if use is None else use[i])
@@ -281,8 +309,9 @@ def _levenberg(
     damping, converged = 1e-6, False
     parts = list(workers.map(lambda s: _linearise(s, structure, names, x, scale, still), shots))
     a, b, rss, count = _total(parts)
-    for _ in range(iterations):
+    for _ in range(iterations if np.isfinite(rss) else 0):
         step = None
+        trial, trial_rss = shots, rss
         for _try in range(8):
             size = np.sqrt(np.maximum(np.diag(a), 1e-300))
             free = ~still
@@ -295,7 +324,7 @@ def _levenberg(
             moved = [q.back(new - x) for q in parts]
             trial = [_moved(s, m) for s, m in zip(shots, moved, strict=True)]
             trial_rss = sum(workers.map(lambda s, new=new: _rss(s, structure, names, new), trial))
-            if np.isfinite(trial_rss) and trial_rss <= rss * (1.0 + 1e-12):
+            if trial_rss <= rss * (1.0 + 1e-12):
                 step = new
                 break
             damping = max(damping * 30.0, 1e-5)
@@ -333,17 +362,14 @@ def _moved(s: Shots, by: tuple[Array, float]) -> Shots:
 
 
 def _rss(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> float:
-    added = s.trace.run.added_inertia_kg_m2
-    r = (s.trace.measured - predict(s, Equations(platform_of(structure, names, x, added)), s.starts, s.bias))[s.weight]
+    equations = Equations(platform_of(structure, names, x, s.number, s.added))
+    r = (s.trace.measured - predict(s, equations, s.starts, s.bias))[s.weight]
     return float(r @ r)
 
 
-def evaluate(estimate: Estimate, traces: Sequence[Trace], use: Sequence[Any] | None = None) -> Estimate:
-    """The same parameters on other runs: only start states and biases are fitted there."""
+def evaluate(
+    estimate: Estimate, traces: Sequence[Trace], use: Sequence[Any] | None = None, shot_s: float | None = None
+) -> Estimate:
+    """The same parameters on other samples: only start states and biases are fitted there."""
     start = dict(zip(estimate.names, estimate.values.tolist(), strict=True))
-    return refine(traces, estimate.structure, start, None, 6, use, fixed=estimate.names)
-
-
-def torque_signal(trace: Trace) -> TorqueSignal | None:
-    """The torque behind a trace."""
-    return trace.torque
+    return refine(traces, estimate.structure, start, shot_s, 4, use, fixed=estimate.names)

@@ -7,7 +7,7 @@ rebuilt from the estimate and the solve repeated until it stands still (Steiglit
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -17,7 +17,7 @@ import numpy as np
 from identify.prefilter import Denominator, Prefilter
 from identify.traces import UPSAMPLING, Trace
 from rig import effects
-from rig.effects.base import Place
+from rig.effects.base import Effect, Place
 from rig.platform import TERMS
 from rig.recording.run import Array
 
@@ -65,21 +65,22 @@ def shape_values(name: str, values: Mapping[str, float]) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class Block:
-    """One stretch of one run, prefiltered: target = columns @ x + nuisances @ n + white noise."""
+    """One stretch of one run, prefiltered: target = columns @ x + bias + free @ n + white noise."""
 
     columns: Array  # (m, p)
-    nuisances: Array  # (m, 2 or 3)
+    free: Array  # (m, 2): what an unknown start state adds
+    biased: bool
     target: Array  # (m,)
     rows: Any  # sample numbers, (m,)
     trace: int
 
     @cached_property
-    def projected(self) -> tuple[Array, Array]:
-        """Columns and target with the nuisances taken out."""
-        q = np.linalg.qr(self.nuisances)[0]
-        both = np.column_stack([self.columns, self.target])
-        both = both - q @ (q.T @ both)
-        return both[:, :-1], both[:, -1]
+    def projected(self) -> Array:
+        """Columns, a column of ones where the sensor may be biased, and the target; the free motion taken out."""
+        ones = [np.ones(len(self.target))] if self.biased else []
+        both = np.column_stack([self.columns, *ones, self.target])
+        q = np.linalg.qr(self.free)[0]
+        return np.asarray(both - q @ (q.T @ both))
 
 
 class Regression:
@@ -91,15 +92,21 @@ class Regression:
         The runs, prepared.
     structure
         Terms and effects of the model.
-    torque_free
-        No torque was measured: inertia is fixed at one, all else is per inertia.
+    cache
+        Where responses behind one denominator are kept for other structures; None keeps nothing.
+
+    Where no torque was measured (``torque_free``), inertia is fixed at one and all else is per inertia.
     """
 
-    def __init__(self, traces: Sequence[Trace], structure: Structure) -> None:
+    def __init__(
+        self, traces: Sequence[Trace], structure: Structure, cache: dict[Any, Any] | None = None
+    ) -> None:
+        self.cache = cache
         self.traces = traces
         self.structure = structure
         self.torque_free = all(t.torque is None for t in traces)
-        labels = structure.labels(len(traces))
+        self.runs = 1 + max(t.number for t in traces)
+        labels = structure.labels(self.runs)
         self.labels = tuple(x for x in labels if not (self.torque_free and x == ("inertia",)))
 
     def blocks(self, denominator: Denominator, shapes: Shapes) -> list[Block]:
@@ -121,59 +128,72 @@ class Regression:
         d = pre.denominator
         m = last - first + 1
 
+        place = (number, first, d)
+
+        def kept(what: Any, make: Callable[[], Any]) -> Any:
+            if self.cache is None:
+                return make()
+            key = (place, what)
+            if key not in self.cache:
+                self.cache[key] = make()
+            return self.cache[key]
+
         def through(pieces: Array, upsampling: int) -> Array:
             return pre.respond(pieces, first, last, upsampling)[:, out]
 
         y = trace.measured[first : last + 1]
-        low = pre.respond(trace.measured_pieces, first, last)
-        base = {
-            "stiffness": low[:, 0],
-            "damping": low[:, 1],
-            "inertia": (y - d.damping * low[:, 1] - d.stiffness * low[:, 0]) / d.inertia,
-        }
+
+        def linear() -> dict[str, Array]:
+            low = pre.respond(trace.measured_pieces, first, last)
+            acceleration = (y - d.damping * low[:, 1] - d.stiffness * low[:, 0]) / d.inertia
+            return {"stiffness": low[:, 0], "damping": low[:, 1], "inertia": acceleration}
+
+        base = kept("linear", linear)
         drive = tuple(
             (name, tuple(shapes[name])) for name in self.structure.effects
             if effects.get(name).place is Place.DRIVE
         )  # fmt: skip
         torque = trace.torque_pieces(drive)
-        target = np.zeros(m) if torque is None else through(*torque)
+        target = np.zeros(m) if torque is None else kept(drive, lambda: through(*torque))
         if trace.run.added_inertia_kg_m2:
             target = target - trace.run.added_inertia_kg_m2 * base["inertia"]
         columns: dict[Label, Array] = {}
         for term in TERMS:
             if term in self.structure.terms:
-                columns[(term,)] = base[term].copy()
-        self._add_effects(columns, through, number, trace, shapes, m)
+                columns[(term,)] = base[term]
+        self._add_effects(columns, through, kept, trace, shapes, m)
         if self.torque_free:
             target = target - columns.pop(("inertia",))
-        free = pre.free(m)
-        nuisances = np.column_stack([free, np.ones(m)]) if rate else free
+        free = kept("free", lambda: pre.free(m))
         rows = np.nonzero(trace.keep[first : last + 1])[0]
         matrix = np.column_stack([columns[x] for x in self.labels])
-        return Block(matrix[rows], nuisances[rows], target[rows], rows + first, number)
+        return Block(matrix[rows], free[rows], trace.biased, target[rows], rows + first, number)
 
     def _add_effects(
-        self, columns: dict[Label, Array], through: Any, number: int, trace: Trace, shapes: Shapes, m: int
+        self, columns: dict[Label, Array], through: Any, kept: Any, trace: Trace, shapes: Shapes, m: int
     ) -> None:
         for name in self.structure.effects:
             effect = effects.get(name)
             if effect.place in (Place.DRIVE, Place.SENSOR):
                 continue
             shape = tuple(shapes.get(name, ()))
+
+            def response(effect: Effect, shape: tuple[float, ...], unit: int) -> Array:
+                pieces = trace.effect_pieces(effect, shape, unit)
+                return np.zeros(m) if pieces is None else through(pieces, UPSAMPLING)
+
             for i, parameter in enumerate(effect.parameters):
                 if not parameter.linear:
                     continue
-                pieces = trace.effect_pieces(effect, shape, i)
-                column = np.zeros(m) if pieces is None else through(pieces, UPSAMPLING)
+                column = kept((name, shape, i), lambda i=i: response(effect, shape, i))
                 if parameter.per_run:
-                    for r in range(len(self.traces)):
-                        columns[(name, parameter.name, str(r))] = column if r == number else np.zeros(m)
+                    for r in range(self.runs):
+                        columns[(name, parameter.name, str(r))] = column if r == trace.number else np.zeros(m)
                 else:
                     columns[(name, parameter.name)] = column
-            for term, unit in UNIT.items():  # backlash takes its torque from the platform's own spring
-                pieces = trace.effect_pieces(effect, shape, unit) if (term,) in columns else None
-                if pieces is not None:
-                    columns[(term,)] = columns[(term,)] + through(pieces, UPSAMPLING)
+            for term in effect.leans_on:
+                if (term,) in columns:
+                    columns[(term,)] = columns[(term,)] + response(effect, shape, UNIT[term])
 
 
 @dataclass(frozen=True)
@@ -206,23 +226,56 @@ class Solution:
         return float(self.values[self.labels.index(label)]) if label in self.labels else 0.0
 
 
-def gram(blocks: Sequence[Block], use: Any = None) -> tuple[Array, Array, float, int]:
-    """Normal matrix, right-hand side, squared target and count, nuisances projected out.
+@dataclass(frozen=True)
+class Normal:
+    """Normal equations of a regression, start states and biases eliminated."""
 
-    ``use`` maps a block to the rows that count (a boolean mask), or None for all.
+    a: Array  # (p, p)
+    b: Array  # (p,)
+    c: float
+    count: int
+
+    def __add__(self, other: Normal) -> Normal:
+        return Normal(self.a + other.a, self.b + other.b, self.c + other.c, self.count + other.count)
+
+    def rss(self, x: Array) -> float:
+        """Sum of squares that a parameter vector leaves."""
+        return float(max(self.c - 2.0 * (self.b @ x) + x @ self.a @ x, 0.0))
+
+
+def normal(blocks: Sequence[Block], use: Sequence[Any] | None = None) -> Normal:
+    """Normal equations of some blocks.
+
+    ``use`` holds a boolean array for each trace (True where a sample counts), or None for all. A bias is
+    common to all stretches of a run.
     """
-    total: tuple[Array, Array, float, int] | None = None
-    for block in blocks:
-        x, y = block.projected
-        if use is not None:
-            mask = use(block)
-            x, y = x[mask], y[mask]
-        part = (x.T @ x, x.T @ y, float(y @ y), len(y))
-        total = part if total is None else (
-            total[0] + part[0], total[1] + part[1], total[2] + part[2], total[3] + part[3]
-        )  # fmt: skip
-    assert total is not None
+    p = blocks[0].columns.shape[1]
+    total = Normal(np.zeros((p, p)), np.zeros(p), 0.0, 0)
+    for trace in sorted({block.trace for block in blocks}):
+        width = p + (2 if any(b.biased for b in blocks if b.trace == trace) else 1)
+        g, count = np.zeros((width, width)), 0
+        for block in blocks:
+            if block.trace == trace:
+                m = block.projected
+                m = m if use is None else m[use[trace][block.rows]]
+                g += m.T @ m
+                count += len(m)
+        if width == p + 2 and g[p, p] > 0.0:
+            g = g - np.outer(g[:, p], g[p, :]) / g[p, p]
+        total = total + Normal(g[:p, :p], g[:p, -1], float(g[-1, -1]), count)
     return total
+
+
+def residuals(blocks: Sequence[Block], x: Array) -> list[Array]:
+    """Prefiltered residual of every block, start states and biases fitted, each of shape (m,)."""
+    out = []
+    for block in blocks:
+        r = block.projected[:, -1] - block.projected[:, : len(x)] @ x
+        if block.biased:
+            one = block.projected[:, len(x)]
+            r = r - one * (one @ r) / max(float(one @ one), 1e-300)
+        out.append(r)
+    return out
 
 
 def solve(a: Array, b: Array) -> Array:
@@ -247,7 +300,7 @@ def fit(
     start: tuple[float, float, float],
     rho: float,
     iterations: int = ITERATIONS,
-    use: Any = None,
+    use: Sequence[Any] | None = None,
 ) -> Solution:
     """Solve at a fixed rho and fixed shapes, the denominator rebuilt from the estimate ``iterations`` times.
 
@@ -258,8 +311,8 @@ def fit(
     for k in range(max(1, iterations)):
         denominator = Denominator.of(*platform, rho, rate)
         blocks = regression.blocks(denominator, shapes)
-        a, b, c, n = gram(blocks, use)
-        x = solve(a, b)
+        equations = normal(blocks, use)
+        x = solve(equations.a, equations.b)
         found = dict(zip(regression.labels, x, strict=True))
         inertia = 1.0 if regression.torque_free else float(found.get(("inertia",), 0.0))
         new = (inertia, float(found.get(("damping",), 0.0)), float(found.get(("stiffness",), 0.0)))
@@ -269,15 +322,13 @@ def fit(
         platform = new
         if k > 0 and change < 1e-7:
             break
-    rss = max(c - float(b @ x), 0.0)
-    if rss < 1e-6 * c:  # the difference of two large numbers: take it from the residual itself
-        rss = sum(
-            float(np.sum((y - m @ x)[slice(None) if use is None else use(block)] ** 2))
-            for block, (m, y) in ((bl, bl.projected) for bl in blocks)
-        )
+    n, rss = equations.count, equations.rss(x)
+    if rss < 1e-6 * equations.c:  # the difference of two large numbers: take it from the residual itself
+        parts = zip(blocks, residuals(blocks, x), strict=True)
+        rss = sum(float(np.sum((r if use is None else r[use[b.trace][b.rows]]) ** 2)) for b, r in parts)
     rms = float(np.sqrt(rss / max(n, 1)))
     gain = log_gain(platform, denominator, regression.traces[0].step_s)
     return Solution(
         regression.structure, dict(shapes), regression.labels, x, denominator, rho,
-        rms / np.exp(gain), rms, n, a, platform,
+        rms / np.exp(gain), rms, n, equations.a, platform,
     )  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -21,7 +21,7 @@ from rig.recording.run import Array, Run
 UPSAMPLING = 4  # nonlinear torques have corners between samples
 SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than it tells
 LONGEST_FILL = 25  # missing samples that a spline may bridge
-STEP_PHASE_RAD = 0.06
+STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
 
 
 def noise_of(values: Array) -> float:
@@ -53,7 +53,7 @@ def bandwidth_of(values: Array, step_s: float) -> float:
 
 @nb.njit(cache=True, error_model="numpy", nogil=True)
 def _along(kernel, angle, rate, time, torque, step, z, substeps, p, friction, soft, out):  # type: ignore[no-untyped-def]
-    """An effect's torque along a given motion; its states by the midpoint rule."""
+    """An effect's torque along a given motion; its states by the midpoint rule, one state linearly implicit."""
     n = len(angle)
     states = len(z)
     dz, mid = np.zeros(max(1, states)), np.zeros(max(1, states))
@@ -76,6 +76,17 @@ def _along(kernel, angle, rate, time, torque, step, z, substeps, p, friction, so
                 a1 = angle[i] + v * (angle[i + 1] - angle[i])
                 w1 = rate[i] + v * (rate[i + 1] - rate[i])
                 t = time[i] + u * step
+                if states == 1:  # linearly implicit: bristles and relaxations may be far faster than a step
+                    z0 = zz[0]
+                    delta = 1e-6 * (1.0 + abs(z0))
+                    zz[0] = z0 + delta
+                    _call(kernel, a1, w1, t, torque[i], pz, pd, pp)
+                    f1 = dz[0]
+                    zz[0] = z0
+                    _call(kernel, a1, w1, t, torque[i], pz, pd, pp)
+                    f0 = dz[0]
+                    zz[0] = z0 + h * f0 / (1.0 - 0.5 * h * min((f1 - f0) / delta, 0.0))
+                    continue
                 _call(kernel, a0, w0, t, torque[i], pz, pd, pp)
                 for j in range(states):
                     mid[j] = zz[j] + 0.5 * h * dz[j]
@@ -108,8 +119,37 @@ class Trace:
     stretches: list[tuple[int, int]]
     torque: TorqueSignal | None
     noise: float
-    bias: float = 0.0
+    cutoff_hz: float  # of the zero-phase low-pass behind ``fine``
+    number: int = 0  # which run of the recording
+    offset_s: float = 0.0  # of the first sample from the start of the run
+    motion: tuple[Array, Array, Array, Array, float] | None = None  # of a piece: cut out of the whole run's
     _series: dict[Any, Any] = field(default_factory=dict)
+
+    @property
+    def start_s(self) -> float:
+        """Time stamp of the first sample."""
+        return float(self.run.time_s[0]) + self.offset_s
+
+    def piece(self, first: int, last: int) -> Trace:
+        """Samples first..last as a trace of their own."""
+        angle, rate, time, torque, left = self.fine
+        fine = slice(first * UPSAMPLING, last * UPSAMPLING + 1)
+        inside = [(max(a, first) - first, min(b, last) - first) for a, b in self.stretches]
+        kept = [(a, b) for a, b in inside if b - a + 1 >= SHORTEST_STRETCH]
+        return replace(
+            self,
+            measured=self.measured[first : last + 1],
+            keep=self.keep[first : last + 1],
+            stretches=kept,
+            offset_s=self.offset_s + first * self.step_s,
+            motion=(angle[fine], rate[fine], time[fine], torque[fine], left),
+            _series={},
+        )
+
+    @property
+    def biased(self) -> bool:
+        """Whether the channel may carry an unknown constant: a gyro alone; an encoder beside it would show it."""
+        return self.channel == "rate" and self.run.angle_rad is None
 
     @property
     def count(self) -> int:
@@ -122,16 +162,13 @@ class Trace:
         return smooth_pieces(self.measured, self.step_s)
 
     @cached_property
-    def cutoff_hz(self) -> float:
-        """Cut-off of the zero-phase low-pass behind ``fine``."""
-        return bandwidth_of(self.measured, self.step_s)
-
-    @cached_property
     def fine(self) -> tuple[Array, Array, Array, Array, float]:
         """Angle, rate, time and torque, upsampled and smoothed, and the noise left in the rate."""
+        if self.motion is not None:
+            return self.motion
         nyquist = 0.5 / self.step_s
         wn = self.cutoff_hz / nyquist
-        y = self.measured - (self.bias if self.channel == "rate" else 0.0)
+        y = self.measured
         if wn < 0.8:
             sos = signal.butter(3, wn, output="sos")
             y = signal.sosfiltfilt(sos, y, padlen=min(len(y) - 1, int(10.0 / wn)))
@@ -142,12 +179,13 @@ class Trace:
             angle, rate = spline.antiderivative()(fine_t), spline(fine_t)
             left = self.noise * np.sqrt(min(1.0, wn))
             if self.run.angle_rad is not None:
-                angle = angle + np.median(np.interp(t + self.run.time_s[0], self.run.time_s, self.run.angle_rad) - angle[::UPSAMPLING])
+                encoder = np.interp(t + self.start_s, self.run.time_s, self.run.angle_rad)
+                angle = angle + np.median(encoder - angle[::UPSAMPLING])
         else:
             angle, rate = spline(fine_t), spline.derivative()(fine_t)
             left = self.noise * 2.0 * np.pi * self.cutoff_hz / np.sqrt(3.0) * np.sqrt(min(1.0, wn))
-        torque = np.zeros_like(fine_t) if self.torque is None else self.torque.at(fine_t + self.run.time_s[0])
-        return angle, rate, fine_t, torque, float(left)
+        torque = np.zeros_like(fine_t) if self.torque is None else self.torque.at(fine_t + self.start_s)
+        return angle, rate, fine_t + self.offset_s, torque, float(left)
 
     def torque_pieces(self, drive: tuple[tuple[str, tuple[float, ...]], ...]) -> tuple[Array, int] | None:
         """Torque behind the given drive effects as polynomials, and how many of them a sample holds."""
@@ -161,7 +199,7 @@ class Trace:
     def _make_torque(self, drive: tuple[tuple[str, tuple[float, ...]], ...]) -> tuple[Array, int]:
         assert self.torque is not None
         n = len(self.measured)
-        start = float(self.run.time_s[0])
+        start = self.start_s
         held = self.torque.hold == "zero_order"
         if not drive and not held:
             return smooth_pieces(self.torque.at(start + self.step_s * np.arange(n)), self.step_s), 1
@@ -202,7 +240,7 @@ class Trace:
         substeps = 1
         if effect.states and effect.fastest_rad_s:
             full = (1.0, 0.0, 0.0, *(v if v else 1e-12 for v in p[3:]))
-            substeps = int(np.clip(np.ceil(fine * effect.fastest_rad_s(full) / STEP_PHASE_RAD), 1, 40))
+            substeps = int(np.clip(np.ceil(fine * effect.fastest_rad_s(full) / STEP_PHASE_RAD), 1, 8))
         out = np.empty_like(angle)
         _along(
             effect.kernel.address, angle, rate, time, torque, fine, z, substeps, p,
@@ -214,22 +252,26 @@ class Trace:
 
 
 def _channel(run: Run) -> Literal["rate", "angle"]:
-    """The channel whose noise is the sensor's own: a rate that is a differenced angle is not one."""
+    """The channel that tells more where 99 % of the motion is; a differenced encoder is no gyro."""
     if run.rate_rad_s is None:
         return "angle"
     if run.angle_rad is None:
         return "rate"
     step = float(np.median(np.diff(run.time_s)))
     ok = run.valid & np.isfinite(run.rate_rad_s) & np.isfinite(run.angle_rad)
-    differenced = noise_of(np.diff(run.angle_rad[ok])) / step
-    return "rate" if noise_of(run.rate_rad_s[ok]) < 0.3 * differenced else "angle"
+    f, power = signal.welch(run.rate_rad_s[ok], 1.0 / step, nperseg=min(int(ok.sum()), 4096), detrend="constant")
+    moving_rad_s = 2.0 * np.pi * f[np.searchsorted(np.cumsum(power), 0.99 * np.sum(power))]
+    as_rate = noise_of(run.angle_rad[ok]) * moving_rad_s
+    return "rate" if noise_of(run.rate_rad_s[ok]) < as_rate else "angle"
 
 
-def prepare(run: Run, noise: float | None = None) -> Trace:
+def prepare(run: Run, number: int = 0, noise: float | None = None) -> Trace:
     """Lay a run on a uniform grid and find its usable stretches.
 
     Parameters
     ----------
+    number
+        Which run of the recording it is.
     noise
         One standard deviation of the measured channel; estimated where None.
     """
@@ -259,8 +301,9 @@ def prepare(run: Run, noise: float | None = None) -> Trace:
     if run.torque_nm is not None and run.torque_time_s is not None:
         torque = TorqueSignal(run.torque_time_s, run.torque_nm, run.torque_hold)
     trace = Trace(
-        run, channel, step, filled, keep, [], torque, noise if noise is not None else noise_of(filled[~broken])
-    )
+        run, channel, step, filled, keep, [], torque, noise if noise is not None else noise_of(filled[~broken]),
+        bandwidth_of(filled[~broken], step), number,
+    )  # fmt: skip
     if run.min_rate_rad_s > 0.0:
         slow = np.abs(trace.fine[1][::UPSAMPLING]) <= run.min_rate_rad_s
         broken |= slow

@@ -135,16 +135,19 @@ class Equations:
         )
         return out
 
-    def integrate_shots(self, torque: Array, step_s: float, first: Array, starts: Array) -> Array:
-        """As ``integrate``, but set to a new angle and rate at the fine steps ``first`` (first[0] is 0).
+    def integrate_shots(
+        self, torque: Array, step_s: float, spans: Sequence[tuple[int, int]], starts: Array, offset_s: float = 0.0
+    ) -> Array:
+        """As ``integrate``, over spans of fine steps (first, last), each begun from its row of ``starts``.
 
-        ``starts`` has shape (len(first), 2). Internal states go on from shot to shot.
+        Internal states go on from span to span. What lies between spans is zero.
         """
+        out = np.zeros((len(torque) + 1, 3))
+        if not spans:
+            return out
         z = self.rest_states(*starts[0])
-        out = np.empty((len(torque) + 1, 3))
-        ends = [*first[1:].tolist(), len(torque)]
-        for (angle, rate), begin, end in zip(starts.tolist(), first.tolist(), ends, strict=True):
-            state = np.array([angle, rate, np.sign(rate), begin * step_s])
+        for (angle, rate), (begin, end) in zip(starts.tolist(), spans, strict=True):
+            state = np.array([angle, rate, np.sign(rate), offset_s + begin * step_s])
             integrator.run_steps(
                 state, z, step_s, torque[begin:end], self.jck, self.kernels, self.loads,
                 self.z_at, self.p, self.p_at, out[begin : end + 1],

@@ -59,6 +59,7 @@ class Scale:
     step_s: float
     natural_frequency_hz: float
     excitation_hz: tuple[float, ...] = ()
+    lines_hz: tuple[float, ...] = ()  # spectral lines of the current residual
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,7 @@ class Effect:
     filter_states: Callable[[float, tuple[float, ...]], int] | None = None
     rest_state: Callable[[float, float], tuple[float, ...]] | None = None  # of angle and rate at the start
     fastest_rad_s: Callable[[tuple[float, ...]], float] | None = None  # of (J, C, K, *values): sets the step
+    leans_on: tuple[str, ...] = ()  # terms of the platform that scale its torque (backlash: the stiffness)
     ordered: tuple[tuple[str, str], ...] = ()  # pairs of parameters of which the first is the smaller
     nests: tuple[str, ...] = ()  # simpler effects that this one contains as a special case
     never_separable: Mapping[str, str] | None = None  # rival -> why no torque-to-rate data can tell

@@ -14,10 +14,7 @@ def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-unt
 
 
 def _frequencies(scale: Scale) -> tuple[float, ...]:
-    # Half a resolution cell apart, up to 100 Hz: a line must not slip through the grid.
-    highest = min(100.0, 0.4 / scale.step_s)
-    count = min(400, max(8, int(2.0 * highest * scale.duration_s / 5.0)))
-    return tuple(0.2 + (highest - 0.2) * i / (count - 1) for i in range(count))
+    return scale.lines_hz or (0.1 / scale.step_s,)
 
 
 EFFECT = Effect(

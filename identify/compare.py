@@ -1,0 +1,128 @@
+"""Models side by side: each fitted by output error over a short horizon, judged on samples not fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.output_error import Estimate, Name, evaluate, names_of, refine
+from identify.regression import Shapes, Solution, Structure
+from identify.traces import Trace
+from rig import effects
+from rig.recording.run import Array
+
+CLEARLY = 3.5  # standard errors by which the held-out error must fall
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A structure with its fit and the squared error of every held-out shot."""
+
+    structure: Structure
+    estimate: Estimate
+    losses: Array  # (shots,)
+    counts: Array  # (shots,)
+
+    @property
+    def sigma(self) -> float:
+        """Root mean square over the held-out samples."""
+        return float(np.sqrt(np.sum(self.losses) / max(np.sum(self.counts), 1)))
+
+    def values(self) -> dict[Name, float]:
+        """Parameter values by name."""
+        return dict(zip(self.estimate.names, self.estimate.values.tolist(), strict=True))
+
+    def shapes(self) -> dict[str, tuple[float, ...]]:
+        """Shape parameters of every effect."""
+        values = self.values()
+        return {
+            name: tuple(values[(name, p.name)] for p in effects.get(name).parameters if not p.linear)
+            for name in self.structure.effects
+        }
+
+
+def horizon_s(platform: tuple[float, float, float], traces: Sequence[Trace]) -> float:
+    """How far ahead a model has to predict while models are compared.
+
+    Three periods of an oscillation, or the time constant of a platform without a spring: long enough for
+    a missing effect to show, short enough that a model which is still wrong stays near the data.
+    """
+    j, c, k = platform
+    shortest = 40.0 * max(t.step_s for t in traces)
+    longest = 0.25 * min(t.step_s * len(t.measured) for t in traces)
+    swings = k > 0.0 and c * c < 4.0 * j * k and np.sqrt(k / j) * longest > np.pi
+    wanted = 6.0 * np.pi * np.sqrt(j / k) if swings else float(np.clip(j / max(abs(c), 1e-12), 0.3, 1.0))
+    return float(np.clip(wanted, shortest, max(longest, shortest)))
+
+
+def start_values(solution: Solution, shapes: Shapes, runs: int) -> dict[Name, float]:
+    """A start for output error from a solved regression."""
+    inertia, damping, stiffness = solution.platform
+    terms = {"inertia": inertia, "damping": damping, "stiffness": stiffness}
+    out: dict[Name, float] = {}
+    for name in names_of(solution.structure, runs):
+        if len(name) == 1:
+            out[name] = terms[name[0]]
+            continue
+        effect = effects.get(name[0])
+        parameter = next(p for p in effect.parameters if p.name == name[1])
+        if parameter.linear:
+            out[name] = float(np.clip(solution.value(*name), parameter.low, parameter.high))
+        else:
+            index = [p.name for p in effect.parameters if not p.linear].index(name[1])
+            out[name] = float(shapes[name[0]][index])
+    return out
+
+
+def judge(
+    fitting: Sequence[Trace],
+    judging: Sequence[Trace],
+    structure: Structure,
+    start: Mapping[Name, float],
+    horizon: float,
+    iterations: int = 8,
+) -> Judged:
+    """Fit on some pieces, then measure on others with nothing but start states fitted there."""
+    torque_free = all(t.torque is None for t in fitting)
+    estimate = refine(
+        fitting, structure, start, horizon, iterations, fixed=[("inertia",)] if torque_free else ()
+    )
+    if not np.isfinite(estimate.sigma):
+        return Judged(structure, estimate, np.array([np.inf]), np.ones(1))
+    held = evaluate(estimate, judging, None, horizon)
+    losses, counts = [], []
+    for shots, residual in zip(held.shots, held.residuals(), strict=True):
+        for (a, b), on in zip(shots.edges, shots.active, strict=True):
+            if on:
+                r = residual[a:b][shots.weight[a:b]]
+                losses.append(float(r @ r))
+                counts.append(len(r))
+    return Judged(structure, estimate, np.array(losses), np.array(counts, dtype=float))
+
+
+def advantage(old: Judged, new: Judged) -> float:
+    """By how many standard errors the new model's held-out error is lower, shots paired."""
+    d = (old.losses - new.losses) / np.maximum(np.sum(old.counts), 1)
+    spread = float(np.std(d, ddof=1)) if len(d) > 1 else 0.0
+    if spread == 0.0:
+        return 0.0
+    # A few shots with a huge gain must not make a gain everywhere look uncertain: ratios count too.
+    ratio = np.log(np.maximum(old.losses, 1e-300) / np.maximum(new.losses, 1e-300))
+    by_ratio = float(np.mean(ratio) / max(np.std(ratio, ddof=1), 1e-12) * np.sqrt(len(d)))
+    by_size = float(np.mean(d) / spread * np.sqrt(len(d)))
+    return max(by_size, by_ratio) if np.sum(d) > 0.0 else min(by_size, 0.0)
+
+
+def delta_bic(old: Judged, new: Judged) -> float:
+    """BIC of the new model minus the old one's, on the samples fitted; negative is better."""
+    n = old.estimate.count
+    more = len(new.estimate.names) - len(old.estimate.names)
+    return float(2.0 * n * np.log(new.estimate.sigma / old.estimate.sigma) + more * np.log(max(n, 2)))
+
+
+def share_explained(old: Judged, new: Judged, floor: float) -> float:
+    """Share of the held-out error above the noise floor that the new model takes away."""
+    excess = old.sigma**2 - floor**2
+    return float((old.sigma**2 - new.sigma**2) / excess) if excess > 1e-6 * floor**2 else 0.0

@@ -1,0 +1,91 @@
+"""Which samples fit and which judge, and a shorter selection for the many fits of a search."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from identify.traces import SHORTEST_STRETCH, Trace
+
+BLOCKS = 10  # of a run that is split; blocks 3, 6 and 9 judge
+ENOUGH = 12_000  # samples that a search fits to; the final fit always takes all
+
+
+@dataclass(frozen=True)
+class Split:
+    """Boolean arrays, one a run: what fits while searching, what judges, what the final fit may use."""
+
+    fit: list[Any]
+    judge: list[Any]
+    final: list[Any]
+    note: str
+
+
+def split(traces: Sequence[Trace]) -> Split:
+    """Declared hold-out runs judge where there are any; else every third block of each run does."""
+    declared = [t.run.use == "holdout" for t in traces]
+    if any(declared) and not all(declared):
+        names = ", ".join(dict.fromkeys(t.run.name for t, d in zip(traces, declared, strict=True) if d))
+        keep = [t.keep.copy() for t in traces]
+        none = [np.zeros(len(k), dtype=bool) for k in keep]
+        fit = [n if d else k for k, n, d in zip(keep, none, declared, strict=True)]
+        judge = [k if d else n for k, n, d in zip(keep, none, declared, strict=True)]
+        return Split(fit, judge, fit, f"held out as declared: {names}; their start states are fitted, nothing else")
+    fit, judge = [], []
+    some_free = any(t.run.use == "auto" for t in traces)
+    for trace in traces:
+        if some_free and trace.run.use == "fit":
+            fit.append(trace.keep.copy())
+            judge.append(np.zeros(len(trace.keep), dtype=bool))
+            continue
+        block = np.minimum(np.arange(len(trace.keep)) * BLOCKS // len(trace.keep), BLOCKS - 1)
+        judging = np.isin(block, (2, 5, 8))
+        fit.append(trace.keep & ~judging)
+        judge.append(trace.keep & judging)
+    note = (
+        "chosen here: of each run cut in ten, blocks 3, 6 and 9 judge the candidates and the errors below; "
+        "their start states are fitted, and the final parameters are refitted on all samples"
+    )
+    return Split(fit, judge, [t.keep.copy() for t in traces], note)
+
+
+def pieces(traces: Sequence[Trace], masks: Sequence[Any], shortest_s: float, enough: int = ENOUGH) -> list[Trace]:
+    """Traces cut down to the samples of the masks, thinned to about ``enough`` samples.
+
+    Each run keeps its first stretch, for the start transient, and equally spaced pieces behind it, each at
+    least ``shortest_s`` long, so that the slowest motion of interest fits in.
+    """
+    total = sum(int(np.sum(m)) for m in masks)
+    out = []
+    for trace, mask in zip(traces, masks, strict=True):
+        spans = [(a, b) for a, b in _runs_of(mask, trace.stretches)]
+        share = int(np.sum(mask)) if total <= enough else int(enough * np.sum(mask) / total)
+        for k, (a, b) in enumerate(spans):
+            length = b - a + 1
+            wanted = length if total <= enough else max(
+                round(share * length / max(int(np.sum(mask)), 1)), round(shortest_s / trace.step_s), SHORTEST_STRETCH
+            )  # fmt: skip
+            if k == 0 and total > enough:
+                wanted *= 2
+            if share <= 0 and k > 0:
+                break
+            last = min(b, a + wanted - 1)
+            out.append(trace.piece(a, last))
+    return [t for t in out if t.stretches]
+
+
+def _runs_of(mask: Any, stretches: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Spans of samples that count, lost single samples bridged, no longer than a stretch."""
+    out = []
+    for a, b in stretches:
+        index = np.nonzero(mask[a : b + 1])[0]
+        if len(index) == 0:
+            continue
+        cuts = np.nonzero(np.diff(index) > SHORTEST_STRETCH)[0]
+        begins = index[np.concatenate([[0], cuts + 1])]
+        ends = index[np.concatenate([cuts, [len(index) - 1]])]
+        out += [(a + int(i), a + int(k)) for i, k in zip(begins, ends, strict=True) if k - i + 1 >= SHORTEST_STRETCH]
+    return out

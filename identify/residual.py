@@ -1,0 +1,165 @@
+"""The residual in torque: what the equation of motion leaves over on the measured motion (Eq. 10).
+
+Angle, rate and acceleration come from the measured channel, low-passed by one zero-phase filter; the torque
+and the torque of every effect, signs included, pass through the same filter. With a gyro alone, start
+angle and rate bias are unknown: a constant and a ramp are fitted to each run's residual.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import signal
+from scipy.interpolate import CubicSpline
+
+from identify.compare import Judged
+from identify.output_error import Name
+from identify.regression import Structure
+from identify.traces import UPSAMPLING, Trace
+from rig import effects
+from rig.effects.base import Place
+from rig.recording.run import Array
+
+
+def low_pass(values: Array, cutoff_hz: float, step_s: float) -> Array:
+    """Zero-phase fourth-order Butterworth (second order run forwards and backwards)."""
+    wn = 2.0 * cutoff_hz * step_s
+    if wn >= 0.95:
+        return values
+    sos = signal.butter(2, wn, output="sos")
+    return np.asarray(signal.sosfiltfilt(sos, values, padlen=min(len(values) - 1, int(6.0 / wn) + 10)))
+
+
+def motion(trace: Trace, cutoff_hz: float) -> tuple[Array, Array, Array]:
+    """Low-passed angle, rate and acceleration at the samples, each of shape (n,).
+
+    Cubic splines differentiate and integrate: at 29 Hz and 1 kHz their bias is below 1e-5.
+    """
+    t = trace.step_s * np.arange(len(trace.measured))
+    spline = CubicSpline(t, low_pass(trace.measured, cutoff_hz, trace.step_s))
+    if trace.channel == "rate":
+        return spline.antiderivative()(t), spline(t), spline.derivative()(t)
+    return spline(t), spline.derivative()(t), spline.derivative(2)(t)
+
+
+@dataclass(frozen=True)
+class TorqueResidual:
+    """Residual and torque of one run behind the low-pass, N m, shape (n,)."""
+
+    residual: Array
+    torque: Array
+
+
+def torque_residual(
+    trace: Trace, structure: Structure, values: dict[Name, float], cutoff_hz: float
+) -> TorqueResidual | None:
+    """M - J a - C w - K th - effects; None for a run without torque."""
+    if trace.torque is None:
+        return None
+    angle, rate, acceleration = motion(trace, cutoff_hz)
+    drive = []
+    model = (
+        (values.get(("inertia",), 0.0) + trace.run.added_inertia_kg_m2) * acceleration
+        + values.get(("damping",), 0.0) * rate
+        + values.get(("stiffness",), 0.0) * angle
+    )
+    extra = np.zeros_like(angle)
+    for name in structure.effects:
+        effect = effects.get(name)
+        given = [_value(values, name, p.name, trace.number) for p in effect.parameters]
+        if effect.place is Place.DRIVE:
+            drive.append((name, tuple(given)))
+            continue
+        if effect.place is Place.SENSOR:
+            continue
+        shape = tuple(v for v, p in zip(given, effect.parameters, strict=True) if not p.linear)
+        for i, (v, p) in enumerate(zip(given, effect.parameters, strict=True)):
+            if p.linear:
+                extra += v * _at_samples(trace.effect_pieces(effect, shape, i), len(angle))
+        for term in effect.leans_on:
+            unit = {"inertia": -3, "damping": -2, "stiffness": -1}[term]
+            pieces = trace.effect_pieces(effect, shape, unit)
+            extra += values.get((term,), 0.0) * _at_samples(pieces, len(angle))
+    pieces = trace.torque_pieces(tuple(drive))
+    assert pieces is not None
+    applied = _at_samples(pieces[0], len(angle), pieces[1])
+    torque = low_pass(applied, cutoff_hz, trace.step_s)
+    residual = torque - model - low_pass(extra, cutoff_hz, trace.step_s)
+    if trace.biased:
+        t = trace.step_s * np.arange(len(angle))
+        nuisance = np.column_stack([np.ones_like(t), t])
+        fitted = np.linalg.lstsq(nuisance[trace.keep], residual[trace.keep], rcond=None)[0]
+        residual = residual - nuisance @ fitted
+    return TorqueResidual(residual, torque)
+
+
+def _value(values: dict[Name, float], effect: str, parameter: str, run: int) -> float:
+    return values.get((effect, parameter), values.get((effect, parameter, str(run)), 0.0))
+
+
+def _at_samples(pieces: Array | None, n: int, upsampling: int = UPSAMPLING) -> Array:
+    """A piecewise polynomial at the sample instants, shape (n,)."""
+    if pieces is None:
+        return np.zeros(n)
+    at = pieces[::upsampling, 0]
+    return np.append(at, np.full(n - len(at), at[-1]))[:n]
+
+
+def relative(parts: Sequence[TorqueResidual | None], masks: Sequence[Any]) -> tuple[float, float] | None:
+    """Root mean square of the residual, and its norm over that of the torque; None without samples."""
+    pairs = [(p.residual[m], p.torque[m]) for p, m in zip(parts, masks, strict=True) if p is not None]
+    if not pairs or not any(len(r) for r, _ in pairs):
+        return None
+    residual = np.concatenate([r for r, _ in pairs])
+    torque = np.concatenate([t for _, t in pairs])
+    return float(np.sqrt(np.mean(residual**2))), float(np.linalg.norm(residual) / max(np.linalg.norm(torque), 1e-300))
+
+
+def torque_noise_floor(
+    traces: Sequence[Trace], values: dict[Name, float], cutoff_hz: float, masks: Sequence[Any]
+) -> float:
+    """What sensor noise alone leaves in the torque residual, root mean square, from simulated noise."""
+    rng = np.random.default_rng(1)
+    squares, count = 0.0, 0
+    for trace, mask in zip(traces, masks, strict=True):
+        if trace.torque is None or not np.any(mask):
+            continue
+        noise = _noise_only(trace, rng)
+        part = torque_residual(noise, Structure(), values, cutoff_hz)
+        assert part is not None
+        squares += float(np.sum((part.residual - part.torque)[mask] ** 2))
+        count += int(np.sum(mask))
+    return float(np.sqrt(squares / count)) if count else float("nan")
+
+
+def _noise_only(trace: Trace, rng: np.random.Generator) -> Trace:
+    from dataclasses import replace  # noqa: PLC0415
+
+    return replace(
+        trace, measured=trace.noise * rng.standard_normal(len(trace.measured)), motion=None, _series={},
+        torque=None if trace.torque is None else replace(trace.torque, torque_nm=np.zeros_like(trace.torque.torque_nm)),
+    )  # fmt: skip
+
+
+def residual_lines_hz(traces: Sequence[Trace], judged: Judged) -> tuple[float, ...]:
+    """The strongest lines of the torque residual that no harmonic of the excitation explains."""
+    values = judged.values()
+    found: list[tuple[float, float]] = []
+    for trace in traces:
+        cutoff = min(0.2 / trace.step_s, 200.0)
+        if trace.torque is None:
+            continue
+        part = torque_residual(trace, judged.structure, values, cutoff)
+        assert part is not None
+        x = part.residual * signal.windows.hann(len(part.residual))
+        size = np.abs(np.fft.rfft(x, 8 * len(x)))
+        f = np.fft.rfftfreq(8 * len(x), trace.step_s)
+        use = (f > 2.0 / (trace.step_s * len(x))) & (f < cutoff)
+        peaks = signal.find_peaks(size * use)[0]
+        for i in peaks[np.argsort(size[peaks])[-4:]]:
+            found.append((float(size[i] / np.sqrt(len(x))), float(f[i])))
+    found.sort(reverse=True)
+    return tuple(f for _, f in found[:12])

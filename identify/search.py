@@ -1,0 +1,165 @@
+"""Find the residual, trace it to an effect, add it, look again: the loop itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from identify.compare import CLEARLY, Judged, advantage, delta_bic, horizon_s, judge, share_explained, start_values
+from identify.regression import Structure
+from identify.results import Candidate
+from identify.screen import Screen, Screened, Start, best_rho
+from identify.traces import Trace
+from rig import effects
+from rig.effects.base import Place
+
+MOST_EFFECTS = 6
+SHORTLIST = 4
+WORTH = 0.2  # share of the excess error that an effect has to take away
+SUPPORT = 0.02  # share of the error by which a term must be missed to stay
+
+
+@dataclass
+class Search:
+    """What the loop found.
+
+    Attributes
+    ----------
+    base
+        The declared model; ``best`` the model at the end.
+    rivals
+        Effect -> other effects that did as well in its round.
+    dropped
+        Terms of the declared model and effects that the data do not support, with the reason.
+    """
+
+    base: Judged
+    best: Judged
+    horizon: float
+    floor: float
+    candidates: list[Candidate] = field(default_factory=list)
+    rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    dropped: list[tuple[str, str]] = field(default_factory=list)
+
+
+class Loop:
+    """The search over structures on one recording's pieces."""
+
+    def __init__(
+        self,
+        fitting: Sequence[Trace],
+        judging: Sequence[Trace],
+        start: Start,
+        allowed: Sequence[str],
+        say: Callable[[str], None],
+    ) -> None:
+        self.fitting, self.judging, self.start, self.say = fitting, judging, start, say
+        self.allowed = [n for n in allowed if effects.get(n).place is not Place.SENSOR]
+        self.noise = float(np.sqrt(np.mean([t.noise**2 for t in fitting])))
+        self.runs = 1 + max(t.number for t in (*fitting, *judging))
+
+    def run(self, declared: Structure) -> Search:
+        """From the declared structure to the one that the data support."""
+        solution = best_rho(self.fitting, declared, {}, self.start)
+        horizon = horizon_s(solution.platform, self.fitting)
+        length = horizon / self.fitting[0].step_s
+        floor = self.noise * float(np.sqrt(max(1.0 - 2.0 / length, 0.25)))
+        base = judge(self.fitting, self.judging, declared, start_values(solution, {}, self.runs), horizon)
+        found = Search(base, base, horizon, floor)
+        for round_ in range(1, MOST_EFFECTS + 1):
+            if not self._round(found, round_):
+                break
+            self._prune(found)
+        self._prune(found)
+        return found
+
+    def _round(self, found: Search, round_: int) -> bool:
+        """One more effect, if one is worth it."""
+        now = found.best
+        screen = Screen(self.fitting, now.structure, now.shapes(), self.start, self._lines(now))
+        names = [n for n in self.allowed if n not in now.structure.effects and self._possible(n)]
+        looks = screen.all(names)
+        tried = [self._try(found, look) for look in screen.shortlist(looks, SHORTLIST)]
+        tried = sorted((t for t in tried if t is not None), key=lambda t: t[1].sigma)
+        if not tried:
+            return False
+        name, best = self._simplest(tried)
+        worth = share_explained(now, best, found.floor)
+        clear = advantage(now, best) > CLEARLY and delta_bic(now, best) < -10.0
+        added = clear and worth >= WORTH
+        for other, judged in tried:
+            status = ("added" if added else "not worth it") if other == name else self._status(best, judged)
+            found.candidates.append(
+                Candidate(other, round_, delta_bic(now, judged), judged.sigma, status)
+            )
+        shown = {n for n, _ in tried}
+        for look in looks:
+            if look.effect not in shown:
+                found.candidates.append(Candidate(look.effect, round_, -2.0 * look.gain, None, "screened out"))
+        if not added:
+            return False
+        self.say(f"added {name}: held-out error {now.sigma:.3g} -> {best.sigma:.3g}")
+        close = tuple(o for o, j in tried if o != name and self._status(best, j) == "rival")
+        found.rivals[name] = close
+        found.best = best
+        return True
+
+    def _try(self, found: Search, look: Screened) -> tuple[str, Judged] | None:
+        structure = found.best.structure.plus(look.effect)
+        start = start_values(look.solution, look.shapes, self.runs)
+        judged = judge(self.fitting, self.judging, structure, start, found.horizon)
+        if judged.estimate.sigma > found.best.estimate.sigma:  # nested: a worse fit is a lost search
+            values = found.best.values()
+            again = {n: values.get(n, v if n[-1] not in look.shapes else v) for n, v in start.items()}
+            judged = min(
+                (judged, judge(self.fitting, self.judging, structure, again, found.horizon)), key=lambda j: j.sigma
+            )
+        return (look.effect, judged) if np.isfinite(judged.sigma) else None
+
+    def _simplest(self, tried: Sequence[tuple[str, Judged]]) -> tuple[str, Judged]:
+        """The best candidate, or one that it contains as a special case and that does as well."""
+        name, best = tried[0]
+        for other, judged in tried[1:]:
+            if other in effects.get(name).nests and self._status(best, judged) == "rival":
+                return other, judged
+        return name, best
+
+    def _status(self, best: Judged, other: Judged) -> str:
+        return "rival" if advantage(other, best) < CLEARLY and other.sigma < 1.05 * best.sigma else "no better"
+
+    def _possible(self, name: str) -> bool:
+        """A constant torque only shifts the unseen rest angle of a gyro-only platform with a spring."""
+        return not (name == "torque_offset" and all(t.biased for t in self.fitting))
+
+    def _lines(self, judged: Judged) -> tuple[float, ...]:
+        """Frequencies of the strongest lines in the equation-error residual."""
+        from identify.residual import residual_lines_hz  # noqa: PLC0415  (residual imports the search's parts)
+
+        return residual_lines_hz(self.fitting, judged)
+
+    def _prune(self, found: Search) -> None:
+        """Drop every term or effect that the model does as well without."""
+        for name in (*found.best.structure.terms, *found.best.structure.effects):
+            if name == "inertia" or len(found.best.structure.effects) == 0 and name not in ("damping", "stiffness"):
+                continue
+            now = found.best
+            smaller = now.structure.minus(name)
+            values = now.values()
+            start = {n: v for n, v in values.items() if n[0] != name}
+            without = judge(self.fitting, self.judging, smaller, start, found.horizon)
+            if self._missed(without, now, found.floor):
+                continue
+            reason = f"held-out error {now.sigma:.4g} with it, {without.sigma:.4g} without it"
+            found.dropped.append((name, reason))
+            found.best = without
+            found.rivals.pop(name, None)
+            self.say(f"dropped {name}: {reason}")
+
+    def _missed(self, without: Judged, full: Judged, floor: float) -> bool:
+        """Whether leaving a term out costs a clear part of the accuracy."""
+        loss = (without.sigma**2 - full.sigma**2) / max(full.sigma**2, 1e-300)
+        near_floor = full.sigma < 1.2 * floor
+        needed = 1e-4 if near_floor else SUPPORT
+        return advantage(without, full) > CLEARLY and loss > needed

@@ -1,0 +1,121 @@
+"""Numbers, units and names as a person reads them: shared by the terminal summary and the report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from identify.results import Identification, NotReported, ParameterEstimate
+
+SYMBOLS = {
+    "inertia": "J",
+    "damping": "C",
+    "stiffness": "K",
+    "damping_over_inertia": "C/J",
+    "stiffness_over_inertia": "K/J",
+}
+_TITLES = {"rotary": "rotary inertia", "linear": "mass"}
+
+
+def unit(text: str) -> str:
+    """``N*m*s/rad`` as N·m·s/rad, ``kg*m^2`` as kg·m²."""
+    return text.replace("*", "·").replace("^2", "²").replace("^3", "³")
+
+
+def title(name: str, axis: str) -> str:
+    """``inertia`` as "rotary inertia J", or "mass J" on a linear axis."""
+    words = _TITLES[axis] if name == "inertia" else name.replace("_", " ")
+    return f"{words} {SYMBOLS[name]}" if name in SYMBOLS else words
+
+
+def plain(name: str) -> str:
+    """``coulomb_friction`` as "Coulomb friction"."""
+    words = name.replace("_", " ")
+    for person in ("coulomb", "stribeck"):
+        words = words.replace(person, person.capitalize())
+    return words
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """``digits`` significant digits without an exponent where that stays short; a dash for None or NaN."""
+    if value is None or math.isnan(value):
+        return "-"
+    if math.isinf(value):
+        return "unbounded"
+    if value == 0.0:
+        return "0"
+    order = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if -5 <= order < 7:
+        return f"{value:.{max(0, digits - 1 - order)}f}"
+    return f"{value:.{digits - 1}e}"
+
+
+def digits_for(value: float, uncertainty: float) -> int:
+    """Significant digits of ``value`` that show two of its uncertainty: between 3 and 9."""
+    if not (math.isfinite(value) and math.isfinite(uncertainty)) or value == 0.0 or uncertainty <= 0.0:
+        return 4
+    return min(9, max(3, math.floor(math.log10(abs(value))) - math.floor(math.log10(uncertainty)) + 2))
+
+
+def value_of(estimate: ParameterEstimate) -> str:
+    """The value with as many digits as its standard error deserves."""
+    return number(estimate.value, digits_for(estimate.value, estimate.std_error))
+
+
+def interval_of(estimate: ParameterEstimate) -> str:
+    """The 95 % interval with the digits of the value: "0.01999 to 0.02001"."""
+    digits = digits_for(estimate.value, estimate.std_error)
+    low, high = (number(bound, digits) for bound in estimate.ci95)
+    return f"{low} to {high}"
+
+
+def percent(value: float | None) -> str:
+    """With a sign and two or three digits that matter: "+412 %", "-0.013 %"."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    return f"{'+' if value > 0 else '-' if value < 0 else ''}{number(abs(value), 3 if abs(value) >= 10 else 2)} %"
+
+
+def bent_percent(identification: Identification) -> dict[str, float]:
+    """How far the declared model reads each of its parameters from where the final model has it, in percent."""
+    if identification.after is None:
+        return {}
+    before, after = identification.before.parameters, identification.after.parameters
+    shared = [name for name in before if name in after and after[name].value != 0.0]
+    return {name: 100.0 * (before[name].value / after[name].value - 1.0) for name in shared}
+
+
+def bent_sentences(identification: Identification) -> list[str]:
+    """What the missing effects did to each parameter of the declared model, largest first, one sentence each."""
+    bent = sorted(bent_percent(identification).items(), key=lambda item: -abs(item[1]))
+    said = []
+    for name, off in bent:
+        before, after = (model.parameters[name] for model in (identification.before, identification.final))
+        within = abs(before.value - after.value) <= 2.0 * math.hypot(before.std_error, after.std_error)
+        size = f"{'within the uncertainty, ' if within else ''}{percent(abs(off)).lstrip('+')}"
+        said.append(
+            f"{title(name, identification.axis)}: the declared model alone reads it {size} too "
+            f"{'high' if off > 0 else 'low'}."
+            if off
+            else f"{title(name, identification.axis)}: unchanged."
+        )
+    return said
+
+
+def frequency(value: float | None) -> str:
+    """``0.5`` as "0.5 Hz"; a dash where a run has no frequency of its own."""
+    return "-" if value is None else f"{value:g} Hz"
+
+
+def pairs(several: Mapping[str, Sequence[str]]) -> list[str]:
+    """What a name can be confused with, one sentence each; names without a rival are left out."""
+    return [
+        f"{plain(name)} explains these data about as well as {', '.join(plain(r) for r in rivals)}."
+        for name, rivals in several.items()
+        if rivals
+    ]
+
+
+def not_reported(several: Sequence[NotReported]) -> list[str]:
+    """Parameters that stand in no table, with the reason, one sentence each."""
+    return [f"{plain(item.name.replace('.', ', '))}: {item.reason}" for item in several]

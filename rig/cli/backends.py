@@ -1,0 +1,118 @@
+"""The backends that a campaign can be played on: a name and a factory each, nothing heavy until one is called."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rig.clock import Clock, VirtualClock
+from rig.config.root import Config
+from rig.errors import ConfigError, UsageError
+from rig.interface import Rig, Torque
+
+if TYPE_CHECKING:
+    from drivers.bench import BenchRig
+    from rig.config.bench import BenchConfig
+
+RECORDED = "recorded"
+EMULATED = "emulated"
+SIMULATED = "simulated"
+
+
+def no_account() -> dict[str, Any]:
+    """Of a rig that has nothing to tell about itself."""
+    return {}
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A rig to play on, the clock that its samples are stamped by, and what it can tell afterwards.
+
+    ``account`` goes into recording.h5 and, as text, to `rig check`.
+    """
+
+    rig: Rig
+    clock: Clock
+    account: Callable[[], dict[str, Any]] = no_account
+
+
+Backend = Callable[[Config, Path], AbstractContextManager[Stage]]
+
+
+@contextmanager
+def simulated(config: Config, raw_folder: Path) -> Iterator[Stage]:
+    """The rig made of equations, in time that jumps."""
+    from sim_backend.simulated import SimulatedRig
+
+    yield Stage(SimulatedRig(config.simulated, config.excitation.sample_rate_hz), VirtualClock())
+
+
+@contextmanager
+def bench(config: Config, raw_folder: Path) -> Iterator[Stage]:
+    """Real devices."""
+    section = _bench_section(config)
+    for key, value in (
+        ("gyroscope.port", section.gyroscope.port),
+        ("amplifier.can.channel", section.amplifier.can.channel),
+    ):
+        if value is None:
+            raise ConfigError(f"bench.{key} is empty: name the port (`rig devices` lists them) or run with --emulate")
+    yield _bench_stage(section, Torque.REAL, raw_folder)
+
+
+@contextmanager
+def emulated(config: Config, raw_folder: Path) -> Iterator[Stage]:
+    """The same drivers on devices that are emulated at wire level in a process of their own."""
+    _bench_section(config)
+    require_emulators()
+    from sim_backend.emulators.launch import on_emulated_ports, started
+
+    with started(config) as emulators:
+        section = _bench_section(on_emulated_ports(config, emulators))
+        stage = _bench_stage(section, Torque.EMULATED, raw_folder)
+        yield Stage(stage.rig, stage.clock, lambda: stage.account() | {"emulated_drive": emulators.events()})
+
+
+BACKENDS: Mapping[str, Backend] = {SIMULATED: simulated, "bench": bench, EMULATED: emulated}
+
+
+def backend_name(config: Config, dry_run: bool, emulate: bool) -> str:
+    """The backend that was asked for. Raises UsageError for two at once."""
+    if dry_run and emulate:
+        raise UsageError("--dry-run and --emulate exclude each other: the first simulates, the second emulates.")
+    if dry_run:
+        return SIMULATED
+    return EMULATED if emulate else config.backend
+
+
+def require_emulators() -> None:
+    """Raise UsageError where there are no pseudo terminals to emulate devices on."""
+    if sys.platform == "win32":
+        raise UsageError("emulated devices need pseudo terminals, which Windows has not: use --dry-run there.")
+
+
+def _bench_section(config: Config) -> BenchConfig:
+    if config.bench is None:
+        raise UsageError("this needs a `bench:` section, which the file has not: see examples/bench.yaml.")
+    return config.bench
+
+
+def _bench_stage(section: BenchConfig, torque: Torque, raw_folder: Path) -> Stage:
+    from drivers.bench import BenchRig
+
+    rig = BenchRig(section, torque, raw_folder)
+    return Stage(rig, rig.clock, lambda: _account(rig))
+
+
+def _account(rig: BenchRig) -> dict[str, Any]:
+    from rig.errors import DeviceFault
+
+    try:
+        report = rig.report()
+    except DeviceFault:  # it was never open
+        return {}
+    return {"bench": asdict(report), "gyroscope": str(report.gyro)}

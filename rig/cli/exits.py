@@ -1,0 +1,106 @@
+"""The one place that turns what went wrong into a message and an exit code."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+
+from rig.errors import Aborted, DeviceFault, RigError, SafetyTrip, UsageError
+
+OK, NOT_ACCEPTED, USAGE, INTERNAL, STOPPED = 0, 1, 2, 70, 130
+TRACEBACK_FILE = "traceback.txt"
+# What the message opens with, the most particular kind first.
+HEADINGS: tuple[tuple[type[BaseException], str], ...] = (
+    (UsageError, "Error"),
+    (DeviceFault, "Device fault"),
+    (SafetyTrip, "Safety trip"),
+    (Aborted, "Stopped"),
+    (RigError, "Error"),
+    (KeyboardInterrupt, "Stopped"),
+)
+_NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EFBIG}
+Evidence = Callable[[], Path | None]  # the results folder as far as there is one
+
+
+def no_evidence() -> Path | None:
+    """For commands that make no results folder."""
+    return None
+
+
+def conclude(command: Callable[[], int], evidence: Evidence = no_evidence) -> int:
+    """Run ``command``; whatever it raises becomes a message on stderr and an exit code. Never raises."""
+    try:
+        code = command()
+    except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (this is the place where all of them end)
+        code = report(error, evidence())
+    return _flushed(code)
+
+
+def report(error: BaseException, folder: Path | None) -> int:
+    """Say on stderr what went wrong and return the exit code; the traceback goes to ``folder`` only."""
+    error = as_known(error)
+    say(message_of(error, folder))
+    return code_of(error)
+
+
+def code_of(error: BaseException) -> int:
+    """The exit code of an error."""
+    if isinstance(error, RigError):
+        return error.exit_code
+    return STOPPED if isinstance(error, KeyboardInterrupt) else INTERNAL
+
+
+def as_known(error: BaseException) -> BaseException:
+    """A full or failing disk ends a campaign as Ctrl-C does; all else is what it is."""
+    if isinstance(error, OSError) and error.errno in _NO_ROOM:
+        return Aborted(
+            f"cannot write {error.filename or 'the results'}: {error.strerror}. What was written until then is "
+            "kept; make room or choose another --out."
+        )
+    return error
+
+
+def message_of(error: BaseException, folder: Path | None) -> str:
+    """What to say of an error; of one that nobody foresaw a short line, and where the rest of it is."""
+    for kind, heading in HEADINGS:
+        if isinstance(error, kind):
+            return f"{heading}: {str(error) or 'Ctrl-C'}"
+    where = traceback.extract_tb(error.__traceback__)
+    at = f" in {Path(where[-1].filename).name}, line {where[-1].lineno}" if where else ""
+    text = " ".join(str(error).split())[:300]
+    kept = _keep_traceback(error, folder)
+    return f"Internal error: {type(error).__name__}: {text}{at}. This is a fault of the program.{kept}"
+
+
+def _keep_traceback(error: BaseException, folder: Path | None) -> str:
+    if folder is None or not folder.is_dir():
+        return ""
+    path = folder / TRACEBACK_FILE
+    try:
+        with path.open("a", encoding="utf-8") as file:
+            file.writelines(traceback.format_exception(error))
+    except OSError as problem:
+        return f" Its traceback could not be written to {path}: {problem.strerror}."
+    return f" Its traceback is in {path}; please send it to the authors."
+
+
+def say(text: str) -> None:
+    """Write to stderr; a terminal that is gone must not stop what remains to be done."""
+    with contextlib.suppress(OSError, ValueError):
+        sys.stderr.write(text + "\n")
+        sys.stderr.flush()
+
+
+def _flushed(code: int) -> int:
+    """Flush here, where a reader that has gone away (`| head`) can be told from an error."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return code

@@ -1,0 +1,92 @@
+"""Signals become requests to stop: the first ends the campaign in order, a second Ctrl-C cuts the torque at once."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+from collections.abc import Callable, Iterator
+from enum import Enum
+from types import FrameType
+
+from rig.errors import Aborted
+
+# By name: not every system has all of them.
+SIGNALS = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "the loss of its terminal", "SIGBREAK": "Ctrl-Break"}
+STOPPING = "Stopping: torque to zero, then saving. Ctrl-C again cuts the torque at once."
+
+
+class _Stage(Enum):
+    IDLE = "a signal raises where it strikes"
+    TICKING = "the sequencer asks at every tick"
+    SAVING = "what is being written is finished first"
+
+
+class StopRequests:
+    """Who asked to stop, if anybody did.
+
+    While ticks run the sequencer asks ``poll`` and ends in order. Before the first tick nothing asks, so the
+    signal raises there, and leaves through the same doors. ``tell`` says a line to the operator; it is called
+    from the signal handler and must never wait.
+    """
+
+    def __init__(self) -> None:
+        self.reason: str | None = None
+        self.tell: Callable[[str], None] = lambda text: None
+        self._torque_off: Callable[[], None] | None = None
+        self._stage = _Stage.IDLE
+
+    def poll(self) -> str | None:
+        """The reason to stop, or None. Asked by the sequencer at every tick."""
+        self._stage = _Stage.TICKING
+        return self.reason
+
+    def request(self, reason: str) -> None:
+        """Ask to stop, from any thread; the first reason counts."""
+        self.reason = self.reason or reason
+
+    @contextlib.contextmanager
+    def playing(self, torque_off: Callable[[], None]) -> Iterator[None]:
+        """While this holds there may be torque, and ``torque_off`` is the shortest road to none."""
+        self._torque_off, self._stage = torque_off, _Stage.IDLE
+        try:
+            yield
+        finally:
+            self._torque_off, self._stage = None, _Stage.IDLE
+
+    @contextlib.contextmanager
+    def saving(self) -> Iterator[None]:
+        """What is written in here is written whole. Raises Aborted at the end where somebody asked meanwhile."""
+        already = self.reason
+        self._stage = _Stage.SAVING
+        try:
+            yield
+        finally:
+            self._stage = _Stage.IDLE
+        if self.reason is not None and already is None:
+            raise Aborted(f"{self.reason}.")
+
+    @contextlib.contextmanager
+    def heeded(self) -> Iterator[None]:
+        """Handlers in place; those from before are put back."""
+        earlier = {}
+        for name in SIGNALS:
+            number = getattr(signal, name, None)
+            if number is not None and signal.getsignal(number) is not signal.SIG_IGN:  # nohup means what it says
+                earlier[number] = signal.signal(number, self._heard)
+        try:
+            yield
+        finally:
+            for number, handler in earlier.items():
+                signal.signal(number, handler)
+
+    def _heard(self, number: int, _frame: FrameType | None) -> None:
+        is_first = self.reason is None
+        self.request(f"Stopped by {SIGNALS[signal.Signals(number).name]}")
+        if is_first and self._stage is _Stage.TICKING:
+            self.tell(STOPPING)
+        elif is_first and self._stage is _Stage.IDLE:
+            raise Aborted(f"{self.reason}.")
+        elif number == signal.SIGINT and not is_first:
+            if self._torque_off is not None:
+                self._torque_off()
+            raise KeyboardInterrupt
