@@ -5,17 +5,18 @@ Whatever ends it, torque is off first and what was recorded is kept; the error c
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rig.cli.backends import BACKENDS, Stage, backend_name
+from rig.cli.backends import BACKENDS, EMULATED, Stage, backend_name
 from rig.cli.desk import Desk
 from rig.cli.exits import as_known
 from rig.cli.opening import ask_consent, opening
@@ -87,8 +88,10 @@ def play(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> Played:
     options, config = desk.options, loaded.config
     backend = backend_name(config, options.dry_run, options.emulate)
     if backend not in BACKENDS:
-        raise UsageError(f"backend: {backend} has nothing to play: give --dry-run, or a `simulated` or `bench` backend.")
-    if backend == "emulated":
+        raise UsageError(
+            f"backend: {backend} has nothing to play: give --dry-run, or a `simulated` or `bench` backend."
+        )
+    if backend == EMULATED:
         desk.terminal.tell("Starting the emulated devices ...")
     with BACKENDS[backend](config, folder.path / RAW_FOLDER) as stage:
         sets = plan(config.model.platform(), config.excitation, config.limits, stage.rig.rate_full_scale_rad_s)
@@ -113,33 +116,26 @@ def _ask(question: str) -> str:
     return answer
 
 
-@dataclass
 class _Recorder:
-    """One campaign being recorded."""
+    """One campaign while it is recorded. What came of it stays here, whatever happens on the way out."""
 
-    desk: Desk
-    stage: Stage
-    loaded: LoadedConfig
-    sets: Sequence[PlannedSet]
-    path: Path
-    tally: Tally
-    info: dict[str, Any] = field(default_factory=dict)
+    def __init__(self, desk: Desk, stage: Stage, loaded: LoadedConfig, sets: Sequence[PlannedSet]) -> None:
+        self.tally = Tally(desk.terminal)
+        self.recording: Recording | None = None
+        self.cause: BaseException | None = None
+        self._desk, self._stage, self._config, self._sets = desk, stage, loaded.config, sets
 
-    def run(self) -> tuple[Recording | None, BaseException | None]:
-        """Play into the journal; the recording is None where only the journal has it."""
-        statement = self.stage.rig.statement()
-        header = {"axis": "rotary", "noise": self.stage.rig.noise_rad_s} | self.info
+    def run(self, journal: Journal) -> None:
+        """Play into the journal and close it."""
+        is_simulated = self._stage.rig.statement().torque is Torque.SIMULATED
         try:
-            with Journal.create(self.path / JOURNAL_FILE, header) as journal:
-                if statement.torque is Torque.SIMULATED:
-                    return self._play(journal)
-                with journal.flushing_in_background():
-                    return self._play(journal)
-        except RigError as error:  # the journal cannot be made or closed
-            return None, error
+            with journal, contextlib.nullcontext() if is_simulated else journal.flushing_in_background():
+                self._play(journal)
+        except RigError as error:
+            self.cause = self.cause or error
 
-    def _play(self, journal: Journal) -> tuple[Recording | None, BaseException | None]:
-        stage, config = self.stage, self.loaded.config
+    def _play(self, journal: Journal) -> None:
+        stage, config = self._stage, self._config
         sequencer = Sequencer(
             stage.rig,
             stage.clock,
@@ -148,14 +144,14 @@ class _Recorder:
             rest_s=config.excitation.rest_s,
             journal=journal,
             observer=self.tally,
-            stop=self.desk.stops.poll,
+            stop=self._desk.stops.poll,
         )
         try:
-            with self.desk.stops.playing(stage.rig.torque_off):
-                campaign = sequencer.play(self.sets)
+            with self._desk.stops.playing(stage.rig.torque_off):
+                campaign = sequencer.play(self._sets)
+            self.recording, self.cause = campaign.recording, campaign.cause
         except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (torque is off by now; what is there is saved)
-            return None, as_known(error)
-        return campaign.recording, campaign.cause
+            self.cause = as_known(error)
 
 
 def _record(
@@ -164,9 +160,9 @@ def _record(
     """Play, then export what the journal and the sequencer have."""
     path = folder.made()
     info = provenance(loaded) | {"backend": str(stage.rig.statement())}
-    recorder = _Recorder(desk, stage, loaded, sets, path, Tally(desk.terminal), info)
-    recording, cause = recorder.run()
-    tally = recorder.tally
+    recorder = _Recorder(desk, stage, loaded, sets)
+    recorder.run(Journal.create(path / JOURNAL_FILE, {"axis": "rotary", "noise": stage.rig.noise_rad_s} | info))
+    cause, tally = recorder.cause, recorder.tally
     if isinstance(cause, UsageError) and not tally.statistics:
         folder.unmade()
         raise cause
@@ -175,21 +171,26 @@ def _record(
     info |= {"ended_utc": datetime.now(UTC).isoformat(), "aborted": str(cause) if cause else None}
     info |= {"sets": [_figures(s) for s in tally.statistics]} | stage.account()
     with desk.stops.saving():
-        recording = _save(desk, path, recording, info)
+        recording = _save(desk, path, recorder.recording, info)
     return Played(recording, tally.whole, cause)
 
 
 def _save(desk: Desk, path: Path, recording: Recording | None, info: Mapping[str, Any]) -> Recording:
     """Write recording.h5; a disk that takes no more is said, and the journal has the samples."""
-    contents = read_journal(path / JOURNAL_FILE)
-    found = recording or recording_from_journal(contents)
-    found = dataclasses.replace(found, info=dict(info))
-    if found.runs:
+    contents = None
+    try:
+        contents = read_journal(path / JOURNAL_FILE)
+    except RigError as problem:
+        desk.say_error(problem)
+    if recording is None:
+        recording = recording_from_journal(contents) if contents is not None else Recording(())
+    recording = dataclasses.replace(recording, info=dict(info))
+    if recording.runs:
         try:
-            write_recording_h5(path / RECORDING_FILE, found, contents)
+            write_recording_h5(path / RECORDING_FILE, recording, contents)
         except RigError as problem:
             desk.say_error(problem)
-    return found
+    return recording
 
 
 def _figures(s: SetStatistics) -> dict[str, Any]:

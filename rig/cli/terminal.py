@@ -82,6 +82,13 @@ class Terminal:
         self._end_line()
         self._lines.put(text + "\n")
 
+    def note(self, text: str) -> None:
+        """Say what is being worked on: in passing on a terminal, a line each elsewhere."""
+        if self.has_bars:
+            self.overwrite(text)
+        else:
+            self.tell(text)
+
     def overwrite(self, text: str) -> None:
         """Put ``text`` in the place of the line that was put here last."""
         if self.has_bars and self._lines.qsize() < MOST_WAITING:
@@ -101,7 +108,7 @@ class Terminal:
 
     def settle(self) -> None:
         """Wait until what was told is written, but not for ever; then others may write there."""
-        self._end_line()
+        self.clear_line()
         written = threading.Event()
         self._lines.put(written)
         written.wait(LAST_WORDS_S)

@@ -1,0 +1,83 @@
+"""The command `rig`: check, devices, play, emulate."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from rig.cli.compiled_cache import ensure_compiled_cache
+from rig.cli.desk import Desk, Options, at_desk
+from rig.cli.exits import conclude
+from rig.cli.options import ConfigFile, DryRun, Emulate, Out, Overrides, Quiet, Seed, Version, Yes, new_app
+
+app = new_app("Prepare, check and play a campaign on the rig. To identify from it: identify-run.")
+
+
+@app.callback()
+def rig(version: Version = False) -> None:
+    """Prepare, check and play a campaign on the rig. To identify from it: identify-run."""
+    ensure_compiled_cache()
+
+
+@app.command()
+def check(config: ConfigFile, emulate: Emulate = False, overrides: Overrides = None) -> None:
+    """Validate CONFIG, forecast every set, contact the devices without torque; say what is wrong and its cure."""
+
+    def command(desk: Desk) -> int:
+        from rig.cli.check import run_checks
+
+        return run_checks(desk)
+
+    raise typer.Exit(at_desk(Options(config, emulate=emulate, overrides=tuple(overrides or ())), command))
+
+
+@app.command()
+def devices() -> None:
+    """List the serial ports and CAN adapters of this machine."""
+
+    def command() -> int:
+        from rig.cli.devices import device_lines
+
+        sys.stdout.write("\n".join(device_lines()) + "\n")
+        return 0
+
+    raise typer.Exit(conclude(command))
+
+
+@app.command()
+def play(
+    config: ConfigFile,
+    out: Out = None,
+    dry_run: DryRun = False,
+    emulate: Emulate = False,
+    yes: Yes = False,
+    overrides: Overrides = None,
+    seed: Seed = None,
+    quiet: Quiet = False,
+) -> None:
+    """Play and record only."""
+
+    def command(desk: Desk) -> int:
+        from rig.cli.play import play_only
+
+        return play_only(desk)
+
+    options = Options(config, out, dry_run, emulate, yes, tuple(overrides or ()), seed, quiet)
+    raise typer.Exit(at_desk(options, command))
+
+
+@app.command()
+def emulate(config: ConfigFile, overrides: Overrides = None) -> None:
+    """Emulate the devices of CONFIG's `bench` section at wire level until Ctrl-C; JSON lines say what they do."""
+
+    def command() -> int:
+        from rig.cli.backends import require_emulators
+
+        require_emulators()
+        from sim_backend.emulators.process import run_emulators
+
+        run_emulators(Options(config, overrides=tuple(overrides or ())).load().config)
+        return 0
+
+    raise typer.Exit(conclude(command))
