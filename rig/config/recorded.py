@@ -8,6 +8,7 @@ from pydantic import Field, field_validator, model_validator
 
 from rig.config.base import NonNegative, Positive, Section
 
+MOST_RUNS = 1000
 ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
 
 
@@ -78,13 +79,22 @@ class Scale(Section):
 class RecordedConfig(Section):
     """The recordings of a campaign that is not played but read."""
 
-    runs: Annotated[tuple[RecordedRun, ...], Field(min_length=1, max_length=1000)]
+    runs: tuple[RecordedRun, ...]
     columns: Columns = Columns()
     scale: Scale = Scale()
     axis: Literal["rotary", "linear"] = "rotary"
     torque_hold: Literal["band_limited", "zero_order"] = "band_limited"
     noise: Positive | None = None
     min_rate_rad_s: NonNegative = 0.0
+
+    @field_validator("runs")
+    @classmethod
+    def _one_to_a_thousand(cls, runs: tuple[RecordedRun, ...]) -> tuple[RecordedRun, ...]:
+        # After the runs themselves, or one wrong run would also be reported as a list that is too short.
+        if not 1 <= len(runs) <= MOST_RUNS:
+            given = f"a list of {len(runs)}" if runs else "[]"
+            raise ValueError(f"{given} is not allowed: has to be at least 1 and at most {MOST_RUNS} runs")
+        return runs
 
     @model_validator(mode="after")
     def _something_to_fit(self) -> Self:

@@ -206,3 +206,11 @@ def test_a_long_value_is_cut_in_the_message(tmp_path: Path) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text(RUNS + f"identify: {{seed: {'x' * 10_000}}}\n")
     assert len(refusal(path)) < 500
+
+
+def test_a_wrong_run_is_not_also_reported_as_a_list_that_is_too_short(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(RUNS + "      usee: fit\n", encoding="utf-8")
+    with pytest.raises(ConfigError) as error:
+        load_config(path)
+    assert len(str(error.value).splitlines()) == 1
