@@ -8,6 +8,7 @@ from typing import Any
 
 from rig.cli.terminal import plain
 
+NO_ADAPTERS = ("virtual", "udp_multicast", "serial")  # offered by python-can everywhere; nothing is plugged in
 Lister = Callable[[], list[Any]]
 
 
@@ -23,7 +24,7 @@ def _can_adapters() -> list[Any]:
     earlier = logging.root.manager.disable
     logging.disable(logging.CRITICAL)  # python-can reports every interface whose library is not installed
     try:
-        return list(can.detect_available_configs())
+        return [found for found in can.detect_available_configs() if found["interface"] not in NO_ADAPTERS]
     finally:
         logging.disable(earlier)
 
@@ -56,7 +57,6 @@ def _serial_line(port: Any) -> str:
 
 
 def _can_line(adapter: Any) -> str:
-    options = ", ".join(f"{key} {value}" for key, value in adapter.items() if key not in ("interface", "channel"))
-    return f"interface {adapter.get('interface')}, channel {adapter.get('channel')}" + (
-        f" ({options})" if options else ""
-    )
+    first = ("interface", "channel")
+    rest = [f"{key} {value}" for key, value in adapter.items() if key not in first]
+    return ", ".join([*(f"{key} {adapter.get(key)}" for key in first), *rest])

@@ -1,0 +1,78 @@
+"""The first signal asks, a second Ctrl-C cuts."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from rig.cli.stop_requests import STOPPING, StopRequests
+from rig.errors import Aborted
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="a process cannot signal itself gently there")
+
+
+def raise_signal(number: int) -> None:
+    os.kill(os.getpid(), number)
+
+
+@pytest.fixture
+def stops() -> Iterator[StopRequests]:
+    requests = StopRequests()
+    with requests.heeded():
+        yield requests
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_while_ticks_run_the_first_signal_becomes_the_reason_that_the_next_tick_reads(
+    stops: StopRequests, name: str
+) -> None:
+    told: list[str] = []
+    stops.tell = told.append
+    with stops.playing(lambda: None):
+        assert stops.poll() is None
+        raise_signal(getattr(signal, name))
+        assert "Stopped by" in str(stops.poll())
+    assert told == [STOPPING]
+
+
+def test_a_second_ctrl_c_takes_the_torque_off_at_once(stops: StopRequests) -> None:
+    cut: list[str] = []
+    with stops.playing(lambda: cut.append("torque off")):
+        stops.poll()
+        raise_signal(signal.SIGINT)
+        assert cut == []
+        with pytest.raises(KeyboardInterrupt):
+            raise_signal(signal.SIGINT)
+    assert cut == ["torque off"]
+
+
+def test_a_second_sigterm_is_no_second_ctrl_c(stops: StopRequests) -> None:
+    with stops.playing(lambda: pytest.fail("torque was cut out of turn")):
+        stops.poll()
+        raise_signal(signal.SIGTERM)
+        raise_signal(signal.SIGHUP)
+        assert stops.poll() == "Stopped by SIGTERM"
+
+
+def test_before_the_first_tick_a_signal_raises_so_that_nothing_is_armed_any_more(stops: StopRequests) -> None:
+    with stops.playing(lambda: None), pytest.raises(Aborted, match="Ctrl-C"):
+        raise_signal(signal.SIGINT)
+
+
+def test_what_is_being_saved_is_saved_whole_before_the_request_counts(stops: StopRequests) -> None:
+    saved = False
+    with pytest.raises(Aborted, match="SIGTERM"), stops.saving():
+        raise_signal(signal.SIGTERM)
+        saved = True
+    assert saved
+
+
+def test_handlers_from_before_are_put_back() -> None:
+    before = signal.getsignal(signal.SIGTERM)
+    with StopRequests().heeded():
+        assert signal.getsignal(signal.SIGTERM) is not before
+    assert signal.getsignal(signal.SIGTERM) is before
