@@ -7,6 +7,7 @@ by the same frames as the torque, so a loop that hangs looks dead to the drive.
 
 from __future__ import annotations
 
+import select
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -26,7 +27,7 @@ from rig.errors import ConfigError, DeviceFault, RigError
 from rig.interface import Exchange, GyroSample, Rig, Statement, Torque, TorqueOfTime, TorqueSample
 from rig.recording.run import TorqueHold
 
-CONTACT_TIME_S = 0.02
+CONTACT_TIME_S = 0.002
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,8 @@ class BenchRig(Rig):
         self._grant: realtime.RealTimeGrant | None = None
         self._notes: list[str] = []
         self._waiting: list[GyroSample] = []
+        self._settle_due_s = 0.0
+        self._link_fault: DeviceFault | None = None
         self.clock = BenchClock(self._listen, config.real_time.spin_us * 1e-6, self._note_clock)
 
     def statement(self) -> Statement:
@@ -137,6 +140,7 @@ class BenchRig(Rig):
             while self._time() - begin_s < self._config.settle_s:
                 self._listen(CONTACT_TIME_S)
                 self._gather(faults)
+                self._settle_drive(faults)
             self._line.note_noise()
             faults += [DeviceFault(text) for text in self._line.problems(self._time() - begin_s)]
         if faults:
@@ -167,6 +171,16 @@ class BenchRig(Rig):
             return fault
         return None
 
+    def _settle_drive(self, faults: list[RigError]) -> None:
+        if self._link is None or faults or self._time() < self._settle_due_s:
+            return
+        self._settle_due_s = self._time() + CONTACT_TIME_S
+        try:
+            self.amplifier.settle(self._link)
+            self._link.poll()
+        except RigError as fault:
+            faults.append(fault)
+
     def _gather(self, faults: list[RigError]) -> None:
         """Decode what has arrived, so that no buffer overflows; samples wait for the next exchange."""
         if self._line is None or self._line.fault is not None:
@@ -179,10 +193,23 @@ class BenchRig(Rig):
             del self._waiting[:-1000]  # while nothing is played only the newest matter
 
     def _listen(self, timeout_s: float) -> bool:
+        """Wait for the gyro or the drive, and stamp what they sent when it arrives."""
         if self._line is None:
             time.sleep(timeout_s)
             return False
-        return self._line.listen(timeout_s)
+        link, line = self._link, self._line
+        gyro, can = line.fileno(), -1 if link is None else link.fileno()
+        if gyro < 0 or can < 0 or link is None or self._link_fault is not None:
+            return line.listen(timeout_s)
+        readable = select.select((gyro, can), (), (), timeout_s)[0]
+        if gyro in readable:
+            line.take_in()
+        if can in readable:
+            try:
+                link.poll()
+            except DeviceFault as fault:
+                self._link_fault = fault
+        return bool(readable)
 
     # -- torque ----------------------------------------------------------------------------------
 
@@ -194,6 +221,7 @@ class BenchRig(Rig):
         self.amplifier.arm(self._link)
         self._gather([])
         self._waiting.clear()
+        self.amplifier.take_reported()
         self._mark("armed", {"real_time": str(self._grant)})
 
     def exchange(self, now_s: float, torque_nm: float) -> Exchange:
@@ -201,20 +229,21 @@ class BenchRig(Rig):
         link, line = self._link, self._line
         if not self._armed or link is None or line is None:
             raise DeviceFault("torque was sent to a bench that is not armed: arm it first")
-        if line.fault is not None:
-            raise line.fault
+        fault = line.fault or self._link_fault
+        if fault is not None:
+            raise fault
         amplifier = self.amplifier
         frames = amplifier.frames(torque_nm, now_s)
         sent_s = link.send(frames)
         sent = [nm for frame in frames if (nm := amplifier.sent_torque_nm(frame)) is not None]
         gyro = self._waiting + line.collect() if self._waiting else line.collect()
         self._waiting.clear()
-        heard = link.poll()
+        link.poll()
         amplifier.check(now_s)
         if self._capture is not None:
             self._capture.tick(now_s, torque_nm)
             self._capture.flush_if_due(now_s)
-        return answer(self._config, amplifier, gyro, [TorqueSample(sent_s, nm) for nm in sent], bool(heard), sent_s)
+        return answer(self._config, amplifier, gyro, [TorqueSample(sent_s, nm) for nm in sent])
 
     def torque_off(self) -> None:
         """Zero torque now. Safe at any time, twice, and from a signal handler."""
@@ -286,16 +315,16 @@ def answer(
     amplifier: Amplifier,
     gyro: list[GyroSample],
     sent: list[TorqueSample],
-    heard: bool,
-    sent_s: float,
 ) -> Exchange:
     """What a tick gives back, on the bench and in a replay alike."""
+    reported = amplifier.take_reported()
     actual = amplifier.actual_torque_nm
     if actual is None:
         return Exchange(gyro, sent)
-    if config.amplifier.torque_source == "actual":
-        sent = [TorqueSample(sent_s, actual)] if heard else []
-    return Exchange(gyro, sent, {"drive_torque_nm": actual})
+    source = config.amplifier.torque_source
+    from_drive = source == "actual" or (source == "auto" and amplifier.stamps_torque)
+    channels = {"drive_torque_nm": actual, "sent_torque_nm": sent[-1].torque_nm if sent else 0.0}
+    return Exchange(gyro, reported if from_drive else sent, channels)
 
 
 def _together(faults: list[RigError]) -> RigError:

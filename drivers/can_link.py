@@ -95,6 +95,13 @@ class CanLink:
                 listener(item)
         return heard
 
+    def fileno(self) -> int:
+        """File descriptor on which arriving frames show, or -1 where the bus has none."""
+        try:
+            return self._bus.fileno()
+        except NotImplementedError:
+            return -1
+
     def wait(self, timeout_s: float, until: Callable[[], bool], every: Callable[[], None] | None = None) -> bool:
         """Poll until the condition holds; False when the time is over. ``every`` runs between polls."""
         deadline = self.clock() + timeout_s

@@ -85,6 +85,18 @@ class GyroLine:
             if self._capture is not None:
                 self._capture.gyro_sent(self._clock(), greeting)
 
+    def fileno(self) -> int:
+        """File descriptor on which arriving bytes show, or -1 where the port has none."""
+        number = getattr(self._port, "fileno", lambda: None)()
+        return -1 if number is None or self.fault is not None else number
+
+    def take_in(self) -> None:
+        """Take in what has arrived; a vanished port is kept for ``collect``."""
+        try:
+            self._take()
+        except DeviceFault as fault:
+            self.fault = fault
+
     def listen(self, timeout_s: float) -> bool:
         """Wait for bytes at most so long and take them in; a vanished port is kept for ``collect``."""
         if self.fault is not None:

@@ -139,7 +139,7 @@ class ReplayRig(Rig):
 
     def _finish_stage(self, mark: str) -> None:
         """Everything up to the mark that ends this stage."""
-        while self._next_frame() is not None:
+        while self._link.poll():
             continue
         if self._at >= len(self._entries) or not self._is_mark(self._entries[self._at], mark):
             raise RecordingError(f"{self._path} ends before the bench was {mark}: nothing was played")
@@ -154,26 +154,24 @@ class ReplayRig(Rig):
         """As ``open``."""
         self.amplifier.arm(self._link)
         self._finish_stage("armed")
+        self.amplifier.take_reported()
 
     def exchange(self, now_s: float, torque_nm: float) -> Exchange:
         """The next tick of the capture. Raises RecordingError when there is none."""
         gyro: list[GyroSample] = []
         sent: list[TorqueSample] = []
-        heard, sent_s = False, 0.0
         while self._at < len(self._entries):
             entry = self._entries[self._at]
             self._at += 1
             if entry.kind == capture.GYRO_READ:
                 gyro += self.gyroscope.feed(entry.payload, entry.time_s)
             elif entry.kind == capture.CAN_READ:
-                heard = True
                 self.amplifier.receive(Heard(entry.time_s, unpack_frame(entry.payload)))
             elif entry.kind == capture.CAN_SENT:
-                sent_s = entry.time_s
                 nm = self.amplifier.sent_torque_nm(unpack_frame(entry.payload))
-                sent += [] if nm is None else [TorqueSample(sent_s, nm)]
+                sent += [] if nm is None else [TorqueSample(entry.time_s, nm)]
             elif entry.kind == capture.TICK:
-                return answer(self.config, self.amplifier, gyro, sent, heard, sent_s)
+                return answer(self.config, self.amplifier, gyro, sent)
         raise RecordingError(f"{self._path} ends here: the campaign that it holds was cut short")
 
     def torque_off(self) -> None:

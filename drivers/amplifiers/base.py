@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
 from rig.config.bench import AmplifierConfig
+from rig.interface import TorqueSample
 
 
 class Amplifier(ABC):
@@ -22,6 +23,7 @@ class Amplifier(ABC):
 
     def __init__(self, config: AmplifierConfig) -> None:
         self.config = config
+        self._reported: list[TorqueSample] = []
         self._to_motor = (-1.0 if config.invert else 1.0) / config.gear_ratio
 
     def motor_nm(self, shaft_nm: float) -> float:
@@ -42,9 +44,22 @@ class Amplifier(ABC):
     def actual_torque_nm(self) -> float | None:
         """Torque at the shaft as the drive last reported it; None where it does not."""
 
+    @property
+    def stamps_torque(self) -> bool:
+        """True if the drive reports its torque with the time of its own clock."""
+        return False
+
+    def take_reported(self) -> list[TorqueSample]:
+        """Torques at the shaft that the drive reported since the last call, with the best time known."""
+        reported, self._reported = self._reported, []
+        return reported
+
     @abstractmethod
     def contact(self, link: CanLink) -> list[str]:
         """Find the drive, set it up, no torque; notes for the operator. Raises DeviceFault."""
+
+    def settle(self, link: CanLink) -> None:  # noqa: B027 (most drives need no time)
+        """Called every few milliseconds between contact and arming, for what needs time; no torque."""
 
     @abstractmethod
     def arm(self, link: CanLink) -> None:

@@ -23,8 +23,10 @@ from drivers.codecs import cia402
 from drivers.codecs.cia402 import State
 from drivers.codecs.lawicel import CanFrame
 from drivers.settings import Settings, read_settings
+from drivers.source_clock import SourceClock
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
+from rig.interface import TorqueSample
 
 NMT_START, NMT_PRE_OPERATIONAL, NMT_RESET_COMMUNICATION = 0x01, 0x80, 0x82
 NMT_OPERATIONAL = 0x05
@@ -33,6 +35,14 @@ PER_MILLE = 1000
 COMMAND_LIMIT = 32_767
 BEATS_PER_WATCHDOG = 4
 MISSED_BEATS = 3.0
+STAMP_UNIT_S = 1e-6
+OPTIONAL_OBJECTS = (
+    cia402.MAX_TORQUE,
+    cia402.RATED_TORQUE,
+    cia402.ACTUAL_TORQUE,
+    cia402.TORQUE_SLOPE,
+    cia402.TIME_STAMP,
+)
 
 
 class Cia402Settings(Settings):
@@ -93,6 +103,10 @@ class Cia402(Amplifier):
         self._new_emergency = ""
         self._armed = False
         self._objects: RemoteObjects | None = None
+        self._stamped = False
+        self._drive_clock = SourceClock(STAMP_UNIT_S)
+        self._stamp: int | None = None
+        self._last_torque_s = 0.0
 
     # -- set-up ----------------------------------------------------------------------------------
 
@@ -120,6 +134,7 @@ class Cia402(Amplifier):
         self._watch(objects)
         self._map(objects, plan)
         objects.write(cia402.MODE, 0, plan.mode, 1)
+        link.send([CanFrame(0, bytes([NMT_START, node]))])
         notes = [] if device & 0xFFFF == 402 else [f"0x1000 says profile {device & 0xFFFF}, not 402"]
         step = abs(self.shaft_nm(self._reference_nm)) / PER_MILLE
         return [
@@ -132,7 +147,7 @@ class Cia402(Amplifier):
     def _present(self, dictionary: Any, objects: RemoteObjects) -> Any:
         """Without an EDS, leave out what this drive turns out not to have."""
         if self.settings.eds is None:
-            for index in (cia402.MAX_TORQUE, cia402.RATED_TORQUE, cia402.ACTUAL_TORQUE, cia402.TORQUE_SLOPE):
+            for index in OPTIONAL_OBJECTS:
                 if objects.read_if_there(index) is None:
                     del dictionary[index]
         return dictionary
@@ -177,11 +192,25 @@ class Cia402(Amplifier):
         self._remap(rpdo, self._rpdo_id, kind, (cia402.CONTROLWORD, cia402.TARGET_TORQUE))
         objects.save_pdo(rpdo, "RPDO 1 (controlword, target torque)")
         reported = (cia402.STATUSWORD,) + ((cia402.ACTUAL_TORQUE,) if plan.has_actual_torque else ())
-        tpdo = objects.remote.tpdo[1]
-        self._remap(tpdo, self._tpdo_id, kind, reported)
-        objects.save_pdo(tpdo, "TPDO 1 (statusword, actual torque)")
+        self._stamped = plan.has_time_stamp and plan.has_actual_torque and self.settings.sync
+        if self._stamped:
+            self._stamped = self._map_status(objects, kind, (*reported, cia402.TIME_STAMP), may_refuse=True)
+        if not self._stamped:
+            self._map_status(objects, kind, reported)
         if not self.settings.sync and objects.read_if_there(0x1800, 5) is not None:
             objects.write(0x1800, 5, 10, 2)
+
+    def _map_status(self, objects: RemoteObjects, kind: int, indices: Sequence[int], may_refuse: bool = False) -> bool:
+        """Map what the drive reports; False where it refuses and may (0x1013 need not be mappable)."""
+        tpdo = objects.remote.tpdo[1]
+        self._remap(tpdo, self._tpdo_id, kind, indices)
+        try:
+            objects.save_pdo(tpdo, "TPDO 1 (statusword, actual torque)")
+        except DeviceFault:
+            if not may_refuse:
+                raise
+            return False
+        return True
 
     @staticmethod
     def _remap(pdo: Any, cob_id: int, kind: int, indices: Sequence[int]) -> None:
@@ -190,6 +219,11 @@ class Cia402(Amplifier):
             pdo.add_variable(index)
         pdo.cob_id, pdo.trans_type, pdo.enabled, pdo.rtr_allowed = cob_id, kind, True, True
         pdo.event_timer = pdo.inhibit_time = pdo.sync_start_value = None
+
+    def settle(self, link: CanLink) -> None:
+        """SYNC alone makes the drive report its time, so that its clock is known before anything moves."""
+        if self._stamped:
+            link.send([self._sync])
 
     # -- state machine ---------------------------------------------------------------------------
 
@@ -332,6 +366,7 @@ class Cia402(Amplifier):
             self._status_at_s = heard.time_s
             if len(data) >= 4:
                 self._actual = int.from_bytes(data[2:4], "little", signed=True)
+                self._note_torque(heard.time_s, data)
         elif can_id == self._beat_id and data:
             self._last_beat_s, self._nmt_state = heard.time_s, data[0] & 0x7F
         elif can_id == self._emergency_id and len(data) >= 3:
@@ -339,6 +374,27 @@ class Cia402(Amplifier):
             text = f"EMCY 0x{code:04X} {cia402.emergency_in_words(code)} (register 0x{register:02X})"
             self.emergencies.append((heard.time_s, text))
             self._new_emergency = text if code else ""
+
+    @property
+    def stamps_torque(self) -> bool:
+        """True where 0x1013 is mapped beside the actual torque."""
+        return self._stamped
+
+    def _note_torque(self, heard_s: float, data: bytes) -> None:
+        """The reported torque with its time: the drive's own, put on the host's clock, where it gives one."""
+        time_s = heard_s
+        if self._stamped and len(data) >= 8:
+            stamp = int.from_bytes(data[4:8], "little")
+            before = self._stamp if self._stamp is not None else stamp
+            self._stamp = before + ((stamp - before) & 0xFFFFFFFF)
+            self._drive_clock.observe(self._stamp, heard_s)
+            time_s = self._drive_clock.host_time_s(self._stamp)
+        # Set points that the drive took up together carry one stamp; the last of them is the one that holds.
+        time_s = max(time_s, self._last_torque_s + STAMP_UNIT_S)
+        self._last_torque_s = time_s
+        actual = self.actual_torque_nm
+        if actual is not None:
+            self._reported.append(TorqueSample(time_s, actual))
 
     def _why(self) -> str:
         if self._new_emergency:

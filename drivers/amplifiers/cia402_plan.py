@@ -36,6 +36,7 @@ class DrivePlan:
     has_max_torque: bool
     has_rated_torque: bool
     has_torque_slope: bool
+    has_time_stamp: bool
     fallbacks: tuple[str, ...] = field(default=())
 
     @property
@@ -72,6 +73,8 @@ def plan_drive(
     has = {i: i in dictionary for i in (cia402.MAX_TORQUE, cia402.RATED_TORQUE, cia402.ACTUAL_TORQUE)}
     mode, mode_note = _choose_mode(dictionary, wish, supported_modes)
     fallbacks = [mode_note] if mode_note else []
+    if cia402.TIME_STAMP not in dictionary:
+        fallbacks.append("no 0x1013 (time stamp): a set point counts from the instant at which it was sent")
     if not has[cia402.MAX_TORQUE]:
         if not peak_is_declared:
             raise ConfigError(
@@ -92,6 +95,7 @@ def plan_drive(
         has[cia402.MAX_TORQUE],
         has[cia402.RATED_TORQUE],
         cia402.TORQUE_SLOPE in dictionary,
+        cia402.TIME_STAMP in dictionary,
         tuple(fallbacks),
     )
 
@@ -145,6 +149,7 @@ def standard_dictionary(node: int) -> canopen.ObjectDictionary:
         (cia402.RATED_TORQUE, "Motor rated torque", datatypes.UNSIGNED32),
         (cia402.ACTUAL_TORQUE, "Torque actual value", datatypes.INTEGER16),
         (cia402.TORQUE_SLOPE, "Torque slope", datatypes.UNSIGNED32),
+        (cia402.TIME_STAMP, "High resolution time stamp", datatypes.UNSIGNED32),
     ):
         od.add_object(_variable(name, index, 0, kind))
     for k in range(4):

@@ -13,7 +13,7 @@ from collections import deque
 from typing import NamedTuple
 
 from drivers.codecs.framing import Matcher, StreamFramer
-from drivers.gyroscopes.source_clock import SourceClock
+from drivers.source_clock import SourceClock
 from rig.config.bench import GyroscopeConfig
 from rig.interface import GyroSample
 

@@ -55,7 +55,8 @@ class AmplifierConfig(Section):
     ``node`` is its address on the bus. ``watchdog_ms``: after so long without a sign of life of this
     computer the drive itself has to cut the torque. ``gear_ratio`` is shaft torque over motor torque
     (losses included), ``invert`` turns the sign. ``torque_source`` says what is recorded as the torque:
-    ``sent`` (what went out, held until the next) or ``actual`` (what the drive reports).
+    ``sent`` (what went out and when, held until the next), ``actual`` (what the drive reports), or ``auto``:
+    what the drive reports where it stamps that with its own time, else what was sent.
     """
 
     device: str = "cia402"
@@ -64,7 +65,7 @@ class AmplifierConfig(Section):
     watchdog_ms: Annotated[int, Field(ge=5, le=5000)] = 100
     gear_ratio: Positive = 1.0
     invert: bool = False
-    torque_source: Literal["sent", "actual"] = "sent"
+    torque_source: Literal["auto", "sent", "actual"] = "auto"
     settings: Mapping[str, Setting] = Field(default_factory=dict)
 
 
@@ -83,12 +84,14 @@ class EmulatorConfig(Section):
     """The devices that `rig emulate` and `--emulate` put in the place of the real ones.
 
     The platform, its undeclared effects and the gyro's noise are those of the `simulated` section.
-    ``gyro_drift_ppm``: the gyro's clock against the host's. ``rated_torque_nm`` and ``peak_torque_nm``:
-    nameplate of the drive; the command's step is a thousandth of the former. ``drive_delay_ms``: from the
-    frame to the torque. ``start_up_s`` of start-up status precede the first good gyro sample.
+    ``gyro_drift_ppm``, ``drive_drift_ppm``: their clocks against the host's. ``rated_torque_nm`` and
+    ``peak_torque_nm``: nameplate of the drive; the command's step is a thousandth of the former.
+    ``drive_delay_ms``: from the frame to the torque. ``start_up_s`` of start-up status precede the first
+    good gyro sample.
     """
 
     gyro_drift_ppm: Annotated[float, Field(ge=-500, le=500)] = 20.0
+    drive_drift_ppm: Annotated[float, Field(ge=-500, le=500)] = -30.0
     start_up_s: Annotated[float, Field(ge=0, le=10)] = 0.3
     rated_torque_nm: Positive = 150.0
     peak_torque_nm: Positive = 300.0

@@ -52,7 +52,7 @@ def _make_gyro(config: Config) -> AnyGyro:
 def _make_cia402(config: Config) -> EmulatedDrive:
     assert config.bench is not None
     e = config.bench.emulator
-    return Cia402Drive(config.bench.amplifier.node, e.rated_torque_nm, e.peak_torque_nm)
+    return Cia402Drive(config.bench.amplifier.node, e.rated_torque_nm, e.peak_torque_nm, e.drive_drift_ppm)
 
 
 def _make_odrive(config: Config) -> EmulatedDrive:
@@ -155,8 +155,8 @@ class EmulatedBench:
 
     def _send_samples(self, lag_s: float) -> None:
         while self._start_s + (self._samples + 1) * self._period_s + lag_s <= self._now_s:
-            for _ in range(WORLD_STEPS_PER_SAMPLE):
-                self._remember(self._world.step())
+            for rate in self._world.advance(WORLD_STEPS_PER_SAMPLE):
+                self._remember(rate)
             self._samples += 1
             self.gyro_port.write(self._gyro.sample(self._filtered()))
 

@@ -123,6 +123,7 @@ class CanopenNode:
         for k, data in sorted(self._waiting_for_sync.items()):
             self._take_pdo(k, data, now_s)
         self._waiting_for_sync.clear()
+        self.on_sync(now_s)
         for k in range(_PDOS):
             if self._valid_pdo(0x1800 + k) and self.od.get(0x1800 + k, 2) <= 240:
                 self._send_pdo(k)
@@ -174,6 +175,9 @@ class CanopenNode:
 
     def on_pdo(self, now_s: float) -> None:
         """Objects were written by a PDO."""
+
+    def on_sync(self, now_s: float) -> None:
+        """PDOs of this SYNC are taken, those that answer it are about to go out."""
 
     def on_reset(self, now_s: float) -> None:
         """NMT reset."""

@@ -27,10 +27,13 @@ class Cia402Drive(CanopenNode):
         Its node number.
     rated_torque_nm, peak_torque_nm
         What 0x6076 (in mN m) and 0x6072 (in thousandths of the former) say.
+    drift_ppm
+        How much faster its clock (0x1013) runs than the host's.
     """
 
-    def __init__(self, node: int, rated_torque_nm: float, peak_torque_nm: float) -> None:
+    def __init__(self, node: int, rated_torque_nm: float, peak_torque_nm: float, drift_ppm: float = 0.0) -> None:
         super().__init__(EDS, node)
+        self._us_per_s = 1e6 * (1.0 + drift_ppm * 1e-6)
         self._output = TorqueOutput()
         self._drive_state = State.SWITCH_ON_DISABLED
         self._last_controlword = 0
@@ -64,6 +67,10 @@ class Cia402Drive(CanopenNode):
         super().receive(frame, now_s)
         if frame.identifier == 0x600 + self.node:
             self.on_pdo(now_s)
+
+    def on_sync(self, now_s: float) -> None:
+        """Stamp the torque that was just put on the shaft with the drive's own time."""
+        self.od.set(cia402.TIME_STAMP, int(now_s * self._us_per_s) & 0xFFFFFFFF)
 
     # -- state machine ---------------------------------------------------------------------------
 

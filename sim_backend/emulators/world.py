@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from rig.platform import Platform
-from sim_backend.plant import RATE, SENSED, Plant
+from sim_backend.plant import SENSED, Plant
 
 
 class World:
@@ -32,16 +32,21 @@ class World:
         self._at = 0
         self._torque_nm = 0.0
         self._changes: deque[tuple[float, float]] = deque()
-        self.rate_rad_s = 0.0
-        self.sensed_rad_s = 0.0
         self._plant.hold(0.0, self._parts)  # compiles, or loads what was compiled, before time counts
 
     def change_torque(self, time_s: float, torque_nm: float) -> None:
         """The torque from ``time_s`` on; calls come in the order of their times."""
         self._changes.append((time_s, torque_nm))
 
-    def step(self) -> float:
-        """Advance by one grid step; the rate behind the sensor effects at its end, in rad/s."""
+    def advance(self, steps: int) -> list[float]:
+        """Advance by so many grid steps; the rates behind the sensor effects at their ends, in rad/s."""
+        end_s = self._start_s + (self._at + steps) * self._step_s
+        if not self._changes or self._changes[0][0] >= end_s:
+            return self._hold(self._torque_nm, steps)
+        return [rate for _ in range(steps) for rate in self._hold(self._mean_torque_nm(), 1)]
+
+    def _mean_torque_nm(self) -> float:
+        """Mean over the coming step, changes within it by their share; the torque at its end is kept."""
         begin_s = self._start_s + self._at * self._step_s
         end_s = begin_s + self._step_s
         mean_nm = self._torque_nm
@@ -50,8 +55,10 @@ class World:
             share = (end_s - max(time_s, begin_s)) / self._step_s
             mean_nm += (torque_nm - self._torque_nm) * share
             self._torque_nm = torque_nm
-        rows = self._plant.hold(mean_nm, self._parts)
-        self._at += 1
-        last = rows[self._parts - 1]
-        self.rate_rad_s, self.sensed_rad_s = float(last[RATE]), float(last[SENSED])
-        return self.sensed_rad_s
+        return mean_nm
+
+    def _hold(self, torque_nm: float, steps: int) -> list[float]:
+        rows = self._plant.hold(torque_nm, steps * self._parts)
+        self._at += steps
+        rates: list[float] = rows[self._parts - 1 : steps * self._parts : self._parts, SENSED].tolist()
+        return rates

@@ -51,7 +51,7 @@ def test_contact_sets_watchdog_and_mapping_and_says_so(bench):
     od = bench.drive.od
     assert od.get(0x1016, 1) == 127 << 16 | 100
     assert [od.get(0x1600, k) for k in (0, 1, 2)] == [2, 0x60400010, 0x60710010]
-    assert [od.get(0x1A00, k) for k in (0, 1, 2)] == [2, 0x60410010, 0x60770010]
+    assert [od.get(0x1A00, k) for k in range(4)] == [3, 0x60410010, 0x60770010, 0x10130020]
     assert bench.drive.torque_nm == 0.0
 
 

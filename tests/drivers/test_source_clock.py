@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from drivers.gyroscopes.source_clock import SourceClock
+from drivers.source_clock import SourceClock
 
 PERIOD_S = 0.5e-3
 

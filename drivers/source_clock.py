@@ -15,7 +15,8 @@ DRIFT_LIMIT = 1e-3
 MIN_BLOCKS_FOR_DRIFT = 6
 TRIMS = 2
 TRIM_FLOOR_S = 30e-6
-TRIM_DEVIATIONS = 4.0  # from the median: blocks in which every read was late, or a latency was misreported
+TRIM_DEVIATIONS = 4.0  # below the median: blocks in which a latency was misreported
+LOWER_SHARE = 0.5  # of the blocks: the others are late, because the host was busy or had to wake up first
 
 
 class SourceClock:
@@ -85,7 +86,7 @@ class SourceClock:
         if n < MIN_BLOCKS_FOR_DRIFT:
             self._offset_s = self._base_s + float(y.min())
             return
-        half = n // 2
+        half, lower = n // 2, int(LOWER_SHARE * (n - 1))
         # Median slope across half the span: a start that a few outliers cannot pull.
         drift = float(np.median((y[n - half :] - y[:half]) / (x[n - half :] - x[:half])))
         level = 0.0
@@ -93,7 +94,8 @@ class SourceClock:
             residual = y - drift * x
             middle = float(np.median(residual))
             spread = float(np.median(np.abs(residual - middle)))
-            use = np.abs(residual - middle) <= max(TRIM_FLOOR_S, TRIM_DEVIATIONS * spread)
+            low = middle - max(TRIM_FLOOR_S, TRIM_DEVIATIONS * spread)
+            use = (residual >= low) & (residual <= np.partition(residual, lower)[lower])
             xu, yu = x[use], y[use]
             mean_x, mean_y = float(xu.mean()), float(yu.mean())
             centred = xu - mean_x
