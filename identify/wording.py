@@ -14,6 +14,7 @@ SYMBOLS = {
     "damping_over_inertia": "C/J",
     "stiffness_over_inertia": "K/J",
 }
+UNCHANGED_PERCENT = 1e-6
 _TITLES = {"rotary": "rotary inertia", "linear": "mass"}
 
 
@@ -34,6 +35,11 @@ def plain(name: str) -> str:
     for person in ("coulomb", "stribeck"):
         words = words.replace(person, person.capitalize())
     return words
+
+
+def capital(words: str) -> str:
+    """With a capital to begin the sentence; what stands behind it is left alone."""
+    return words[:1].upper() + words[1:]
 
 
 def number(value: float | None, digits: int = 4) -> str:
@@ -69,6 +75,24 @@ def interval_of(estimate: ParameterEstimate) -> str:
     return f"{low} to {high}"
 
 
+def half_interval(estimate: ParameterEstimate) -> float:
+    """Half the width of the 95 % interval."""
+    return 0.5 * (estimate.ci95[1] - estimate.ci95[0])
+
+
+def with_interval(estimate: ParameterEstimate) -> str:
+    """Value and half its 95 % interval, "0.02030 ± 0.00012"; both ends where they lie unevenly or are unbounded."""
+    low, high = (abs(bound - estimate.value) for bound in estimate.ci95)
+    if not (math.isfinite(low) and math.isfinite(high)) or abs(high - low) > 0.2 * max(high, low):
+        return f"{value_of(estimate)} ({interval_of(estimate)})"
+    return f"{value_of(estimate)} ± {number(half_interval(estimate), 2)}"
+
+
+def printable(words: str) -> str:
+    """Without control characters: a run's name must not steer the terminal."""
+    return "".join(c if c.isprintable() else "?" for c in words)
+
+
 def percent(value: float | None) -> str:
     """With a sign and two or three digits that matter: "+412 %", "-0.013 %"."""
     if value is None or not math.isfinite(value):
@@ -90,14 +114,16 @@ def bent_sentences(identification: Identification) -> list[str]:
     bent = sorted(bent_percent(identification).items(), key=lambda item: -abs(item[1]))
     said = []
     for name, off in bent:
+        if abs(off) < UNCHANGED_PERCENT:
+            said.append(f"{capital(title(name, identification.axis))}: the same with and without what was added.")
+            continue
         before, after = (model.parameters[name] for model in (identification.before, identification.final))
         within = abs(before.value - after.value) <= 2.0 * math.hypot(before.std_error, after.std_error)
-        size = f"{'within the uncertainty, ' if within else ''}{percent(abs(off)).lstrip('+')}"
+        size = percent(abs(off)).lstrip("+")
+        note = " (within its uncertainty)" if within else ""
+        way = "high" if off > 0 else "low"
         said.append(
-            f"{title(name, identification.axis)}: the declared model alone reads it {size} too "
-            f"{'high' if off > 0 else 'low'}."
-            if off
-            else f"{title(name, identification.axis)}: unchanged."
+            f"{capital(title(name, identification.axis))}: the declared model alone reads it {size} too {way}{note}."
         )
     return said
 
@@ -110,7 +136,7 @@ def frequency(value: float | None) -> str:
 def pairs(several: Mapping[str, Sequence[str]]) -> list[str]:
     """What a name can be confused with, one sentence each; names without a rival are left out."""
     return [
-        f"{plain(name)} explains these data about as well as {', '.join(plain(r) for r in rivals)}."
+        capital(f"{' or '.join(plain(r) for r in rivals)} would explain these data about as well as {plain(name)}.")
         for name, rivals in several.items()
         if rivals
     ]
@@ -118,4 +144,4 @@ def pairs(several: Mapping[str, Sequence[str]]) -> list[str]:
 
 def not_reported(several: Sequence[NotReported]) -> list[str]:
     """Parameters that stand in no table, with the reason, one sentence each."""
-    return [f"{plain(item.name.replace('.', ', '))}: {item.reason}" for item in several]
+    return [capital(f"{plain(item.name.replace('.', ', '))}: {item.reason}") for item in several]

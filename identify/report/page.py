@@ -1,0 +1,255 @@
+"""The page as a whole: the verdict in words first, then what stands behind it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from itertools import count
+from typing import Any
+
+from plotly.offline import get_plotlyjs
+
+from identify.json_values import finite
+from identify.report.convergence import convergence_figure, convergence_table
+from identify.report.estimates import estimates_figure
+from identify.report.figure import Figure
+from identify.report.markup import Markup, Piece, bullets, element, join, paragraph, section
+from identify.report.motion import RUNS, motion_figures
+from identify.report.residual import residual_figures
+from identify.report.tables import (
+    candidate_table,
+    correlation_table,
+    effect_cards,
+    error_table,
+    parameter_table,
+    set_table,
+)
+from identify.results import Identification
+from identify.wording import (
+    SYMBOLS,
+    bent_percent,
+    bent_sentences,
+    half_interval,
+    not_reported,
+    number,
+    pairs,
+    percent,
+    plain,
+    unit,
+    value_of,
+)
+from rig.recording.run import Recording
+
+# Nothing may be fetched and nothing sent: the browser itself holds the page to it.
+POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+
+
+def report_html(identification: Identification, recording: Recording, name: str) -> str:
+    """report.html of one identification: self-contained, opens without a network.
+
+    ``name`` is the campaign's. Plots are thinned to a few thousand points a line with all peaks kept.
+    """
+    gallery = _Gallery()
+    body = join(
+        [
+            _header(identification, name),
+            _verdict(identification, gallery),
+            _errors(identification, gallery),
+            _candidates(identification),
+            _sets(identification, gallery),
+            _motion(identification, gallery),
+            _origin(recording),
+        ]
+    )
+    return _page(name, body, gallery.figures)
+
+
+class _Gallery:
+    """Hands out places for figures and remembers what is to be drawn there."""
+
+    def __init__(self) -> None:
+        self.figures: dict[str, dict[str, Any]] = {}
+        self._numbers = count(1)
+
+    def place(self, figure: Figure | None) -> Markup:
+        """Where the figure will stand; nothing for None."""
+        if figure is None:
+            return Markup("")
+        key = f"figure-{next(self._numbers)}"
+        self.figures[key] = {"data": list(figure.traces), "layout": figure.layout | {"height": figure.height}}
+        buttons = [
+            element("button", text, type="button", data_figure=key, data_range=json.dumps(span))
+            for text, span in figure.zooms
+        ]
+        plot = element(
+            "div", class_="plot", id=key, role="img", aria_label=figure.label, style=f"height:{figure.height}px"
+        )
+        heading = element("h3", figure.heading) if figure.heading else Markup("")
+        zooms = element("div", *buttons, class_="zooms") if buttons else Markup("")
+        return element("figure", heading, zooms, plot, element("figcaption", figure.caption))
+
+
+def _header(identification: Identification, name: str) -> Markup:
+    if identification.aborted:
+        badge, state = "ABORTED: what was recorded until then", "bad"
+    else:
+        badge, state = ("ACCEPTED", "good") if identification.accepted else ("NOT ACCEPTED", "bad")
+    return element(
+        "header",
+        element("p", "Identification of an inertial stability platform", class_="kicker"),
+        element("h1", name),
+        element("p", badge, class_=f"badge {state}"),
+    )
+
+
+def _verdict(identification: Identification, gallery: _Gallery) -> Markup:
+    verdict, final = identification.verdict, identification.final
+    reasons = [
+        element("div", element("h3", "Why not, and what to run next"), bullets(identification.reasons), class_="next")
+    ]
+    missing = not_reported(final.dropped), not_reported(final.not_determined)
+    return section(
+        "verdict",
+        "What was found",
+        element("div", *[paragraph(sentence) for sentence in verdict.sentences], class_="sentences"),
+        *(reasons if identification.reasons else []),
+        _tiles(identification),
+        parameter_table(identification),
+        _titled("What this did to the declared model", bent_sentences(identification)),
+        _titled("Dropped, since the data do not support it", missing[0]),
+        _titled("Not determined by these data", missing[1]),
+        gallery.place(estimates_figure(identification)),
+        effect_cards(identification),
+        correlation_table(final.correlation),
+    )
+
+
+def _titled(heading: str, lines: Sequence[Piece]) -> Markup:
+    return join([element("h3", heading), bullets(lines)]) if lines else Markup("")
+
+
+def _tiles(identification: Identification) -> Markup:
+    bent, tiles = bent_percent(identification), []
+    for name, found in identification.final.parameters.items():
+        half = half_interval(found)
+        before = f"declared model alone: {percent(bent[name])}" if name in bent else ""
+        tiles.append(
+            element(
+                "div",
+                element("span", SYMBOLS.get(name, plain(name)), class_="symbol"),
+                element("span", value_of(found), class_="value"),
+                element("span", unit(found.unit), class_="unit"),
+                element("span", f"± {number(half, 2)} (95 %)" if math.isfinite(half) else "", class_="half"),
+                element("span", before, class_="bent"),
+                class_="tile",
+            )
+        )
+    return element("div", *tiles, class_="tiles")
+
+
+def _errors(identification: Identification, gallery: _Gallery) -> Markup:
+    share = identification.verdict.unexplained_fraction
+    state = (
+        f"Unexplained: {number(100.0 * share, 2)} % of the motion's error stays significantly above the noise floor."
+        if identification.verdict.unexplained
+        else "The residual is at the noise floor: nothing significant is left unexplained."
+    )
+    figures = [gallery.place(figure) for figure in residual_figures(identification)]
+    return section(
+        "residual",
+        "What is left unexplained",
+        paragraph(state),
+        error_table(identification),
+        paragraph(identification.holdout_note, class_="note"),
+        *figures,
+    )
+
+
+def _candidates(identification: Identification) -> Markup:
+    verdict = identification.verdict
+    never = [f"{names.replace('_', ' ')}: {why}" for names, why in verdict.never_separable.items()]
+    return section(
+        "candidates",
+        "What was tried",
+        candidate_table(verdict.candidates, identification.noise_floor.holdout_rate_rms),
+        _titled("Confusable on these data", pairs(verdict.confusable_with)),
+        _titled("Not to be told apart by any torque and rate", never),
+    )
+
+
+def _sets(identification: Identification, gallery: _Gallery) -> Markup:
+    if not identification.per_set and identification.joint is None:
+        return Markup("")
+    return section(
+        "sets",
+        "Set by set, and the genetic algorithm",
+        set_table(identification) if identification.per_set else Markup(""),
+        gallery.place(convergence_figure(identification)),
+        convergence_table(identification),
+    )
+
+
+def _motion(identification: Identification, gallery: _Gallery) -> Markup:
+    figures = [gallery.place(figure) for figure in motion_figures(identification)]
+    total = len(identification.traces)
+    note = f"The {RUNS} of {total} runs with the largest error; recording.h5 has all." if total > RUNS else ""
+    hint = "Drag to zoom, double-click to see all, click a name in the legend to hide or show it."
+    return section("motion", "Measured and simulated", paragraph(f"{note} {hint}".strip(), class_="note"), *figures)
+
+
+def _origin(recording: Recording) -> Markup:
+    """Where the recording came from, as it says itself."""
+    rows, long = [], []
+    for key, value in _flat(recording.info).items():
+        if "\n" in value or len(value) > 300:
+            long.append(element("details", element("summary", key), element("pre", value)))
+        else:
+            rows.append(element("tr", element("th", key, scope="row"), element("td", value)))
+    lengths = f"{len(recording.runs)} runs, {sum(len(run.time_s) for run in recording.runs)} samples"
+    rows.insert(0, element("tr", element("th", "recording", scope="row"), element("td", lengths)))
+    return section("origin", "Where this comes from", element("table", element("tbody", *rows), class_="plain"), *long)
+
+
+def _flat(info: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
+    out: dict[str, str] = {}
+    for key, value in info.items():
+        name = f"{prefix}{key}".replace("_", " ")
+        if isinstance(value, Mapping):
+            out |= _flat(value, f"{name}: ")
+        elif isinstance(value, list | tuple):
+            out[name] = ", ".join(str(item) for item in value)
+        elif value is not None:
+            out[name] = str(value)
+    return out
+
+
+def embedded(value: Any) -> str:
+    """JSON that may stand inside a script element: no character of it can end the element."""
+    text = json.dumps(finite(value), allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _page(name: str, body: Markup, figures: Mapping[str, Any]) -> str:
+    own = files("identify.report")
+    title = element("title", f"{name}: identification").html
+    return "\n".join(
+        [
+            "<!DOCTYPE html>",
+            '<html lang="en"><head><meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            '<meta name="color-scheme" content="light dark">',
+            '<link rel="icon" href="data:,">',
+            title,
+            f"<style>{(own / 'page.css').read_text(encoding='utf-8')}</style></head>",
+            f"<body><main>{body.html}</main>",
+            "<noscript><p>The plots need JavaScript, which this page carries; text and tables do not.</p></noscript>",
+            f'<script type="application/json" id="figures">{embedded(figures)}</script>',
+            f"<script>{get_plotlyjs()}</script>",
+            f"<script>{(own / 'page.js').read_text(encoding='utf-8')}</script>",
+            "</body></html>",
+            "",
+        ]
+    )

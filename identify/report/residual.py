@@ -1,0 +1,186 @@
+"""What the model leaves unexplained, against time, angle, rate and frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import Literal
+
+import numpy as np
+from scipy import signal
+
+from identify.report.figure import (
+    AFTER,
+    BEFORE,
+    FLOOR,
+    Figure,
+    Panel,
+    Trace,
+    grid,
+    level,
+    lines,
+    once_in_legend,
+    points,
+)
+from identify.report.motion import left_over
+from identify.report.quantities import QUANTITIES, axis
+from identify.report.thinning import binned_mean, cloud, line
+from identify.results import Identification, RunTraces
+from rig.recording.run import Array
+
+LINE_POINTS = 4000
+CLOUD_POINTS = 1500
+SEGMENT = 4096  # samples of one Welch segment at most
+Which = Literal["before", "after"]
+NAMES = {"before": "declared model", "after": "final model"}
+COLORS = {"before": BEFORE, "after": AFTER}
+
+
+def residual_figures(identification: Identification) -> list[Figure]:
+    """Four figures: residual against time, angle, rate and frequency; none where nothing was simulated."""
+    if not identification.traces:
+        return []
+    quantities = QUANTITIES[identification.axis]
+    return [
+        _against_time(identification),
+        _against(identification, "angle_rad", quantities.angle, quantities.angle_unit),
+        _against(identification, "rate_rad_s", quantities.rate, quantities.rate_unit),
+        _spectrum(identification),
+    ]
+
+
+def _models(identification: Identification) -> tuple[Which, ...]:
+    return ("before", "after") if identification.after is not None else ("before",)
+
+
+def _torque_known(traces: Sequence[RunTraces]) -> bool:
+    return all(t.torque_residual_before is not None and t.torque_residual_after is not None for t in traces)
+
+
+def _residual(trace: RunTraces, which: Which, torque: bool) -> Array:
+    """Torque residual where there is one, else measured less simulated; NaN where a sample does not count."""
+    if torque:
+        found = trace.torque_residual_before if which == "before" else trace.torque_residual_after
+        return np.where(trace.keep > 0.0, np.asarray(found), np.nan)
+    return left_over(trace, trace.simulated_before if which == "before" else trace.simulated_after)
+
+
+def _titled(identification: Identification) -> tuple[str, bool]:
+    """Title of the residual's axis, and whether it is a torque."""
+    quantities, torque = QUANTITIES[identification.axis], _torque_known(identification.traces)
+    if torque:
+        return axis(f"{quantities.torque} residual", quantities.torque_unit), True
+    return axis("error", quantities.measured(identification.traces[0])[1]), False
+
+
+def _lowpass_note(identification: Identification, torque: bool) -> str:
+    cutoff = identification.final.error.lowpass_hz
+    return f" Behind a zero-phase low-pass at {cutoff:g} Hz." if torque and cutoff else ""
+
+
+def _against_time(identification: Identification) -> Figure:
+    title, torque = _titled(identification)
+    traces, models = identification.traces, _models(identification)
+    starts = np.cumsum([0.0, *[1.02 * float(t.time_s[-1] - t.time_s[0]) for t in traces]])
+    drawn: list[Trace] = []
+    budget = max(200, LINE_POINTS // len(traces))
+    for panel, which in enumerate(models, 1):
+        for start, trace in zip(starts, traces, strict=False):
+            x, y = line(start + trace.time_s - trace.time_s[0], _residual(trace, which, torque), budget)
+            drawn.append(lines(x, y, NAMES[which], COLORS[which], panel, width=0.9))
+    panels = [Panel("runs laid end to end (s)", title) for which in models]
+    layout = grid(panels, shared_x=True, gap=0.12)
+    many = len(traces) > 8
+    for start, trace in zip(starts, [] if many else traces, strict=False):
+        layout["annotations"].append(_run_name(trace.name, float(start)))
+    floor = identification.noise_floor.residual_rms_torque if torque else identification.noise_floor.holdout_rate_rms
+    if floor is not None:
+        layout["shapes"] = [level(sign * 2.0 * floor, FLOOR, p) for sign in (-1, 1) for p in range(1, len(models) + 1)]
+    return Figure(
+        label="Residual against time, before and after",
+        caption="Mind the scales: each panel has its own. Dashed green: twice the noise floor."
+        + _lowpass_note(identification, torque),
+        traces=once_in_legend(drawn),
+        layout=layout,
+        height=200 * len(models) + 60,
+    )
+
+
+def _run_name(name: str, x: float) -> dict[str, object]:
+    place = {"xref": "x", "yref": "paper", "xanchor": "left", "yanchor": "bottom", "showarrow": False}
+    return {"text": escape(name[:24]), "x": x, "y": 1.0, "font": {"size": 10}, "opacity": 0.8, **place}
+
+
+def _against(
+    identification: Identification, which_x: Literal["angle_rad", "rate_rad_s"], name: str, unit: str
+) -> Figure:
+    title, torque = _titled(identification)
+    models, drawn = _models(identification), []
+    for panel, which in enumerate(models, 1):
+        x = np.concatenate([getattr(t, which_x) for t in identification.traces])
+        y = np.concatenate([_residual(t, which, torque) for t in identification.traces])
+        drawn.append(points(*cloud(x, y, CLOUD_POINTS), NAMES[which], COLORS[which], panel))
+        mean = binned_mean(x, y)
+        drawn.append(lines(*mean, f"mean, {NAMES[which]}", COLORS[which], panel, width=3))
+    panels = [Panel(axis(name, unit), title, NAMES[which]) for which in models]
+    return Figure(
+        label=f"Residual against {name}, before and after",
+        caption=f"Residual against {name}: a sample of the points and their mean. A mean that leaves zero is a torque "
+        f"that depends on the {name} and that the model lacks.",
+        traces=drawn,
+        layout=grid(panels, columns=len(models), gap=0.1) | {"showlegend": False},
+        height=300,
+    )
+
+
+def spectrum(traces: Sequence[RunTraces], which: Which) -> tuple[Array, Array]:
+    """Power density of measured less simulated, averaged over the runs: frequencies (m,) in Hz, density (m,) per Hz.
+
+    Samples that do not count are zero and made up for by the rest. Runs of different rate meet on the
+    coarsest common grid.
+    """
+    found, weights = [], []
+    for trace in traces:
+        simulated = trace.simulated_before if which == "before" else trace.simulated_after
+        left = left_over(trace, simulated)
+        known = np.isfinite(left)
+        if len(left) < 16 or not known.any():
+            continue
+        rate = (len(left) - 1) / float(trace.time_s[-1] - trace.time_s[0])
+        hertz, density = signal.welch(np.where(known, left, 0.0), rate, nperseg=min(SEGMENT, len(left)), detrend=False)
+        found.append((hertz[1:], density[1:] / known.mean()))
+        weights.append(float(known.sum()))
+    if not found:
+        return np.empty(0), np.empty(0)
+    common = min((hertz for hertz, _ in found), key=lambda h: (float(h[-1]), len(h)))
+    stacked = np.array([np.interp(common, hertz, density) for hertz, density in found])
+    return common, np.average(stacked, axis=0, weights=weights)
+
+
+def _spectrum(identification: Identification) -> Figure:
+    quantities, traces = QUANTITIES[identification.axis], identification.traces
+    unit = quantities.measured(traces[0])[1]
+    drawn = []
+    for which in _models(identification):
+        hertz, density = spectrum(traces, which)
+        drawn.append(lines(hertz, np.sqrt(density), NAMES[which], COLORS[which], width=1.3))
+    steps = [float(t.time_s[-1] - t.time_s[0]) / max(1, len(t.time_s) - 1) for t in traces]
+    white = identification.noise_floor.holdout_rate_rms * float(np.sqrt(2.0 * np.median(steps)))
+    panel = Panel(
+        "frequency (Hz)",
+        f"error density ({unit} / √Hz)",
+        x_log=True,
+        y_log=True,
+        extra_x={"dtick": 1},
+        extra_y={"dtick": 1},
+    )
+    layout = grid([panel])
+    layout["shapes"] = [level(white, FLOOR)] if white > 0.0 else []
+    return Figure(
+        label="Residual against frequency, before and after, with the noise floor",
+        caption="Amplitude density of measured less simulated. Dashed green: white noise of the sensor's own size; "
+        "what stands above it at some frequency is motion that the model does not have.",
+        traces=drawn,
+        layout=layout,
+        height=330,
+    )

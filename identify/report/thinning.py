@@ -1,0 +1,52 @@
+"""Fewer points that look the same: peaks kept in a line, clouds sampled evenly, a mean in bins."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rig.recording.run import Array
+
+
+def line(x: Array, y: Array, points: int) -> tuple[Array, Array]:
+    """Lowest and highest sample of each of ``points`` / 2 stretches, so that no peak is lost.
+
+    NaN in ``y`` breaks the line: a stretch without any number is one NaN.
+    """
+    if len(y) <= points:
+        return x, y
+    kept: list[int] = [0]
+    for stretch in np.array_split(np.arange(len(y)), max(1, points // 2 - 1)):
+        known = stretch[np.isfinite(y[stretch])]
+        if len(known) == 0:
+            kept.append(int(stretch[0]))
+            continue
+        ends = {int(known[np.argmin(y[known])]), int(known[np.argmax(y[known])])}
+        kept += sorted(ends)
+    kept.append(len(y) - 1)
+    at = np.unique(kept)
+    return x[at], y[at]
+
+
+def cloud(x: Array, y: Array, points: int) -> tuple[Array, Array]:
+    """At most ``points`` of the samples, the same ones every time; NaN left out.
+
+    Drawn at random: a fixed stride would beat with a periodic signal.
+    """
+    known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    if len(known) > points:
+        known = np.sort(np.random.default_rng(0).choice(known, points, replace=False))
+    return x[known], y[known]
+
+
+def binned_mean(x: Array, y: Array, bins: int = 40) -> tuple[Array, Array]:
+    """Mean of ``y`` in bins of ``x`` of equal width; those with too few samples to mean anything left out."""
+    known = np.isfinite(x) & np.isfinite(y)
+    x, y = x[known], y[known]
+    if len(x) == 0 or np.ptp(x) == 0.0:
+        return np.empty(0), np.empty(0)
+    edges = np.linspace(x.min(), x.max(), bins + 1)
+    at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, bins - 1)
+    count = np.bincount(at, minlength=bins)
+    full = count >= max(5, len(x) // 1000)
+    total = np.bincount(at, weights=y, minlength=bins)
+    return (0.5 * (edges[1:] + edges[:-1]))[full], total[full] / count[full]

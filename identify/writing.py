@@ -1,0 +1,209 @@
+"""The results folder: result.json, model.yaml, report.html and recording.h5."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from identify.json_values import finite
+from identify.report import report_html
+from identify.results import (
+    Errors,
+    GeneticRun,
+    Identification,
+    ModelResult,
+    NotReported,
+    ParameterEstimate,
+    SetResult,
+    Verdict,
+)
+from identify.wording import bent_percent
+from rig.config.model import model_yaml
+from rig.effects import get
+from rig.platform import TERMS, Platform
+from rig.recording.hdf5 import write_recording_h5
+from rig.recording.journal_reader import JournalContents
+from rig.recording.run import Recording
+
+SCHEMA_VERSION = 1
+
+
+def result_json(identification: Identification) -> dict[str, Any]:
+    """result.json as plain values; null where there is no number, never NaN or infinity."""
+    final = identification.final
+    content = {
+        "schema_version": SCHEMA_VERSION,
+        "accepted": identification.accepted,
+        "reasons": list(identification.reasons),
+        "aborted": identification.aborted,
+        "axis": identification.axis,
+        "before": _model(identification.before),
+        "verdict": _verdict(identification.verdict),
+        "after": _model(identification.after) if identification.after else None,
+        "noise_floor": dict(vars(identification.noise_floor)),
+        "per_set": [_set(one) for one in identification.per_set],
+        "max_error_percent": identification.max_error_percent,
+        "dropped": _listed(final.dropped),
+        "not_determined": _listed(final.not_determined),
+        "bent_percent": bent_percent(identification),
+        "genetic": _genetic(identification.joint) if identification.joint else None,
+        "holdout": identification.holdout_note,
+    }
+    if identification.max_error_percent is None:
+        del content["max_error_percent"]
+    return {key: finite(value) for key, value in content.items()}
+
+
+def _model(model: ModelResult) -> dict[str, Any]:
+    return {
+        "parameters": {name: _parameter(p) for name, p in model.parameters.items()},
+        "effect_parameters": {
+            effect: {name: _parameter(p) for name, p in parameters.items()}
+            for effect, parameters in model.effect_parameters.items()
+        },
+        "error": _error(model.error),
+        "dropped": _listed(model.dropped),
+        "not_determined": _listed(model.not_determined),
+        "correlation": model.correlation,
+    }
+
+
+def _parameter(estimate: ParameterEstimate) -> dict[str, Any]:
+    content = dict(vars(estimate)) | {"ci95": list(estimate.ci95)}
+    if estimate.max_error_percent is None:
+        del content["max_error_percent"]
+    return content
+
+
+def _error(error: Errors) -> dict[str, Any]:
+    return dict(vars(error))
+
+
+def _listed(several: Sequence[NotReported]) -> list[dict[str, str]]:
+    return [{"name": item.name, "reason": item.reason} for item in several]
+
+
+def _verdict(verdict: Verdict) -> dict[str, Any]:
+    return dict(vars(verdict)) | {"candidates": [dict(vars(candidate)) for candidate in verdict.candidates]}
+
+
+def _set(one: SetResult) -> dict[str, Any]:
+    errors = {n: p.max_error_percent for n, p in one.parameters.items() if p.max_error_percent is not None}
+    content = dict(vars(one)) | {
+        "parameters": {name: _parameter(p) for name, p in one.parameters.items()},
+        "genetic": _genetic(one.genetic) if one.genetic else None,
+    }
+    return content | ({"max_error_percent": errors} if errors else {})
+
+
+def _genetic(run: GeneticRun) -> dict[str, Any]:
+    """All but the history, which the report draws."""
+    return {key: value for key, value in vars(run).items() if key != "history"} | {"generations": len(run.history)}
+
+
+def final_platform(identification: Identification, declared: Platform) -> Platform:
+    """The identified platform, fit to be declared or simulated next.
+
+    What the data do not determine keeps the declared value; a dropped term is no longer part of the model.
+    Without torque the declared inertia sets the scale of damping and stiffness. An effect with a parameter
+    that has no number is left out.
+    """
+    final = identification.final
+    if final.platform is not None:
+        return final.platform
+    dropped = {item.name for item in final.dropped}
+    terms = tuple(t for t in TERMS if t in declared.terms and t not in dropped and f"{t}_over_inertia" not in dropped)
+    kept = dict(zip(TERMS, _jck(declared), strict=True))
+    scale = final.parameters["inertia"].value if "inertia" in final.parameters else kept["inertia"]
+    for name in TERMS:
+        if name in final.parameters:
+            kept[name] = final.parameters[name].value
+        elif f"{name}_over_inertia" in final.parameters:
+            kept[name] = scale * final.parameters[f"{name}_over_inertia"].value
+        elif name not in terms:
+            kept[name] = 0.0
+    effects = {
+        effect: {name: p.value for name, p in parameters.items()}
+        for effect, parameters in final.effect_parameters.items()
+        if {p.name for p in get(effect).parameters} == set(parameters)
+    }
+    return Platform(kept["inertia"], kept["damping"], kept["stiffness"], effects, terms)
+
+
+def _jck(platform: Platform) -> tuple[float, float, float]:
+    return platform.inertia_kg_m2, platform.damping_nm_s_rad, platform.stiffness_nm_rad
+
+
+def model_text(identification: Identification, declared: Platform) -> str:
+    """model.yaml: the augmented model, with what stands behind its numbers as a comment.
+
+    Raises
+    ------
+    ValueError
+        Where the identified numbers are none that a model may have (an inertia that is not positive).
+    """
+    final, platform = identification.final, final_platform(identification, declared)
+    lines = [
+        "The identified model. Use it as `model:` of the next campaign (a path, or pasted), or as",
+        "`simulated.platform:` for a twin of the rig.",
+    ]
+    if not identification.accepted:
+        lines.append("NOT ACCEPTED: see result.json and report.html before you build on it.")
+    if identification.axis == "linear":
+        lines.append("Linear axis: kg, N s/m and N/m stand where the keys say kg m^2, N m s/rad and N m/rad.")
+    if "damping_over_inertia" in final.parameters or "stiffness_over_inertia" in final.parameters:
+        lines.append("No torque was recorded: the declared inertia sets the scale of damping and stiffness.")
+    lines += [f"Dropped: {item.name}: {item.reason}" for item in final.dropped]
+    lines += [f"Not determined, kept as declared: {item.name}: {item.reason}" for item in final.not_determined]
+    lost = [effect for effect in final.effect_parameters if effect not in platform.effects]
+    lines += [f"Left out, since not all of its parameters are determined: {effect}" for effect in lost]
+    return model_yaml(platform, "\n".join(" ".join(line.split()) for line in lines))
+
+
+def write_results(
+    folder: Path,
+    identification: Identification,
+    recording: Recording,
+    declared: Platform,
+    name: str,
+    journal: JournalContents | None = None,
+) -> tuple[Path, ...]:
+    """Write recording.h5, model.yaml, report.html and result.json into ``folder``, in that order.
+
+    ``declared`` is the platform of the configuration, ``name`` the campaign's. A recording.h5 that stands
+    there already is left alone. Each file appears whole or not at all, and result.json last: where it
+    stands, the others do. Returns the paths written; model.yaml is left out where no valid model came out.
+
+    Raises
+    ------
+    OSError
+        Where the folder cannot be written (full disk, no permission).
+    JournalError
+        The same, while writing recording.h5.
+    """
+    written = []
+    if not (folder / "recording.h5").exists():
+        write_recording_h5(folder / "recording.h5", recording, journal)
+        written.append(folder / "recording.h5")
+    try:
+        texts = {"model.yaml": model_text(identification, declared)}
+    except ValueError:
+        texts = {}
+    texts["report.html"] = report_html(identification, recording, name)
+    texts["result.json"] = json.dumps(result_json(identification), indent=1, allow_nan=False) + "\n"
+    for file, text in texts.items():
+        _replace(folder / file, text)
+        written.append(folder / file)
+    return tuple(written)
+
+
+def _replace(path: Path, text: str) -> None:
+    partial = path.with_name(path.name + ".part")
+    try:
+        partial.write_text(text, encoding="utf-8", newline="\n")
+        partial.replace(path)
+    except OSError:
+        partial.unlink(missing_ok=True)
+        raise
