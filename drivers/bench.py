@@ -86,7 +86,7 @@ class BenchRig(Rig):
         self._waiting: list[GyroSample] = []
         self._settle_due_s = 0.0
         self._link_fault: DeviceFault | None = None
-        self.clock = BenchClock(self._listen, config.real_time.spin_us * 1e-6, self._note_clock)
+        self.clock = BenchClock(self._listen, config.real_time.spin_us * 1e-6, self._note_clock, clock)
 
     def statement(self) -> Statement:
         """Both devices with their ports."""

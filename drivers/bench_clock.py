@@ -23,6 +23,8 @@ class BenchClock:
         Looked at the clock instead of asleep for so long before each deadline.
     on_reading
         Told every reading that is handed out, for the capture.
+    time_s
+        Where seconds come from.
     """
 
     def __init__(
@@ -30,14 +32,16 @@ class BenchClock:
         listen: Callable[[float], bool],
         spin_s: float = 0.0,
         on_reading: Callable[[float], None] | None = None,
+        time_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self._listen = listen
         self._spin_s = spin_s
         self._on_reading = on_reading
+        self._time = time_s
 
     def now_s(self) -> float:
-        """Seconds on ``time.monotonic``."""
-        return self._told(time.monotonic())
+        """Seconds of the host."""
+        return self._told(self._time())
 
     def _told(self, time_s: float) -> float:
         if self._on_reading is not None:
@@ -47,12 +51,12 @@ class BenchClock:
     def wait_until(self, deadline_s: float) -> float:
         """Listen, sleep, then spin, until the deadline."""
         listen_until_s = deadline_s - max(STOP_LISTENING_S, self._spin_s)
-        while (left_s := listen_until_s - time.monotonic()) > 0.0:
+        while (left_s := listen_until_s - self._time()) > 0.0:
             self._listen(left_s)
-        asleep_s = deadline_s - self._spin_s - time.monotonic()
+        asleep_s = deadline_s - self._spin_s - self._time()
         if asleep_s > 0.0:
             time.sleep(asleep_s)
-        now_s = time.monotonic()
+        now_s = self._time()
         while now_s < deadline_s:
-            now_s = time.monotonic()
+            now_s = self._time()
         return self._told(now_s)

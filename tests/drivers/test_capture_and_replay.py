@@ -1,0 +1,177 @@
+"""A bench without wires: an emulated gyro's bytes and an emulated drive, captured, then replayed."""
+
+import math
+
+import numpy as np
+import pytest
+
+import drivers.bench
+import drivers.can_link
+from drivers import capture
+from drivers.bench import BenchRig
+from drivers.capture import Capture, export, read_capture, unpack_frame
+from drivers.codecs import stim300
+from drivers.codecs.lawicel import CanFrame
+from drivers.replay import ReplayRig
+from rig.config.bench import AmplifierConfig, BenchConfig, CanConfig, GyroscopeConfig, RealTimeConfig
+from rig.errors import Aborted, DeviceFault, RecordingError
+from rig.interface import Torque
+from sim_backend.emulators.drive import Cia402Drive
+from tests.drivers.emulated_bus import EmulatedBus, FakeTime
+
+CONFIG = BenchConfig(
+    gyroscope=GyroscopeConfig(port="wire", settings={"datagram": 0x90}),
+    amplifier=AmplifierConfig(can=CanConfig(channel="bus")),
+    real_time=RealTimeConfig(priority=0, lock_memory=False),
+    settle_s=1.0,
+)
+
+
+class GyroPort:
+    """A STIM300 whose datagrams appear as time passes; every tenth read is cut in the middle."""
+
+    name = "wire"
+
+    def __init__(self, time):
+        self.time, self.sent, self.begin_s, self.rest = time, 0, time.now_s, b""
+        self.vanished = False
+
+    def fileno(self):
+        return None
+
+    def read(self):
+        if self.vanished:
+            raise DeviceFault("wire has vanished (test)")
+        due = int((self.time.now_s - self.begin_s) * 2000)
+        data = self.rest
+        for k in range(self.sent, due):
+            word = round(100 * math.sin(k / 100) / stim300.RATE_LSB_DEG_S)
+            data += stim300.encode_datagram(stim300.Datagram(0x90, (0, 0, word), 0, k & 255, 506))
+        self.sent = due
+        keep = 7 if due % 10 == 0 and len(data) > 7 else 0
+        data, self.rest = data[: len(data) - keep], data[len(data) - keep :]
+        return data
+
+    def write(self, data, timeout_s=0.1):
+        pass
+
+    def wait_readable(self, timeout_s):
+        self.time.now_s += timeout_s
+        return True
+
+    def close(self):
+        pass
+
+
+@pytest.fixture
+def bench(monkeypatch, tmp_path):
+    time = FakeTime()
+    drive = Cia402Drive(1, 100.0, 150.0)
+    monkeypatch.setattr(drivers.can_link.time, "sleep", lambda s: None)
+    monkeypatch.setattr(drivers.bench, "open_bus", lambda config: EmulatedBus(drive, time))
+    monkeypatch.setattr(drivers.bench, "SerialPort", lambda path, baud: GyroPort(time))
+    rig = BenchRig(CONFIG, Torque.EMULATED, tmp_path / "raw", time)
+    rig.time, rig.drive = time, drive
+    return rig
+
+
+def play(rig, ticks, torque=lambda k: 10 * math.sin(k / 20)):
+    return [rig.exchange(rig.clock.now_s(), torque(k)) for k in range(ticks)]
+
+
+def test_replay_gives_bit_identical_samples(bench, tmp_path):
+    with bench.opened(), bench.armed():
+        live = play(bench, 400)
+    replay = ReplayRig(tmp_path / "raw" / "wire.cap")
+    with replay.opened(), replay.armed():
+        again = play(replay, 400)
+    assert sum(len(e.gyro) for e in live) > 300
+    assert sum(len(e.torque) for e in live) > 300
+    for a, b in zip(live, again, strict=True):
+        assert np.array_equal(np.array(a.gyro), np.array(b.gyro), equal_nan=True)
+        assert a.torque == b.torque
+        assert a.channels == b.channels
+    with pytest.raises(RecordingError, match="was cut short"):
+        replay.exchange(0.0, 0.0)
+
+
+def test_capture_holds_what_crossed_the_wire(bench, tmp_path):
+    with bench.opened(), bench.armed():
+        play(bench, 50)
+    entries = list(read_capture(tmp_path / "raw" / "wire.cap"))
+    raw = (tmp_path / "raw" / "gyro.bin").read_bytes()
+    assert raw == b"".join(e.payload for e in entries if e.kind == capture.GYRO_READ)
+    sent = [unpack_frame(e.payload) for e in entries if e.kind == capture.CAN_SENT]
+    assert sum(frame.identifier == 0x201 for frame in sent) >= 50
+    lines = (tmp_path / "raw" / "can.log").read_text().splitlines()
+    assert len(lines) == sum(e.kind in (capture.CAN_READ, capture.CAN_SENT) for e in entries)
+    assert lines[0].split()[1:] == ["can0", "000#8001", "T"]
+
+
+def test_cut_capture_is_read_up_to_the_cut(tmp_path):
+    writer = Capture(tmp_path)
+    for k in range(10):
+        writer.can(float(k), True, CanFrame(k, b"abc"))
+    writer.close()
+    path = tmp_path / "wire.cap"
+    path.write_bytes(path.read_bytes()[:-5])
+    assert [unpack_frame(e.payload).identifier for e in read_capture(path)] == list(range(9))
+    export(path)
+    path.write_bytes(b"something else")
+    with pytest.raises(RecordingError, match="not a raw capture"):
+        list(read_capture(path))
+    with pytest.raises(RecordingError, match="No such file"):
+        list(read_capture(tmp_path / "none.cap"))
+    with pytest.raises(Aborted, match="File exists"):
+        Capture(tmp_path)
+
+
+def test_frames_of_all_kinds_survive_packing():
+    for frame in (
+        CanFrame(0x123, b"\x01", False, False, 1),
+        CanFrame(0x1ABCDEF0, b"", True, True, 8),
+        CanFrame(0x8001, bytes(24), True, False, 24, -1, True),
+    ):
+        assert unpack_frame(capture.pack_frame(frame)) == frame
+
+
+def test_vanished_gyro_stops_the_next_tick_before_any_torque(bench):
+    with bench.opened(), pytest.raises(DeviceFault, match="wire has vanished"), bench.armed():
+        play(bench, 20, lambda k: 5.0)
+        assert bench.drive.torque_nm == 5.0
+        bench._line._port.vanished = True
+        with pytest.raises(DeviceFault):
+            bench.exchange(bench.time(), 5.0)
+        bench.exchange(bench.time(), 7.0)
+    assert bench.drive.torque_nm == 0.0
+
+
+def test_all_that_is_wrong_is_listed_at_once(bench, monkeypatch):
+    class Silent(GyroPort):
+        def read(self):
+            return b""
+
+    monkeypatch.setattr(drivers.bench, "SerialPort", lambda path, baud: Silent(bench.time))
+    bench.drive.receive = lambda frame, now_s: None
+    with pytest.raises(DeviceFault, match=r"(?s)2 things are wrong.*does not answer.*no byte in 1"), bench.opened():
+        pass
+
+
+def test_torque_is_refused_before_arming_and_off_is_safe_at_any_time(bench):
+    bench.torque_off()
+    bench.disarm()
+    bench.close()
+    with pytest.raises(DeviceFault, match="not armed"):
+        bench.exchange(0.0, 1.0)
+    with pytest.raises(DeviceFault, match="before it is open"):
+        bench.arm()
+
+
+def test_report_tells_of_both_devices(bench):
+    with bench.opened(), bench.armed():
+        play(bench, 50)
+        report = bench.report()
+    assert report.gyro.lost == 0
+    assert report.gyro.rate_hz == pytest.approx(2000, rel=0.05)
+    assert "watchdog of 100 ms set in the drive and read back" in report.amplifier_notes
+    assert "ordinary scheduling" in report.real_time
