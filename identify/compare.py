@@ -11,9 +11,10 @@ from identify.output_error import Estimate, Name, evaluate, names_of, refine
 from identify.regression import Shapes, Solution, Structure
 from identify.traces import Trace
 from rig import effects
+from rig.effects.base import Place
 from rig.recording.run import Array
 
-CLEARLY = 3.5  # standard errors by which the held-out error must fall
+CLEARLY = 2.5  # standard errors by which the held-out error must fall
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,14 @@ class Judged:
         """Parameter values by name."""
         return dict(zip(self.estimate.names, self.estimate.values.tolist(), strict=True))
 
+    def strength(self, name: str) -> float:
+        """Smallest value of a term or of an effect's parameters over its standard error, errors taken as white."""
+        inverse = np.linalg.pinv(_scaled(self.estimate.information))
+        scale = np.sqrt(np.maximum(np.diag(self.estimate.information), 1e-300))
+        errors = np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale * self.estimate.sigma
+        pairs = zip(self.estimate.names, self.estimate.values, errors, strict=True)
+        return float(min(abs(v) / max(e, 1e-300) for n, v, e in pairs if n[0] == name))
+
     def shapes(self) -> dict[str, tuple[float, ...]]:
         """Shape parameters of every effect."""
         values = self.values()
@@ -41,6 +50,11 @@ class Judged:
             name: tuple(values[(name, p.name)] for p in effects.get(name).parameters if not p.linear)
             for name in self.structure.effects
         }
+
+
+def _scaled(a: Array) -> Array:
+    scale = np.sqrt(np.maximum(np.diag(a), 1e-300))
+    return np.asarray(a / np.outer(scale, scale))
 
 
 def horizon_s(platform: tuple[float, float, float], traces: Sequence[Trace]) -> float:
@@ -76,6 +90,12 @@ def start_values(solution: Solution, shapes: Shapes, runs: int) -> dict[Name, fl
     return out
 
 
+def rough(structure: Structure) -> bool:
+    """Whether the error of a structure has false minima: dry friction, or shapes to be found."""
+    found = [effects.get(name) for name in structure.effects]
+    return any(e.place is Place.FRICTION or any(not p.linear for p in e.parameters) for e in found)
+
+
 def judge(
     fitting: Sequence[Trace],
     judging: Sequence[Trace],
@@ -83,15 +103,22 @@ def judge(
     start: Mapping[Name, float],
     horizon: float,
     iterations: int = 8,
+    hopeless: float = np.inf,
 ) -> Judged:
     """Fit on some pieces, then measure on others with nothing but start states fitted there."""
     torque_free = all(t.torque is None for t in fitting)
+    fixed = [("inertia",)] if torque_free else []
+    first = start
+    if rough(structure):  # a short horizon has fewer false minima
+        near = refine(fitting, structure, start, 0.25 * horizon, 5, fixed=fixed, tolerance=1e-3, coarse=True)
+        first = dict(zip(near.names, near.values.tolist(), strict=True)) if np.isfinite(near.sigma) else start
     estimate = refine(
-        fitting, structure, start, horizon, iterations, fixed=[("inertia",)] if torque_free else ()
-    )
+        fitting, structure, first, horizon, iterations, fixed=fixed,
+        tolerance=1e-3, coarse=True, hopeless=hopeless,
+    )  # fmt: skip
     if not np.isfinite(estimate.sigma):
         return Judged(structure, estimate, np.array([np.inf]), np.ones(1))
-    held = evaluate(estimate, judging, None, horizon)
+    held = evaluate(estimate, judging, None, horizon, coarse=True)
     losses, counts = [], []
     for shots, residual in zip(held.shots, held.residuals(), strict=True):
         for (a, b), on in zip(shots.edges, shots.active, strict=True):

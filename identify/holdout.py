@@ -11,7 +11,7 @@ import numpy as np
 from identify.traces import SHORTEST_STRETCH, Trace
 
 BLOCKS = 10  # of a run that is split; blocks 3, 6 and 9 judge
-ENOUGH = 12_000  # samples that a search fits to; the final fit always takes all
+ENOUGH = 8_000  # samples that a search fits to; the final fit always takes all
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -61,6 +62,19 @@ def platform_of(
     )
 
 
+@lru_cache(maxsize=128)
+def _equations(structure: Structure, names: tuple[Name, ...], packed: bytes, run: int, added: float) -> Equations:
+    return Equations(platform_of(structure, names, np.frombuffer(packed), run, added))
+
+
+def equations_of(
+    structure: Structure, names: Sequence[Name], values: Array, run: int = 0, added: float = 0.0
+) -> Equations:
+    """The equations that a parameter vector stands for in one run; runs that share them share the object."""
+    per_run = any(len(name) == 3 for name in names)
+    return _equations(structure, tuple(names), values.tobytes(), run if per_run else 0, added)
+
+
 @dataclass
 class Shots:
     """One run as the simulator sees it: its fine grid, its shots and their start states."""
@@ -82,12 +96,12 @@ class Shots:
         """Known inertia mounted for this run."""
         return self.trace.run.added_inertia_kg_m2
 
-    @property
+    @cached_property
     def active(self) -> Any:
         """Which shots hold samples that count; the others are not simulated."""
         return np.array([bool(np.any(self.weight[a:b])) for a, b in self.edges])
 
-    @property
+    @cached_property
     def edges(self) -> list[tuple[int, int]]:
         """First sample and one past the last of each shot."""
         ends = [*self.first[1:].tolist(), len(self.trace.measured)]
@@ -119,11 +133,7 @@ def predict(shots: Shots, equations: Equations, starts: Array, bias: float) -> A
     ratio = round(shots.trace.step_s / grid.step_s)
     n = len(shots.trace.measured)
     rate = shots.trace.channel == "rate"
-    active = [
-        (a * ratio, min(b, n - 1) * ratio if b == n else b * ratio)
-        for (a, b), on in zip(shots.edges, shots.active, strict=True)
-        if on
-    ]
+    active = [(a * ratio, min(b, n - 1) * ratio) for (a, b), on in zip(shots.edges, shots.active, strict=True) if on]
     fine = equations.integrate_shots(torque, grid.step_s, active, starts[shots.active], shots.trace.offset_s)
     if rate and equations.sensor.names:
         return np.asarray(equations.sensor.apply(fine[:, 1], grid.step_s)[: n * ratio : ratio] + bias)
@@ -178,7 +188,7 @@ class _Normal:
 
 def _linearise(s: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any) -> _Normal:
     def run(values: Array, starts: Array) -> Array:
-        return predict(s, Equations(platform_of(structure, names, values, s.number, s.added)), starts, s.bias)
+        return predict(s, equations_of(structure, names, values, s.number, s.added), starts, s.bias)
 
     base = run(x, s.starts)
     residual = s.trace.measured - base
@@ -253,6 +263,8 @@ def refine(
     carry: Sequence[Shots] | None = None,
     fixed: Sequence[Name] = (),
     tolerance: float = 1e-4,
+    coarse: bool = False,
+    hopeless: float = np.inf,
 ) -> Estimate:
     """Fit all parameters of a structure by output error.
 
@@ -271,26 +283,31 @@ def refine(
     tolerance
         Stop when the sum of squares falls by less than this share of itself times 1e-2, or when no
         parameter moves by more than this many of its standard errors.
+    coarse
+        Half the fine steps: a hundredth of the noise, enough while models are compared.
+    hopeless
+        Give up after three iterations where the root mean square is still above this.
     """
     names = names_of(structure, 1 + max(t.number for t in traces))
     x = np.array([start[name] for name in names])
     still = np.array([name in fixed for name in names])
-    shots = _shots_for(traces, structure, names, x, shot_s, use, carry)
+    shots = _shots_for(traces, structure, names, x, shot_s, use, carry, coarse)
     workers = ThreadPoolExecutor(2)
     try:
-        return _levenberg(workers, shots, structure, names, x, still, iterations, tolerance)
+        return _levenberg(workers, shots, structure, names, x, still, iterations, tolerance, hopeless)
     finally:
         workers.shutdown()
 
 
 def _shots_for(
     traces: Sequence[Trace], structure: Structure, names: Sequence[Name], x: Array,
-    shot_s: float | None, use: Sequence[Any] | None, carry: Sequence[Shots] | None,
+    shot_s: float | None, use: Sequence[Any] | None, carry: Sequence[Shots] | None, coarse: bool,
 ) -> list[Shots]:  # fmt: skip
     out = []
     for i, trace in enumerate(traces):
         equations = Equations(platform_of(structure, names, x, trace.number, trace.run.added_inertia_kg_m2))
         substeps = min(MAX_SUBSTEPS, equations.substeps(trace.step_s))
+        substeps = max(2, substeps // 2) if coarse else substeps
         length = None if shot_s is None else max(8, round(shot_s / trace.step_s))
         shots = make_shots(trace, substeps, length, None if use is None else use[i])
         if carry is not None and len(carry[i].first) == len(shots.first):
@@ -301,7 +318,7 @@ def _shots_for(
 
 def _levenberg(
     workers: ThreadPoolExecutor, shots: list[Shots], structure: Structure, names: tuple[Name, ...],
-    x: Array, still: Any, iterations: int, tolerance: float,
+    x: Array, still: Any, iterations: int, tolerance: float, hopeless: float,
 ) -> Estimate:  # fmt: skip
     scale = np.where(np.abs(x) > 0, np.abs(x), 1.0)
     low = np.array([bounds_of(n)[0] for n in names])
@@ -309,7 +326,9 @@ def _levenberg(
     damping, converged = 1e-6, False
     parts = list(workers.map(lambda s: _linearise(s, structure, names, x, scale, still), shots))
     a, b, rss, count = _total(parts)
-    for _ in range(iterations if np.isfinite(rss) else 0):
+    for k in range(iterations if np.isfinite(rss) else 0):
+        if k == 3 and rss > hopeless**2 * count:
+            break
         step = None
         trial, trial_rss = shots, rss
         for _try in range(8):
@@ -362,14 +381,18 @@ def _moved(s: Shots, by: tuple[Array, float]) -> Shots:
 
 
 def _rss(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> float:
-    equations = Equations(platform_of(structure, names, x, s.number, s.added))
+    equations = equations_of(structure, names, x, s.number, s.added)
     r = (s.trace.measured - predict(s, equations, s.starts, s.bias))[s.weight]
     return float(r @ r)
 
 
 def evaluate(
-    estimate: Estimate, traces: Sequence[Trace], use: Sequence[Any] | None = None, shot_s: float | None = None
+    estimate: Estimate,
+    traces: Sequence[Trace],
+    use: Sequence[Any] | None = None,
+    shot_s: float | None = None,
+    coarse: bool = False,
 ) -> Estimate:
     """The same parameters on other samples: only start states and biases are fitted there."""
     start = dict(zip(estimate.names, estimate.values.tolist(), strict=True))
-    return refine(traces, estimate.structure, start, shot_s, 4, use, fixed=estimate.names)
+    return refine(traces, estimate.structure, start, shot_s, 4, use, fixed=estimate.names, coarse=coarse)

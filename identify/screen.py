@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import product
@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from identify.prefilter import Denominator
-from identify.regression import Regression, Shapes, Solution, Structure, fit, normal, solve
+from identify.regression import Label, Regression, Shapes, Solution, Structure, fit, normal, solve
 from identify.traces import Trace
 from rig import effects
 from rig.effects.base import Effect, Place, Scale
@@ -23,6 +23,8 @@ RHO_STEPS = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)  # of the largest rho that the sens
 SCREEN_STEPS = (0.03, 0.3, 1.0)
 NOISE_SHARE = 0.003  # of the torque: where the torque residual's noise reaches it, the low-pass cuts off
 SHAPE_EVALUATIONS = 24
+BEYOND = 4.0  # times the outermost starting values: how far a shape may wander
+NEAR = 0.8  # of the best gain: a simpler candidate that reaches it is always tried
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,6 @@ class Screened:
 
     effect: str
     shapes: dict[str, tuple[float, ...]]
-    solution: Solution
     gain: float  # in log-likelihood, best over the filters tried
     gains: tuple[float, ...]
 
@@ -121,15 +122,14 @@ def grid_of(effect: Effect, scale: Scale) -> list[tuple[float, ...]]:
     return [tuple(x) for x in product(*axes)]
 
 
-def allowed(solution: Solution, name: str) -> bool:
+def allowed(values: Mapping[Label, float], name: str) -> bool:
     """Whether an effect's gains lie within their bounds (friction that pushes is no friction)."""
-    for parameter in effects.get(name).parameters:
+    effect = effects.get(name)
+    for parameter in effect.parameters:
         if parameter.linear and not parameter.per_run:
-            value = solution.value(name, parameter.name)
-            if not parameter.low <= value <= parameter.high:
+            if not parameter.low <= values.get((name, parameter.name), 0.0) <= parameter.high:
                 return False
-    ordered = effects.get(name).ordered
-    return all(solution.value(name, a) <= solution.value(name, b) for a, b in ordered)
+    return all(values.get((name, a), 0.0) <= values.get((name, b), 0.0) for a, b in effect.ordered)
 
 
 class Screen:
@@ -161,16 +161,19 @@ class Screen:
         blocks = regression.blocks(base.denominator, {**self.shapes, name: shape})
         equations = normal(blocks)
         x = solve(equations.a, equations.b)
-        rss = equations.rss(x)
+        values = dict(zip(regression.labels, x.tolist(), strict=True))
+        inertia = values.get(("inertia",), base.platform[0])
+        if inertia <= 0.0 or not allowed(values, name):
+            return -1.0
+        # In units of the measured channel: a torque scaled to nothing would leave no residual either.
+        rss = equations.rss(x) * (base.platform[0] / inertia) ** 2
         return float(0.5 * equations.count * np.log(base.rms**2 * equations.count / max(rss, 1e-300)))
 
-    def gain(self, name: str, shape: tuple[float, ...], k: int, iterations: int = 4) -> tuple[float, Solution]:
-        """The same with the filter rebuilt from the estimate; nothing for gains out of bounds."""
-        regression = Regression(self.traces, self.structure.plus(name))
-        solution = fit(regression, {**self.shapes, name: shape}, self.base[k].platform, self.rhos[k], iterations)
-        if not np.isfinite(solution.sigma) or not allowed(solution, name):
-            return -1.0, solution
-        return solution.count * float(np.log(self.base[k].sigma / max(solution.sigma, 1e-300))), solution
+    def solution(self, look: Screened) -> Solution:
+        """A candidate solved behind its best filter, the filter rebuilt from the estimate."""
+        k = int(np.argmax(look.gains))
+        regression = Regression(self.traces, self.structure.plus(look.effect))
+        return fit(regression, look.shapes, self.base[k].platform, self.rhos[k])
 
     def look(self, name: str) -> Screened | None:
         """The candidate at its best shapes: a grid behind the middle filter, then a local search."""
@@ -182,13 +185,16 @@ class Screen:
         _, shape = max(tried, key=lambda t: t[0])
         if shape:
             shape = self._search(effect, shape, middle)
-        results = [self.gain(name, shape, k) for k in range(len(self.rhos))]
-        gain, solution = max(results, key=lambda r: r[0])
-        return Screened(name, {**self.shapes, name: shape}, solution, gain, tuple(g for g, _ in results))
+        gains = tuple(self.quick(name, shape, k) for k in range(len(self.rhos)))
+        return Screened(name, {**self.shapes, name: shape}, max(gains), gains)
 
     def _search(self, effect: Effect, shape: tuple[float, ...], k: int) -> tuple[float, ...]:
         """Nelder-Mead in the logarithm of the shapes, few steps: output error finishes the work."""
-        bounds = [(p.low, p.high) for p in effect.parameters if not p.linear]
+        axes = [p for p in effect.parameters if not p.linear]
+        starts = [p.start(self.scale) if p.start else (1.0,) for p in axes]
+        bounds = [
+            (max(p.low, min(s) / BEYOND), min(p.high, BEYOND * max(s))) for p, s in zip(axes, starts, strict=True)
+        ]
 
         def inside(u: Array) -> tuple[float, ...]:
             return tuple(float(np.clip(np.exp(x), lo, hi)) for x, (lo, hi) in zip(u, bounds, strict=True))
@@ -210,12 +216,15 @@ class Screen:
         return sorted(looks, key=lambda s: -s.gain)
 
     def shortlist(self, looks: Sequence[Screened], most: int) -> list[Screened]:
-        """The best behind each filter, each once, the best gains first."""
+        """The best behind each filter, and the simplest that comes near it; the best gains first."""
         picked: dict[str, Screened] = {}
-        for rank in range(3):
+        for rank in range(most):
             for k in range(len(self.rhos)):
-                order = sorted(looks, key=lambda s, k=k: -s.gains[k])
-                if rank < len(order) and order[rank].gains[k] > 10.0:
+                order = sorted((s for s in looks if s.gains[k] > 10.0), key=lambda s, k=k: -s.gains[k])
+                if rank == 0 and order:
+                    near = [s for s in order if s.gains[k] > NEAR * order[0].gains[k]]
+                    simple = min(near, key=lambda s: len(effects.get(s.effect).parameters))
+                    picked.setdefault(simple.effect, simple)
+                if rank < len(order):
                     picked.setdefault(order[rank].effect, order[rank])
-        chosen = list(picked.values())[:most]
-        return sorted(chosen, key=lambda s: -s.gain)
+        return sorted(list(picked.values())[:most], key=lambda s: -s.gain)

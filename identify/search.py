@@ -18,6 +18,8 @@ from rig.effects.base import Place
 MOST_EFFECTS = 6
 SHORTLIST = 4
 WORTH = 0.2  # share of the excess error that an effect has to take away
+MISSED = 0.1  # share of the squared error by which nobody doubts that a term is needed
+CERTAIN = 100.0  # standard errors beyond which nobody asks whether a term is needed
 SUPPORT = 0.02  # share of the error by which a term must be missed to stay
 
 
@@ -71,8 +73,8 @@ class Loop:
         for round_ in range(1, MOST_EFFECTS + 1):
             if not self._round(found, round_):
                 break
-            self._prune(found)
-        self._prune(found)
+            self._prune(found, found.best.structure.effects[:-1])
+        self._prune(found, (*found.best.structure.terms, *found.best.structure.effects))
         return found
 
     def _round(self, found: Search, round_: int) -> bool:
@@ -81,8 +83,12 @@ class Loop:
         screen = Screen(self.fitting, now.structure, now.shapes(), self.start, self._lines(now))
         names = [n for n in self.allowed if n not in now.structure.effects and self._possible(n)]
         looks = screen.all(names)
-        tried = [self._try(found, look) for look in screen.shortlist(looks, SHORTLIST)]
-        tried = sorted((t for t in tried if t is not None), key=lambda t: t[1].sigma)
+        tried: list[tuple[str, Judged]] = []
+        for look in screen.shortlist(looks, SHORTLIST):
+            best_yet = min((j.estimate.sigma for _, j in tried), default=now.estimate.sigma)
+            result = self._try(found, screen, look, 4.0 * best_yet)
+            tried += [result] if result else []
+        tried.sort(key=lambda t: t[1].sigma)
         if not tried:
             return False
         name, best = self._simplest(tried)
@@ -106,25 +112,24 @@ class Loop:
         found.best = best
         return True
 
-    def _try(self, found: Search, look: Screened) -> tuple[str, Judged] | None:
+    def _try(
+        self, found: Search, screen: Screen, look: Screened, hopeless: float
+    ) -> tuple[str, Judged] | None:
         structure = found.best.structure.plus(look.effect)
-        start = start_values(look.solution, look.shapes, self.runs)
-        judged = judge(self.fitting, self.judging, structure, start, found.horizon)
+        start = start_values(screen.solution(look), look.shapes, self.runs)
+        judged = judge(self.fitting, self.judging, structure, start, found.horizon, hopeless=hopeless)
         if judged.estimate.sigma > found.best.estimate.sigma:  # nested: a worse fit is a lost search
             values = found.best.values()
             again = {n: values.get(n, v if n[-1] not in look.shapes else v) for n, v in start.items()}
-            judged = min(
-                (judged, judge(self.fitting, self.judging, structure, again, found.horizon)), key=lambda j: j.sigma
-            )
+            other = judge(self.fitting, self.judging, structure, again, found.horizon, hopeless=hopeless)
+            judged = min((judged, other), key=lambda j: j.sigma)
         return (look.effect, judged) if np.isfinite(judged.sigma) else None
 
     def _simplest(self, tried: Sequence[tuple[str, Judged]]) -> tuple[str, Judged]:
-        """The best candidate, or one that it contains as a special case and that does as well."""
-        name, best = tried[0]
-        for other, judged in tried[1:]:
-            if other in effects.get(name).nests and self._status(best, judged) == "rival":
-                return other, judged
-        return name, best
+        """The best candidate, or the one with the fewest parameters that does as well."""
+        best = tried[0][1]
+        as_good = [t for t in tried if t[1] is best or self._status(best, t[1]) == "rival"]
+        return min(as_good, key=lambda t: (len(effects.get(t[0]).parameters), t[1].sigma))
 
     def _status(self, best: Judged, other: Judged) -> str:
         return "rival" if advantage(other, best) < CLEARLY and other.sigma < 1.05 * best.sigma else "no better"
@@ -139,12 +144,14 @@ class Loop:
 
         return residual_lines_hz(self.fitting, judged)
 
-    def _prune(self, found: Search) -> None:
+    def _prune(self, found: Search, names: Sequence[str]) -> None:
         """Drop every term or effect that the model does as well without."""
-        for name in (*found.best.structure.terms, *found.best.structure.effects):
-            if name == "inertia" or len(found.best.structure.effects) == 0 and name not in ("damping", "stiffness"):
+        for name in names:
+            if name == "inertia":
                 continue
             now = found.best
+            if now.strength(name) > CERTAIN:
+                continue
             smaller = now.structure.minus(name)
             values = now.values()
             start = {n: v for n, v in values.items() if n[0] != name}
@@ -162,4 +169,4 @@ class Loop:
         loss = (without.sigma**2 - full.sigma**2) / max(full.sigma**2, 1e-300)
         near_floor = full.sigma < 1.2 * floor
         needed = 1e-4 if near_floor else SUPPORT
-        return advantage(without, full) > CLEARLY and loss > needed
+        return loss > MISSED or (advantage(without, full) > CLEARLY and loss > needed)

@@ -291,6 +291,22 @@ def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, out):  #
 
 
 @jit
+def run_spans(starts, spans, offset_s, z, h, torque, jck, kernels, loads, z_at, p, p_at, out):  # type: ignore[no-untyped-def]
+    """``run_steps`` over spans (first, last) of fine steps, each begun from its row of ``starts``.
+
+    Internal states go on from span to span.
+    """
+    motion = np.empty(4)
+    for k in range(len(spans)):
+        first, last = spans[k, 0], spans[k, 1]
+        motion[0], motion[1] = starts[k, 0], starts[k, 1]
+        motion[2], motion[3] = np.sign(starts[k, 1]), offset_s + first * h
+        run_steps(
+            motion, z, h, torque[first:last], jck, kernels, loads, z_at, p, p_at, out[first : last + 1]
+        )
+
+
+@jit
 def run_filter(kernels, x, h, s, s_at, p, p_at):  # type: ignore[no-untyped-def]
     """Send the samples x (in place) through a chain of filter kernels, one after the other.
 

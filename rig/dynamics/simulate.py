@@ -96,6 +96,8 @@ class Equations:
     def rest_states(self, angle_rad: float, rate_rad_s: float) -> Array:
         """Internal states of a platform that has stood at this angle and moves with this rate, shape (states,)."""
         z = np.zeros(self.states)
+        if not self.states:
+            return z
         for i, name in enumerate(self._body):
             rest = effects.get(name).rest_state
             if rest:
@@ -145,13 +147,10 @@ class Equations:
         out = np.zeros((len(torque) + 1, 3))
         if not spans:
             return out
-        z = self.rest_states(*starts[0])
-        for (angle, rate), (begin, end) in zip(starts.tolist(), spans, strict=True):
-            state = np.array([angle, rate, np.sign(rate), offset_s + begin * step_s])
-            integrator.run_steps(
-                state, z, step_s, torque[begin:end], self.jck, self.kernels, self.loads,
-                self.z_at, self.p, self.p_at, out[begin : end + 1],
-            )  # fmt: skip
+        integrator.run_spans(
+            starts, np.array(spans, dtype=np.int64), offset_s, self.rest_states(*starts[0]), step_s, torque,
+            self.jck, self.kernels, self.loads, self.z_at, self.p, self.p_at, out,
+        )  # fmt: skip
         return out
 
 
@@ -188,11 +187,19 @@ class Grid:
         self.n = int(np.ceil(steps[-1] - 1e-4))
         torque = torque or NO_TORQUE
         self._held = torque.hold == "zero_order"
+        self._plain: Array | None = None
         self._half = torque.on_half_steps(float(time_s[0]), 0.5 * self.step_s, 2 * self.n + 1)
 
     def shaft_torque(self, equations: Equations) -> Array:
         """Torque behind the drive effects at start, middle and end of each fine step, shape (n, 3)."""
-        half = equations.drive.apply(self._half, 0.5 * self.step_s)
+        if not equations.drive.names and self._plain is not None:
+            return self._plain
+        steps = self._by_step(equations.drive.apply(self._half, 0.5 * self.step_s))
+        if not equations.drive.names:
+            self._plain = steps
+        return steps
+
+    def _by_step(self, half: Array) -> Array:
         if self._held:
             mean = 0.5 * (half[0:-1:2] + half[1::2])
             return np.ascontiguousarray(np.stack([mean, mean, mean], axis=1))

@@ -18,7 +18,7 @@ EFFECT = Effect(
     source="gear and bearing friction: Hamon, Gautier, Garrec 2010, load-dependent Coulomb friction",
     meaning="Gears and loaded bearings: the transmitted torque presses the rubbing surfaces together.",
     sign="Resisting: it opposes the rate.",
-    parameters=(Parameter("factor", "1", "friction per transmitted torque", linear=True, high=1.0),),
+    parameters=(Parameter("factor", "1", "friction per transmitted torque", linear=True, high=0.5),),
     kernel=_level,
     separated_by="from Coulomb friction: repeats at another amplitude",
 )
