@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 import sys
 from typing import TYPE_CHECKING
 
@@ -120,7 +121,7 @@ def _conclude(
     desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, recording: Recording, found: Identification
 ) -> int:
     """Write the results and the summary; returns 0 or 1."""
-    from identify.summary import summary_text
+    from identify.summary import WIDTH, summary
     from identify.writing import write_results
     from rig.cli.exits import NOT_ACCEPTED, OK
 
@@ -129,7 +130,9 @@ def _conclude(
         write_results(path, found, recording, loaded.config.model.platform(), loaded.config.name)
     desk.terminal.settle()
     if not desk.options.quiet:
-        sys.stdout.write(summary_text(found) + f"\nResults: {path}\n")
+        is_terminal = sys.stdout.isatty()
+        width = shutil.get_terminal_size().columns if is_terminal else WIDTH
+        sys.stdout.write(summary(found, width, colour=is_terminal) + f"\nResults: {path}\n")
     if found.accepted:
         return OK
     for reason in found.reasons:
