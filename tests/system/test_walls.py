@@ -1,0 +1,54 @@
+"""The identifier cannot see who made a recording: neither by import nor by what is handed over."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from rig.recording.run import Recording, Run
+
+ROOT = Path(__file__).parents[2]
+# The command hands recordings over; it is no part of the identifier.
+MODULES = sorted(p for p in (ROOT / "identify").rglob("*.py") if p != ROOT / "identify" / "cli.py")
+MAKERS = {"drivers", "sim_backend"}
+
+
+def imported(path: Path) -> set[str]:
+    """Every module that a file imports, wherever in the file."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found.add(node.module)
+    return found
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_module_of_the_identifier_imports_a_maker_of_recordings_or_the_commands(path: Path) -> None:
+    names = imported(path)
+    assert MAKERS.isdisjoint(name.split(".")[0] for name in names)
+    assert not any(name == "rig.cli" or name.startswith(("rig.cli.", "rig.config.simulated")) for name in names)
+
+
+def test_no_module_of_the_identifier_brings_a_maker_in_by_a_detour() -> None:
+    modules = [".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for p in MODULES]
+    program = (
+        f"import importlib, sys\nfor name in {modules!r}: importlib.import_module(name)\n"
+        f"print([name for name in sys.modules if name.split('.')[0] in {sorted(MAKERS)!r}])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_recording_has_room_for_samples_and_not_for_a_platform() -> None:
+    assert {f.name for f in fields(Recording)} == {"runs", "axis", "noise", "info"}
+    assert {f.name for f in fields(Run)} == {
+        "name", "time_s", "valid", "rate_rad_s", "angle_rad", "torque_time_s", "torque_nm", "torque_hold", "use",
+        "min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "channels",
+    }  # fmt: skip
