@@ -23,6 +23,11 @@ class Split:
     final: list[Any]
     note: str
 
+    @property
+    def everything(self) -> list[Any]:
+        """All samples that are looked at, held out or not."""
+        return [f | j for f, j in zip(self.final, self.judge, strict=True)]
+
 
 def split(traces: Sequence[Trace]) -> Split:
     """Declared hold-out runs judge where there are any; else every third block of each run does."""

@@ -187,6 +187,36 @@ class _Normal:
 
 
 def _linearise(s: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any) -> _Normal:
+    columns, state, residual = _sensitivities(s, structure, names, x, scale, fixed)
+    return _eliminate(s, columns, state, residual, s.trace.biased)
+
+
+def jacobian(s: Shots, estimate: Estimate) -> tuple[Array, Array]:
+    """Sensitivities and residual of the samples that count, start states and bias projected out: (m, p), (m,)."""
+    scale = np.where(np.abs(estimate.values) > 0, np.abs(estimate.values), 1.0)
+    still = np.zeros(len(estimate.names), dtype=bool)
+    columns, state, residual = _sensitivities(s, estimate.structure, estimate.names, estimate.values, scale, still)
+    parts = []
+    for begin, end in s.edges:
+        mask = s.weight[begin:end]
+        if not np.any(mask):
+            continue
+        ones = [np.ones(int(mask.sum()))] if s.trace.biased else []
+        both = np.column_stack([columns[begin:end][mask], *ones, residual[begin:end][mask]])
+        q = np.linalg.qr(state[begin:end][mask])[0]
+        parts.append(both - q @ (q.T @ both))
+    both = np.concatenate(parts)
+    if s.trace.biased:
+        one = both[:, -2] / np.linalg.norm(both[:, -2])
+        both = np.delete(both - np.outer(one, one @ both), -2, axis=1)
+    return both[:, :-1], both[:, -1]
+
+
+def _sensitivities(
+    s: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any
+) -> tuple[Array, Array, Array]:
+    """Derivatives by the parameters (n, p) and by the shots' start states (n, 2), and the residual (n,)."""
+
     def run(values: Array, starts: Array) -> Array:
         return predict(s, equations_of(structure, names, values, s.number, s.added), starts, s.bias)
 
@@ -208,7 +238,7 @@ def _linearise(s: Shots, structure: Structure, names: Sequence[Name], x: Array, 
         moved = s.starts.copy()
         moved[:, k] += STEP * 10.0 * span[k]
         state[:, k] = (run(x, moved) - base) / (STEP * 10.0 * span[k])
-    return _eliminate(s, columns, state, residual, s.trace.biased)
+    return columns, state, residual
 
 
 def _eliminate(s: Shots, columns: Array, state: Array, residual: Array, rate: bool) -> _Normal:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from identify.compare import CLEARLY, Judged, advantage, delta_bic, horizon_s, judge, share_explained, start_values
-from identify.regression import Structure
+from identify.regression import Shapes, Structure
 from identify.results import Candidate
 from identify.screen import Screen, Screened, Start, best_rho
 from identify.traces import Trace
@@ -62,13 +62,13 @@ class Loop:
         self.noise = float(np.sqrt(np.mean([t.noise**2 for t in fitting])))
         self.runs = 1 + max(t.number for t in (*fitting, *judging))
 
-    def run(self, declared: Structure) -> Search:
-        """From the declared structure to the one that the data support."""
-        solution = best_rho(self.fitting, declared, {}, self.start)
+    def run(self, declared: Structure, shapes: Shapes) -> Search:
+        """From the declared structure, with its declared shapes, to the one that the data support."""
+        solution = best_rho(self.fitting, declared, shapes, self.start)
         horizon = horizon_s(solution.platform, self.fitting)
         length = horizon / self.fitting[0].step_s
         floor = self.noise * float(np.sqrt(max(1.0 - 2.0 / length, 0.25)))
-        base = judge(self.fitting, self.judging, declared, start_values(solution, {}, self.runs), horizon)
+        base = judge(self.fitting, self.judging, declared, start_values(solution, shapes, self.runs), horizon)
         found = Search(base, base, horizon, floor)
         for round_ in range(1, MOST_EFFECTS + 1):
             if not self._round(found, round_):

@@ -105,17 +105,17 @@ def _table(heading: str, columns: Sequence[str], words: Sequence[int] = (0,)) ->
 def _parameters(identification: Identification) -> Table:
     before, after, bent = identification.before, identification.after, bent_percent(identification)
     names = list(dict.fromkeys([*before.parameters, *(after.parameters if after else ())]))
-    head = ["", "declared model", *(["final model", "declared is off by"] if after else []), "unit"]
+    head = ["", "declared model", *(["off by", "final model"] if after else []), "unit"]
     table = _table("Parameters, with 95 % intervals", head, words=(0, len(head) - 1))
     for name in names:
         first, last = before.parameters.get(name), (after or before).parameters.get(name)
-        more = [_estimate(last), percent(bent.get(name))] if after else []
+        more = [percent(bent.get(name)), _estimate(last)] if after else []
         shown = last or first
         table.add_row(title(name, identification.axis), _estimate(first), *more, unit(shown.unit) if shown else "")
     for effect, parameters in (after or before).effect_parameters.items():
         for name, found in parameters.items():
             earlier = before.effect_parameters.get(effect, {}).get(name)
-            more = [_estimate(found), ""] if after else []
+            more = ["", _estimate(found)] if after else []
             table.add_row(f"{plain(effect)}, {name.replace('_', ' ')}", _estimate(earlier), *more, unit(found.unit))
     return table
 

@@ -61,7 +61,7 @@ def convergence_table(identification: Identification) -> Markup:
         return Markup("")
     names = list(runs[0].closed_form)
     symbols = ", ".join(SYMBOLS.get(name, plain(name)) for name in names)
-    head = ["search", "J", "J_dec", "repeats", "J < J_dec"]
+    head = ["search", "objective", "J_dec", "repeats", "J < J_dec"]
     head += [f"{which}: {symbols} (%)" for which in ("gap", "Eq. 13 alone", "plain error")]
     rows = []
     for run in runs:

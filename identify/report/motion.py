@@ -72,11 +72,12 @@ def _run(identification: Identification, trace: RunTraces) -> Figure:
     layout = grid(panels, shared_x=True, gap=0.1)
     floor = identification.noise_floor.holdout_rate_rms
     layout["shapes"] = [level(sign * 2.0 * floor, FLOOR, last) for sign in (-1, 1)]
-    layout["shapes"] += [band(a, b, p) for a, b in stretches(time, trace.holdout) for p in range(1, last + 1)]
+    shaded = stretches(time, trace.holdout)
+    layout["shapes"] += [band(a, b, p) for a, b in shaded for p in range(1, last + 1)]
     return Figure(
         label=f"Run {trace.name}: measured and simulated {name} against time, and the error before and after",
         heading=trace.name,
-        caption="Dashed green: twice the noise of the sensor. Shaded: held out of the fit.",
+        caption=f"Dashed green: twice the noise of the sensor.{' Shaded: held out.' if shaded else ''}",
         traces=once_in_legend(drawn),
         layout=layout,
         height=230 * last - 60,

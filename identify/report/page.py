@@ -152,7 +152,7 @@ def _tiles(identification: Identification) -> Markup:
 def _errors(identification: Identification, gallery: _Gallery) -> Markup:
     share = identification.verdict.unexplained_fraction
     state = (
-        f"Unexplained: {number(100.0 * share, 2)} % of the motion's error stays significantly above the noise floor."
+        f"Unexplained: the residual stays significantly above the noise floor ({number(100.0 * share, 2)} % of it)."
         if identification.verdict.unexplained
         else "The residual is at the noise floor: nothing significant is left unexplained."
     )

@@ -125,8 +125,8 @@ def _against(
     panels = [Panel(axis(name, unit), title, NAMES[which]) for which in models]
     return Figure(
         label=f"Residual against {name}, before and after",
-        caption=f"Residual against {name}: a sample of the points and their mean. A mean that leaves zero is a torque "
-        f"that depends on the {name} and that the model lacks.",
+        caption=f"Residual against {name}: a sample of the points and their mean. Where the mean leaves zero, "
+        f"something depends on the {name} that the model lacks.",
         traces=drawn,
         layout=grid(panels, columns=len(models), gap=0.1) | {"showlegend": False},
         height=300,

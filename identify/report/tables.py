@@ -40,7 +40,11 @@ def parameter_table(identification: Identification) -> Markup:
     rows += _effect_rows(before, after)
     head = ["", "declared model", "95 % interval"]
     head += ["final model", "95 % interval", "declared model is off by"] if after else []
-    return table([*head, "unit"], rows, "Parameters, fitted to all samples that were not declared held out.")
+    return table(
+        [*head, "unit"],
+        rows,
+        "Fitted to all samples not declared held out. Declared model: its own terms alone, without what was added.",
+    )
 
 
 def _effect_rows(before: ModelResult, after: ModelResult | None) -> list[list[Piece]]:
@@ -97,7 +101,7 @@ def error_table(identification: Identification) -> Markup:
 def candidate_table(candidates: Sequence[Candidate], floor: float) -> Markup:
     """All that was tried, by round, best first."""
     if not candidates:
-        return paragraph("No effect was tried: the declared model already reaches the noise floor.")
+        return paragraph("No effect was tried.")
     order = sorted(candidates, key=lambda c: (c.round, c.delta_bic))
     rows: list[list[Piece]] = [
         [

@@ -1,0 +1,186 @@
+"""The final fit of one model on all samples, with uncertainties that hold for coloured residuals too."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from identify.compare import start_values
+from identify.output_error import Estimate, Name, Shots, evaluate, jacobian, refine
+from identify.regression import Regression, Solution, Structure, residuals
+from identify.screen import Start, best_rho
+from identify.traces import Trace
+from rig.recording.run import Array
+
+NEAR_FLOOR = 1.3  # times the sensor's noise: close enough for a free run over the whole set
+BLOCKS_PER_RUN = 20
+SINGULAR = 1e-11  # smallest over largest eigenvalue of the scaled information
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """One model with its uncertainty.
+
+    Attributes
+    ----------
+    sigma
+        Root mean square residual of the fit, in units of the measured channel.
+    free_run
+        The model simulated over the whole of each run, start states fitted; None where it runs away.
+    sensor_limited
+        The free run leaves no more than the sensor's noise.
+    determined
+        Parameters that the data determine (False along directions of the information that are empty).
+    """
+
+    structure: Structure
+    values: dict[Name, float]
+    covariance: Array
+    names: tuple[Name, ...]
+    sigma: float
+    free_run: Estimate | None
+    sensor_limited: bool
+    determined: tuple[bool, ...]
+    method: str
+
+    def std_error(self, name: Name) -> float:
+        """One standard error."""
+        i = self.names.index(name)
+        return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+
+
+def noise_of_all(traces: Sequence[Trace]) -> float:
+    """The sensor's noise, pooled over the runs."""
+    return float(np.sqrt(np.mean([t.noise**2 for t in traces])))
+
+
+def by_regression(
+    traces: Sequence[Trace], structure: Structure, shapes: Mapping[str, tuple[float, ...]], start: Start,
+    use: Sequence[Any], everything: Sequence[Any],
+) -> Fitted:  # fmt: skip
+    """The declared model where it is far from the data: white-residual regression at its best filter."""
+    solution = best_rho(traces, structure, shapes, start, use)
+    runs = 1 + max(t.number for t in traces)
+    values = start_values(solution, shapes, runs)
+    covariance, determined = _regression_covariance(traces, solution, use)
+    free = _free_run(traces, structure, values, everything)
+    limited = free is not None and free.sigma < NEAR_FLOOR * noise_of_all(traces)
+    names = solution.labels
+    return Fitted(structure, values, covariance, names, solution.rms, free, limited, determined, "regression")
+
+
+def _free_run(
+    traces: Sequence[Trace], structure: Structure, values: Mapping[Name, float], use: Sequence[Any]
+) -> Estimate | None:
+    names = tuple(values)
+    held = Estimate(structure, names, np.array(list(values.values())), np.inf, 0, np.zeros((0, 0)), (), True)
+    free = evaluate(held, traces, use)
+    return free if np.isfinite(free.sigma) else None
+
+
+def by_output_error(
+    traces: Sequence[Trace], structure: Structure, start: Mapping[Name, float], horizon: float,
+    use: Sequence[Any], everything: Sequence[Any],
+) -> Fitted:  # fmt: skip
+    """Output error from a short horizon to the whole run, as far as the model can be trusted."""
+    torque_free = all(t.torque is None for t in traces)
+    fixed = [("inertia",)] if torque_free else []
+    noise = noise_of_all(traces)
+    estimate = refine(traces, structure, start, horizon, 12, use, fixed=fixed)
+    best = estimate
+    for longer in (4.0 * horizon, None):
+        values = dict(zip(best.names, best.values.tolist(), strict=True))
+        trial = refine(traces, structure, values, longer, 12, use, fixed=fixed)
+        if not np.isfinite(trial.sigma) or (longer is not None and trial.sigma > NEAR_FLOOR * noise):
+            continue
+        if trial.sigma <= NEAR_FLOOR * noise:
+            best = trial
+    values = dict(zip(best.names, best.values.tolist(), strict=True))
+    whole = best if len(best.shots[0].first) == len(make_whole(best.shots[0])) else None
+    same = all(np.array_equal(u, e) for u, e in zip(use, everything, strict=True))
+    free = whole if whole is not None and same else _free_run(traces, structure, values, everything)
+    limited = whole is not None and whole.sigma <= NEAR_FLOOR * noise
+    free_names = tuple(n for n in best.names if n not in fixed)
+    covariance, determined = _output_covariance(best, free_names)
+    method = "output error over whole runs" if limited else f"output error over {horizon:.3g} s"
+    return Fitted(structure, values, covariance, free_names, best.sigma, free, limited, determined, method)
+
+
+def make_whole(shots: Shots) -> list[int]:
+    """First samples of the shots that a free run over each usable stretch would have."""
+    return sorted({0, *(a for a, _ in shots.trace.stretches)})
+
+
+def _inverse(information: Array) -> tuple[Array, tuple[bool, ...]]:
+    """Inverse of an information matrix and which parameters it determines."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    power, axes = np.linalg.eigh(information / np.outer(scale, scale))
+    empty = power < SINGULAR * max(power[-1], 1e-300)
+    inverse = axes[:, ~empty] @ np.diag(1.0 / power[~empty]) @ axes[:, ~empty].T
+    touched = np.any(np.abs(axes[:, empty]) > 0.05, axis=1) if np.any(empty) else np.zeros(len(scale), dtype=bool)
+    dead = np.diag(information) <= 1e-290
+    return inverse / np.outer(scale, scale), tuple(bool(x) for x in ~(touched | dead))
+
+
+def _sandwich(information: Array, scores: Array, sigma: float, count: int, white: bool) -> tuple[Array, Any]:
+    inverse, determined = _inverse(information)
+    plain = inverse * sigma**2
+    if white or len(scores) < 3 * len(information):
+        return plain, determined
+    m = len(scores)
+    meat = scores.T @ scores * m / (m - 1.0)
+    return inverse @ meat @ inverse, determined
+
+
+def is_white(series: Sequence[Array]) -> bool:
+    """Whether the first autocorrelations of a residual are no larger than chance makes them."""
+    num, den, count = np.zeros(8), 0.0, 0
+    for r in series:
+        r = r - np.mean(r)
+        num += np.array([float(r[k:] @ r[:-k]) for k in range(1, 9)])
+        den += float(r @ r)
+        count += len(r)
+    rho = num / max(den, 1e-300)
+    return bool(np.all(np.abs(rho) < 4.0 / np.sqrt(max(count, 1)) + 0.01))
+
+
+def _output_covariance(estimate: Estimate, names: tuple[Name, ...]) -> tuple[Array, tuple[bool, ...]]:
+    keep = [estimate.names.index(n) for n in names]
+    p = len(names)
+    information, scores, series = np.zeros((p, p)), [], []
+    count, rss = 0, 0.0
+    for shots in estimate.shots:
+        columns, residual = jacobian(shots, estimate)
+        columns = columns[:, keep]
+        information += columns.T @ columns
+        count += len(residual)
+        rss += float(residual @ residual)
+        series.append(residual)
+        for part in np.array_split(np.arange(len(residual)), min(BLOCKS_PER_RUN, max(len(residual) // 50, 1))):
+            scores.append(columns[part].T @ residual[part])
+    free = count - p - 2 * sum(len(s.first) for s in estimate.shots)
+    sigma = float(np.sqrt(rss / max(free, 1)))
+    return _sandwich(information, np.array(scores), sigma, count, is_white(series))
+
+
+def _regression_covariance(
+    traces: Sequence[Trace], solution: Solution, use: Sequence[Any]
+) -> tuple[Array, tuple[bool, ...]]:
+    regression = Regression(traces, solution.structure)
+    blocks = regression.blocks(solution.denominator, solution.shapes)
+    p = len(solution.labels)
+    information, scores, series, count, rss = np.zeros((p, p)), [], [], 0, 0.0
+    for block, r in zip(blocks, residuals(blocks, solution.values), strict=True):
+        mask = use[block.trace][block.rows]
+        columns, r = block.projected[mask][:, :p], r[mask]
+        information += columns.T @ columns
+        count += len(r)
+        rss += float(r @ r)
+        series.append(r)
+        for part in np.array_split(np.arange(len(r)), min(BLOCKS_PER_RUN, max(len(r) // 50, 1))):
+            scores.append(columns[part].T @ r[part])
+    sigma = float(np.sqrt(rss / max(count - p, 1)))
+    return _sandwich(information, np.array(scores), sigma, count, is_white(series))

@@ -1,0 +1,297 @@
+"""One recording in, one identification out: fit, residual, effect, refit, verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from identify import persets
+from identify.compare import horizon_s
+from identify.finish import Fitted, by_output_error, by_regression
+from identify.holdout import Split, pieces, split
+from identify.measures import Measured, floor_of, measure
+from identify.regression import Structure, shape_values
+from identify.results import (
+    UNITS,
+    Identification,
+    ModelResult,
+    NoiseFloor,
+    NotReported,
+    ParameterEstimate,
+    RunTraces,
+    SetResult,
+    Verdict,
+)
+from identify.screen import Start, first_guess
+from identify.search import Loop, Search
+from identify.traces import UPSAMPLING, Trace, prepare
+from identify.verdict import sentences_of
+from rig import effects
+from rig.config.identify import IdentifyConfig
+from rig.errors import RecordingError
+from rig.platform import Platform
+from rig.recording.run import Recording
+
+UNEXPLAINED = 1.1  # times the noise floor in free run: above it, something is left that no effect here explains
+TORQUE_FREE = {"damping": ("damping_over_inertia", "1/s"), "stiffness": ("stiffness_over_inertia", "1/s^2")}
+
+
+def identify(
+    recording: Recording,
+    declared: Platform,
+    settings: IdentifyConfig,
+    progress: Callable[[str], None] | None = None,
+) -> Identification:
+    """Estimate J, C, K, find what the declared model lacks, and say what is left.
+
+    Parameters
+    ----------
+    recording
+        The runs; nothing else of their origin is known here.
+    declared
+        The model as declared: its terms and effects are fitted, its values are only the centre of the
+        genetic algorithm's search range.
+    settings
+        The ``identify`` section.
+    progress
+        Receives a line now and then.
+
+    Raises
+    ------
+    RecordingError
+        Where no run holds enough usable samples.
+    """
+    with threadpool_limits(1):  # small matrices: a second BLAS thread only waits
+        return _Identifier(recording, declared, settings, progress or (lambda text: None)).run()
+
+
+class _Identifier:
+    def __init__(
+        self, recording: Recording, declared: Platform, settings: IdentifyConfig, say: Callable[[str], None]
+    ) -> None:
+        self.recording, self.declared, self.settings, self.say = recording, declared, settings, say
+        free = all(r.torque_nm is None or not np.any(r.torque_nm) for r in recording.runs)
+        runs = [replace(r, torque_nm=None, torque_time_s=None) if free else r for r in recording.runs]
+        traces = [prepare(r, i, recording.noise) for i, r in enumerate(runs)]
+        self.traces = [t for t in traces if t.stretches and t.count > 40]
+        if not self.traces:
+            raise RecordingError(
+                "no run holds a usable stretch of 40 samples: look at valid, min_rate_rad_s, from_s and to_s"
+            )
+        self.torque_free = free
+        self.split: Split = split(self.traces)
+        names = tuple(declared.effects)
+        self.structure = Structure(declared.terms, names)
+        self.start: Start = first_guess(self.traces, Structure(declared.terms))
+        if settings.lowpass_hz is not None:
+            self.start = replace(self.start, cutoff_hz=settings.lowpass_hz)
+
+    def run(self) -> Identification:
+        self.say("fitting the declared model")
+        shapes = {n: shape_values(n, _plain(self.declared, n)) for n in self.structure.effects}
+        search = self._search(shapes)
+        before = self._before(search, shapes)
+        changed = search.best.structure != self.structure
+        after = self._after(search) if changed else before
+        cutoff = self.start.cutoff_hz
+        measured_before = measure(self.traces, self.split, before, cutoff)
+        measured_after = measure(self.traces, self.split, after, cutoff) if changed else measured_before
+        floor = floor_of(self.traces, self.split, after, cutoff, self.recording.noise is not None)
+        self.say("each set for itself")
+        centre = {
+            "inertia": self.declared.inertia_kg_m2,
+            "damping": self.declared.damping_nm_s_rad,
+            "stiffness": self.declared.stiffness_nm_rad,
+        }
+        per_set, joint = persets.each_set(
+            self.traces, after, self.start, centre, self.settings, self.recording.axis
+        )
+        return self._conclude(
+            search, before, after, measured_before, measured_after, floor, per_set, joint, changed
+        )
+
+    def _search(self, shapes: Mapping[str, tuple[float, ...]]) -> Search:
+        horizon = horizon_s(self.start.platform, self.traces)
+        fitting = pieces(self.traces, self.split.fit, 3.0 * horizon)
+        judging = pieces(self.traces, self.split.judge, 3.0 * horizon, 5_000)
+        allowed = self.settings.candidates or effects.names()
+        loop = Loop(fitting, judging, self.start, allowed, self.say)
+        return loop.run(self.structure, shapes)
+
+    def _before(self, search: Search, shapes: Mapping[str, tuple[float, ...]]) -> Fitted:
+        regressed = by_regression(
+            self.traces, self.structure, shapes, self.start, self.split.final, self.split.everything
+        )
+        if search.base.sigma < 2.0 * search.floor or self.structure.effects:
+            return by_output_error(
+                self.traces, self.structure, search.base.values(), search.horizon,
+                self.split.final, self.split.everything,
+            )  # fmt: skip
+        return regressed
+
+    def _after(self, search: Search) -> Fitted:
+        self.say(f"final fit with {', '.join(search.best.structure.effects) or 'fewer terms'}")
+        return by_output_error(
+            self.traces, search.best.structure, search.best.values(), search.horizon,
+            self.split.final, self.split.everything,
+        )  # fmt: skip
+
+    def _conclude(
+        self, search: Search, before: Fitted, after: Fitted, measured_before: Measured, measured_after: Measured,
+        floor: NoiseFloor, per_set: tuple[SetResult, ...], joint: persets.GeneticRun | None, changed: bool,
+    ) -> Identification:  # fmt: skip
+        dropped = tuple(NotReported(n, why) for n, why in search.dropped)
+        result_before = self._model(before, measured_before, ())
+        result_after = self._model(after, measured_after, dropped) if changed else None
+        final = result_after or result_before
+        ratio = self._ratio(after, search)
+        unexplained = ratio > UNEXPLAINED
+        verdict = Verdict(
+            effects=tuple(e for e in search.best.structure.effects if e not in self.structure.effects),
+            confusable_with=search.rivals,
+            never_separable=_never(search.best.structure),
+            unexplained_fraction=_fraction(measured_before, measured_after, floor),
+            unexplained=unexplained,
+            candidates=tuple(search.candidates),
+            sentences=(),
+        )
+        reasons = []
+        if unexplained:
+            reasons.append(
+                f"the residual stays at {ratio:.3g} times the sensor's noise: "
+                "something acts that no effect of the library explains"
+            )
+        if joint is not None and after.sensor_limited and not joint.accepted:
+            reasons.append(
+                f"the objective {joint.objective:.4g} stays above J_dec {joint.j_dec:.4g} after {joint.restarts} repeats"
+            )
+        reasons += [f"{x.name} is not determined: {x.reason}" for x in final.not_determined]
+        reference, per_set = self._against_reference(per_set)
+        found = Identification(
+            accepted=not reasons, reasons=tuple(reasons), axis=self.recording.axis, before=result_before,
+            verdict=verdict, after=result_after, noise_floor=floor, per_set=per_set, joint=joint,
+            traces=self._series(measured_before, measured_after), holdout_note=self.split.note,
+            max_error_percent=reference,
+        )  # fmt: skip
+        return replace(found, verdict=replace(verdict, sentences=sentences_of(found)))
+
+    def _ratio(self, after: Fitted, search: Search) -> float:
+        """Residual over sensor noise: in free run where the model can run free, else over the horizon."""
+        noise = floor_noise(self.traces)
+        if after.free_run is not None and after.sensor_limited:
+            return after.sigma / noise
+        free = after.free_run.sigma / noise if after.free_run is not None else np.inf
+        return float(min(free, search.best.sigma / search.floor)) if np.isfinite(free) else search.best.sigma / search.floor
+
+    def _model(self, fitted: Fitted, measured: Measured, dropped: tuple[NotReported, ...]) -> ModelResult:
+        units = UNITS[self.recording.axis]
+        parameters: dict[str, ParameterEstimate] = {}
+        of_effects: dict[str, dict[str, ParameterEstimate]] = {e: {} for e in fitted.structure.effects}
+        missing: list[NotReported] = []
+        per = "/(kg*m^2)" if self.torque_free else ""
+        for i, name in enumerate(fitted.names):
+            value, error = fitted.values[name], fitted.std_error(name)
+            label, unit = name[0], units.get(name[0], "")
+            if len(name) > 1:
+                parameter = next(p for p in effects.get(name[0]).parameters if p.name == name[1])
+                label, unit = ".".join(name), parameter.unit + (per if parameter.linear else "")
+            elif self.torque_free:
+                label, unit = TORQUE_FREE[name[0]]
+            if not fitted.determined[i] or not np.isfinite(error) or error > 0.5 * abs(value) and len(name) == 1:
+                if len(name) > 1 and fitted.determined[i]:
+                    pass
+                else:
+                    missing.append(NotReported(label, _undetermined(value, error, fitted.determined[i])))
+                    continue
+            estimate = ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), unit)
+            if len(name) == 1:
+                parameters[label] = estimate
+            else:
+                key = name[1] if len(name) == 2 else f"{name[1]}_run_{int(name[2]) + 1}"
+                of_effects[name[0]][key] = estimate
+        return ModelResult(parameters, of_effects, measured.errors, dropped, tuple(missing), _correlation(fitted))
+
+    def _against_reference(
+        self, per_set: tuple[SetResult, ...]
+    ) -> tuple[dict[str, float] | None, tuple[SetResult, ...]]:
+        """Max_Error of Eq. 15 over the sets, and each set's own."""
+        known = self.settings.reference
+        if known is None:
+            return None, per_set
+        out: dict[str, float] = {}
+        sets = []
+        for one in per_set:
+            parameters = dict(one.parameters)
+            for term, key in persets.KEYS.items():
+                reference = getattr(known, key)
+                if reference and term in parameters:
+                    error = 100.0 * abs(parameters[term].value - reference) / reference
+                    parameters[term] = replace(parameters[term], max_error_percent=error)
+                    out[term] = max(out.get(term, 0.0), error)
+            sets.append(replace(one, parameters=parameters))
+        return out, tuple(sets)
+
+    def _series(self, before: Measured, after: Measured) -> tuple[RunTraces, ...]:
+        out = []
+        for i, trace in enumerate(self.traces):
+            angle, rate, _, torque, _ = trace.fine
+            first, last = before.torque[i], after.torque[i]
+            out.append(
+                RunTraces(
+                    trace.run.name, trace.start_s + trace.step_s * np.arange(len(trace.measured)), trace.measured,
+                    trace.channel, trace.keep.astype(float), before.simulated[i], after.simulated[i],
+                    None if first is None else first.residual, None if last is None else last.residual,
+                    angle[::UPSAMPLING], rate[::UPSAMPLING], None if trace.torque is None else torque[::UPSAMPLING],
+                    self.split.judge[i].astype(float),
+                )
+            )  # fmt: skip
+        return tuple(out)
+
+
+def floor_noise(traces: list[Trace]) -> float:
+    """The sensor's noise, pooled."""
+    return float(np.sqrt(np.mean([t.noise**2 for t in traces])))
+
+
+def _plain(declared: Platform, name: str) -> dict[str, float]:
+    effect = effects.get(name)
+    return dict(zip((p.name for p in effect.parameters), effect.values(declared.effects[name]), strict=True))
+
+
+def _undetermined(value: float, error: float, determined: bool) -> str:
+    if not determined:
+        return "these runs hold no information on it; add a set at another frequency or keep the start transient"
+    return f"its standard error {error:.3g} is more than half of its value {value:.3g}; excite it more or for longer"
+
+
+def _correlation(fitted: Fitted) -> dict[str, float]:
+    size = np.sqrt(np.maximum(np.diag(fitted.covariance), 1e-300))
+    out = {}
+    for i in range(len(fitted.names)):
+        for k in range(i):
+            value = float(fitted.covariance[i, k] / (size[i] * size[k]))
+            if abs(value) > 0.9:
+                out[f"{'.'.join(fitted.names[k])}, {'.'.join(fitted.names[i])}"] = value
+    return out
+
+
+def _never(structure: Structure) -> dict[str, str]:
+    out = {}
+    for name in structure.effects:
+        for rival, why in (effects.get(name).never_separable or {}).items():
+            out[f"{name} / {rival}"] = why
+    return out
+
+
+def _fraction(before: Measured, after: Measured, floor: NoiseFloor) -> float:
+    """Share of the torque residual above the noise floor that is left."""
+    a, b = after.errors.residual_rms_torque, before.errors.residual_rms_torque
+    f = floor.residual_rms_torque
+    if a is None or b is None or f is None:
+        return 0.0
+    excess = b * b - f * f
+    return float(np.clip((a * a - f * f) / excess, 0.0, 1.0)) if excess > 0.01 * f * f else 0.0
+

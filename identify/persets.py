@@ -1,0 +1,184 @@
+"""Each set for itself, and all sets together, by the paper's genetic algorithm (Eq. 12-14, Tab. 1 and 2).
+
+The effects of the final model are taken off the torque first, along the motion that the final model makes,
+so that J, C and K of a set answer to a linear equation; e(k) of Eq. 12 is its prefiltered residual. The
+objective is then a quadratic form whose cost does not grow with the number of samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identify.finish import Fitted, _regression_covariance
+from identify.genetic import QuadraticObjective, search
+from identify.output_error import equations_of
+from identify.prefilter import Denominator
+from identify.regression import Regression, Structure, fit, normal
+from identify.results import UNITS, GeneticRun, ParameterEstimate, SetResult
+from identify.screen import Start
+from identify.traces import Trace, prepare
+from rig.config.identify import GeneticConfig, IdentifyConfig
+from rig.dynamics import TorqueSignal
+from rig.platform import TERMS
+from rig.recording.run import Array
+
+ALLOWANCE = 1.2  # J_dec over the objective that the sensor's noise alone makes
+WELL_KNOWN = 0.05  # relative standard error up to which a set alone determines a parameter
+KEYS = {"inertia": "inertia_kg_m2", "damping": "damping_nm_s_rad", "stiffness": "stiffness_nm_rad"}
+
+
+def linear_traces(traces: Sequence[Trace], fitted: Fitted) -> list[Trace]:
+    """The runs with the torque that is left for J a + C w + K th once the model's effects are taken off."""
+    if not fitted.structure.effects or fitted.free_run is None or not fitted.sensor_limited:
+        return list(traces)
+    out = []
+    values = np.array([fitted.values[n] for n in fitted.free_run.names])
+    for trace, shots in zip(traces, fitted.free_run.shots, strict=True):
+        equations = equations_of(fitted.structure, fitted.free_run.names, values, shots.number, shots.added)
+        grid = shots.grid
+        ratio = round(trace.step_s / grid.step_s)
+        ends = [*shots.first[1:].tolist(), len(trace.measured) - 1]
+        spans = [(a * ratio, b * ratio) for a, b in zip(shots.first.tolist(), ends, strict=True)]
+        fine = equations.integrate_shots(grid.shaft_torque(equations), grid.step_s, spans, shots.starts)
+        j, c, k = equations.jck
+        # Its mean over each fine step, exact also where dry friction makes the acceleration jump.
+        h = grid.step_s
+        turned, gained = np.diff(fine[:, 0]), np.diff(fine[:, 1])
+        angle = 0.5 * (fine[1:, 0] + fine[:-1, 0]) - h * gained / 12.0
+        mean = (j * gained + c * turned) / h + k * angle
+        mean = np.append(mean, mean[-1])
+        time = trace.start_s + h * np.arange(len(mean))
+        out.append(replace(trace, torque=TorqueSignal(time, mean, "zero_order"), _series={}))
+    return out
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """One regression condensed to its normal equations, at its own filter."""
+
+    objective: QuadraticObjective
+    terms: tuple[str, ...]
+    count: int
+    floor: float  # sum of squares that the sensor's noise makes
+
+
+def condense(traces: Sequence[Trace], terms: tuple[str, ...], start: Start, plain: bool = False) -> Condensed:
+    """Normal equations of the linear model, prefiltered to white (or, ``plain``, as bare equation error)."""
+    regression = Regression(traces, Structure(terms))
+    if plain:
+        w = 2.0 * np.pi * start.cutoff_hz  # a low-pass on both sides, as section 3 of the paper filters
+        denominator = Denominator(1.0, 1.4 * w, w * w)
+    else:
+        solution = fit(regression, {}, start.platform, 0.0, 8)
+        denominator = solution.denominator
+    equations = normal(regression.blocks(denominator, {}))
+    kept = tuple(label[0] for label in regression.labels)
+    noise = float(np.mean([t.noise**2 for t in traces]))
+    objective = QuadraticObjective(equations.a, equations.b, equations.c)
+    return Condensed(objective, kept, equations.count, noise * equations.count)
+
+
+def genetic(
+    name: str, traces: Sequence[Trace], terms: tuple[str, ...], start: Start, centre: Mapping[str, float],
+    settings: IdentifyConfig, seed: int, beside: bool,
+) -> GeneticRun:  # fmt: skip
+    """The paper's search on one set (or all), with the closed form beside it.
+
+    ``centre`` are the values around which the range spans ``search_factor`` either way; ``beside`` also runs
+    Eq. 13 alone and the plain equation error, to be reported next to it.
+    """
+    condensed = condense(traces, terms, start)
+    goal = condensed.objective
+    low, high = search_range(condensed.terms, goal.closed_form, centre, settings.genetic.search_factor)
+    j_dec = settings.j_dec if settings.j_dec is not None else ALLOWANCE * condensed.floor
+    chosen = condense(traces, terms, start, plain=True).objective if settings.genetic.objective == "plain" else goal
+    outcome = search(chosen, low, high, settings.genetic, np.random.default_rng(seed), j_dec)
+
+    def named(x: Array) -> dict[str, float]:
+        return dict(zip(condensed.terms, (float(v) for v in x), strict=True))
+
+    roulette: dict[str, float] = {}
+    plain: dict[str, float] = {}
+    if beside:
+        bare = settings.genetic.model_copy(update={"elitism": False, "shrinking_mutation": False, "restarts": 0})
+        roulette = named(search(chosen, low, high, bare, np.random.default_rng(seed)).best)
+        once = settings.genetic.model_copy(update={"restarts": 0})
+        other = condense(traces, terms, start, plain=True).objective
+        plain = named(search(other, low, high, once, np.random.default_rng(seed)).best)
+    return GeneticRun(
+        name, named(outcome.best), named(chosen.closed_form), named(chosen.gap_percent(outcome.best)),
+        float(outcome.objective), float(j_dec), outcome.restarts, bool(outcome.objective < j_dec),
+        outcome.history, roulette, plain,
+    )  # fmt: skip
+
+
+def search_range(
+    terms: Sequence[str], optimum: Array, centre: Mapping[str, float], factor: float
+) -> tuple[Array, Array]:
+    """From a tenth to ten times the declared value, widened to hold the data's own optimum well inside."""
+    low, high = [], []
+    for term, best in zip(terms, optimum, strict=True):
+        declared = abs(centre.get(term, 0.0)) or abs(best) or 1.0
+        top = factor * max(declared, abs(best))
+        bottom = 0.0 if best >= 0.0 else -top
+        low.append(bottom)
+        high.append(top)
+    return np.array(low), np.array(high)
+
+
+def each_set(
+    traces: Sequence[Trace], fitted: Fitted, start: Start, centre: Mapping[str, float],
+    settings: IdentifyConfig, axis: str,
+) -> tuple[tuple[SetResult, ...], GeneticRun | None]:  # fmt: skip
+    """Every run fitted for itself, and all of them together; nothing where no torque was measured."""
+    if any(t.torque is None for t in traces):
+        return (), None
+    linear = linear_traces(traces, fitted)
+    terms = fitted.structure.terms
+    begin = replace(start, platform=tuple(fitted.values.get((t,), 0.0) for t in TERMS))
+    whole = prepare_linear(linear, fitted)
+    results = []
+    for i, trace in enumerate(whole):
+        run = genetic(trace.run.name, [trace], terms, begin, centre, settings, settings.seed + i, False)
+        results.append(_result(trace, run, terms, begin, axis))
+    joint = genetic("all sets", whole, terms, begin, centre, settings, settings.seed, True)
+    return tuple(results), joint
+
+
+def prepare_linear(traces: Sequence[Trace], fitted: Fitted) -> list[Trace]:
+    """Runs with at least one usable stretch, numbered anew."""
+    del fitted
+    return [replace(t, number=i) for i, t in enumerate(x for x in traces if x.stretches)]
+
+
+def _result(trace: Trace, run: GeneticRun, terms: tuple[str, ...], start: Start, axis: str) -> SetResult:
+    regression = Regression([trace], Structure(terms))
+    solution = fit(regression, {}, start.platform, 0.0, 8)
+    mask = [trace.keep]
+    covariance, determined = _regression_covariance([trace], solution, mask)
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    parameters, identifiable = {}, []
+    for i, (term,) in enumerate(solution.labels):
+        value, error = run.parameters[term], float(errors[i])
+        known = determined[i] and error < WELL_KNOWN * max(abs(value), 1e-300)
+        if not known:
+            continue
+        identifiable.append(term)
+        parameters[term] = ParameterEstimate(
+            value, error, (value - 1.96 * error, value + 1.96 * error), UNITS[axis][term]
+        )  # fmt: skip
+    missing = [t for t in terms if t not in identifiable]
+    advice = (
+        f"{trace.run.name} alone does not determine {' and '.join(missing)}: keep the start transient "
+        "or fit it together with another frequency" if missing else ""
+    )  # fmt: skip
+    return SetResult(
+        trace.run.name, trace.run.frequency_hz, parameters, run.objective, run.restarts, run.accepted,
+        tuple(identifiable), advice, run,
+    )  # fmt: skip
+
+
+__all__ = ["GeneticConfig", "condense", "each_set", "genetic", "linear_traces", "prepare"]
