@@ -39,7 +39,7 @@ def cloud(x: Array, y: Array, points: int) -> tuple[Array, Array]:
 
 
 def binned_mean(x: Array, y: Array, bins: int = 40) -> tuple[Array, Array]:
-    """Mean of ``y`` in bins of ``x`` of equal width; those with too few samples to mean anything left out."""
+    """Means of ``x`` and ``y`` in bins of ``x`` of equal width; those with too few samples to mean anything left out."""
     known = np.isfinite(x) & np.isfinite(y)
     x, y = x[known], y[known]
     if len(x) == 0 or np.ptp(x) == 0.0:
@@ -48,5 +48,5 @@ def binned_mean(x: Array, y: Array, bins: int = 40) -> tuple[Array, Array]:
     at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, bins - 1)
     count = np.bincount(at, minlength=bins)
     full = count >= max(5, len(x) // 1000)
-    total = np.bincount(at, weights=y, minlength=bins)
-    return (0.5 * (edges[1:] + edges[:-1]))[full], total[full] / count[full]
+    where, mean = (np.bincount(at, weights=values, minlength=bins)[full] / count[full] for values in (x, y))
+    return where, mean
