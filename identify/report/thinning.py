@@ -39,7 +39,7 @@ def cloud(x: Array, y: Array, points: int) -> tuple[Array, Array]:
 
 
 def binned_mean(x: Array, y: Array, bins: int = 40) -> tuple[Array, Array]:
-    """Means of ``x`` and ``y`` in bins of ``x`` of equal width; those with too few samples to mean anything left out."""
+    """Means of ``x`` and ``y`` in bins of ``x`` of equal width; bins with too few samples left out."""
     known = np.isfinite(x) & np.isfinite(y)
     x, y = x[known], y[known]
     if len(x) == 0 or np.ptp(x) == 0.0:
