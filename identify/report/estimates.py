@@ -8,7 +8,7 @@ import numpy as np
 
 from identify.report.figure import AFTER, BEFORE, MEASURED, Figure, Panel, Trace, grid, level
 from identify.results import Identification, ParameterEstimate
-from identify.wording import title, unit, value_of
+from identify.wording import title, value_of
 
 FAR = 3.0  # an estimate further out than this many times the spread of the others is named, not drawn
 
@@ -39,7 +39,7 @@ def estimates_figure(identification: Identification) -> Figure | None:
                 )
         labels = [label[:20] for label, _, _ in rows]
         ticks = {"tickvals": list(range(len(rows))), "ticktext": labels, "range": [len(rows) - 0.5, -0.5]}
-        away = f"% from {value_of(final[name])} {unit(final[name].unit)}"
+        away = f"% from {value_of(final[name])}"
         extra_y: dict[str, Any] = {**ticks, "showticklabels": panel == 1, "showgrid": False}
         panels.append(
             Panel(away, "", title(name, identification.axis), extra_y=extra_y, extra_x={"nticks": 5, "zeroline": True})
