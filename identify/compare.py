@@ -28,8 +28,13 @@ class Judged:
 
     @property
     def sigma(self) -> float:
-        """Root mean square over the held-out samples."""
-        return float(np.sqrt(np.sum(self.losses) / max(np.sum(self.counts), 1)))
+        """Held-out error: the geometric mean over shots of their root mean square.
+
+        A shot that begins next to a standstill can go the wrong way whatever the model; one such shot must
+        not outweigh all others, and quiet shots, where friction shows, must count.
+        """
+        mean_square = np.maximum(self.losses, 1e-300) / np.maximum(self.counts, 1.0)
+        return float(np.exp(0.5 * np.mean(np.log(mean_square))))
 
     def values(self) -> dict[Name, float]:
         """Parameter values by name."""

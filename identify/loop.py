@@ -13,6 +13,7 @@ from identify.compare import horizon_s
 from identify.finish import Fitted, by_output_error, by_regression
 from identify.holdout import Split, pieces, split
 from identify.measures import Measured, floor_of, measure
+from identify.output_error import platform_of
 from identify.regression import Structure, shape_values
 from identify.results import (
     UNITS,
@@ -76,7 +77,7 @@ class _Identifier:
         free = all(r.torque_nm is None or not np.any(r.torque_nm) for r in recording.runs)
         runs = [replace(r, torque_nm=None, torque_time_s=None) if free else r for r in recording.runs]
         traces = [prepare(r, i, recording.noise) for i, r in enumerate(runs)]
-        self.traces = [t for t in traces if t.stretches and t.count > 40]
+        self.traces = _one_noise([t for t in traces if t.stretches and t.count > 40])
         if not self.traces:
             raise RecordingError(
                 "no run holds a usable stretch of 40 samples: look at valid, min_rate_rad_s, from_s and to_s"
@@ -212,7 +213,11 @@ class _Identifier:
             else:
                 key = name[1] if len(name) == 2 else f"{name[1]}_run_{int(name[2]) + 1}"
                 of_effects[name[0]][key] = estimate
-        return ModelResult(parameters, of_effects, measured.errors, dropped, tuple(missing), _correlation(fitted))
+        names = tuple(fitted.values)
+        platform = platform_of(fitted.structure, names, np.array(list(fitted.values.values())))
+        return ModelResult(
+            parameters, of_effects, measured.errors, dropped, tuple(missing), _correlation(fitted), platform
+        )
 
     def _against_reference(
         self, per_set: tuple[SetResult, ...]
@@ -249,6 +254,12 @@ class _Identifier:
                 )
             )  # fmt: skip
         return tuple(out)
+
+
+def _one_noise(traces: list[Trace]) -> list[Trace]:
+    """All runs were measured by one sensor; the quietest run shows its noise with the least of the motion in it."""
+    quietest = {c: min((t.noise for t in traces if t.channel == c), default=0.0) for c in ("rate", "angle")}
+    return [replace(t, noise=quietest[t.channel]) for t in traces]
 
 
 def floor_noise(traces: list[Trace]) -> float:

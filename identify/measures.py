@@ -9,6 +9,8 @@ import numpy as np
 
 from identify.finish import Fitted, noise_of_all
 from identify.holdout import Split
+from identify.persets import linear_traces
+from identify.regression import Structure
 from identify.residual import TorqueResidual, relative, torque_noise_floor, torque_residual
 from identify.results import Errors, NoiseFloor
 from identify.traces import Trace
@@ -26,7 +28,10 @@ class Measured:
 
 def measure(traces: Sequence[Trace], split: Split, fitted: Fitted, cutoff_hz: float) -> Measured:
     """Errors of a fitted model on the samples of the final fit and on the held-out ones."""
-    parts = [torque_residual(t, fitted.structure, fitted.values, cutoff_hz) for t in traces]
+    structure, along = fitted.structure, traces
+    if fitted.sensor_limited:  # friction along the model's own motion knows when it sticks; a noisy sign does not
+        structure, along = Structure(structure.terms), linear_traces(traces, fitted)
+    parts = [torque_residual(t, structure, fitted.values, cutoff_hz) for t in along]
     everything = relative(parts, split.everything)
     held = relative(parts, split.judge)
     if fitted.free_run is None:

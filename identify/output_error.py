@@ -26,6 +26,7 @@ from rig.recording.run import Array
 
 Name = tuple[str, ...]
 FIELD = {"inertia": "inertia_kg_m2", "damping": "damping_nm_s_rad", "stiffness": "stiffness_nm_rad"}
+SETTLE = 6  # rounds in which start states are fitted at fixed parameters
 STEP = 1e-6  # relative step of the differences: simulations repeat to 1e-13
 
 
@@ -424,5 +425,47 @@ def evaluate(
     coarse: bool = False,
 ) -> Estimate:
     """The same parameters on other samples: only start states and biases are fitted there."""
-    start = dict(zip(estimate.names, estimate.values.tolist(), strict=True))
-    return refine(traces, estimate.structure, start, shot_s, 4, use, fixed=estimate.names, coarse=coarse)
+    names, x, structure = estimate.names, estimate.values, estimate.structure
+    shots = _shots_for(traces, structure, names, x, shot_s, use, None, coarse)
+    with ThreadPoolExecutor(2) as workers:
+        settled = list(workers.map(lambda s: _settle(s, structure, names, x), shots))
+    rss = sum(float(np.sum(losses)) for _, losses in settled)
+    count = sum(int(np.sum(s.weight)) for s, _ in settled)
+    sigma = float(np.sqrt(rss / max(count, 1)))
+    return Estimate(
+        structure, names, x, sigma, count, np.zeros((len(x),) * 2), tuple(s for s, _ in settled), True
+    )
+
+
+def _losses(s: Shots, residual: Array) -> Array:
+    """Sum of squares of every shot over the samples that count, (shots,); infinite where it ran away."""
+    squares = np.where(s.weight, residual**2, 0.0)
+    sums = np.array([float(np.sum(squares[a:b])) for a, b in s.edges])
+    return np.where(np.isfinite(sums), sums, np.inf)
+
+
+def _settle(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> tuple[Shots, Array]:
+    """Start states and bias of one run at fixed parameters; every shot keeps what is best for itself."""
+    still = np.ones(len(x), dtype=bool)
+    equations = equations_of(structure, names, x, s.number, s.added)
+    losses = _losses(s, s.trace.measured - predict(s, equations, s.starts, s.bias))
+    share = np.ones(len(s.first))  # of the full step that each shot dares
+    for _ in range(SETTLE):
+        part = _linearise(s, structure, names, x, np.ones(len(x)), still)
+        step, bias = part.back(np.zeros(len(x)))
+        if not np.isfinite(part.rss):
+            bias = 0.0
+        trial = _moved(s, (step * share[:, None], bias))
+        new = _losses(trial, trial.trace.measured - predict(trial, equations, trial.starts, trial.bias))
+        worse = ~(new <= losses)
+        if np.all(worse) or np.sum(np.where(worse, losses, new)) > np.sum(losses) * (1.0 - 1e-4):
+            if np.min(share) < 0.2 or not np.any(worse):
+                break
+        share = np.where(worse, 0.3 * share, np.minimum(1.0, 2.0 * share))
+        trial.starts[worse] = s.starts[worse]
+        kept = _losses(trial, trial.trace.measured - predict(trial, equations, trial.starts, trial.bias))
+        if np.sum(kept) > np.sum(losses):
+            trial.bias = s.bias
+            kept = _losses(trial, trial.trace.measured - predict(trial, equations, trial.starts, trial.bias))
+        s, losses = trial, kept
+    return s, losses

@@ -111,7 +111,7 @@ def genetic(
     return GeneticRun(
         name, named(outcome.best), named(chosen.closed_form), named(chosen.gap_percent(outcome.best)),
         float(outcome.objective), float(j_dec), outcome.restarts, bool(outcome.objective < j_dec),
-        outcome.history, roulette, plain,
+        outcome.history, roulette, plain, chosen.minimum,
     )  # fmt: skip
 
 

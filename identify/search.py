@@ -84,7 +84,10 @@ class Loop:
         names = [n for n in self.allowed if n not in now.structure.effects and self._possible(n)]
         looks = screen.all(names)
         tried: list[tuple[str, Judged]] = []
-        for look in screen.shortlist(looks, SHORTLIST):
+        short = screen.shortlist(looks, SHORTLIST)
+        # A delay lies in every record of torque and rate, and a microsecond of it bends C: tried always.
+        short += [s for s in looks if s.effect == "torque_delay" and s.gain > 10.0 and s not in short]
+        for look in short:
             best_yet = min((j.estimate.sigma for _, j in tried), default=now.estimate.sigma)
             result = self._try(found, screen, look, 4.0 * best_yet)
             tried += [result] if result else []
