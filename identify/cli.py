@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from rig.cli.compiled_cache import ensure_compiled_cache
 from rig.cli.desk import Desk, Options, at_desk
 from rig.cli.options import ConfigFile, DryRun, Emulate, Out, Overrides, Quiet, Seed, Version, Yes, new_app
 
@@ -40,7 +39,6 @@ def identify_run(
     Exit codes: 0 identified and accepted, 1 not accepted (the results say why), 2 wrong usage, file or forecast,
     3 device fault, 4 safety trip, 70 internal error, 130 Ctrl-C.
     """
-    ensure_compiled_cache()
     options = Options(config, out, dry_run, emulate, yes, tuple(overrides or ()), seed, quiet)
     raise typer.Exit(at_desk(options, run))
 

@@ -6,7 +6,6 @@ import sys
 
 import typer
 
-from rig.cli.compiled_cache import ensure_compiled_cache
 from rig.cli.desk import Desk, Options, at_desk
 from rig.cli.exits import conclude
 from rig.cli.options import ConfigFile, DryRun, Emulate, Out, Overrides, Quiet, Seed, Version, Yes, new_app
@@ -17,7 +16,6 @@ app = new_app("Prepare, check and play a campaign on the rig. To identify from i
 @app.callback()
 def rig(version: Version = False) -> None:
     """Prepare, check and play a campaign on the rig. To identify from it: identify-run."""
-    ensure_compiled_cache()
 
 
 @app.command()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.cli.compiled_cache import VARIABLE, ensure_compiled_cache
+from rig.compiled_cache import VARIABLE, ensure_compiled_cache
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="permissions work otherwise there")
 

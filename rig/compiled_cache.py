@@ -19,7 +19,7 @@ def ensure_compiled_cache(package: Path | None = None) -> None:
     """Set NUMBA_CACHE_DIR where it is needed. Has to come before numba is imported."""
     if os.environ.get(VARIABLE):
         return
-    source = package or Path(__file__).parents[1]
+    source = package or Path(__file__).parent
     if _can_write(source / "__pycache__") or _can_write(_user_cache()):
         return
     os.environ[VARIABLE] = str(_own_folder())
