@@ -48,7 +48,10 @@ class CanLink:
     def __init__(self, bus: can.BusABC, clock: Callable[[], float] = time.monotonic) -> None:
         self._bus = bus
         self.clock = clock
-        self._lines = bus.send_lines if isinstance(bus, SlcanBulkBus) else None
+        # Our own bus sends a tick in one write and hands frames over without a message object each.
+        own = bus if isinstance(bus, SlcanBulkBus) else None
+        self._lines = own.send_lines if own is not None else None
+        self._take = own.take_frames if own is not None else None
         self.name = str(bus.channel_info)
         self.record: Record | None = None
         self.idle: Callable[[], None] = lambda: None
@@ -78,22 +81,30 @@ class CanLink:
 
     def poll(self) -> list[Heard]:
         """Frames that have arrived, handed to every listener too; never waits."""
-        heard: list[Heard] = []
         try:
-            while len(heard) < MOST_FRAMES_A_POLL:
-                message = self._bus.recv(0)
-                if message is None:
-                    break
-                if not message.is_error_frame:
-                    heard.append(Heard(self.clock(), _frame(message)))
+            frames = self._take() if self._take is not None else self._receive()
         except can.CanError as problem:
             raise DeviceFault(f"CAN on {self.name}: {problem}") from None
+        if not frames:
+            return []
+        now_s = self.clock()
+        heard = [Heard(now_s, frame) for frame in frames]
         for item in heard:
             if self.record is not None:
                 self.record(item.time_s, False, item.frame)
             for listener in self.listeners:
                 listener(item)
         return heard
+
+    def _receive(self) -> list[CanFrame]:
+        frames: list[CanFrame] = []
+        while len(frames) < MOST_FRAMES_A_POLL:
+            message = self._bus.recv(0)
+            if message is None:
+                break
+            if not message.is_error_frame:
+                frames.append(_frame(message))
+        return frames
 
     def fileno(self) -> int:
         """File descriptor on which arriving frames show, or -1 where the bus has none."""

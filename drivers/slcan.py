@@ -60,7 +60,7 @@ class SlcanBulkBus(can.BusABC):
             raise ValueError(f"bitrate {bitrate} is not one of a Lawicel adapter: {allowed}")
         self._answer_timeout_s = answer_timeout_s
         self._decoder = LawicelDecoder()
-        self._frames: deque[Message] = deque()
+        self._frames: deque[tuple[float, CanFrame]] = deque()
         self._unanswered = 0
         self._last_answer_s = 0.0
         self._answers_frames: bool | None = None
@@ -120,7 +120,7 @@ class SlcanBulkBus(can.BusABC):
         refused = 0
         for item in self._decoder.feed(data):
             if isinstance(item, CanFrame):
-                self._frames.append(self._message(item, now))
+                self._frames.append((now, item))
             elif self._unanswered and item.kind in ("sent", "ok", "error"):
                 self._unanswered -= 1
                 self._last_answer_s = time.monotonic()
@@ -209,7 +209,26 @@ class SlcanBulkBus(can.BusABC):
                     self._wait_for_frame(timeout)
             except DeviceFault as problem:
                 raise CanOperationError(str(problem)) from None
-        return (self._frames.popleft(), False) if self._frames else (None, False)
+        if not self._frames:
+            return None, False
+        read_at_s, frame = self._frames.popleft()
+        return self._message(frame, read_at_s), False
+
+    def take_frames(self) -> list[CanFrame]:
+        """Every frame that has arrived, without the cost of a message object each; filters do not apply.
+
+        Raises
+        ------
+        can.CanOperationError
+            As ``recv`` does.
+        """
+        try:
+            self._take(self._port.read())
+        except DeviceFault as problem:
+            raise CanOperationError(str(problem)) from None
+        frames = [frame for _, frame in self._frames]
+        self._frames.clear()
+        return frames
 
     def _wait_for_frame(self, timeout: float | None) -> None:
         deadline = None if timeout is None else time.monotonic() + timeout
