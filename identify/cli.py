@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from rig.cli.desk import Desk, Options, at_desk
+from rig.cli.exits import leave_warnings_to_developers
 from rig.cli.options import ConfigFile, DryRun, Emulate, Out, Overrides, Quiet, Seed, Version, Yes, new_app
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def identify_run(
 
 def main() -> None:
     """Entry point of `identify-run`."""
+    leave_warnings_to_developers()
     app(prog_name="identify-run")
 
 

@@ -10,5 +10,7 @@ from __future__ import annotations
 def main() -> None:
     """Entry point of `rig`."""
     from rig.cli.app import app
+    from rig.cli.exits import leave_warnings_to_developers
 
+    leave_warnings_to_developers()
     app(prog_name="rig")

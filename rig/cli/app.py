@@ -23,9 +23,10 @@ def check(config: ConfigFile, emulate: Emulate = False, overrides: Overrides = N
     """Validate CONFIG, forecast every set, contact the devices without torque; say what is wrong and its cure."""
 
     def command(desk: Desk) -> int:
+        loaded = desk.options.load()
         from rig.cli.check import run_checks
 
-        return run_checks(desk)
+        return run_checks(desk, loaded)
 
     raise typer.Exit(at_desk(Options(config, emulate=emulate, overrides=tuple(overrides or ())), command))
 
@@ -57,9 +58,10 @@ def play(
     """Play and record only."""
 
     def command(desk: Desk) -> int:
+        loaded = desk.options.load()
         from rig.cli.play import play_only
 
-        return play_only(desk)
+        return play_only(desk, loaded)
 
     options = Options(config, out, dry_run, emulate, yes, tuple(overrides or ()), seed, quiet)
     raise typer.Exit(at_desk(options, command))

@@ -95,9 +95,8 @@ def _account_lines(account: Mapping[str, Any]) -> Iterator[str]:
 CHECKS: tuple[Check, ...] = (configuration, recordings, forecast, contact)
 
 
-def run_checks(desk: Desk) -> int:
+def run_checks(desk: Desk, loaded: LoadedConfig) -> int:
     """Run all checks; lines go to stdout, what is wrong to stderr. Returns the exit code of the first fault."""
-    loaded = desk.options.load()
     code = OK
     with tempfile.TemporaryDirectory() as scratch, _known(desk, loaded, Path(scratch)) as known:
         for check in CHECKS:

@@ -7,6 +7,7 @@ import errno
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -56,7 +57,9 @@ def code_of(error: BaseException) -> int:
 
 
 def as_known(error: BaseException) -> BaseException:
-    """A full or failing disk ends a campaign as Ctrl-C does; all else is what it is."""
+    """A full disk, or a reader that has gone away, ends a campaign as Ctrl-C does; all else is what it is."""
+    if isinstance(error, BrokenPipeError):
+        return Aborted("nobody reads the output any more.")
     if isinstance(error, OSError) and error.errno in _NO_ROOM:
         return Aborted(
             f"cannot write {error.filename or 'the results'}: {error.strerror}. What was written until then is "
@@ -69,7 +72,8 @@ def message_of(error: BaseException, folder: Path | None) -> str:
     """What to say of an error; of one that nobody foresaw a short line, and where the rest of it is."""
     for kind, heading in HEADINGS:
         if isinstance(error, kind):
-            return f"{heading}: {str(error) or 'Ctrl-C'}"
+            text = str(error) or "by Ctrl-C"
+            return text if text.startswith(heading) else f"{heading}: {text}"
     where = traceback.extract_tb(error.__traceback__)
     at = f" in {Path(where[-1].filename).name}, line {where[-1].lineno}" if where else ""
     text = " ".join(str(error).split())[:300]
@@ -87,6 +91,12 @@ def _keep_traceback(error: BaseException, folder: Path | None) -> str:
     except OSError as problem:
         return f" Its traceback could not be written to {path}: {problem.strerror}."
     return f" Its traceback is in {path}; please send it to the authors."
+
+
+def leave_warnings_to_developers() -> None:
+    """What NumPy warns of says nothing to whoever stands at the bench; python -W shows it."""
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")
 
 
 def say(text: str) -> None:

@@ -8,14 +8,14 @@ from rig.cli.campaign import play
 from rig.cli.desk import Desk
 from rig.cli.exits import code_of
 from rig.cli.terminal import plain
+from rig.config.load import LoadedConfig
 
 
-def play_only(desk: Desk) -> int:
+def play_only(desk: Desk, loaded: LoadedConfig) -> int:
     """Play the campaign and say where its recording is; returns the exit code."""
-    loaded = desk.options.load()
     folder = desk.choose_folder(loaded.config.name)
     played = play(desk, loaded, folder)
     desk.terminal.settle()
     if not desk.options.quiet:
-        sys.stdout.write(f"{len(played.whole)} set(s) recorded in {plain(str(folder.path))}\n")
+        sys.stdout.write(f"{len(played.whole)} complete set(s); the recording is in {plain(str(folder.path))}\n")
     return 0 if played.cause is None else code_of(played.cause)

@@ -50,7 +50,7 @@ def test_a_simulated_campaign_is_recorded_whole(tmp_path: Path) -> None:
     done = command(app, "play", write_config(tmp_path), "--out", out)
     assert done.exit_code == 0, done.output
     assert "Torque is SIMULATED" in done.stderr
-    assert "2 set(s) recorded" in done.stdout
+    assert "2 complete set(s)" in done.stdout
     recording = read_recording_h5(out / "recording.h5")
     assert [r.name for r in recording.runs] == ["5 Hz", "7 Hz"]
     assert recording.info["config_text"] == TWO_SETS

@@ -1,0 +1,97 @@
+"""The commands as processes of their own: what they print, what they leave behind, how they end."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rig.recording.hdf5 import read_recording_h5
+
+ROOT = Path(__file__).parents[2]
+RIG = (sys.executable, "-c", "from rig.cli import main; main()")
+IDENTIFY_RUN = (sys.executable, "-c", "from identify.cli import main; main()")
+posix = pytest.mark.skipif(sys.platform == "win32", reason="emulated devices need pseudo terminals")
+LONG_SET = "excitation.sets=[{torque_nm: 60, frequency_hz: 3, duration_s: 60}]"
+
+
+def start(*arguments: object) -> subprocess.Popen[str]:
+    line = [str(a) for a in arguments]
+    return subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True)
+
+
+def wait_until(happened: Callable[[], bool], process: subprocess.Popen[str], limit_s: float = 60.0) -> None:
+    deadline_s = time.monotonic() + limit_s
+    while not happened():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline_s, "it never happened"
+        time.sleep(0.02)
+
+
+def size_of(path: Path) -> int:
+    return path.stat().st_size if path.exists() else 0
+
+
+@posix
+def test_ctrl_c_on_the_bench_takes_the_torque_off_disables_the_drive_and_keeps_the_record(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    process = start(*RIG, "play", ROOT / "examples" / "bench.yaml", "--emulate", "--out", out, "--set", LONG_SET)
+    wait_until(lambda: size_of(out / "recording.journal") > 100_000, process)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 130, said
+    assert "Stopped by Ctrl-C: torque is off" in said and "Traceback" not in said
+    recording = read_recording_h5(out / "recording.h5")
+    assert 0.5 < recording.runs[0].duration_s < 59.0
+    events = recording.info["emulated_drive"]
+    assert {e["event"] for e in events[-2:]} == {"disabled", "torque_zero"}
+    assert events[-1]["torque_nm"][1] == 0.0
+    assert recording.info["sets"][0]["complete"] is False
+
+
+@posix
+def test_emulate_says_where_it_listens_and_ends_with_ctrl_c() -> None:
+    process = start(*RIG, "emulate", ROOT / "examples" / "bench.yaml")
+    assert process.stdout is not None
+    first = json.loads(process.stdout.readline())
+    assert first["event"] == "listening"
+    assert Path(first["gyro"]).exists() and Path(first["can"]).exists()
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=10)
+    assert (process.returncode, said) == (0, "")
+
+
+def test_a_reader_that_goes_away_is_no_fault_of_the_program() -> None:
+    process = start(*RIG, "check", ROOT / "rig.yaml")
+    assert process.stdout is not None and process.stderr is not None
+    process.stdout.close()
+    said = process.stderr.read()
+    process.stderr.close()
+    assert process.wait(30) in (0, 130)
+    assert "Internal error" not in said and "Exception" not in said
+
+
+@pytest.mark.parametrize("line", [IDENTIFY_RUN, (*RIG, "check")], ids=["identify-run", "rig check"])
+def test_a_wrong_file_is_answered_before_anything_heavy_is_loaded(line: tuple[str, ...]) -> None:
+    program = f"import atexit, sys; atexit.register(lambda: print('numba' in sys.modules)); {line[2]}"
+    process = start(line[0], "-c", program, *line[3:], "nowhere.yaml")
+    told, said = process.communicate(timeout=30)
+    assert process.returncode == 2
+    assert "nowhere.yaml: no such file" in said
+    assert told.strip() == "False"
+
+
+@pytest.mark.parametrize("heading", ["Run", "Test"])
+def test_the_readme_gives_one_line_to_run_and_one_to_test(heading: str) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    section = re.split(r"^## ", text.split(f"\n## {heading}\n")[1], flags=re.MULTILINE)[0]
+    blocks = re.findall(r"^```(\w*)\n(.*?)^```$", section, flags=re.MULTILINE | re.DOTALL)
+    assert [language for language, _ in blocks] == ["sh"]
+    assert len(blocks[0][1].splitlines()) == 1
