@@ -33,29 +33,33 @@ class GyroSettings:
 
 
 def flat_low_pass(group_delay_s: float, corner_hz: float, step_s: float) -> Array:
-    """A symmetric kernel with this delay, -3 dB at the corner and no curvature at zero frequency.
+    """A symmetric kernel with this delay and -3 dB at the corner, its pass band as flat as the delay allows.
 
-    A Gaussian times (a + b t^2) whose second moment is zero: the pass band stays flat to fourth order, so
-    that the amplitude at 29 Hz is right to 1e-4 while the delay is that of the data sheet.
+    A Gaussian times (a + b t^2) whose second moment is zero is flat to fourth order, so that the amplitude
+    at 29 Hz is right to 1e-4. Where the delay leaves no room for its lobes, a plain Gaussian has to do.
     """
     half = round(group_delay_s / step_s)
     t = step_s * np.arange(-half, half + 1)
-    target = math.sqrt(0.5)
 
-    def kernel(width_s: float) -> Array:
+    def flat(width_s: float) -> Array:
         g = np.exp(-0.5 * (t / width_s) ** 2)
         m0, m2, m4 = (float(np.sum(g * t**k)) for k in (0, 2, 4))
-        shape = g * (m4 - m2 * t**2)
-        return np.asarray(shape / (m0 * m4 - m2 * m2))
+        return np.asarray(g * (m4 - m2 * t**2) / (m0 * m4 - m2 * m2))
 
-    def gain(width_s: float) -> float:
-        return float(np.sum(kernel(width_s) * np.cos(2.0 * math.pi * corner_hz * t)))
+    def plain(width_s: float) -> Array:
+        g = np.exp(-0.5 * (t / width_s) ** 2)
+        return np.asarray(g / np.sum(g))
 
-    narrow, wide = 0.3 * step_s, max(half, 1) * step_s
+    def gain(kernel: Array) -> float:
+        return float(np.sum(kernel * np.cos(2.0 * math.pi * corner_hz * t)))
+
+    widest_s = 4.0 * max(half, 1) * step_s
+    shape = flat if gain(flat(widest_s)) < math.sqrt(0.5) else plain
+    narrow, wide = 0.3 * step_s, widest_s
     for _ in range(60):
         middle = 0.5 * (narrow + wide)
-        narrow, wide = (middle, wide) if gain(middle) > target else (narrow, middle)
-    return kernel(0.5 * (narrow + wide))
+        narrow, wide = (middle, wide) if gain(shape(middle)) > math.sqrt(0.5) else (narrow, middle)
+    return shape(0.5 * (narrow + wide))
 
 
 class Stim300Emulator:
