@@ -38,15 +38,22 @@ def write_recording_h5(path: str | Path, recording: Recording, journal: JournalC
     if path.exists():
         raise JournalError(f"{path} exists and is never overwritten: choose another --out")
     try:
-        with h5py.File(partial, "w") as file:
-            _write(file, recording, journal)
+        partial.write_bytes(_image(recording, journal))
         partial.replace(path)
-    except (OSError, RuntimeError) as error:
+    except OSError as error:
         partial.unlink(missing_ok=True)
-        reason = getattr(error, "strerror", None) or str(error)
         raise JournalError(
-            f"cannot write {path}: {reason}. The raw journal keeps everything: free space, then export it again"
+            f"cannot write {path}: {error.strerror or error}. The raw journal keeps everything: free space, then "
+            "export it again"
         ) from error
+
+
+def _image(recording: Recording, journal: JournalContents | None) -> bytes:
+    """The bytes of the file, made in memory: on a full disk the HDF5 library crashes instead of raising."""
+    with h5py.File("recording.h5", "w", driver="core", backing_store=False) as file:
+        _write(file, recording, journal)
+        file.flush()
+        return bytes(file.id.get_file_image())
 
 
 def _write(file: h5py.File, recording: Recording, journal: JournalContents | None) -> None:

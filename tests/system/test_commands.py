@@ -95,3 +95,14 @@ def test_the_readme_gives_one_line_to_run_and_one_to_test(heading: str) -> None:
     blocks = re.findall(r"^```(\w*)\n(.*?)^```$", section, flags=re.MULTILINE | re.DOTALL)
     assert [language for language, _ in blocks] == ["sh"]
     assert len(blocks[0][1].splitlines()) == 1
+
+
+@posix
+def test_a_disk_that_takes_no_more_ends_in_130_with_what_there_is_exported(tmp_path: Path) -> None:
+    limited = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000)); {RIG[2]}"
+    process = start(RIG[0], "-c", limited, "play", ROOT / "rig.yaml", "--out", tmp_path / "out")
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130, said
+    assert "recording.journal: File too large" in said and "Traceback" not in said
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"recording.journal", "recording.h5"}
+    assert len(read_recording_h5(tmp_path / "out" / "recording.h5").runs) == 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -119,6 +120,22 @@ def test_an_existing_file_is_never_overwritten(tmp_path: Path) -> None:
     with pytest.raises(JournalError, match="never overwritten: choose another --out"):
         write_recording_h5(tmp_path / "recording.h5", recording())
     assert (tmp_path / "recording.h5").read_text() == "precious"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")
+def test_a_disk_that_takes_no_more_is_an_error_and_not_a_crash(tmp_path: Path) -> None:
+    import resource  # noqa: PLC0415 (not there on Windows)
+
+    noise = np.random.default_rng(1).standard_normal(100_000)
+    run = Run("noise", np.arange(100_000.0), np.ones(100_000, dtype=bool), rate_rad_s=noise)
+    earlier = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, earlier[1]))
+    try:
+        with pytest.raises(JournalError, match="File too large"):
+            write_recording_h5(tmp_path / "recording.h5", Recording((run,)))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, earlier)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_nothing_is_left_half_written(tmp_path: Path) -> None:
