@@ -26,6 +26,9 @@ from rig.recording.run import Array
 
 Name = tuple[str, ...]
 FIELD = {"inertia": "inertia_kg_m2", "damping": "damping_nm_s_rad", "stiffness": "stiffness_nm_rad"}
+COARSEST = 16  # fine steps a sample while models are compared
+ROBUST_FROM = 12  # shots: fewer show no outlier
+OUTLIER = 4.0  # times the median error of a shot
 SETTLE = 6  # rounds in which start states are fitted at fixed parameters
 STEP = 1e-6  # relative step of the differences: simulations repeat to 1e-13
 
@@ -101,6 +104,11 @@ class Shots:
     def active(self) -> Any:
         """Which shots hold samples that count; the others are not simulated."""
         return np.array([bool(np.any(self.weight[a:b])) for a, b in self.edges])
+
+    @cached_property
+    def counts(self) -> Array:
+        """Samples that count in each shot, (shots,)."""
+        return np.array([float(np.sum(self.weight[a:b])) for a, b in self.edges])
 
     @cached_property
     def edges(self) -> list[tuple[int, int]]:
@@ -182,14 +190,16 @@ class _Normal:
 
     a: Array
     b: Array
-    rss: float
-    count: int
+    losses: Array
+    counts: Array
     back: Callable[[Array], tuple[Array, float]]
 
 
-def _linearise(s: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any) -> _Normal:
+def _linearise(
+    s: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any, outlier: float
+) -> _Normal:
     columns, state, residual = _sensitivities(s, structure, names, x, scale, fixed)
-    return _eliminate(s, columns, state, residual, s.trace.biased)
+    return _eliminate(s, columns, state, residual, s.trace.biased, outlier)
 
 
 def jacobian(s: Shots, estimate: Estimate) -> tuple[Array, Array]:
@@ -242,28 +252,33 @@ def _sensitivities(
     return columns, state, residual
 
 
-def _eliminate(s: Shots, columns: Array, state: Array, residual: Array, rate: bool) -> _Normal:
+def _eliminate(
+    s: Shots, columns: Array, state: Array, residual: Array, rate: bool, outlier: float
+) -> _Normal:
+    """Normal equations of one run; shots whose error is far beyond ``outlier`` (root mean square) count less."""
     p = columns.shape[1]
-    used = s.weight
-    if not (np.all(np.isfinite(columns[used])) and np.all(np.isfinite(state[used])) and np.all(np.isfinite(residual[used]))):
+    used, counts = s.weight, s.counts
+    losses = _losses(s, residual)
+    if not (np.all(np.isfinite(columns[used])) and np.all(np.isfinite(state[used])) and np.all(np.isfinite(losses))):
         # The simulation ran away: nothing can be said from here.
-        return _Normal(np.zeros((p, p)), np.zeros(p), np.inf, int(np.sum(used)), lambda dx: (0.0 * s.starts, 0.0))
+        return _Normal(
+            np.zeros((p, p)), np.zeros(p), np.full(len(counts), np.inf), counts, lambda dx: (0.0 * s.starts, 0.0)
+        )
     wide = np.column_stack([columns, np.ones(len(residual))]) if rate else columns
     a, b = np.zeros((wide.shape[1],) * 2), np.zeros(wide.shape[1])
-    rss, count = 0.0, 0
     kept = []
-    for begin, end in s.edges:
+    for (begin, end), loss, count in zip(s.edges, losses, counts, strict=True):
         mask = s.weight[begin:end]
         w, z, r = wide[begin:end][mask], state[begin:end][mask], residual[begin:end][mask]
         zz = z.T @ z
         scale = np.sqrt(np.maximum(np.diag(zz), 1e-300))
         inverse = np.linalg.pinv(zz / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
         zw, zr = z.T @ w, z.T @ r
-        a += w.T @ w - zw.T @ inverse @ zw
-        b += w.T @ r - zw.T @ inverse @ zr
-        rss += float(r @ r)
-        count += len(r)
+        trust = 1.0 / (1.0 + loss / max(count, 1) / outlier**2)
+        a += trust * (w.T @ w - zw.T @ inverse @ zw)
+        b += trust * (w.T @ r - zw.T @ inverse @ zr)
         kept.append((inverse, zw, zr))
+    right, column, pivot = 0.0, np.zeros(p), 1.0
     if rate:
         pivot = max(a[p, p], 1e-300)
         column, right = a[:p, p].copy(), b[p]
@@ -274,14 +289,30 @@ def _eliminate(s: Shots, columns: Array, state: Array, residual: Array, rate: bo
         full = np.append(dx, bias) if rate else dx
         return np.array([inv @ (zr - zw @ full) for inv, zw, zr in kept]), bias
 
-    return _Normal(a, b, rss, count, back)
+    return _Normal(a, b, losses, counts, back)
 
 
-def _total(parts: Sequence[_Normal]) -> tuple[Array, Array, float, int]:
+def _total(parts: Sequence[_Normal]) -> tuple[Array, Array, Array, Array]:
     return (
         np.sum([q.a for q in parts], axis=0), np.sum([q.b for q in parts], axis=0),
-        sum(q.rss for q in parts), sum(q.count for q in parts),
+        np.concatenate([q.losses for q in parts]), np.concatenate([q.counts for q in parts]),
     )  # fmt: skip
+
+
+def _outlier(losses: Array, counts: Array) -> float:
+    """Root mean square beyond which a shot is mistrusted; none is where there are only a few."""
+    used = counts > 0
+    if np.sum(used) < ROBUST_FROM or not np.all(np.isfinite(losses[used])):
+        return np.inf
+    return float(OUTLIER * np.sqrt(max(np.median(losses[used] / counts[used]), 1e-300)))
+
+
+def _cost(losses: Array, counts: Array, outlier: float) -> float:
+    """Sum of squares, with the shots that are mistrusted growing only as a logarithm."""
+    if not np.isfinite(outlier):
+        return float(np.sum(losses))
+    n = np.maximum(counts, 1.0)
+    return float(np.sum(n * outlier**2 * np.log1p(losses / n / outlier**2)))
 
 
 def refine(
@@ -338,7 +369,11 @@ def _shots_for(
     for i, trace in enumerate(traces):
         equations = Equations(platform_of(structure, names, x, trace.number, trace.run.added_inertia_kg_m2))
         substeps = min(MAX_SUBSTEPS, equations.substeps(trace.step_s))
-        substeps = max(2, substeps // 2) if coarse else substeps
+        substeps = int(np.clip(substeps // 2, 2, COARSEST)) if coarse else substeps
+        if trace.torque is not None and trace.torque.hold == "zero_order":
+            # A step that spans several held values sees only their mean: that alone is a sigma or two.
+            held = trace.step_s / float(np.median(np.diff(trace.torque.time_s)))
+            substeps = min(MAX_SUBSTEPS, max(substeps, round(held)))
         length = None if shot_s is None else max(8, round(shot_s / trace.step_s))
         shots = make_shots(trace, substeps, length, None if use is None else use[i])
         if carry is not None and len(carry[i].first) == len(shots.first):
@@ -355,13 +390,23 @@ def _levenberg(
     low = np.array([bounds_of(n)[0] for n in names])
     high = np.array([bounds_of(n)[1] for n in names])
     damping, converged = 1e-6, False
-    parts = list(workers.map(lambda s: _linearise(s, structure, names, x, scale, still), shots))
-    a, b, rss, count = _total(parts)
-    for k in range(iterations if np.isfinite(rss) else 0):
-        if k == 3 and rss > hopeless**2 * count:
+
+    def linearise(x: Array, shots: Sequence[Shots], outlier: float) -> list[_Normal]:
+        return list(workers.map(lambda s: _linearise(s, structure, names, x, scale, still, outlier), shots))
+
+    first = list(workers.map(lambda s: _losses_at(s, structure, names, x), shots))
+    counts = np.concatenate([s.counts for s in shots])
+    losses = np.concatenate(first)
+    outlier = _outlier(losses, counts)
+    parts = linearise(x, shots, outlier)
+    a, b, losses, counts = _total(parts)
+    count = int(np.sum(counts))
+    for k in range(iterations if np.all(np.isfinite(losses)) else 0):
+        cost = _cost(losses, counts, outlier)
+        if k == 3 and cost > hopeless**2 * count:
             break
         step = None
-        trial, trial_rss = shots, rss
+        trial, trial_cost = shots, cost
         for _try in range(8):
             size = np.sqrt(np.maximum(np.diag(a), 1e-300))
             free = ~still
@@ -373,26 +418,27 @@ def _levenberg(
             new = ordered(names, np.clip(x + dx, low, high))
             moved = [q.back(new - x) for q in parts]
             trial = [_moved(s, m) for s, m in zip(shots, moved, strict=True)]
-            trial_rss = sum(workers.map(lambda s, new=new: _rss(s, structure, names, new), trial))
-            if trial_rss <= rss * (1.0 + 1e-12):
+            found = list(workers.map(lambda s, new=new: _losses_at(s, structure, names, new), trial))
+            trial_cost = _cost(np.concatenate(found), counts, outlier)
+            if trial_cost <= cost * (1.0 + 1e-12):
                 step = new
                 break
             damping = max(damping * 30.0, 1e-5)
         if step is None:
             converged = True
             break
-        sigma = np.sqrt(rss / max(count, 1))
+        sigma = np.sqrt(cost / max(count, 1))
         small = bool(np.all(np.abs(step - x) * np.sqrt(np.maximum(np.diag(a), 0.0)) <= tolerance * 30.0 * sigma))
-        flat = rss - trial_rss < 1e-2 * tolerance * rss
+        flat = cost - trial_cost < 1e-2 * tolerance * cost
         x, shots, damping = step, trial, max(damping / 30.0, 1e-9)
-        parts = list(workers.map(lambda s, x=x: _linearise(s, structure, names, x, scale, still), shots))
-        a, b, rss, count = _total(parts)
+        outlier = _outlier(np.concatenate(found), counts)
+        parts = linearise(x, shots, outlier)
+        a, b, losses, counts = _total(parts)
         if small or flat:
             converged = True
             break
-    return Estimate(
-        structure, names, x, float(np.sqrt(rss / max(count, 1))), count, a, tuple(shots), converged
-    )
+    sigma = float(np.sqrt(_cost(losses, counts, outlier) / max(count, 1)))
+    return Estimate(structure, names, x, sigma, count, a, tuple(shots), converged)
 
 
 def ordered(names: Sequence[Name], values: Array) -> Array:
@@ -411,10 +457,9 @@ def _moved(s: Shots, by: tuple[Array, float]) -> Shots:
     return Shots(s.trace, s.grid, s.first, s.starts + by[0], s.bias + by[1], s.weight)
 
 
-def _rss(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> float:
+def _losses_at(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> Array:
     equations = equations_of(structure, names, x, s.number, s.added)
-    r = (s.trace.measured - predict(s, equations, s.starts, s.bias))[s.weight]
-    return float(r @ r)
+    return _losses(s, s.trace.measured - predict(s, equations, s.starts, s.bias))
 
 
 def evaluate(
@@ -451,10 +496,8 @@ def _settle(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> 
     losses = _losses(s, s.trace.measured - predict(s, equations, s.starts, s.bias))
     share = np.ones(len(s.first))  # of the full step that each shot dares
     for _ in range(SETTLE):
-        part = _linearise(s, structure, names, x, np.ones(len(x)), still)
+        part = _linearise(s, structure, names, x, np.ones(len(x)), still, np.inf)
         step, bias = part.back(np.zeros(len(x)))
-        if not np.isfinite(part.rss):
-            bias = 0.0
         trial = _moved(s, (step * share[:, None], bias))
         new = _losses(trial, trial.trace.measured - predict(trial, equations, trial.starts, trial.bias))
         worse = ~(new <= losses)

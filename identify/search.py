@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from identify.compare import CLEARLY, Judged, advantage, delta_bic, horizon_s, judge, share_explained, start_values
-from identify.regression import Shapes, Structure
+from identify.regression import Shapes, Solution, Structure
 from identify.results import Candidate
 from identify.screen import Screen, Screened, Start, best_rho
 from identify.traces import Trace
 from rig import effects
 from rig.effects.base import Place
+from rig.platform import TERMS
 
 MOST_EFFECTS = 6
 SHORTLIST = 4
 WORTH = 0.2  # share of the excess error that an effect has to take away
 MISSED = 0.1  # share of the squared error by which nobody doubts that a term is needed
+MOST = 0.4  # share of the excess error beyond which one standard error is lead enough
+TWICE = 2.0
+STRONG = 4.0  # standard errors by which every parameter of a new effect must differ from zero
 CERTAIN = 100.0  # standard errors beyond which nobody asks whether a term is needed
 SUPPORT = 0.02  # share of the error by which a term must be missed to stay
 
@@ -70,10 +74,12 @@ class Loop:
         floor = self.noise * float(np.sqrt(max(1.0 - 2.0 / length, 0.25)))
         base = judge(self.fitting, self.judging, declared, start_values(solution, shapes, self.runs), horizon)
         found = Search(base, base, horizon, floor)
+        self._probation(found, solution)
         for round_ in range(1, MOST_EFFECTS + 1):
             if not self._round(found, round_):
                 break
             self._prune(found, found.best.structure.effects[:-1])
+        self._restore(found, declared)
         self._prune(found, (*found.best.structure.terms, *found.best.structure.effects))
         return found
 
@@ -86,7 +92,8 @@ class Loop:
         tried: list[tuple[str, Judged]] = []
         short = screen.shortlist(looks, SHORTLIST)
         # A delay lies in every record of torque and rate, and a microsecond of it bends C: tried always.
-        short += [s for s in looks if s.effect == "torque_delay" and s.gain > 10.0 and s not in short]
+        always = {"torque_delay", *(low for s in short for low in effects.get(s.effect).lower_order)}
+        short += [s for s in looks if s.effect in always and s.gain > 10.0 and s not in short]
         for look in short:
             best_yet = min((j.estimate.sigma for _, j in tried), default=now.estimate.sigma)
             result = self._try(found, screen, look, 4.0 * best_yet)
@@ -94,10 +101,8 @@ class Loop:
         tried.sort(key=lambda t: t[1].sigma)
         if not tried:
             return False
-        name, best = self._simplest(tried)
-        worth = share_explained(now, best, found.floor)
-        clear = advantage(now, best) > CLEARLY and delta_bic(now, best) < -10.0
-        added = clear and worth >= WORTH
+        name, best = self._simplest(tried, found, now)
+        added = self._worth_adding(now, name, best, found.floor)
         for other, judged in tried:
             status = ("added" if added else "not worth it") if other == name else self._status(best, judged)
             found.candidates.append(
@@ -128,11 +133,53 @@ class Loop:
             judged = min((judged, other), key=lambda j: j.sigma)
         return (look.effect, judged) if np.isfinite(judged.sigma) else None
 
-    def _simplest(self, tried: Sequence[tuple[str, Judged]]) -> tuple[str, Judged]:
-        """The best candidate, or the one with the fewest parameters that does as well."""
-        best = tried[0][1]
+    def _probation(self, found: Search, solution: Solution) -> None:
+        """Set a spring aside that pushes, or whose period is longer than the record.
+
+        On a platform without a spring, K soaks up whatever is constant or drifts (a constant torque, a
+        slope of the friction) and hides it. It comes back at the end if the finished model misses it.
+        """
+        inertia, _, stiffness = solution.platform
+        longest = max(t.offset_s + t.step_s * len(t.measured) for t in self.fitting)
+        slow = stiffness > 0.0 and 2.0 * np.pi * np.sqrt(inertia / stiffness) > longest
+        if "stiffness" not in found.best.structure.terms or not (stiffness <= 0.0 or slow):
+            return
+        values = {n: v for n, v in found.best.values().items() if n != ("stiffness",)}
+        found.best = judge(
+            self.fitting, self.judging, found.best.structure.minus("stiffness"), values, found.horizon
+        )
+        why = "it came out negative" if stiffness <= 0.0 else f"its period would be longer than the {longest:.3g} s record"
+        found.dropped.append(("stiffness", f"{why}, and the finished model predicts as well without it"))
+
+    def _worth_adding(self, now: Judged, name: str, new: Judged, floor: float) -> bool:
+        """Whether an effect lowers the held-out error clearly, by enough, and with parameters that stand out."""
+        share, lead = share_explained(now, new, floor), advantage(now, new)
+        # A few long shots cannot reach a high t value however well the effect explains them.
+        clear = lead > CLEARLY or (share > MOST and lead > 1.0)
+        return clear and share >= WORTH and delta_bic(now, new) < -10.0 and new.strength(name) > STRONG
+
+    def _simplest(
+        self, tried: Sequence[tuple[str, Judged]], found: Search, now: Judged
+    ) -> tuple[str, Judged]:
+        """The best candidate, or the one with the fewest parameters that does as well.
+
+        Far above the noise floor, where no candidate is the whole truth, a special case of the best one
+        does as well when it leaves at most twice the excess; and what comes first by marginality goes first.
+        """
+        name, best = tried[0]
         as_good = [t for t in tried if t[1] is best or self._status(best, t[1]) == "rival"]
-        return min(as_good, key=lambda t: (len(effects.get(t[0]).parameters), t[1].sigma))
+        excess = best.sigma**2 - found.floor**2
+        if best.sigma > 1.5 * found.floor:
+            nested = effects.get(name).nests
+            as_good += [
+                t for t in tried
+                if t[0] in nested and t not in as_good and t[1].sigma**2 - found.floor**2 < TWICE * excess
+            ]  # fmt: skip
+        name, best = min(as_good, key=lambda t: (len(effects.get(t[0]).parameters), t[1].sigma))
+        for other, judged in tried:
+            if other in effects.get(name).lower_order and self._worth_adding(now, other, judged, found.floor):
+                return other, judged
+        return name, best
 
     def _status(self, best: Judged, other: Judged) -> str:
         return "rival" if advantage(other, best) < CLEARLY and other.sigma < 1.05 * best.sigma else "no better"
@@ -150,9 +197,10 @@ class Loop:
     def _prune(self, found: Search, names: Sequence[str]) -> None:
         """Drop every term or effect that the model does as well without."""
         for name in names:
-            if name == "inertia":
-                continue
             now = found.best
+            kept_by = [e for e in now.structure.effects if name in effects.get(e).lower_order]
+            if name == "inertia" or kept_by:
+                continue
             if now.strength(name) > CERTAIN:
                 continue
             smaller = now.structure.minus(name)
@@ -166,6 +214,20 @@ class Loop:
             found.best = without
             found.rivals.pop(name, None)
             self.say(f"dropped {name}: {reason}")
+
+    def _restore(self, found: Search, declared: Structure) -> None:
+        """Take a declared term back that is missed now that the effects are there."""
+        for name in declared.terms:
+            if name in found.best.structure.terms:
+                continue
+            now = found.best
+            structure = replace(now.structure, terms=tuple(t for t in TERMS if t in (*now.structure.terms, name)))
+            with_it = judge(self.fitting, self.judging, structure, {**now.values(), (name,): 0.0}, found.horizon)
+            missed = share_explained(now, with_it, found.floor) > WORTH and advantage(now, with_it) > 1.0
+            if missed and with_it.strength(name) > STRONG:
+                found.best = with_it
+                found.dropped = [d for d in found.dropped if d[0] != name]
+                self.say(f"took {name} back: held-out error {now.sigma:.4g} -> {with_it.sigma:.4g}")
 
     def _missed(self, without: Judged, full: Judged, floor: float) -> bool:
         """Whether leaving a term out costs a clear part of the accuracy."""

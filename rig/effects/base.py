@@ -109,6 +109,7 @@ class Effect:
     fastest_rad_s: Callable[[tuple[float, ...]], float] | None = None  # of (J, C, K, *values): sets the step
     leans_on: tuple[str, ...] = ()  # terms of the platform that scale its torque (backlash: the stiffness)
     ordered: tuple[tuple[str, str], ...] = ()  # pairs of parameters of which the first is the smaller
+    lower_order: tuple[str, ...] = ()  # effects that come first by marginality: a constant before a slope
     nests: tuple[str, ...] = ()  # simpler effects that this one contains as a special case
     never_separable: Mapping[str, str] | None = None  # rival -> why no torque-to-rate data can tell
     separated_by: str = ""

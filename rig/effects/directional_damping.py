@@ -29,5 +29,6 @@ EFFECT = Effect(
         ),
     ),
     kernel=_torque,
+    lower_order=("torque_offset",),
     separated_by="from damping: motion in both directions at several speeds",
 )

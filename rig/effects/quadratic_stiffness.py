@@ -22,6 +22,7 @@ EFFECT = Effect(
         Parameter("factor", "N*m/rad^2", "torque per angle^2", linear=True, low=-float("inf"), suffix="nm_rad2"),
     ),
     kernel=_torque,
+    lower_order=("torque_offset",),
     never_separable={
         "unbalance": "sin and cos of a small angle are polynomials in it; only turning the base tells them apart"
     },
