@@ -153,6 +153,8 @@ def _output_covariance(estimate: Estimate, names: tuple[Name, ...]) -> tuple[Arr
     information, scores, series = np.zeros((p, p)), [], []
     count, rss = 0, 0.0
     for shots in estimate.shots:
+        if not np.any(shots.weight):
+            continue
         columns, residual = jacobian(shots, estimate)
         columns = columns[:, keep]
         information += columns.T @ columns
@@ -175,6 +177,8 @@ def _regression_covariance(
     information, scores, series, count, rss = np.zeros((p, p)), [], [], 0, 0.0
     for block, r in zip(blocks, residuals(blocks, solution.values), strict=True):
         mask = use[block.trace][block.rows]
+        if not np.any(mask):
+            continue
         columns, r = block.projected[mask][:, :p], r[mask]
         information += columns.T @ columns
         count += len(r)

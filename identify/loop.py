@@ -134,11 +134,22 @@ class _Identifier:
         return regressed
 
     def _after(self, search: Search) -> Fitted:
-        self.say(f"final fit with {', '.join(search.best.structure.effects) or 'fewer terms'}")
-        return by_output_error(
-            self.traces, search.best.structure, search.best.values(), search.horizon,
+        """Output error where the model runs free at the sensor's noise; else regression in torque units.
+
+        Far above the sensor's noise the rest is a torque that nothing here describes, and what it adds to a
+        prediction grows with the horizon; weighed as a torque it does the least harm to the parameters.
+        """
+        structure = search.best.structure
+        self.say(f"final fit with {', '.join(structure.effects) or 'fewer terms'}")
+        fitted = by_output_error(
+            self.traces, structure, search.best.values(), search.horizon,
             self.split.final, self.split.everything,
         )  # fmt: skip
+        if fitted.sensor_limited or self.torque_free:
+            return fitted
+        return by_regression(
+            self.traces, structure, search.best.shapes(), self.start, self.split.final, self.split.everything
+        )
 
     def _conclude(
         self, search: Search, before: Fitted, after: Fitted, measured_before: Measured, measured_after: Measured,

@@ -19,9 +19,11 @@ from identify.prefilter import Denominator
 from identify.regression import Regression, Structure, fit, normal
 from identify.results import UNITS, GeneticRun, ParameterEstimate, SetResult
 from identify.screen import Start
-from identify.traces import Trace, prepare
-from rig.config.identify import GeneticConfig, IdentifyConfig
+from identify.traces import UPSAMPLING, Trace
+from rig import effects
+from rig.config.identify import IdentifyConfig
 from rig.dynamics import TorqueSignal
+from rig.effects.base import Place
 from rig.platform import TERMS
 from rig.recording.run import Array
 
@@ -32,8 +34,10 @@ KEYS = {"inertia": "inertia_kg_m2", "damping": "damping_nm_s_rad", "stiffness": 
 
 def linear_traces(traces: Sequence[Trace], fitted: Fitted) -> list[Trace]:
     """The runs with the torque that is left for J a + C w + K th once the model's effects are taken off."""
-    if not fitted.structure.effects or fitted.free_run is None or not fitted.sensor_limited:
+    if not fitted.structure.effects:
         return list(traces)
+    if fitted.free_run is None or not fitted.sensor_limited:
+        return [_along_measured(t, fitted) for t in traces]
     out = []
     values = np.array([fitted.values[n] for n in fitted.free_run.names])
     for trace, shots in zip(traces, fitted.free_run.shots, strict=True):
@@ -55,6 +59,35 @@ def linear_traces(traces: Sequence[Trace], fitted: Fitted) -> list[Trace]:
     return out
 
 
+def _along_measured(trace: Trace, fitted: Fitted) -> Trace:
+    """A run less its effects' torque along the measured motion, as means over each upsampled step."""
+    n = (len(trace.measured) - 1) * UPSAMPLING
+    drive = []
+    extra = np.zeros(n + 1)
+    for name in fitted.structure.effects:
+        effect = effects.get(name)
+        given = [fitted.values.get((name, p.name), fitted.values.get((name, p.name, str(trace.number)), 0.0))
+                 for p in effect.parameters]  # fmt: skip
+        if effect.place is Place.DRIVE:
+            drive.append((name, tuple(given)))
+            continue
+        shape = tuple(v for v, p in zip(given, effect.parameters, strict=True) if not p.linear)
+        units = [(i, v) for i, (v, p) in enumerate(zip(given, effect.parameters, strict=True)) if p.linear]
+        units += [({"inertia": -3, "damping": -2, "stiffness": -1}[t], fitted.values[(t,)]) for t in effect.leans_on]
+        for unit, value in units:
+            pieces = trace.effect_pieces(effect, shape, unit)
+            if pieces is not None:
+                extra[:-1] += value * pieces[:, 0]
+                extra[-1] += value * pieces[-1, 0]
+    torque = trace.torque_pieces((("torque_delay", (0.0,)), *drive))
+    assert torque is not None
+    applied = np.append(torque[0][:, 0], torque[0][-1, 0])[: n + 1]
+    left = applied - extra
+    mean = np.append(0.5 * (left[1:] + left[:-1]), left[-1])
+    time = trace.start_s + trace.step_s / UPSAMPLING * np.arange(n + 1)
+    return replace(trace, torque=TorqueSignal(time, mean, "zero_order"), _series={})
+
+
 @dataclass(frozen=True)
 class Condensed:
     """One regression condensed to its normal equations, at its own filter."""
@@ -65,14 +98,16 @@ class Condensed:
     floor: float  # sum of squares that the sensor's noise makes
 
 
-def condense(traces: Sequence[Trace], terms: tuple[str, ...], start: Start, plain: bool = False) -> Condensed:
+def condense(
+    traces: Sequence[Trace], terms: tuple[str, ...], start: Start, rho: float, plain: bool = False
+) -> Condensed:
     """Normal equations of the linear model, prefiltered to white (or, ``plain``, as bare equation error)."""
     regression = Regression(traces, Structure(terms))
     if plain:
         w = 2.0 * np.pi * start.cutoff_hz  # a low-pass on both sides, as section 3 of the paper filters
         denominator = Denominator(1.0, 1.4 * w, w * w)
     else:
-        solution = fit(regression, {}, start.platform, 0.0, 8)
+        solution = fit(regression, {}, start.platform, rho, 8)
         denominator = solution.denominator
     equations = normal(regression.blocks(denominator, {}))
     kept = tuple(label[0] for label in regression.labels)
@@ -83,18 +118,18 @@ def condense(traces: Sequence[Trace], terms: tuple[str, ...], start: Start, plai
 
 def genetic(
     name: str, traces: Sequence[Trace], terms: tuple[str, ...], start: Start, centre: Mapping[str, float],
-    settings: IdentifyConfig, seed: int, beside: bool,
+    settings: IdentifyConfig, seed: int, rho: float, beside: bool,
 ) -> GeneticRun:  # fmt: skip
     """The paper's search on one set (or all), with the closed form beside it.
 
     ``centre`` are the values around which the range spans ``search_factor`` either way; ``beside`` also runs
     Eq. 13 alone and the plain equation error, to be reported next to it.
     """
-    condensed = condense(traces, terms, start)
+    condensed = condense(traces, terms, start, rho)
     goal = condensed.objective
     low, high = search_range(condensed.terms, goal.closed_form, centre, settings.genetic.search_factor)
     j_dec = settings.j_dec if settings.j_dec is not None else ALLOWANCE * condensed.floor
-    chosen = condense(traces, terms, start, plain=True).objective if settings.genetic.objective == "plain" else goal
+    chosen = condense(traces, terms, start, rho, plain=True).objective if settings.genetic.objective == "plain" else goal
     outcome = search(chosen, low, high, settings.genetic, np.random.default_rng(seed), j_dec)
 
     def named(x: Array) -> dict[str, float]:
@@ -106,7 +141,7 @@ def genetic(
         bare = settings.genetic.model_copy(update={"elitism": False, "shrinking_mutation": False, "restarts": 0})
         roulette = named(search(chosen, low, high, bare, np.random.default_rng(seed)).best)
         once = settings.genetic.model_copy(update={"restarts": 0})
-        other = condense(traces, terms, start, plain=True).objective
+        other = condense(traces, terms, start, rho, plain=True).objective
         plain = named(search(other, low, high, once, np.random.default_rng(seed)).best)
     return GeneticRun(
         name, named(outcome.best), named(chosen.closed_form), named(chosen.gap_percent(outcome.best)),
@@ -139,24 +174,19 @@ def each_set(
     linear = linear_traces(traces, fitted)
     terms = fitted.structure.terms
     begin = replace(start, platform=tuple(fitted.values.get((t,), 0.0) for t in TERMS))
-    whole = prepare_linear(linear, fitted)
+    whole = [replace(t, number=i) for i, t in enumerate(linear)]
+    rho = 0.0 if fitted.sensor_limited else start.rho
     results = []
     for i, trace in enumerate(whole):
-        run = genetic(trace.run.name, [trace], terms, begin, centre, settings, settings.seed + i, False)
-        results.append(_result(trace, run, terms, begin, axis))
-    joint = genetic("all sets", whole, terms, begin, centre, settings, settings.seed, True)
+        run = genetic(trace.run.name, [trace], terms, begin, centre, settings, settings.seed + i, rho, False)
+        results.append(_result(trace, run, terms, begin, rho, axis))
+    joint = genetic("all sets", whole, terms, begin, centre, settings, settings.seed, rho, True)
     return tuple(results), joint
 
 
-def prepare_linear(traces: Sequence[Trace], fitted: Fitted) -> list[Trace]:
-    """Runs with at least one usable stretch, numbered anew."""
-    del fitted
-    return [replace(t, number=i) for i, t in enumerate(x for x in traces if x.stretches)]
-
-
-def _result(trace: Trace, run: GeneticRun, terms: tuple[str, ...], start: Start, axis: str) -> SetResult:
+def _result(trace: Trace, run: GeneticRun, terms: tuple[str, ...], start: Start, rho: float, axis: str) -> SetResult:
     regression = Regression([trace], Structure(terms))
-    solution = fit(regression, {}, start.platform, 0.0, 8)
+    solution = fit(regression, {}, start.platform, rho, 8)
     mask = [trace.keep]
     covariance, determined = _regression_covariance([trace], solution, mask)
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -179,6 +209,3 @@ def _result(trace: Trace, run: GeneticRun, terms: tuple[str, ...], start: Start,
         trace.run.name, trace.run.frequency_hz, parameters, run.objective, run.restarts, run.accepted,
         tuple(identifiable), advice, run,
     )  # fmt: skip
-
-
-__all__ = ["GeneticConfig", "condense", "each_set", "genetic", "linear_traces", "prepare"]

@@ -21,7 +21,7 @@ from rig.recording.run import Array
 
 RHO_STEPS = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)  # of the largest rho that the sensor's noise allows
 SCREEN_STEPS = (0.03, 0.3, 1.0)
-NOISE_SHARE = 0.003  # of the torque: where the torque residual's noise reaches it, the low-pass cuts off
+NOISE_SHARE = 0.001  # of the torque: where noise in the torque residual reaches it, the low-pass cuts off
 SHAPE_EVALUATIONS = 24
 BEYOND = 4.0  # times the outermost starting values: how far a shape may wander
 NEAR = 0.8  # of the best gain: a simpler candidate that reaches it is always tried
