@@ -26,7 +26,7 @@ EFFECT = Effect(
     family="sensor",
     place=Place.SENSOR,
     equation="time * d(rate)/dt + rate = rate before the lag",
-    source="first-order low-pass; electric time constant L_a / R_m of Fig. 2-3",
+    source="first-order low-pass; its -3 dB frequency in a data sheet is 1 / (2 pi time)",
     meaning="The bandwidth of the gyro or of its output filter.",
     sign="A time constant, never negative.",
     parameters=(
