@@ -109,12 +109,13 @@ def judge(
     horizon: float,
     iterations: int = 8,
     hopeless: float = np.inf,
+    rough_start: bool = True,
 ) -> Judged:
     """Fit on some pieces, then measure on others with nothing but start states fitted there."""
     torque_free = all(t.torque is None for t in fitting)
     fixed = [("inertia",)] if torque_free else []
     first = start
-    if rough(structure):  # a short horizon has fewer false minima
+    if rough_start and rough(structure):  # a short horizon has fewer false minima
         near = refine(fitting, structure, start, 0.25 * horizon, 5, fixed=fixed, tolerance=1e-3, coarse=True)
         first = dict(zip(near.names, near.values.tolist(), strict=True)) if np.isfinite(near.sigma) else start
     estimate = refine(
@@ -142,7 +143,7 @@ def advantage(old: Judged, new: Judged) -> float:
         return 0.0
     # A few shots with a huge gain must not make a gain everywhere look uncertain: ratios count too.
     ratio = np.log(np.maximum(old.losses, 1e-300) / np.maximum(new.losses, 1e-300))
-    by_ratio = float(np.mean(ratio) / max(np.std(ratio, ddof=1), 1e-12) * np.sqrt(len(d)))
+    by_ratio = float(np.mean(ratio) / max(float(np.std(ratio, ddof=1)), 1e-12) * np.sqrt(len(d)))
     by_size = float(np.mean(d) / spread * np.sqrt(len(d)))
     return max(by_size, by_ratio) if np.sum(d) > 0.0 else min(by_size, 0.0)
 

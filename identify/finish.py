@@ -89,13 +89,13 @@ def by_output_error(
     torque_free = all(t.torque is None for t in traces)
     fixed = [("inertia",)] if torque_free else []
     noise = noise_of_all(traces)
-    estimate = refine(traces, structure, start, horizon, 12, use, fixed=fixed)
-    best = estimate
-    for longer in (4.0 * horizon, None):
+    best = refine(traces, structure, start, None, 12, use, fixed=fixed)
+    straight = best.sigma <= NEAR_FLOOR * noise  # the search came close enough: no ladder of horizons needed
+    if not straight:
+        best = refine(traces, structure, start, horizon, 12, use, fixed=fixed)
+    for longer in () if straight else (4.0 * horizon, None):
         values = dict(zip(best.names, best.values.tolist(), strict=True))
         trial = refine(traces, structure, values, longer, 12, use, fixed=fixed)
-        if not np.isfinite(trial.sigma) or (longer is not None and trial.sigma > NEAR_FLOOR * noise):
-            continue
         if trial.sigma <= NEAR_FLOOR * noise:
             best = trial
     values = dict(zip(best.names, best.values.tolist(), strict=True))
@@ -138,8 +138,10 @@ def _sandwich(information: Array, scores: Array, sigma: float, count: int, white
 def is_white(series: Sequence[Array]) -> bool:
     """Whether the first autocorrelations of a residual are no larger than chance makes them."""
     num, den, count = np.zeros(8), 0.0, 0
-    for r in series:
-        r = r - np.mean(r)
+    for values in series:
+        if len(values) < 9:
+            continue
+        r = values - np.mean(values)
         num += np.array([float(r[k:] @ r[:-k]) for k in range(1, 9)])
         den += float(r @ r)
         count += len(r)
@@ -175,11 +177,11 @@ def _regression_covariance(
     blocks = regression.blocks(solution.denominator, solution.shapes)
     p = len(solution.labels)
     information, scores, series, count, rss = np.zeros((p, p)), [], [], 0, 0.0
-    for block, r in zip(blocks, residuals(blocks, solution.values), strict=True):
+    for block, whole in zip(blocks, residuals(blocks, solution.values), strict=True):
         mask = use[block.trace][block.rows]
         if not np.any(mask):
             continue
-        columns, r = block.projected[mask][:, :p], r[mask]
+        columns, r = block.projected[mask][:, :p], whole[mask]
         information += columns.T @ columns
         count += len(r)
         rss += float(r @ r)

@@ -76,7 +76,8 @@ def search(
     low, high = np.atleast_1d(np.asarray(low, dtype=float)), np.atleast_1d(np.asarray(high, dtype=float))
     if low.ndim != 1 or low.shape != high.shape or not np.all(np.isfinite(low) & np.isfinite(high) & (low <= high)):
         raise ValueError(f"search range from {low.tolist()} to {high.tolist()}: give finite bounds, low <= high")
-    best, best_value = 0.5 * (low + high), np.inf
+    best: Array = 0.5 * (low + high)
+    best_value = np.inf
     for repeat in range(settings.restarts + 1):
         found, value, history = _evolve(objective, low, high, settings, rng)
         if repeat == 0 or value < best_value:
@@ -94,7 +95,7 @@ def _evolve(
 ) -> tuple[Array, float, Array]:
     """The best of the last generation, its objective, and the best objective of each generation (generations,)."""
     size, span = settings.population, high - low
-    people = low + span * rng.random((size, len(low)))
+    people: Array = low + span * rng.random((size, len(low)))
     values = _valued(objective, people)
     history = np.empty(settings.generations)
     for generation in range(settings.generations):

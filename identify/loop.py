@@ -107,12 +107,8 @@ class _Identifier:
             "damping": self.declared.damping_nm_s_rad,
             "stiffness": self.declared.stiffness_nm_rad,
         }
-        per_set, joint = persets.each_set(
-            self.traces, after, self.start, centre, self.settings, self.recording.axis
-        )
-        return self._conclude(
-            search, before, after, measured_before, measured_after, floor, per_set, joint, changed
-        )
+        per_set, joint = persets.each_set(self.traces, after, self.start, centre, self.settings, self.recording.axis)
+        return self._conclude(search, before, after, measured_before, measured_after, floor, per_set, joint, changed)
 
     def _search(self, shapes: Mapping[str, tuple[float, ...]]) -> Search:
         horizon = horizon_s(self.start.platform, self.traces)
@@ -178,7 +174,8 @@ class _Identifier:
             )
         if joint is not None and after.sensor_limited and not joint.accepted:
             reasons.append(
-                f"the objective {joint.objective:.4g} stays above J_dec {joint.j_dec:.4g} after {joint.restarts} repeats"
+                f"the objective {joint.objective:.4g} stays above J_dec {joint.j_dec:.4g} "
+                f"after {joint.restarts} repeats"
             )
         reasons += [f"{x.name} is not determined: {x.reason}" for x in final.not_determined]
         reference, per_set = self._against_reference(per_set)
@@ -196,7 +193,11 @@ class _Identifier:
         if after.free_run is not None and after.sensor_limited:
             return after.sigma / noise
         free = after.free_run.sigma / noise if after.free_run is not None else np.inf
-        return float(min(free, search.best.sigma / search.floor)) if np.isfinite(free) else search.best.sigma / search.floor
+        return (
+            float(min(free, search.best.sigma / search.floor))
+            if np.isfinite(free)
+            else search.best.sigma / search.floor
+        )
 
     def _model(self, fitted: Fitted, measured: Measured, dropped: tuple[NotReported, ...]) -> ModelResult:
         units = UNITS[self.recording.axis]
@@ -212,7 +213,7 @@ class _Identifier:
                 label, unit = ".".join(name), parameter.unit + (per if parameter.linear else "")
             elif self.torque_free:
                 label, unit = TORQUE_FREE[name[0]]
-            if not fitted.determined[i] or not np.isfinite(error) or error > 0.5 * abs(value) and len(name) == 1:
+            if not fitted.determined[i] or not np.isfinite(error) or (error > 0.5 * abs(value) and len(name) == 1):
                 if len(name) > 1 and fitted.determined[i]:
                     pass
                 else:
@@ -316,4 +317,3 @@ def _fraction(before: Measured, after: Measured, floor: NoiseFloor) -> float:
         return 0.0
     excess = b * b - f * f
     return float(np.clip((a * a - f * f) / excess, 0.0, 1.0)) if excess > 0.01 * f * f else 0.0
-

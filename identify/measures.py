@@ -59,12 +59,12 @@ def _free_run(traces: Sequence[Trace], split: Split, simulated: Sequence[Array])
     e, s = np.concatenate(error), np.concatenate(signal)
     if len(e) == 0 or not np.all(np.isfinite(e)):
         return None, None
-    return float(np.sqrt(np.mean(e**2))), float(100.0 * (1.0 - np.linalg.norm(e) / max(np.linalg.norm(s), 1e-300)))
+    return float(np.sqrt(np.mean(e**2))), float(
+        100.0 * (1.0 - np.linalg.norm(e) / max(float(np.linalg.norm(s)), 1e-300))
+    )
 
 
-def floor_of(
-    traces: Sequence[Trace], split: Split, fitted: Fitted, cutoff_hz: float, given: bool
-) -> NoiseFloor:
+def floor_of(traces: Sequence[Trace], split: Split, fitted: Fitted, cutoff_hz: float, given: bool) -> NoiseFloor:
     """What the sensor's noise alone leaves."""
     masks = split.everything
     torque = torque_noise_floor(traces, fitted.values, cutoff_hz, masks)

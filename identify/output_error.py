@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
+import numba as nb
 import numpy as np
 
 from identify.regression import Structure
@@ -61,9 +62,7 @@ def platform_of(
             terms[name[0]] = float(value)
         elif len(name) == 2 or int(name[2]) == run:
             held[name[0]][name[1]] = float(value)
-    return Platform(
-        terms["inertia"] + added, terms["damping"], terms["stiffness"], held, structure.terms
-    )
+    return Platform(terms["inertia"] + added, terms["damping"], terms["stiffness"], held, structure.terms)
 
 
 @lru_cache(maxsize=128)
@@ -238,7 +237,7 @@ def _sensitivities(
         if fixed[i] or (len(names[i]) == 3 and int(names[i][2]) != s.number):
             continue
         h = STEP * scale[i]
-        low, high = bounds_of(names[i])
+        _low, high = bounds_of(names[i])
         h = -h if x[i] + h > high else h
         moved = x.copy()
         moved[i] += h
@@ -252,9 +251,52 @@ def _sensitivities(
     return columns, state, residual
 
 
-def _eliminate(
-    s: Shots, columns: Array, state: Array, residual: Array, rate: bool, outlier: float
-) -> _Normal:
+@nb.njit(cache=True, error_model="numpy", nogil=True)
+def _schur(wide, state, residual, used, edges, trust):  # type: ignore[no-untyped-def]
+    """Normal equations with every shot's two start states eliminated, and what leads back to them."""
+    q, shots = wide.shape[1], len(edges)
+    a, b = np.zeros((q, q)), np.zeros(q)
+    inverse, zw, zr = np.zeros((shots, 2, 2)), np.zeros((shots, 2, q)), np.zeros((shots, 2))
+    ww, wr = np.zeros((q, q)), np.zeros(q)
+    for s in range(shots):
+        ww[:], wr[:] = 0.0, 0.0
+        z00, z01, z11 = 0.0, 0.0, 0.0
+        for i in range(edges[s, 0], edges[s, 1]):
+            if not used[i]:
+                continue
+            r, u, v = residual[i], state[i, 0], state[i, 1]
+            z00 += u * u
+            z01 += u * v
+            z11 += v * v
+            zr[s, 0] += u * r
+            zr[s, 1] += v * r
+            for j in range(q):
+                x = wide[i, j]
+                zw[s, 0, j] += u * x
+                zw[s, 1, j] += v * x
+                wr[j] += x * r
+                for k in range(j + 1):
+                    ww[j, k] += x * wide[i, k]
+        det = z00 * z11 - z01 * z01
+        if det > 1e-12 * z00 * z11:
+            inverse[s, 0, 0], inverse[s, 1, 1] = z11 / det, z00 / det
+            inverse[s, 0, 1] = inverse[s, 1, 0] = -z01 / det
+        else:  # only one of them shows
+            inverse[s, 0, 0] = 1.0 / z00 if z00 >= z11 and z00 > 0.0 else 0.0
+            inverse[s, 1, 1] = 1.0 / z11 if z11 > z00 else 0.0
+        for j in range(q):
+            ij0 = inverse[s, 0, 0] * zw[s, 0, j] + inverse[s, 0, 1] * zw[s, 1, j]
+            ij1 = inverse[s, 1, 0] * zw[s, 0, j] + inverse[s, 1, 1] * zw[s, 1, j]
+            b[j] += trust[s] * (wr[j] - ij0 * zr[s, 0] - ij1 * zr[s, 1])
+            for k in range(j + 1):
+                a[j, k] += trust[s] * (ww[j, k] - ij0 * zw[s, 0, k] - ij1 * zw[s, 1, k])
+    for j in range(q):
+        for k in range(j):
+            a[k, j] = a[j, k]
+    return a, b, inverse, zw, zr
+
+
+def _eliminate(s: Shots, columns: Array, state: Array, residual: Array, rate: bool, outlier: float) -> _Normal:
     """Normal equations of one run; shots whose error is far beyond ``outlier`` (root mean square) count less."""
     p = columns.shape[1]
     used, counts = s.weight, s.counts
@@ -264,20 +306,9 @@ def _eliminate(
         return _Normal(
             np.zeros((p, p)), np.zeros(p), np.full(len(counts), np.inf), counts, lambda dx: (0.0 * s.starts, 0.0)
         )
-    wide = np.column_stack([columns, np.ones(len(residual))]) if rate else columns
-    a, b = np.zeros((wide.shape[1],) * 2), np.zeros(wide.shape[1])
-    kept = []
-    for (begin, end), loss, count in zip(s.edges, losses, counts, strict=True):
-        mask = s.weight[begin:end]
-        w, z, r = wide[begin:end][mask], state[begin:end][mask], residual[begin:end][mask]
-        zz = z.T @ z
-        scale = np.sqrt(np.maximum(np.diag(zz), 1e-300))
-        inverse = np.linalg.pinv(zz / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
-        zw, zr = z.T @ w, z.T @ r
-        trust = 1.0 / (1.0 + loss / max(count, 1) / outlier**2)
-        a += trust * (w.T @ w - zw.T @ inverse @ zw)
-        b += trust * (w.T @ r - zw.T @ inverse @ zr)
-        kept.append((inverse, zw, zr))
+    wide = np.column_stack([columns, np.ones(len(residual))]) if rate else np.ascontiguousarray(columns)
+    trust = 1.0 / (1.0 + losses / np.maximum(counts, 1.0) / outlier**2)
+    a, b, inverse, zw, zr = _schur(wide, state, residual, used, np.array(s.edges), trust)
     right, column, pivot = 0.0, np.zeros(p), 1.0
     if rate:
         pivot = max(a[p, p], 1e-300)
@@ -287,7 +318,7 @@ def _eliminate(
     def back(dx: Array) -> tuple[Array, float]:
         bias = float((right - column @ dx) / pivot) if rate else 0.0
         full = np.append(dx, bias) if rate else dx
-        return np.array([inv @ (zr - zw @ full) for inv, zw, zr in kept]), bias
+        return np.einsum("sij,sj->si", inverse, zr - zw @ full), bias
 
     return _Normal(a, b, losses, counts, back)
 
@@ -477,9 +508,7 @@ def evaluate(
     rss = sum(float(np.sum(losses)) for _, losses in settled)
     count = sum(int(np.sum(s.weight)) for s, _ in settled)
     sigma = float(np.sqrt(rss / max(count, 1)))
-    return Estimate(
-        structure, names, x, sigma, count, np.zeros((len(x),) * 2), tuple(s for s, _ in settled), True
-    )
+    return Estimate(structure, names, x, sigma, count, np.zeros((len(x),) * 2), tuple(s for s, _ in settled), True)
 
 
 def _losses(s: Shots, residual: Array) -> Array:
@@ -501,9 +530,9 @@ def _settle(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> 
         trial = _moved(s, (step * share[:, None], bias))
         new = _losses(trial, trial.trace.measured - predict(trial, equations, trial.starts, trial.bias))
         worse = ~(new <= losses)
-        if np.all(worse) or np.sum(np.where(worse, losses, new)) > np.sum(losses) * (1.0 - 1e-4):
-            if np.min(share) < 0.2 or not np.any(worse):
-                break
+        stuck = bool(np.all(worse)) or np.sum(np.where(worse, losses, new)) > np.sum(losses) * (1.0 - 1e-4)
+        if stuck and (np.min(share) < 0.2 or not np.any(worse)):
+            break
         share = np.where(worse, 0.3 * share, np.minimum(1.0, 2.0 * share))
         trial.starts[worse] = s.starts[worse]
         kept = _losses(trial, trial.trace.measured - predict(trial, equations, trial.starts, trial.bias))

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identify.effect_free import effect_free
 from identify.finish import Fitted, _regression_covariance
 from identify.genetic import QuadraticObjective, search
-from identify.output_error import equations_of
 from identify.prefilter import Denominator
 from identify.regression import Regression, Structure, fit, normal
 from identify.results import UNITS, GeneticRun, ParameterEstimate, SetResult
@@ -38,25 +38,7 @@ def linear_traces(traces: Sequence[Trace], fitted: Fitted) -> list[Trace]:
         return list(traces)
     if fitted.free_run is None or not fitted.sensor_limited:
         return [_along_measured(t, fitted) for t in traces]
-    out = []
-    values = np.array([fitted.values[n] for n in fitted.free_run.names])
-    for trace, shots in zip(traces, fitted.free_run.shots, strict=True):
-        equations = equations_of(fitted.structure, fitted.free_run.names, values, shots.number, shots.added)
-        grid = shots.grid
-        ratio = round(trace.step_s / grid.step_s)
-        ends = [*shots.first[1:].tolist(), len(trace.measured) - 1]
-        spans = [(a * ratio, b * ratio) for a, b in zip(shots.first.tolist(), ends, strict=True)]
-        fine = equations.integrate_shots(grid.shaft_torque(equations), grid.step_s, spans, shots.starts)
-        j, c, k = equations.jck
-        # Its mean over each fine step, exact also where dry friction makes the acceleration jump.
-        h = grid.step_s
-        turned, gained = np.diff(fine[:, 0]), np.diff(fine[:, 1])
-        angle = 0.5 * (fine[1:, 0] + fine[:-1, 0]) - h * gained / 12.0
-        mean = (j * gained + c * turned) / h + k * angle
-        mean = np.append(mean, mean[-1])
-        time = trace.start_s + h * np.arange(len(mean))
-        out.append(replace(trace, torque=TorqueSignal(time, mean, "zero_order"), _series={}))
-    return out
+    return [effect_free(t, s, fitted.free_run) for t, s in zip(traces, fitted.free_run.shots, strict=True)]
 
 
 def _along_measured(trace: Trace, fitted: Fitted) -> Trace:
@@ -129,7 +111,9 @@ def genetic(
     goal = condensed.objective
     low, high = search_range(condensed.terms, goal.closed_form, centre, settings.genetic.search_factor)
     j_dec = settings.j_dec if settings.j_dec is not None else ALLOWANCE * condensed.floor
-    chosen = condense(traces, terms, start, rho, plain=True).objective if settings.genetic.objective == "plain" else goal
+    chosen = (
+        condense(traces, terms, start, rho, plain=True).objective if settings.genetic.objective == "plain" else goal
+    )
     outcome = search(chosen, low, high, settings.genetic, np.random.default_rng(seed), j_dec)
 
     def named(x: Array) -> dict[str, float]:
@@ -164,6 +148,11 @@ def search_range(
     return np.array(low), np.array(high)
 
 
+def _platform(fitted: Fitted) -> tuple[float, float, float]:
+    inertia, damping, stiffness = (fitted.values.get((t,), 0.0) for t in TERMS)
+    return inertia, damping, stiffness
+
+
 def each_set(
     traces: Sequence[Trace], fitted: Fitted, start: Start, centre: Mapping[str, float],
     settings: IdentifyConfig, axis: str,
@@ -173,7 +162,7 @@ def each_set(
         return (), None
     linear = linear_traces(traces, fitted)
     terms = fitted.structure.terms
-    begin = replace(start, platform=tuple(fitted.values.get((t,), 0.0) for t in TERMS))
+    begin = replace(start, platform=_platform(fitted))
     whole = [replace(t, number=i) for i, t in enumerate(linear)]
     rho = 0.0 if fitted.sensor_limited else start.rho
     results = []

@@ -98,9 +98,7 @@ class Regression:
     Where no torque was measured (``torque_free``), inertia is fixed at one and all else is per inertia.
     """
 
-    def __init__(
-        self, traces: Sequence[Trace], structure: Structure, cache: dict[Any, Any] | None = None
-    ) -> None:
+    def __init__(self, traces: Sequence[Trace], structure: Structure, cache: dict[Any, Any] | None = None) -> None:
         self.cache = cache
         self.traces = traces
         self.structure = structure
@@ -119,9 +117,7 @@ class Regression:
                 out.append(self._block(pre, i, trace, stretch, shapes))
         return out
 
-    def _block(
-        self, pre: Prefilter, number: int, trace: Trace, stretch: tuple[int, int], shapes: Shapes
-    ) -> Block:
+    def _block(self, pre: Prefilter, number: int, trace: Trace, stretch: tuple[int, int], shapes: Shapes) -> Block:
         first, last = stretch
         rate = trace.channel == "rate"
         out = 1 if rate else 0  # which response carries a torque into the units of the measured channel
@@ -185,7 +181,7 @@ class Regression:
             for i, parameter in enumerate(effect.parameters):
                 if not parameter.linear:
                     continue
-                column = kept((name, shape, i), lambda i=i: response(effect, shape, i))
+                column = kept((name, shape, i), lambda effect=effect, shape=shape, i=i: response(effect, shape, i))
                 if parameter.per_run:
                     for r in range(self.runs):
                         columns[(name, parameter.name, str(r))] = column if r == trace.number else np.zeros(m)
@@ -240,7 +236,7 @@ class Normal:
 
     def rss(self, x: Array) -> float:
         """Sum of squares that a parameter vector leaves."""
-        return float(max(self.c - 2.0 * (self.b @ x) + x @ self.a @ x, 0.0))
+        return max(float(self.c - 2.0 * (self.b @ x) + x @ self.a @ x), 0.0)
 
 
 def normal(blocks: Sequence[Block], use: Sequence[Any] | None = None) -> Normal:
@@ -268,7 +264,7 @@ def normal(blocks: Sequence[Block], use: Sequence[Any] | None = None) -> Normal:
 
 def residuals(blocks: Sequence[Block], x: Array) -> list[Array]:
     """Prefiltered residual of every block, start states and biases fitted, each of shape (m,)."""
-    out = []
+    out: list[Array] = []
     for block in blocks:
         r = block.projected[:, -1] - block.projected[:, : len(x)] @ x
         if block.biased:

@@ -83,9 +83,9 @@ def torque_residual(
             unit = {"inertia": -3, "damping": -2, "stiffness": -1}[term]
             pieces = trace.effect_pieces(effect, shape, unit)
             extra += values.get((term,), 0.0) * _at_samples(pieces, len(angle))
-    pieces = trace.torque_pieces(tuple(drive))
-    assert pieces is not None
-    applied = _at_samples(pieces[0], len(angle), pieces[1])
+    asked = trace.torque_pieces(tuple(drive))
+    assert asked is not None
+    applied = _at_samples(asked[0], len(angle), asked[1])
     torque = low_pass(applied, cutoff_hz, trace.step_s)
     residual = torque - model - low_pass(extra, cutoff_hz, trace.step_s)
     if trace.biased:
@@ -115,7 +115,9 @@ def relative(parts: Sequence[TorqueResidual | None], masks: Sequence[Any]) -> tu
         return None
     residual = np.concatenate([r for r, _ in pairs])
     torque = np.concatenate([t for _, t in pairs])
-    return float(np.sqrt(np.mean(residual**2))), float(np.linalg.norm(residual) / max(np.linalg.norm(torque), 1e-300))
+    return float(np.sqrt(np.mean(residual**2))), float(
+        np.linalg.norm(residual) / max(float(np.linalg.norm(torque)), 1e-300)
+    )
 
 
 def torque_noise_floor(

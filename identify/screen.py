@@ -45,7 +45,7 @@ def first_guess(traces: Sequence[Trace], structure: Structure) -> Start:
     trace = traces[0]
     rate = trace.channel == "rate"
     highest = 0.1 / trace.step_s
-    moving = max(2.0, min(highest, min(t.cutoff_hz for t in traces)))
+    moving = max(2.0, min(highest, *(t.cutoff_hz for t in traces)))
     w = 2.0 * np.pi * moving
     regression = Regression(traces, structure)
     blocks = regression.blocks(Denominator(1.0, 1.4 * w, w * w), {})
@@ -70,7 +70,7 @@ def first_guess(traces: Sequence[Trace], structure: Structure) -> Start:
 def _torque_size(traces: Sequence[Trace], inertia: float) -> float:
     squares = []
     for t in traces:
-        angle, rate, time, torque, _ = t.fine
+        _angle, rate, time, torque, _ = t.fine
         x = torque if t.torque is not None else inertia * np.gradient(rate, time)
         squares.append(float(np.mean(x**2)))
     return float(np.sqrt(np.mean(squares)))
@@ -97,7 +97,7 @@ def scale_of(traces: Sequence[Trace], platform: tuple[float, float, float], line
     return Scale(
         angle_rad=max(float(np.max(np.abs(f[0]))) for f in fine),
         rate_rad_s=max(float(np.max(np.abs(f[1]))) for f in fine),
-        torque_nm=max(max(float(np.max(np.abs(f[3]))) for f in fine), 1e-12),
+        torque_nm=max(*(float(np.max(np.abs(f[3]))) for f in fine), 1e-12),
         duration_s=max(t.step_s * len(t.measured) for t in traces),
         step_s=traces[0].step_s,
         natural_frequency_hz=float(np.sqrt(max(k, 1e-12) / max(j, 1e-12)) / (2.0 * np.pi)),
@@ -126,9 +126,9 @@ def allowed(values: Mapping[Label, float], name: str) -> bool:
     """Whether an effect's gains lie within their bounds (friction that pushes is no friction)."""
     effect = effects.get(name)
     for parameter in effect.parameters:
-        if parameter.linear and not parameter.per_run:
-            if not parameter.low <= values.get((name, parameter.name), 0.0) <= parameter.high:
-                return False
+        value = values.get((name, parameter.name), 0.0)
+        if parameter.linear and not parameter.per_run and not parameter.low <= value <= parameter.high:
+            return False
     return all(values.get((name, a), 0.0) <= values.get((name, b), 0.0) for a, b in effect.ordered)
 
 
@@ -220,7 +220,7 @@ class Screen:
         picked: dict[str, Screened] = {}
         for rank in range(most):
             for k in range(len(self.rhos)):
-                order = sorted((s for s in looks if s.gains[k] > 10.0), key=lambda s, k=k: -s.gains[k])
+                order = sorted((s for s in looks if s.gains[k] > 10.0), key=lambda s: -s.gains[k])  # noqa: B023
                 if rank == 0 and order:
                     near = [s for s in order if s.gains[k] > NEAR * order[0].gains[k]]
                     simple = min(near, key=lambda s: len(effects.get(s.effect).parameters))

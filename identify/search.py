@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from identify.compare import CLEARLY, Judged, advantage, delta_bic, horizon_s, judge, share_explained, start_values
+from identify.effect_free import effect_free
 from identify.regression import Shapes, Solution, Structure
 from identify.results import Candidate
 from identify.screen import Screen, Screened, Start, best_rho
@@ -20,6 +21,8 @@ MOST_EFFECTS = 6
 SHORTLIST = 4
 WORTH = 0.2  # share of the excess error that an effect has to take away
 MISSED = 0.1  # share of the squared error by which nobody doubts that a term is needed
+HOPELESS = 2.5  # times the best fit of the round: a candidate still above it after three steps is given up
+NEAR = 1.5  # times the noise floor: from here on the screen looks behind the model's effects
 MOST = 0.4  # share of the excess error beyond which one standard error is lead enough
 TWICE = 2.0
 STRONG = 4.0  # standard errors by which every parameter of a new effect must differ from zero
@@ -86,7 +89,7 @@ class Loop:
     def _round(self, found: Search, round_: int) -> bool:
         """One more effect, if one is worth it."""
         now = found.best
-        screen = Screen(self.fitting, now.structure, now.shapes(), self.start, self._lines(now))
+        screen = self._screen(found, now)
         names = [n for n in self.allowed if n not in now.structure.effects and self._possible(n)]
         looks = screen.all(names)
         tried: list[tuple[str, Judged]] = []
@@ -96,7 +99,7 @@ class Loop:
         short += [s for s in looks if s.effect in always and s.gain > 10.0 and s not in short]
         for look in short:
             best_yet = min((j.estimate.sigma for _, j in tried), default=now.estimate.sigma)
-            result = self._try(found, screen, look, 4.0 * best_yet)
+            result = self._try(found, screen, look, HOPELESS * best_yet)
             tried += [result] if result else []
         tried.sort(key=lambda t: t[1].sigma)
         if not tried:
@@ -105,9 +108,7 @@ class Loop:
         added = self._worth_adding(now, name, best, found.floor)
         for other, judged in tried:
             status = ("added" if added else "not worth it") if other == name else self._status(best, judged)
-            found.candidates.append(
-                Candidate(other, round_, delta_bic(now, judged), judged.sigma, status)
-            )
+            found.candidates.append(Candidate(other, round_, delta_bic(now, judged), judged.sigma, status))
         shown = {n for n, _ in tried}
         for look in looks:
             if look.effect not in shown:
@@ -117,18 +118,35 @@ class Loop:
         self.say(f"added {name}: held-out error {now.sigma:.3g} -> {best.sigma:.3g}")
         close = tuple(o for o, j in tried if o != name and self._status(best, j) == "rival")
         found.rivals[name] = close
+        if not best.estimate.converged:
+            again = judge(self.fitting, self.judging, best.structure, best.values(), found.horizon, rough_start=False)
+            best = again if again.estimate.sigma <= best.estimate.sigma else best
         found.best = best
         return True
 
-    def _try(
-        self, found: Search, screen: Screen, look: Screened, hopeless: float
-    ) -> tuple[str, Judged] | None:
+    def _screen(self, found: Search, now: Judged) -> Screen:
+        """Candidates are screened on the residual of the model as it stands.
+
+        Near the noise floor its effects are taken off the torque along its own motion: the regression is
+        then as good as the model, and what no candidate can gain there need not be simulated.
+        """
+        if now.structure.effects and now.sigma < NEAR * found.floor:
+            bare = [
+                effect_free(t, s, now.estimate)
+                for t, s, r in zip(self.fitting, now.estimate.shots, now.estimate.residuals(), strict=True)
+                if float(np.sqrt(np.mean(r[s.weight] ** 2))) < 2.0 * NEAR * found.floor  # no shot went astray
+            ]
+            if bare:
+                return Screen(bare, Structure(now.structure.terms), {}, self.start, self._lines(now))
+        return Screen(self.fitting, now.structure, now.shapes(), self.start, self._lines(now))
+
+    def _try(self, found: Search, screen: Screen, look: Screened, hopeless: float) -> tuple[str, Judged] | None:
         structure = found.best.structure.plus(look.effect)
-        start = start_values(screen.solution(look), look.shapes, self.runs)
+        start = {**found.best.values(), **start_values(screen.solution(look), look.shapes, self.runs)}
         judged = judge(self.fitting, self.judging, structure, start, found.horizon, hopeless=hopeless)
         if judged.estimate.sigma > found.best.estimate.sigma:  # nested: a worse fit is a lost search
             values = found.best.values()
-            again = {n: values.get(n, v if n[-1] not in look.shapes else v) for n, v in start.items()}
+            again = {n: values.get(n, v) for n, v in start.items()}
             other = judge(self.fitting, self.judging, structure, again, found.horizon, hopeless=hopeless)
             judged = min((judged, other), key=lambda j: j.sigma)
         return (look.effect, judged) if np.isfinite(judged.sigma) else None
@@ -145,10 +163,12 @@ class Loop:
         if "stiffness" not in found.best.structure.terms or not (stiffness <= 0.0 or slow):
             return
         values = {n: v for n, v in found.best.values().items() if n != ("stiffness",)}
-        found.best = judge(
-            self.fitting, self.judging, found.best.structure.minus("stiffness"), values, found.horizon
+        found.best = judge(self.fitting, self.judging, found.best.structure.minus("stiffness"), values, found.horizon)
+        why = (
+            "it came out negative"
+            if stiffness <= 0.0
+            else f"its period would be longer than the {longest:.3g} s record"
         )
-        why = "it came out negative" if stiffness <= 0.0 else f"its period would be longer than the {longest:.3g} s record"
         found.dropped.append(("stiffness", f"{why}, and the finished model predicts as well without it"))
 
     def _worth_adding(self, now: Judged, name: str, new: Judged, floor: float) -> bool:
@@ -158,9 +178,7 @@ class Loop:
         clear = lead > CLEARLY or (share > MOST and lead > 1.0)
         return clear and share >= WORTH and delta_bic(now, new) < -10.0 and new.strength(name) > STRONG
 
-    def _simplest(
-        self, tried: Sequence[tuple[str, Judged]], found: Search, now: Judged
-    ) -> tuple[str, Judged]:
+    def _simplest(self, tried: Sequence[tuple[str, Judged]], found: Search, now: Judged) -> tuple[str, Judged]:
         """The best candidate, or the one with the fewest parameters that does as well.
 
         Far above the noise floor, where no candidate is the whole truth, a special case of the best one

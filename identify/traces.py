@@ -194,7 +194,7 @@ class Trace:
         key = ("torque", drive)
         if key not in self._series:
             self._series[key] = self._make_torque(drive)
-        return self._series[key]  # type: ignore[no-any-return]
+        return self._series[key]
 
     def _make_torque(self, drive: tuple[tuple[str, tuple[float, ...]], ...]) -> tuple[Array, int]:
         assert self.torque is not None
@@ -225,7 +225,7 @@ class Trace:
             if len(self._series) > 400:
                 self._series.clear()
             self._series[key] = self._make_effect(effect, shape, unit)
-        return self._series[key]  # type: ignore[no-any-return]
+        return self._series[key]
 
     def _make_effect(self, effect: Effect, shape: tuple[float, ...], unit: int) -> Array | None:
         angle, rate, time, torque, left = self.fine
@@ -235,7 +235,9 @@ class Trace:
             p[3 + i] = (1.0 if i == unit else 0.0) if parameter.linear else next(shapes)
         if unit < 0:
             p[3 + unit] = 1.0
-        z = np.array(effect.rest_state(angle[0], rate[0]) if effect.rest_state else np.zeros(effect.states), dtype=float)
+        z = np.array(
+            effect.rest_state(angle[0], rate[0]) if effect.rest_state else np.zeros(effect.states), dtype=float
+        )
         fine = self.step_s / UPSAMPLING
         substeps = 1
         if effect.states and effect.fastest_rad_s:
@@ -308,9 +310,7 @@ def prepare(run: Run, number: int = 0, noise: float | None = None) -> Trace:
         slow = np.abs(trace.fine[1][::UPSAMPLING]) <= run.min_rate_rad_s
         broken |= slow
     trace.keep = keep & ~broken
-    trace.stretches = [
-        (a, b) for a, b in _gaps(broken) if b - a + 1 >= SHORTEST_STRETCH
-    ]
+    trace.stretches = [(a, b) for a, b in _gaps(broken) if b - a + 1 >= SHORTEST_STRETCH]
     inside = np.zeros(n, dtype=bool)
     for a, b in trace.stretches:
         inside[a : b + 1] = True

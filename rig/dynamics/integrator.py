@@ -227,10 +227,7 @@ def step(motion, n, z, work, saved, h, m0, m1, m2, jck, body):  # type: ignore[n
             if not lo < mid < hi:
                 mid = 0.5 * (lo + hi)
             _advance_to(motion, saved, zs, x, mid, h, m0, m1, m2, n, z, w0, k1, k2, k3, k4, jck, body)
-            if slip == 0.0:
-                f = _excess(motion, _quadratic(m0, m1, m2, mid), z, k1, jck, body)[1]
-            else:
-                f = -motion[1] * slip
+            f = _excess(motion, _quadratic(m0, m1, m2, mid), z, k1, jck, body)[1] if slip == 0.0 else -motion[1] * slip
             if f > 0.0:
                 hi, f_hi = mid, f
                 if side == 1:
@@ -301,9 +298,7 @@ def run_spans(starts, spans, offset_s, z, h, torque, jck, kernels, loads, z_at, 
         first, last = spans[k, 0], spans[k, 1]
         motion[0], motion[1] = starts[k, 0], starts[k, 1]
         motion[2], motion[3] = np.sign(starts[k, 1]), offset_s + first * h
-        run_steps(
-            motion, z, h, torque[first:last], jck, kernels, loads, z_at, p, p_at, out[first : last + 1]
-        )
+        run_steps(motion, z, h, torque[first:last], jck, kernels, loads, z_at, p, p_at, out[first : last + 1])
 
 
 @jit

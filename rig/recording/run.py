@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]  # float64 in fact; numpy's annotations lose that in arithmetic
 TorqueHold = Literal["band_limited", "zero_order"]
 Use = Literal["auto", "fit", "holdout"]
 

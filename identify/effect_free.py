@@ -1,0 +1,36 @@
+"""A run with a model's effects taken off its torque: what is left obeys J a + C w + K th = M."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identify.output_error import Estimate, Shots, equations_of
+from identify.traces import Trace
+from rig.dynamics import TorqueSignal
+
+
+def effect_free(trace: Trace, shots: Shots, estimate: Estimate) -> Trace:
+    """The run with the torque that the model leaves for its linear part, along the model's own motion.
+
+    Along that motion friction knows when it sticks; a noisy measured rate does not.
+    """
+    equations = equations_of(estimate.structure, estimate.names, estimate.values, shots.number, shots.added)
+    grid = shots.grid
+    ratio = round(trace.step_s / grid.step_s)
+    ends = [*shots.first[1:].tolist(), len(trace.measured) - 1]
+    spans = [(a * ratio, b * ratio) for a, b in zip(shots.first.tolist(), ends, strict=True)]
+    j, c, k = equations.jck
+    torque = grid.shaft_torque(equations)
+    mean = np.empty(len(torque) + 1)
+    h = grid.step_s
+    for (first, last), start in zip(spans, shots.starts, strict=True):
+        fine = equations.integrate_shots(torque, h, [(first, last)], start[None, :], trace.offset_s)[first : last + 1]
+        # Its mean over each fine step, exact also where dry friction makes the acceleration jump.
+        turned, gained = np.diff(fine[:, 0]), np.diff(fine[:, 1])
+        angle = 0.5 * (fine[1:, 0] + fine[:-1, 0]) - h * gained / 12.0
+        mean[first:last] = (j * gained + c * turned) / h + k * angle
+    mean[spans[-1][1] :] = mean[spans[-1][1] - 1]
+    time = trace.start_s + h * np.arange(len(mean))
+    return replace(trace, torque=TorqueSignal(time, mean, "zero_order"), _series={})
