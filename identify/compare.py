@@ -40,12 +40,15 @@ class Judged:
         """Parameter values by name."""
         return dict(zip(self.estimate.names, self.estimate.values.tolist(), strict=True))
 
+    @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def strength(self, name: str) -> float:
         """Smallest value of a term or of an effect's parameters over its standard error, errors taken as white."""
         inverse = np.linalg.pinv(_scaled(self.estimate.information))
         scale = np.sqrt(np.maximum(np.diag(self.estimate.information), 1e-300))
         errors = np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale * self.estimate.sigma
         pairs = zip(self.estimate.names, self.estimate.values, errors, strict=True)
+        if not np.all(np.isfinite(errors)):
+            return 0.0
         return float(min(abs(v) / max(e, 1e-300) for n, v, e in pairs if n[0] == name))
 
     def shapes(self) -> dict[str, tuple[float, ...]]:

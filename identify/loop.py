@@ -36,6 +36,7 @@ from rig.errors import RecordingError
 from rig.platform import Platform
 from rig.recording.run import Recording
 
+MOVES = 3.0  # times the sensor's noise that a motion has to reach
 UNEXPLAINED = 1.1  # times the noise floor in free run: above it, something is left that no effect here explains
 TORQUE_FREE = {"damping": ("damping_over_inertia", "1/s"), "stiffness": ("stiffness_over_inertia", "1/s^2")}
 
@@ -83,6 +84,7 @@ class _Identifier:
                 "no run holds a usable stretch of 40 samples: look at valid, min_rate_rad_s, from_s and to_s"
             )
         self.torque_free = free
+        _refuse_the_idle(self.traces, free)
         self.split: Split = split(self.traces)
         names = tuple(declared.effects)
         self.structure = Structure(declared.terms, names)
@@ -266,6 +268,28 @@ class _Identifier:
                 )
             )  # fmt: skip
         return tuple(out)
+
+
+def _refuse_the_idle(traces: list[Trace], free: bool) -> None:
+    """Refuse a recording in which nothing happens.
+
+    Raises
+    ------
+    RecordingError
+        Where no run moves more than the sensor's noise, or the torque never changes in any run.
+    """
+    moved = [float(np.std(t.measured[t.keep])) / max(t.noise, 1e-300) for t in traces]
+    if max(moved) < MOVES:
+        raise RecordingError(
+            f"no run moves more than {max(moved):.2g} times the sensor's noise (needed: {MOVES:g}): nothing to "
+            "identify; use more torque, or give recorded.noise if the noise is smaller than it looks"
+        )
+    steady = [t.torque is not None and float(np.ptp(t.torque.torque_nm)) == 0.0 for t in traces]
+    if not free and all(steady):
+        raise RecordingError(
+            "the torque has the same value in every sample of every run: J, C and K need a torque that changes; "
+            "check recorded.columns.torque, or leave the torque out for a free decay"
+        )
 
 
 def _one_noise(traces: list[Trace]) -> list[Trace]:

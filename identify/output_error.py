@@ -31,6 +31,7 @@ COARSEST = 16  # fine steps a sample while models are compared
 ROBUST_FROM = 12  # shots: fewer show no outlier
 OUTLIER = 4.0  # times the median error of a shot
 SETTLE = 6  # rounds in which start states are fitted at fixed parameters
+RUNAWAY = np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a simulation may; its error is then infinite
 STEP = 1e-6  # relative step of the differences: simulations repeat to 1e-13
 
 
@@ -201,6 +202,7 @@ def _linearise(
     return _eliminate(s, columns, state, residual, s.trace.biased, outlier)
 
 
+@RUNAWAY
 def jacobian(s: Shots, estimate: Estimate) -> tuple[Array, Array]:
     """Sensitivities and residual of the samples that count, start states and bias projected out: (m, p), (m,)."""
     scale = np.where(np.abs(estimate.values) > 0, np.abs(estimate.values), 1.0)
@@ -222,6 +224,7 @@ def jacobian(s: Shots, estimate: Estimate) -> tuple[Array, Array]:
     return both[:, :-1], both[:, -1]
 
 
+@RUNAWAY
 def _sensitivities(
     s: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any
 ) -> tuple[Array, Array, Array]:
@@ -511,6 +514,7 @@ def evaluate(
     return Estimate(structure, names, x, sigma, count, np.zeros((len(x),) * 2), tuple(s for s, _ in settled), True)
 
 
+@RUNAWAY
 def _losses(s: Shots, residual: Array) -> Array:
     """Sum of squares of every shot over the samples that count, (shots,); infinite where it ran away."""
     squares = np.where(s.weight, residual**2, 0.0)
@@ -518,6 +522,7 @@ def _losses(s: Shots, residual: Array) -> Array:
     return np.where(np.isfinite(sums), sums, np.inf)
 
 
+@RUNAWAY
 def _settle(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> tuple[Shots, Array]:
     """Start states and bias of one run at fixed parameters; every shot keeps what is best for itself."""
     still = np.ones(len(x), dtype=bool)

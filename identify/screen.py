@@ -220,7 +220,7 @@ class Screen:
         picked: dict[str, Screened] = {}
         for rank in range(most):
             for k in range(len(self.rhos)):
-                order = sorted((s for s in looks if s.gains[k] > 10.0), key=lambda s: -s.gains[k])  # noqa: B023
+                order = sorted((s for s in looks if s.gains[k] > 10.0), key=lambda s: -s.gains[k])
                 if rank == 0 and order:
                     near = [s for s in order if s.gains[k] > NEAR * order[0].gains[k]]
                     simple = min(near, key=lambda s: len(effects.get(s.effect).parameters))

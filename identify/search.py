@@ -67,6 +67,7 @@ class Loop:
         self.fitting, self.judging, self.start, self.say = fitting, judging, start, say
         self.allowed = [n for n in allowed if effects.get(n).place is not Place.SENSOR]
         self.noise = float(np.sqrt(np.mean([t.noise**2 for t in fitting])))
+        self.torque_free = all(t.torque is None for t in fitting)
         self.runs = 1 + max(t.number for t in (*fitting, *judging))
 
     def run(self, declared: Structure, shapes: Shapes) -> Search:
@@ -217,7 +218,8 @@ class Loop:
         for name in names:
             now = found.best
             kept_by = [e for e in now.structure.effects if name in effects.get(e).lower_order]
-            if name == "inertia" or kept_by:
+            last = len(now.structure.terms) - (1 if self.torque_free else 0) + len(now.structure.effects) <= 1
+            if name == "inertia" or kept_by or last:
                 continue
             if now.strength(name) > CERTAIN:
                 continue
