@@ -11,7 +11,7 @@ import numpy as np
 from identify.traces import SHORTEST_STRETCH, Trace
 
 BLOCKS = 10  # of a run that is split; blocks 3, 6 and 9 judge
-PIECES = 2  # of each run while searching, where a run has more usable spans
+PIECES = 2  # of each of five runs while searching, where a run has more usable spans; more of fewer runs
 ENOUGH = 8_000  # samples that a search fits to; the final fit always takes all
 
 
@@ -65,11 +65,12 @@ def pieces(traces: Sequence[Trace], masks: Sequence[Any], shortest_s: float, eno
     least ``shortest_s`` long, so that the slowest motion of interest fits in.
     """
     total = sum(int(np.sum(m)) for m in masks)
+    few = max(PIECES, round(PIECES * 5 / max(len(traces), 1)))
     out = []
     for trace, mask in zip(traces, masks, strict=True):
         spans = _runs_of(mask, trace.stretches)
-        if total > enough and len(spans) > PIECES:  # few long pieces: each start state costs two unknowns
-            spans = [spans[i] for i in np.unique(np.linspace(0, len(spans) - 1, PIECES).astype(int))]
+        if total > enough and len(spans) > few:  # few long pieces: each start state costs two unknowns
+            spans = [spans[i] for i in np.unique(np.linspace(0, len(spans) - 1, few).astype(int))]
         share = int(np.sum(mask)) if total <= enough else int(enough * np.sum(mask) / total)
         for k, (a, b) in enumerate(spans):
             length = b - a + 1

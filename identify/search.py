@@ -11,7 +11,7 @@ from identify.compare import CLEARLY, Judged, advantage, delta_bic, horizon_s, j
 from identify.effect_free import effect_free
 from identify.regression import Shapes, Solution, Structure
 from identify.results import Candidate
-from identify.screen import Screen, Screened, Start, best_rho
+from identify.screen import Screen, Screened, Start, best_rho, grid_of
 from identify.traces import Trace
 from rig import effects
 from rig.effects.base import Place
@@ -21,6 +21,8 @@ MOST_EFFECTS = 6
 SHORTLIST = 4
 WORTH = 0.2  # share of the excess error that an effect has to take away
 MISSED = 0.1  # share of the squared error by which nobody doubts that a term is needed
+AGAIN = 2  # candidates of a round that are tried from other shapes
+RESTARTS = 5
 HOPELESS = 2.5  # times the best fit of the round: a candidate still above it after three steps is given up
 NEAR = 1.5  # times the noise floor: from here on the screen looks behind the model's effects
 MOST = 0.4  # share of the excess error beyond which one standard error is lead enough
@@ -103,6 +105,7 @@ class Loop:
             result = self._try(found, screen, look, HOPELESS * best_yet)
             tried += [result] if result else []
         tried.sort(key=lambda t: t[1].sigma)
+        tried = self._again(found, screen, tried)
         if not tried:
             return False
         name, best = self._simplest(tried, found, now)
@@ -124,6 +127,29 @@ class Loop:
             best = again if again.estimate.sigma <= best.estimate.sigma else best
         found.best = best
         return True
+
+    def _again(self, found: Search, screen: Screen, tried: list[tuple[str, Judged]]) -> list[tuple[str, Judged]]:
+        """The best candidates once more from other shapes, while they stay above the noise floor.
+
+        A shape (the Stribeck speed above all) has false minima that no step out of one of them finds.
+        """
+        out = []
+        for rank, (name, first) in enumerate(tried):
+            best = first
+            shapes = [p.name for p in effects.get(name).parameters if not p.linear]
+            if rank < AGAIN and shapes:
+                grid = grid_of(effects.get(name), screen.scale)
+                for shape in grid[:: max(1, len(grid) // RESTARTS)]:
+                    if best.sigma < NEAR * found.floor:
+                        break
+                    start = {**first.values(), **{(name, p): v for p, v in zip(shapes, shape, strict=True)}}
+                    other = judge(
+                        self.fitting, self.judging, first.structure, start, found.horizon,
+                        hopeless=HOPELESS * best.estimate.sigma,
+                    )  # fmt: skip
+                    best = min((best, other), key=lambda j: (j.estimate.sigma, j.sigma))
+            out.append((name, best))
+        return sorted(out, key=lambda t: t[1].sigma)
 
     def _screen(self, found: Search, now: Judged) -> Screen:
         """Candidates are screened on the residual of the model as it stands.
@@ -185,6 +211,7 @@ class Loop:
         Far above the noise floor, where no candidate is the whole truth, a special case of the best one
         does as well when it leaves at most twice the excess; and what comes first by marginality goes first.
         """
+        tried = [t for t in tried if t[1].strength(t[0]) > STRONG] or list(tried)
         name, best = tried[0]
         as_good = [t for t in tried if t[1] is best or self._status(best, t[1]) == "rival"]
         excess = best.sigma**2 - found.floor**2
