@@ -12,6 +12,7 @@ from identify.regression import Shapes, Solution, Structure
 from identify.traces import Trace
 from rig import effects
 from rig.effects.base import Place
+from rig.platform import TERMS
 from rig.recording.run import Array
 
 CLEARLY = 2.5  # standard errors by which the held-out error must fall
@@ -42,14 +43,28 @@ class Judged:
 
     @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def strength(self, name: str) -> float:
-        """Smallest value of a term or of an effect's parameters over its standard error, errors taken as white."""
-        inverse = np.linalg.pinv(_scaled(self.estimate.information))
+        """How many standard errors, taken as white, a term or an effect stands from zero.
+
+        Of an effect's gains it is the joint distance (one of a sine and a cosine may well be nothing), of
+        its shapes the smallest.
+        """
         scale = np.sqrt(np.maximum(np.diag(self.estimate.information), 1e-300))
-        errors = np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale * self.estimate.sigma
-        pairs = zip(self.estimate.names, self.estimate.values, errors, strict=True)
-        if not np.all(np.isfinite(errors)):
+        if not np.all(np.isfinite(scale)):
             return 0.0
-        return float(min(abs(v) / max(e, 1e-300) for n, v, e in pairs if n[0] == name))
+        inverse = np.linalg.pinv(_scaled(self.estimate.information), rcond=1e-12, hermitian=True)
+        covariance = inverse / np.outer(scale, scale) * self.estimate.sigma**2
+        linear = {p.name: p.linear for p in effects.get(name).parameters} if name not in TERMS else {}
+        mine = [i for i, n in enumerate(self.estimate.names) if n[0] == name]
+        gains = [i for i in mine if len(self.estimate.names[i]) == 1 or linear[self.estimate.names[i][1]]]
+        x = self.estimate.values
+        out = [abs(x[i]) / float(np.sqrt(max(covariance[i, i], 1e-300))) for i in mine if i not in gains]
+        if gains:
+            part = covariance[np.ix_(gains, gains)]
+            size = np.sqrt(np.maximum(np.diag(part), 1e-300))
+            t = x[gains] / size
+            joint = float(t @ np.linalg.pinv(part / np.outer(size, size), rcond=1e-9, hermitian=True) @ t)
+            out.append(float(np.sqrt(max(joint, 0.0) / len(gains))))
+        return float(min(out)) if np.all(np.isfinite(out)) else 0.0
 
     def shapes(self) -> dict[str, tuple[float, ...]]:
         """Shape parameters of every effect."""

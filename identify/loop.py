@@ -117,7 +117,7 @@ class _Identifier:
         fitting = pieces(self.traces, self.split.fit, 3.0 * horizon)
         judging = pieces(self.traces, self.split.judge, 3.0 * horizon, 5_000)
         allowed = self.settings.candidates or effects.names()
-        loop = Loop(fitting, judging, self.start, allowed, self.say)
+        loop = Loop(fitting, judging, self.start, allowed, self.say, self.traces)
         return loop.run(self.structure, shapes)
 
     def _before(self, search: Search, shapes: Mapping[str, tuple[float, ...]]) -> Fitted:

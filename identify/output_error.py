@@ -27,6 +27,7 @@ from rig.recording.run import Array
 
 Name = tuple[str, ...]
 FIELD = {"inertia": "inertia_kg_m2", "damping": "damping_nm_s_rad", "stiffness": "stiffness_nm_rad"}
+LEAD_S = 0.1  # of torque before a piece begins, for drives with memory
 COARSEST = 16  # fine steps a sample while models are compared
 ROBUST_FROM = 12  # shots: fewer show no outlier
 OUTLIER = 4.0  # times the median error of a shot
@@ -132,7 +133,7 @@ def make_shots(trace: Trace, substeps: int, length: int | None, use: Any = None)
     ratio = (len(angle) - 1) // (n - 1)
     starts = np.stack([angle[first * ratio], rate[first * ratio]], axis=1)
     weight = trace.keep if use is None else trace.keep & use
-    return Shots(trace, Grid(time, trace.torque, substeps), first, starts, 0.0, weight)
+    return Shots(trace, Grid(time, trace.torque, substeps, min(LEAD_S, trace.offset_s)), first, starts, 0.0, weight)
 
 
 def predict(shots: Shots, equations: Equations, starts: Array, bias: float) -> Array:

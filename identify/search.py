@@ -65,7 +65,9 @@ class Loop:
         start: Start,
         allowed: Sequence[str],
         say: Callable[[str], None],
+        whole: Sequence[Trace] | None = None,
     ) -> None:
+        self.whole = whole or fitting  # spectral lines want the longest stretches there are
         self.fitting, self.judging, self.start, self.say = fitting, judging, start, say
         self.allowed = [n for n in allowed if effects.get(n).place is not Place.SENSOR]
         self.noise = float(np.sqrt(np.mean([t.noise**2 for t in fitting])))
@@ -238,7 +240,7 @@ class Loop:
         """Frequencies of the strongest lines in the equation-error residual."""
         from identify.residual import residual_lines_hz  # noqa: PLC0415  (residual imports the search's parts)
 
-        return residual_lines_hz(self.fitting, judged)
+        return residual_lines_hz(self.whole, judged)
 
     def _prune(self, found: Search, names: Sequence[str]) -> None:
         """Drop every term or effect that the model does as well without."""

@@ -20,6 +20,7 @@ from rig.recording.run import Array, Run
 
 UPSAMPLING = 4  # nonlinear torques have corners between samples
 SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than it tells
+LEAD_S = 0.1
 LONGEST_FILL = 25  # missing samples that a spline may bridge
 STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
 
@@ -205,7 +206,8 @@ class Trace:
             return smooth_pieces(self.torque.at(start + self.step_s * np.arange(n)), self.step_s), 1
         fine = self.step_s / UPSAMPLING
         count = (n - 1) * UPSAMPLING
-        x = self.torque.on_half_steps(start, fine, count + 1)
+        lead = int(min(LEAD_S, self.offset_s) / fine)  # a drive with memory has seen what came before a piece
+        x = self.torque.on_half_steps(start - lead * fine, fine, count + 1 + lead)
         for name, values in drive:
             effect = effects.get(name)
             size = effect.filter_states(fine, values) if effect.filter_states else 0
@@ -213,7 +215,7 @@ class Trace:
                 addresses([effect.kernel]), x, fine, np.zeros(size), np.array([0, size]),
                 np.array(values), np.array([0, len(values)]),
             )  # fmt: skip
-        return (held_pieces(x[:count]) if held else linear_pieces(x, fine)), UPSAMPLING
+        return (held_pieces(x[lead : lead + count]) if held else linear_pieces(x[lead:], fine)), UPSAMPLING
 
     def effect_pieces(self, effect: Effect, shape: tuple[float, ...], unit: int) -> Array | None:
         """Torque of an effect with one linear parameter (or J, C, K: unit -3, -2, -1) at one, the rest at zero.

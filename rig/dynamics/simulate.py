@@ -174,9 +174,11 @@ class Grid:
         The torque asked of the drive, or None for free motion.
     substeps
         Fine steps per (median) sample period.
+    lead_s
+        How far before the first sample the torque is known: a drive with memory has seen it.
     """
 
-    def __init__(self, time_s: Array, torque: TorqueSignal | None, substeps: int) -> None:
+    def __init__(self, time_s: Array, torque: TorqueSignal | None, substeps: int, lead_s: float = 0.0) -> None:
         spacing = np.diff(time_s)
         sample_s = float(np.median(spacing))
         self.time_s = time_s
@@ -188,13 +190,15 @@ class Grid:
         torque = torque or NO_TORQUE
         self._held = torque.hold == "zero_order"
         self._plain: Array | None = None
-        self._half = torque.on_half_steps(float(time_s[0]), 0.5 * self.step_s, 2 * self.n + 1)
+        self._lead = 2 * int(lead_s / self.step_s)
+        begin = float(time_s[0]) - 0.5 * self.step_s * self._lead
+        self._half = torque.on_half_steps(begin, 0.5 * self.step_s, 2 * self.n + 1 + self._lead)
 
     def shaft_torque(self, equations: Equations) -> Array:
         """Torque behind the drive effects at start, middle and end of each fine step, shape (n, 3)."""
         if not equations.drive.names and self._plain is not None:
             return self._plain
-        steps = self._by_step(equations.drive.apply(self._half, 0.5 * self.step_s))
+        steps = self._by_step(equations.drive.apply(self._half, 0.5 * self.step_s)[self._lead :])
         if not equations.drive.names:
             self._plain = steps
         return steps
