@@ -122,6 +122,15 @@ class Information:
         """
         return float(np.sqrt(self.energy)) * self.relative(name)
 
+    def without(self, name: Name) -> Information:
+        """The same where one parameter is known."""
+        kept = [i for i, n in enumerate(self.names) if n != name]
+        table = np.ix_(kept, kept)
+        return replace(
+            self, names=tuple(self.names[i] for i in kept), values=self.values[kept],
+            matrix=self.matrix[table], known=self.known[table],
+        )  # fmt: skip
+
     def if_known(self) -> Information:
         """The same with start states and bias known."""
         return replace(self, matrix=self.known)

@@ -21,6 +21,7 @@ MOST_EFFECTS = 6
 SHORTLIST = 4
 WORTH = 0.2  # share of the excess error that an effect has to take away
 MISSED = 0.1  # share of the squared error by which nobody doubts that a term is needed
+FAR = 10.0  # times the horizon
 AGAIN = 2  # candidates of a round that are tried from other shapes
 RESTARTS = 5
 HOPELESS = 2.5  # times the best fit of the round: a candidate still above it after three steps is given up
@@ -110,10 +111,19 @@ class Loop:
         tried = self._again(found, screen, tried)
         if not tried:
             return False
-        name, best = self._simplest(tried, found, now)
+        far = self._far(found, tried)
+        name, best = self._simplest(tried, far, found, now)
         added = self._worth_adding(now, name, best, found.floor)
+
+        def status_of(other: str, judged: Judged) -> str:
+            if other == name:
+                return "added" if added else "not worth it"
+            if name in far:
+                return self._status(far[name], far[other]) if other in far else "no better"
+            return self._status(best, judged)
+
         for other, judged in tried:
-            status = ("added" if added else "not worth it") if other == name else self._status(best, judged)
+            status = status_of(other, judged)
             found.candidates.append(Candidate(other, round_, delta_bic(now, judged), judged.sigma, status))
         shown = {n for n, _ in tried}
         for look in looks:
@@ -122,13 +132,23 @@ class Loop:
         if not added:
             return False
         self.say(f"added {name}: held-out error {now.sigma:.3g} -> {best.sigma:.3g}")
-        close = tuple(o for o, j in tried if o != name and self._status(best, j) == "rival")
+        close = tuple(o for o, j in tried if status_of(o, j) == "rival")
         found.rivals[name] = close
         if not best.estimate.converged:
             again = judge(self.fitting, self.judging, best.structure, best.values(), found.horizon, rough_start=False)
             best = again if again.estimate.sigma <= best.estimate.sigma else best
         found.best = best
         return True
+
+    def _far(self, found: Search, tried: Sequence[tuple[str, Judged]]) -> dict[str, Judged]:
+        """Candidates that reach the noise floor, judged over whole pieces: a longer look ahead parts them."""
+        near = [(n, j) for n, j in tried if j.sigma < NEAR * found.floor]
+        if len(near) < 2:
+            return {}
+        return {
+            n: judge(self.fitting, self.judging, j.structure, j.values(), FAR * found.horizon, 15, rough_start=False)
+            for n, j in near
+        }
 
     def _again(self, found: Search, screen: Screen, tried: list[tuple[str, Judged]]) -> list[tuple[str, Judged]]:
         """The best candidates once more from other shapes, while they stay above the noise floor.
@@ -144,7 +164,8 @@ class Loop:
                 for shape in grid[:: max(1, len(grid) // RESTARTS)]:
                     if best.sigma < NEAR * found.floor:
                         break
-                    start = {**first.values(), **{(name, p): v for p, v in zip(shapes, shape, strict=True)}}
+                    start = first.values()
+                    start.update({(name, p): v for p, v in zip(shapes, shape, strict=True)})
                     other = judge(
                         self.fitting, self.judging, first.structure, start, found.horizon,
                         hopeless=HOPELESS * best.estimate.sigma,
@@ -207,13 +228,22 @@ class Loop:
         clear = lead > CLEARLY or (share > MOST and lead > 1.0)
         return clear and share >= WORTH and delta_bic(now, new) < -10.0 and new.strength(name) > STRONG
 
-    def _simplest(self, tried: Sequence[tuple[str, Judged]], found: Search, now: Judged) -> tuple[str, Judged]:
+    def _simplest(
+        self, tried: Sequence[tuple[str, Judged]], far: dict[str, Judged], found: Search, now: Judged
+    ) -> tuple[str, Judged]:
         """The best candidate, or the one with the fewest parameters that does as well.
 
         Far above the noise floor, where no candidate is the whole truth, a special case of the best one
         does as well when it leaves at most twice the excess; and what comes first by marginality goes first.
         """
         tried = [t for t in tried if t[1].strength(t[0]) > STRONG] or list(tried)
+        if far:
+            short = dict(tried)
+            order = sorted((n for n in far if n in short), key=lambda n: far[n].sigma)
+            if order:
+                alike = [n for n in order if n == order[0] or self._status(far[order[0]], far[n]) == "rival"]
+                chosen = min(alike, key=lambda n: (len(effects.get(n).parameters), far[n].sigma))
+                return chosen, short[chosen]
         name, best = tried[0]
         as_good = [t for t in tried if t[1] is best or self._status(best, t[1]) == "rival"]
         excess = best.sigma**2 - found.floor**2
