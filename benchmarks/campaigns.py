@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from identify.compare import start_values
-from identify.output_error import Estimate, Name, refine
+from identify.output_error import Estimate, refine
+from identify.parameters import Name
 from identify.regression import Structure
 from identify.screen import best_rho, first_guess
 from identify.traces import Trace, prepare

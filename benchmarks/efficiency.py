@@ -9,6 +9,7 @@ counted in; beside it stands the bound with these known.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,7 +20,7 @@ from campaigns import (
 from threadpoolctl import threadpool_limits
 
 from identify.identifiability import Information, information_of, together
-from identify.output_error import Name
+from identify.parameters import Name
 from identify.traces import Trace
 from rig.platform import Platform
 from rig.recording.run import Array
@@ -66,14 +67,14 @@ def errors(delay: bool, runs: int, seed: int) -> Array:
     for run in range(runs):
         traces = traces_from(rates, white(np.random.default_rng([seed, int(delay), run])))
         fits: list[list[Trace]] = [*(alone(t) for t in traces), traces]
-        joint = regression_start(traces, structure)
+        start = regression_start(traces, structure)
         rows = []
         for several in fits:
-            start = joint if len(several) > 1 else regression_start(several, structure)
             found = fitted(several, structure, start)
             true = truth_of(found.names)
             rows.append(found.values / true - 1.0)
         out.append(rows)
+        print(f"\r{run + 1} of {runs} campaigns", end="", file=sys.stderr, flush=True)
     return np.array(out)
 
 

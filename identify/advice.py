@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.identifiability import DELAY, Information, together
-from identify.output_error import Name
+from identify.parameters import Name
 from identify.wording import SYMBOLS, number, plain
 from rig import effects
 from rig.platform import TERMS
@@ -95,7 +95,9 @@ def of_set(information: Information, others: Sequence[Information] = ()) -> str:
     if below_noise(i):
         worst = max(i.relative(n) for k, n in enumerate(i.names) if i.values[k] != 0.0)
         told = f"its motion is {number(i.loudness, 2)} times the gyro's noise, and nothing comes out well"
-        cure = f"about {number(worst / AIM, 2)} times the torque would give {100 * AIM:g} %" if worst < 1e6 else "raise it"
+        cure = (
+            f"about {number(worst / AIM, 2)} times the torque would give {100 * AIM:g} %" if worst < 1e6 else "raise it"
+        )
         return f"{i.name}: below the noise: {told} ({expected(i)}); {cure}"
     missing = weak(i)
     if not missing:
@@ -113,7 +115,9 @@ def _about_zeros(information: Information) -> str:
         if information.values[k] == 0.0 and name in {("damping",), ("stiffness",)}:
             least = DETECTABLE * information.std_error(name)
             if np.isfinite(least):
-                told += f"; {name[0]} is declared as 0: below {number(least, 2)} {_unit(name)} it cannot be told from none"
+                told += (
+                    f"; {name[0]} is declared as 0: below {number(least, 2)} {_unit(name)} it cannot be told from none"
+                )
     return told
 
 
@@ -139,11 +143,23 @@ def of_campaign(each: Sequence[Information]) -> str:
             f"all sets together: {expected(total)} expected; J, C and K themselves stay unknown without torque "
             "(record it, or repeat the decay with a known inertia mounted)"
         )
-    told = f"all sets together: {expected(total)} expected{_about_zeros(total)}"
+    told = f"all sets together: {expected(total)} expected{_about_zeros(total)}; {_figures(total)}"
     missing = weak(total)
     if missing:
         told += f"; NOT determined: {' and '.join(label(n) for n in missing)}. {_cure(total, missing)}"
     return told
+
+
+def _figures(total: Information) -> str:
+    """Rank, condition and the strongest correlation."""
+    p = len(total.names)
+    told = f"rank {total.rank} of {p}, condition {number(total.condition, 2)}"
+    if p < 2:
+        return told
+    size = np.abs(total.correlation - np.eye(p))
+    i, k = np.unravel_index(int(np.argmax(size)), size.shape)
+    names = f"{label(total.names[min(i, k)])} and {label(total.names[max(i, k)])}"
+    return f"{told}, strongest correlation {number(float(total.correlation[i, k]), 3)} ({names})"
 
 
 def _cure(total: Information, missing: Sequence[Name]) -> str:

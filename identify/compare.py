@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify.output_error import Estimate, Name, evaluate, names_of, refine
+from identify.output_error import Estimate, evaluate, refine
+from identify.parameters import Name, names_of
 from identify.regression import Shapes, Solution, Structure
 from identify.traces import Trace
 from rig import effects

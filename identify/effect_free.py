@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.output_error import Estimate, Shots, equations_of
+from identify.output_error import Estimate
+from identify.parameters import equations_of
+from identify.shots import Shots
 from identify.traces import Trace
 from rig.dynamics import TorqueSignal
 

@@ -9,9 +9,12 @@ from typing import Any
 import numpy as np
 
 from identify.compare import start_values
-from identify.output_error import Estimate, Name, Shots, evaluate, jacobian, refine
+from identify.output_error import Estimate, evaluate, refine
+from identify.parameters import Name
 from identify.regression import Regression, Solution, Structure, residuals
 from identify.screen import Start, best_rho
+from identify.sensitivities import jacobian
+from identify.shots import Shots
 from identify.traces import Trace
 from rig.recording.run import Array
 
@@ -157,7 +160,7 @@ def _output_covariance(estimate: Estimate, names: tuple[Name, ...]) -> tuple[Arr
     for shots in estimate.shots:
         if not np.any(shots.weight):
             continue
-        columns, residual = jacobian(shots, estimate)
+        columns, residual = jacobian(shots, estimate.structure, estimate.names, estimate.values)
         columns = columns[:, keep]
         information += columns.T @ columns
         count += len(residual)

@@ -14,8 +14,10 @@ from functools import cached_property
 
 import numpy as np
 
-from identify.output_error import Name, Shots, _sensitivities, make_shots, names_of
+from identify.parameters import Name, names_of
 from identify.regression import Structure
+from identify.sensitivities import sensitivities
+from identify.shots import Shots, make_shots
 from identify.traces import Trace, prepare
 from rig import effects
 from rig.dynamics import Equations, TorqueSignal, simulate
@@ -77,7 +79,7 @@ class Information:
     @property
     def rank(self) -> int:
         """How many combinations of the parameters show at all."""
-        return int(np.sum(~self._empty))
+        return int(np.sum(np.logical_not(self._empty)))
 
     @property
     def condition(self) -> float:
@@ -200,7 +202,7 @@ def information_of(
     free = trace.torque is None or not np.any(trace.torque.torque_nm)
     fixed = np.array([free and n == ("inertia",) for n in names])
     scale = np.where(values != 0.0, np.abs(values), 1.0)
-    columns, state, _ = _sensitivities(shots, structure, names, values, scale, fixed)
+    columns, state, _ = sensitivities(shots, structure, names, values, scale, fixed)
     used = shots.weight
     bare = columns[used][:, ~fixed] / trace.noise
     nuisances = _nuisances(shots, state)[used]

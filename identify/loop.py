@@ -13,7 +13,7 @@ from identify.compare import horizon_s
 from identify.finish import Fitted, by_output_error, by_regression
 from identify.holdout import Split, pieces, split
 from identify.measures import Measured, floor_of, measure
-from identify.output_error import platform_of
+from identify.parameters import platform_of
 from identify.regression import Structure, shape_values
 from identify.results import (
     UNITS,

@@ -16,7 +16,7 @@ from scipy import signal
 from scipy.interpolate import CubicSpline
 
 from identify.compare import Judged
-from identify.output_error import Name
+from identify.parameters import Name
 from identify.regression import Structure
 from identify.traces import UPSAMPLING, Trace
 from rig import effects

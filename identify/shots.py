@@ -1,0 +1,108 @@
+"""A run as the simulator sees it: cut into shots, each with a start state of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from identify.parameters import Name, equations_of
+from identify.regression import Structure
+from identify.traces import LEAD_S, Trace
+from rig.dynamics import Equations, Grid
+from rig.recording.run import Array
+
+RUNAWAY = np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a simulation may; its error is then infinite
+
+
+@dataclass
+class Shots:
+    """One run as the simulator sees it: its fine grid, its shots and their start states."""
+
+    trace: Trace
+    grid: Grid
+    first: Any  # sample number at which each shot begins, (s,)
+    starts: Array  # angle and rate there, (s, 2)
+    bias: float = 0.0
+    weight: Any = field(default=None)  # (n,) boolean: samples that count
+
+    @property
+    def number(self) -> int:
+        """Which run of the recording it is."""
+        return self.trace.number
+
+    @property
+    def added(self) -> float:
+        """Known inertia mounted for this run."""
+        return self.trace.run.added_inertia_kg_m2
+
+    @cached_property
+    def active(self) -> Any:
+        """Which shots hold samples that count; the others are not simulated."""
+        return np.array([bool(np.any(self.weight[a:b])) for a, b in self.edges])
+
+    @cached_property
+    def counts(self) -> Array:
+        """Samples that count in each shot, (shots,)."""
+        return np.array([float(np.sum(self.weight[a:b])) for a, b in self.edges])
+
+    @cached_property
+    def edges(self) -> list[tuple[int, int]]:
+        """First sample and one past the last of each shot."""
+        ends = [*self.first[1:].tolist(), len(self.trace.measured)]
+        return list(zip(self.first.tolist(), ends, strict=True))
+
+
+def make_shots(trace: Trace, substeps: int, length: int | None, use: Any = None) -> Shots:
+    """Cut a run into shots of ``length`` samples (None: one), started from the smoothed measurement."""
+    n = len(trace.measured)
+    time = trace.start_s + trace.step_s * np.arange(n)
+    begins = [0]  # every usable stretch begins anew: what happened in between is not to be predicted
+    for a, b in trace.stretches:
+        inside = np.arange(a, b + 1, length) if length else np.array([a])
+        if length and len(inside) > 1 and b + 1 - inside[-1] < length // 2:
+            inside = inside[:-1]
+        begins += inside.tolist()
+    first = np.unique(np.array(begins))
+    angle, rate, _, _, _ = trace.fine
+    ratio = (len(angle) - 1) // (n - 1)
+    starts = np.stack([angle[first * ratio], rate[first * ratio]], axis=1)
+    weight = trace.keep if use is None else trace.keep & use
+    return Shots(trace, Grid(time, trace.torque, substeps, min(LEAD_S, trace.offset_s)), first, starts, 0.0, weight)
+
+
+def predict(shots: Shots, equations: Equations, starts: Array, bias: float) -> Array:
+    """The measured channel as the model gives it, shape (n,)."""
+    grid = shots.grid
+    torque = grid.shaft_torque(equations)
+    ratio = round(shots.trace.step_s / grid.step_s)
+    n = len(shots.trace.measured)
+    rate = shots.trace.channel == "rate"
+    active = [(a * ratio, min(b, n - 1) * ratio) for (a, b), on in zip(shots.edges, shots.active, strict=True) if on]
+    fine = equations.integrate_shots(torque, grid.step_s, active, starts[shots.active], shots.trace.offset_s)
+    if rate and equations.sensor.names:
+        return np.asarray(equations.sensor.apply(fine[:, 1], grid.step_s)[: n * ratio : ratio] + bias)
+    out = fine[: n * ratio : ratio, 1 if rate else 0]
+    return out + bias if rate else out
+
+
+@RUNAWAY
+def losses_of(s: Shots, residual: Array) -> Array:
+    """Sum of squares of every shot over the samples that count, (shots,); infinite where it ran away."""
+    squares = np.where(s.weight, residual**2, 0.0)
+    sums = np.array([float(np.sum(squares[a:b])) for a, b in s.edges])
+    return np.where(np.isfinite(sums), sums, np.inf)
+
+
+def losses_at(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> Array:
+    """Sum of squares of every shot at a parameter vector, (shots,)."""
+    equations = equations_of(structure, names, x, s.number, s.added)
+    return losses_of(s, s.trace.measured - predict(s, equations, s.starts, s.bias))
+
+
+def moved(s: Shots, by: tuple[Array, float]) -> Shots:
+    """The same shots with other start states and bias."""
+    return Shots(s.trace, s.grid, s.first, s.starts + by[0], s.bias + by[1], s.weight)
