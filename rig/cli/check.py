@@ -19,7 +19,7 @@ from rig.cli.desk import Desk
 from rig.cli.exits import OK
 from rig.cli.terminal import plain
 from rig.config.load import LoadedConfig
-from rig.errors import RigError
+from rig.errors import RecordingError, RigError
 from rig.interface import Torque
 from rig.preflight import plan, predict_all
 
@@ -73,6 +73,29 @@ def recordings(known: Known) -> list[str]:
     return lines
 
 
+def identifiability(known: Known) -> list[str]:
+    """What every set alone and all together can determine about the declared platform."""
+    from identify.foresight import of_planned_campaign, of_recorded_campaign
+
+    config = known.loaded.config
+    if known.stage is None:
+        from rig.recording.load import read_recording
+
+        try:
+            recording = read_recording(known.loaded)
+        except RecordingError:  # said by the check before
+            return []
+        lines = of_recorded_campaign(recording, config.model.platform())
+    else:
+        rig = known.stage.rig
+        platform = config.model.platform()
+        predictions = predict_all(platform, config.excitation, config.limits, rig.rate_full_scale_rad_s)
+        # A set that would break a limit is refused by the forecast; here it speaks at the torque that passes.
+        sets = [p.planned.scaled(p.scale) for p in predictions if p.scale > 0.0]
+        lines = of_planned_campaign(platform, sets, config.excitation.sample_rate_hz, rig.noise_rad_s)
+    return [f"identifiability {plain(line)}" for line in lines]
+
+
 def contact(known: Known) -> list[str]:
     """That every device answers, without torque. Raises DeviceFault that lists all that do not."""
     stage = known.stage
@@ -92,7 +115,7 @@ def _account_lines(account: Mapping[str, Any]) -> Iterator[str]:
         yield f"this computer: {plain(bench['real_time'])}"
 
 
-CHECKS: tuple[Check, ...] = (configuration, recordings, forecast, contact)
+CHECKS: tuple[Check, ...] = (configuration, recordings, forecast, identifiability, contact)
 
 
 def run_checks(desk: Desk, loaded: LoadedConfig) -> int:
