@@ -14,7 +14,7 @@ from rig.platform import TERMS
 
 WELL_KNOWN = 0.05  # relative standard error up to which a parameter counts as determined
 AIM = 0.01  # relative standard error that advice on the torque aims at
-SEPARATE = 100.0  # amplification of the model's errors beyond which inertia and stiffness are not told apart
+SEPARATE = 200.0  # amplification of the model's errors beyond which inertia and stiffness are not told apart
 DETECTABLE = 1.96  # standard errors: what is smaller cannot be told from none
 DELAY_NAME: Name = (DELAY, "delay")
 _RATIOS = {("damping",): "C/J", ("stiffness",): "K/J"}
@@ -177,9 +177,11 @@ def of_delay(each: Sequence[Information]) -> str:
         return ""
     error = total.std_error(DELAY_NAME)
     bent = total.relative(("damping",))
+    if below_noise(total):
+        return ""
     if not np.isfinite(error) or bent > WELL_KNOWN:
         return (
-            "an unknown torque delay cannot be told from damping here: one microsecond of it reads as K x 1e-6 of C. "
-            "Add sets at other frequencies, or one that starts at once"
+            "an unknown torque delay cannot be told from damping here, and a delay bends C most of all: "
+            "add sets at other frequencies, or one that starts at once"
         )
     return f"an unknown torque delay would be told to {number(1e6 * error, 2)} us, C then to {number(100 * bent, 2)} %"

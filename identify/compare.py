@@ -42,6 +42,22 @@ class Judged:
         """Parameter values by name."""
         return dict(zip(self.estimate.names, self.estimate.values.tolist(), strict=True))
 
+    def _covariance(self) -> Array | None:
+        """Covariance of the parameters, errors taken as white; None where the fit ran away."""
+        scale = np.sqrt(np.maximum(np.diag(self.estimate.information), 1e-300))
+        if not np.all(np.isfinite(scale)):
+            return None
+        inverse = np.linalg.pinv(_scaled(self.estimate.information), rcond=1e-12, hermitian=True)
+        return np.asarray(inverse / np.outer(scale, scale) * self.estimate.sigma**2)
+
+    def std_errors(self) -> dict[Name, float]:
+        """Standard error of every parameter, errors taken as white; infinite where the fit ran away."""
+        covariance = self._covariance()
+        size = np.full(len(self.estimate.names), np.inf) if covariance is None else np.sqrt(
+            np.maximum(np.diag(covariance), 0.0)
+        )  # fmt: skip
+        return dict(zip(self.estimate.names, size.tolist(), strict=True))
+
     @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def strength(self, name: str) -> float:
         """How many standard errors, taken as white, a term or an effect stands from zero.
@@ -49,11 +65,9 @@ class Judged:
         Of an effect's gains it is the joint distance (one of a sine and a cosine may well be nothing), of
         its shapes the smallest.
         """
-        scale = np.sqrt(np.maximum(np.diag(self.estimate.information), 1e-300))
-        if not np.all(np.isfinite(scale)):
+        covariance = self._covariance()
+        if covariance is None:
             return 0.0
-        inverse = np.linalg.pinv(_scaled(self.estimate.information), rcond=1e-12, hermitian=True)
-        covariance = inverse / np.outer(scale, scale) * self.estimate.sigma**2
         linear = {p.name: p.linear for p in effects.get(name).parameters} if name not in TERMS else {}
         mine = [i for i, n in enumerate(self.estimate.names) if n[0] == name]
         gains = [i for i in mine if len(self.estimate.names[i]) == 1 or linear[self.estimate.names[i][1]]]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from identify.compare import start_values
 from identify.output_error import Estimate, evaluate, refine
@@ -62,16 +63,22 @@ def noise_of_all(traces: Sequence[Trace]) -> float:
 
 def by_regression(
     traces: Sequence[Trace], structure: Structure, shapes: Mapping[str, tuple[float, ...]], start: Start,
-    use: Sequence[Any], everything: Sequence[Any],
+    use: Sequence[Any], everything: Sequence[Any], shape_errors: Mapping[Name, float],
 ) -> Fitted:  # fmt: skip
-    """The declared model where it is far from the data: white-residual regression at its best filter."""
+    """A model that stays far from the data: white-residual regression at its best filter.
+
+    ``shape_errors`` are the standard errors of shape parameters, which the regression takes as given.
+    """
     solution = best_rho(traces, structure, shapes, start, use)
     runs = 1 + max(t.number for t in traces)
     values = start_values(solution, shapes, runs)
     covariance, determined = _regression_covariance(traces, solution, use)
     free = _free_run(traces, structure, values, everything)
     limited = free is not None and free.sigma < NEAR_FLOOR * noise_of_all(traces)
-    names = solution.labels
+    found = [n for n in values if len(n) > 1 and n not in solution.labels and n in shape_errors]
+    names = (*solution.labels, *found)
+    covariance = block_diag(covariance, np.diag([shape_errors[n] ** 2 for n in found])) if found else covariance
+    determined = (*determined, *(bool(np.isfinite(shape_errors[n])) for n in found))
     return Fitted(structure, values, covariance, names, solution.rms, free, limited, determined, "regression")
 
 

@@ -42,6 +42,9 @@ class Information:
         The same with start states and bias known.
     energy, count
         Sum of squares of the motion in the measured channel over the noise variance, and samples that count.
+    misfit
+        Shape (p, p): the matrices of all runs, each times its energy. What a model leaves of a run is a share of
+        that run's motion.
     torque_free
         No torque was measured: only ratios to the inertia show, and inertia is not among ``names``.
     """
@@ -51,6 +54,7 @@ class Information:
     values: Array
     matrix: Array
     known: Array
+    misfit: Array
     energy: float
     count: int
     frequency_hz: float | None = None
@@ -60,7 +64,7 @@ class Information:
         """Both together."""
         return replace(
             self, name=f"{self.name} + {other.name}", matrix=self.matrix + other.matrix,
-            known=self.known + other.known, energy=self.energy + other.energy, count=self.count + other.count,
+            known=self.known + other.known, misfit=self.misfit + other.misfit, energy=self.energy + other.energy, count=self.count + other.count,
             frequency_hz=None, torque_free=self.torque_free and other.torque_free,
         )  # fmt: skip
 
@@ -88,9 +92,19 @@ class Information:
         return float(np.sqrt(power[-1] / power[0])) if self.rank == len(power) else np.inf
 
     @cached_property
+    def _inverse(self) -> tuple[Array, Array]:
+        """Inverse of the matrix without its empty directions, and which parameters these touch."""
+        length, power, axes = self._axes
+        inverse = (axes / np.where(self._empty, np.inf, power)) @ axes.T / np.outer(length, length)
+        return inverse, np.any(np.abs(axes[:, self._empty]) > 1e-3, axis=1)
+
+    @cached_property
     def covariance(self) -> Array:
         """The Cramer-Rao bound, (p, p); infinite variance for what an empty direction touches."""
-        return _bound(*self._axes, self._empty)
+        inverse, touched = self._inverse
+        out = inverse.copy()
+        out[touched, touched] = np.inf
+        return out
 
     @property
     def correlation(self) -> Array:
@@ -117,12 +131,17 @@ class Information:
         return float(np.sqrt(self.energy / max(self.count, 1)))
 
     def amplification(self, name: Name) -> float:
-        """Relative error of a parameter per relative error of the model, both root mean square, at the worst.
+        """Relative error of a parameter per relative error of the model, at the worst.
 
-        About one where the parameter shapes the whole motion. At a thousand, a thousandth of the motion that
-        the model does not explain can move the parameter by all of its value, however quiet the sensor.
+        About one where the parameter shapes the whole motion. At a thousand, a thousandth of each run's motion
+        that the model does not explain can move the parameter by all of its value, however quiet the sensor.
         """
-        return float(np.sqrt(self.energy)) * self.relative(name)
+        i = self.names.index(name)
+        inverse, touched = self._inverse
+        value = abs(float(self.values[i]))
+        if touched[i] or value == 0.0:
+            return np.inf
+        return float(np.sqrt(inverse[i] @ self.misfit @ inverse[i])) / value
 
     def without(self, name: Name) -> Information:
         """The same where one parameter is known."""
@@ -130,20 +149,12 @@ class Information:
         table = np.ix_(kept, kept)
         return replace(
             self, names=tuple(self.names[i] for i in kept), values=self.values[kept],
-            matrix=self.matrix[table], known=self.known[table],
+            matrix=self.matrix[table], known=self.known[table], misfit=self.misfit[table],
         )  # fmt: skip
 
     def if_known(self) -> Information:
         """The same with start states and bias known."""
         return replace(self, matrix=self.known)
-
-
-def _bound(length: Array, power: Array, axes: Array, empty: Array) -> Array:
-    safe = np.where(empty, np.inf, power)
-    inverse = (axes / safe) @ axes.T / np.outer(length, length)
-    touched = np.any(np.abs(axes[:, empty]) > 1e-3, axis=1)
-    inverse[touched, touched] = np.inf
-    return np.asarray(inverse)
 
 
 def with_delay(platform: Platform) -> Platform:
@@ -209,8 +220,9 @@ def information_of(
     clean = bare - nuisances @ np.linalg.lstsq(nuisances, bare)[0]
     motion = trace.measured[used] / trace.noise
     kept = tuple(n for n, out in zip(names, fixed, strict=True) if not out)
+    matrix, energy = clean.T @ clean, float(motion @ motion)
     return Information(
-        trace.run.name, kept, values[~fixed], clean.T @ clean, bare.T @ bare, float(motion @ motion), len(motion),
+        trace.run.name, kept, values[~fixed], matrix, bare.T @ bare, energy * matrix, energy, len(motion),
         trace.run.frequency_hz, free,
     )  # fmt: skip
 

@@ -122,8 +122,9 @@ class _Identifier:
 
     def _before(self, search: Search, shapes: Mapping[str, tuple[float, ...]]) -> Fitted:
         regressed = by_regression(
-            self.traces, self.structure, shapes, self.start, self.split.final, self.split.everything
-        )
+            self.traces, self.structure, shapes, self.start, self.split.final, self.split.everything,
+            search.base.std_errors(),
+        )  # fmt: skip
         if search.base.sigma < 2.0 * search.floor or self.structure.effects:
             return by_output_error(
                 self.traces, self.structure, search.base.values(), search.horizon,
@@ -146,8 +147,9 @@ class _Identifier:
         if fitted.sensor_limited or self.torque_free:
             return fitted
         return by_regression(
-            self.traces, structure, search.best.shapes(), self.start, self.split.final, self.split.everything
-        )
+            self.traces, structure, search.best.shapes(), self.start, self.split.final, self.split.everything,
+            search.best.std_errors(),
+        )  # fmt: skip
 
     def _conclude(
         self, search: Search, before: Fitted, after: Fitted, measured_before: Measured, measured_after: Measured,

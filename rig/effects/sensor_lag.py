@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from rig.effects._first_order import lag, times
 from rig.effects.base import Effect, Parameter, Place
-from rig.effects.first_order import lag, times
 
 EFFECT = Effect(
     name="sensor_lag",
