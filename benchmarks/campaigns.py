@@ -52,7 +52,8 @@ def run_of(rate_rad_s: Array, torque_nm: float, frequency_hz: float, lost: Array
     kept = np.ones(len(time), dtype=bool) if lost is None else ~lost.astype(bool)
     return Run(
         f"{frequency_hz:g} Hz", time[kept], np.ones(int(kept.sum()), dtype=bool), rate_rad_s=rate_rad_s[kept],
-        torque_time_s=time, torque_nm=torque_nm * np.sin(2.0 * math.pi * frequency_hz * time), frequency_hz=frequency_hz,
+        torque_time_s=time, torque_nm=torque_nm * np.sin(2.0 * math.pi * frequency_hz * time),
+        frequency_hz=frequency_hz,
     )  # fmt: skip
 
 
@@ -62,7 +63,10 @@ def clean_rates(delay_s: float = 0.0, sets: Sequence[tuple[float, float]] = SETS
 
 
 def traces_from(
-    rates: Sequence[Array], noise: Sequence[Array], lost: Sequence[Array] | None = None, sigma: float | None = SIGMA_RAD_S
+    rates: Sequence[Array],
+    noise: Sequence[Array],
+    lost: Sequence[Array] | None = None,
+    sigma: float | None = SIGMA_RAD_S,
 ) -> list[Trace]:
     """The sets as the fit takes them; ``sigma`` None lets it estimate the noise."""
     parts = []

@@ -88,7 +88,10 @@ def measure(kind: str, noise: Noise, runs: int, lost: bool, seed: int = 0) -> Co
 
 def text(found: Sequence[Coverage]) -> str:
     """A markdown table."""
-    lines = ["| noise | campaigns | J % | C % | K % | all % | error over standard error, J, C, K |", "|---|---|---|---|---|---|---|"]
+    lines = [
+        "| noise | campaigns | J % | C % | K % | all % | error over standard error, J, C, K |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for c in found:
         shares = " | ".join(f"{100 * v:.1f}" for v in (*c.inside.values(), c.overall))
         lines.append(f"| {c.kind} | {c.runs} | {shares} | {', '.join(f'{v:.3f}' for v in c.spread.values())} |")

@@ -15,7 +15,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from campaigns import (
-    DELAY, DELAY_NAME, SIGMA_RAD_S, TRUTH, alone, clean_rates, fitted, regression_start, structure_with, traces_from, white,
+    DELAY,
+    DELAY_NAME,
+    SIGMA_RAD_S,
+    TRUTH,
+    alone,
+    clean_rates,
+    fitted,
+    regression_start,
+    structure_with,
+    traces_from,
+    white,
 )  # fmt: skip
 from threadpoolctl import threadpool_limits
 
@@ -93,9 +103,13 @@ def compare(delay: bool, runs: int, seed: int = 0) -> list[Row]:
 def text(rows: Sequence[Row], title: str) -> str:
     """The rows as a markdown table."""
     lines = [f"{title}, gyro noise {np.rad2deg(SIGMA_RAD_S):.2f} deg/s", ""]
-    lines += ["| fit | parameter | rms error % | bound % | ratio | bound, start and bias known % |", "|---|---|---|---|---|---|"]
     lines += [
-        f"| {r.fit} | {r.parameter} | {r.error_percent:.3g} | {r.bound_percent:.3g} | {r.ratio:.3f} | {r.known_percent:.3g} |"
+        "| fit | parameter | rms error % | bound % | ratio | bound, start and bias known % |",
+        "|---|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {r.fit} | {r.parameter} | {r.error_percent:.3g} | {r.bound_percent:.3g} | {r.ratio:.3f} "
+        f"| {r.known_percent:.3g} |"
         for r in rows
     ]
     return "\n".join(lines)
@@ -113,7 +127,7 @@ def main() -> None:
             print(text(rows, f"{title}: {given.runs} campaigns"))
             joint = max(r.ratio for r in rows if r.fit == "all sets together" and r.parameter in TRUTH)
             single = max(r.ratio for r in rows if r.fit != "all sets together" and r.parameter in TRUTH)
-            print(f"\nlargest ratio: {joint:.3f} jointly (at most {MOST_JOINT}), {single:.3f} alone (at most {MOST_ALONE})\n")
+            print(f"\nlargest ratio: {joint:.3f} jointly (at most {MOST_JOINT}), {single:.3f} alone ({MOST_ALONE})\n")
 
 
 if __name__ == "__main__":

@@ -64,7 +64,8 @@ class Information:
         """Both together."""
         return replace(
             self, name=f"{self.name} + {other.name}", matrix=self.matrix + other.matrix,
-            known=self.known + other.known, misfit=self.misfit + other.misfit, energy=self.energy + other.energy, count=self.count + other.count,
+            known=self.known + other.known, misfit=self.misfit + other.misfit,
+            energy=self.energy + other.energy, count=self.count + other.count,
             frequency_hz=None, torque_free=self.torque_free and other.torque_free,
         )  # fmt: skip
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -65,3 +66,27 @@ def test_devices_that_do_not_answer_are_listed_together_after_the_forecast() -> 
     assert done.exit_code == 3
     assert done.stdout.count("forecast") == 5
     assert "/dev/no_gyro" in done.stderr and "/dev/no_adapter" in done.stderr
+
+
+def test_it_says_which_set_alone_cannot_tell_inertia_from_stiffness_and_how_to_mend_it(tmp_path: Path) -> None:
+    text = """
+backend: simulated
+simulated: {}
+limits: {frozen_gyro_ms: null}
+excitation:
+  sets: [{torque_nm: 60, frequency_hz: 0.5, soft_start_s: 1.5, duration_s: 4}]
+"""
+    done = command(app, "check", write_config(tmp_path, text))
+    assert done.exit_code == 0, done.output
+    assert "0.5 Hz soft alone cannot separate inertia from stiffness: keep the start transient" in done.stdout
+    assert "NOT determined" in done.stdout
+
+
+def test_a_free_decay_without_torque_promises_ratios_only(tmp_path: Path) -> None:
+    time_s = [i / 200 for i in range(1000)]
+    ring = [math.exp(-1.125 * t) * math.cos(184.0 * t) for t in time_s]
+    rows = "\n".join(f"{t},{0.1 * x}" for t, x in zip(time_s, ring, strict=True))
+    (tmp_path / "decay.csv").write_text(f"time_s,angle_rad\n{rows}\n")
+    done = command(app, "check", write_config(tmp_path, "backend: recorded\nrecorded: {runs: [{file: decay.csv}]}\n"))
+    assert done.exit_code == 0, done.output
+    assert "without torque only ratios show, C/J" in done.stdout
