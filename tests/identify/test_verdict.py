@@ -1,0 +1,47 @@
+"""The verdict in sentences."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from identify.verdict import sentences_of
+from tests.identify.sample import sample
+
+FOUND, _ = sample(1.0)
+
+
+def test_each_effect_is_named_with_its_numbers_and_units_in_the_order_of_finding() -> None:
+    first, second, *_ = sentences_of(FOUND)
+    assert "Coulomb friction" in first
+    assert "N·m" in first
+    assert "torque delay" in second
+    assert " s)" in second or "ms)" in second
+
+
+def test_what_the_missing_effect_did_to_each_parameter_is_said_with_its_direction() -> None:
+    said = " ".join(sentences_of(FOUND))
+    assert "damping C came out 822 % too high" in said
+    assert "rotary inertia J came out" in said
+
+
+def test_a_rival_is_named_with_what_would_separate_it() -> None:
+    verdict = replace(FOUND.verdict, confusable_with={"coulomb_friction": ("stribeck_friction",)})
+    said = sentences_of(replace(FOUND, verdict=verdict))[0]
+    assert "cannot exclude Stribeck friction" in said
+    assert "slow ramp" in said
+
+
+def test_nothing_found_is_said_as_plainly_whether_the_floor_is_reached_or_not() -> None:
+    empty = replace(FOUND.verdict, effects=(), unexplained=False)
+    assert "reaches the noise floor" in sentences_of(replace(FOUND, verdict=empty, after=None))[0]
+    lost = replace(empty, unexplained=True, unexplained_fraction=0.42)
+    said = sentences_of(replace(FOUND, verdict=lost, after=None))
+    assert "none of those known" in said[0]
+    assert any("42 %" in s for s in said)
+
+
+def test_what_can_never_be_told_apart_is_said_with_the_reason() -> None:
+    verdict = replace(FOUND.verdict, never_separable={"actuator_lag / sensor_lag": "they answer alike"})
+    said = sentences_of(replace(FOUND, verdict=verdict))[-1]
+    assert "cannot be told apart" in said
+    assert "they answer alike" in said
