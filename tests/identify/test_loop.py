@@ -1,0 +1,162 @@
+"""One recording in, one identification out."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import replace
+from functools import cache
+from typing import get_type_hints
+
+import numpy as np
+import pytest
+
+from identify.loop import identify
+from identify.results import Identification
+from identify.writing import result_json
+from rig.config.identify import IdentifyConfig
+from rig.errors import RecordingError
+from rig.platform import TERMS, Platform
+from rig.recording.run import Recording, Run
+from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, decay_run, white
+
+FEW = ("coulomb_friction", "cubic_stiffness", "quadratic_damping", "torque_delay")
+SETTINGS = IdentifyConfig.model_validate({"candidates": FEW})
+LOW = Platform(0.002, 0.0045, 67.0)
+HIGH = Platform(0.2, 0.45, 6773.0)
+
+
+@cache
+def recording(*, friction: bool = True) -> Recording:
+    return campaign({"coulomb_friction": {"level": 1.0}} if friction else None, duration_s=4.0)
+
+
+@cache
+def found_from(declared: str) -> Identification:
+    return identify(recording(), {"low": LOW, "high": HIGH}[declared], SETTINGS)
+
+
+def test_the_identifier_is_handed_a_recording_a_declared_model_its_settings_and_nothing_else() -> None:
+    hints = get_type_hints(identify)
+    assert list(inspect.signature(identify).parameters) == ["recording", "declared", "settings", "progress"]
+    assert hints["recording"] is Recording
+    assert hints["declared"] is Platform
+    assert hints["settings"] is IdentifyConfig
+
+
+def test_the_hidden_friction_is_named_and_damping_comes_from_far_off_to_within_a_percent() -> None:
+    found = found_from("low")
+    assert found.accepted, found.reasons
+    assert found.verdict.effects == ("coulomb_friction",)
+    assert found.after is not None
+    assert abs(found.before.parameters["damping"].value / TRUTH[1] - 1) > 1.0
+    np.testing.assert_allclose([found.after.parameters[t].value for t in TERMS], TRUTH, rtol=0.01)
+    level = found.after.effect_parameters["coulomb_friction"]["level"]
+    assert level.value == pytest.approx(1.0, rel=0.005)
+    assert level.unit == "N*m"
+    assert level.ci95[0] < level.value < level.ci95[1]
+
+
+def test_the_error_falls_to_the_noise_and_nothing_stays_unexplained() -> None:
+    found = found_from("low")
+    assert found.after is not None
+    assert found.after.error.holdout_rate_rms == pytest.approx(NOISE_RAD_S, rel=0.1)
+    assert found.before.error.holdout_rate_rms is not None
+    assert found.before.error.holdout_rate_rms > 20 * NOISE_RAD_S
+    assert not found.verdict.unexplained
+
+
+def test_declared_models_a_hundred_times_apart_end_at_the_same_numbers() -> None:
+    low, high = found_from("low"), found_from("high")
+    assert low.verdict.effects == high.verdict.effects
+    for term in TERMS:
+        assert low.final.parameters[term].value == pytest.approx(high.final.parameters[term].value, rel=1e-9)
+        assert low.before.parameters[term].value == pytest.approx(high.before.parameters[term].value, rel=1e-9)
+
+
+def test_what_stands_in_info_is_never_read() -> None:
+    class Untouchable(dict[str, object]):
+        def __getitem__(self, key: str) -> object:
+            raise AssertionError(f"the identifier read {key}")
+
+        get = __contains__ = __iter__ = __getitem__  # type: ignore[assignment]
+
+    telling = replace(recording(friction=False), info=Untouchable())
+    assert identify(telling, LOW, SETTINGS).accepted
+
+
+def test_where_nothing_is_missing_there_is_no_after() -> None:
+    found = identify(recording(friction=False), HIGH, SETTINGS)
+    assert found.accepted, found.reasons
+    assert found.after is None
+    assert found.verdict.effects == ()
+    for term, truth in zip(TERMS, TRUTH, strict=True):
+        estimate = found.final.parameters[term]
+        assert abs(estimate.value - truth) < 4.5 * estimate.std_error
+
+
+def test_an_effect_that_is_declared_is_fitted_and_not_named_as_missing() -> None:
+    declared = Platform(*TRUTH, effects={"coulomb_friction": {"level": 0.5}})
+    found = identify(recording(), declared, SETTINGS)
+    assert found.verdict.effects == ()
+    assert found.final.effect_parameters["coulomb_friction"]["level"].value == pytest.approx(1.0, rel=0.01)
+
+
+def test_something_that_no_effect_explains_is_said_and_not_accepted() -> None:
+    runs = []
+    for i, run in enumerate(recording(friction=False).runs):
+        assert run.torque_nm is not None
+        wander = np.cumsum(white(len(run.time_s), 0.3, i))
+        runs.append(replace(run, torque_nm=run.torque_nm + wander - np.linspace(0, wander[-1], len(wander))))
+    found = identify(Recording(tuple(runs)), LOW, SETTINGS)
+    assert not found.accepted
+    assert found.verdict.unexplained
+    assert any("times the sensor's noise" in r for r in found.reasons)
+
+
+def test_a_free_decay_gives_ratios_with_their_units() -> None:
+    found = identify(Recording((decay_run(Platform(0.5, 0.1, 20.0)),)), Platform(), SETTINGS)
+    assert set(found.final.parameters) == {"damping_over_inertia", "stiffness_over_inertia"}
+    stiffness = found.final.parameters["stiffness_over_inertia"]
+    assert stiffness.value == pytest.approx(40.0, rel=1e-3)
+    assert stiffness.unit == "1/s^2"
+    assert found.final.parameters["damping_over_inertia"].value == pytest.approx(0.2, rel=0.02)
+    assert found.per_set == ()
+    assert found.noise_floor.residual_rms_torque is None
+
+
+def test_a_torque_of_zeros_is_a_free_decay_too() -> None:
+    run = decay_run(Platform(0.5, 0.1, 20.0))
+    still = replace(run, torque_time_s=run.time_s, torque_nm=np.zeros(len(run.time_s)))
+    assert "stiffness_over_inertia" in identify(Recording((still,)), Platform(), SETTINGS).final.parameters
+
+
+def test_with_a_reference_the_largest_error_of_equation_fifteen_stands_with_every_set() -> None:
+    known = {"inertia_kg_m2": TRUTH[0], "damping_nm_s_rad": TRUTH[1], "stiffness_nm_rad": TRUTH[2]}
+    settings = SETTINGS.model_validate(SETTINGS.model_dump() | {"reference": known})
+    found = identify(recording(friction=False), LOW, settings)
+    assert found.max_error_percent is not None
+    for term, truth in zip(TERMS, TRUTH, strict=True):
+        errors = [100 * abs(s.parameters[term].value / truth - 1) for s in found.per_set if term in s.parameters]
+        assert found.max_error_percent[term] == pytest.approx(max(errors))
+
+
+def test_a_result_can_be_written_and_a_second_run_repeats_it() -> None:
+    first = result_json(found_from("low"))
+    again = result_json(identify(recording(), LOW, SETTINGS))
+    assert first["after"] == again["after"]
+    assert first["per_set"] == again["per_set"]
+
+
+@pytest.mark.parametrize("fault", ["still", "short", "steady"])
+def test_a_recording_without_anything_to_identify_is_refused_with_its_reason(fault: str) -> None:
+    time = np.arange(2001) * 1e-3
+    run = Run(
+        "run", time, np.ones(len(time), bool), rate_rad_s=white(len(time)), torque_time_s=time, torque_nm=np.sin(time)
+    )
+    said = {"still": "sensor's noise", "short": "40 samples", "steady": "same value"}
+    if fault == "short":
+        run = replace(run, valid=np.arange(len(time)) < 30)
+    if fault == "steady":
+        run = replace(run, rate_rad_s=np.sin(9 * time), torque_nm=np.full(len(time), 3.0))
+    with pytest.raises(RecordingError, match=said[fault]):
+        identify(Recording((run,)), LOW, SETTINGS)
