@@ -93,8 +93,9 @@ def figures() -> None:
         torque = np.asarray(one.torque(time))
         angle = np.degrees(simulate(PLATFORM, time, TorqueSignal(time, torque)).angle_rad)
         torques.append((one.name, [("", time, torque)]))
-        limits = [("", time, np.full_like(time, sign * TRAVEL_DEG)) for sign in (1.0, -1.0)]
-        angles.append((one.name, [("", time, angle), ("the paper's limit of 10 deg", *limits[0][1:]), limits[1]]))
+        box = np.array([0.0, time[-1], time[-1], 0.0]), TRAVEL_DEG * np.array([1.0, 1.0, -1.0, -1.0])
+        label = "" if angles else "the paper's limit of 10 deg"
+        angles.append((one.name, [("", time, angle), (label, *box)]))
     write = (("paper_fig6.svg", torques, "torque, N m"), ("paper_fig7.svg", angles, "angle, deg"))
     for name, panels, label in write:
         (DOCS / "figures" / name).write_text(stacked(panels, "time, s", label), encoding="utf-8")
