@@ -16,6 +16,7 @@ from rig.effects.base import Place
 from rig.platform import TERMS
 from rig.recording.run import Array
 
+ABOVE = 0.02  # of the noise's square: less than that above the floor is the floor
 CLEARLY = 2.5  # standard errors by which the held-out error must fall
 
 
@@ -191,4 +192,4 @@ def delta_bic(old: Judged, new: Judged) -> float:
 def share_explained(old: Judged, new: Judged, floor: float) -> float:
     """Share of the held-out error above the noise floor that the new model takes away."""
     excess = old.sigma**2 - floor**2
-    return float((old.sigma**2 - new.sigma**2) / excess) if excess > 1e-6 * floor**2 else 0.0
+    return float((old.sigma**2 - new.sigma**2) / excess) if excess > ABOVE * floor**2 else 0.0

@@ -118,7 +118,8 @@ class _Identifier:
         judging = pieces(self.traces, self.split.judge, 3.0 * horizon, 5_000)
         allowed = self.settings.candidates or effects.names()
         loop = Loop(fitting, judging, self.start, allowed, self.say, self.traces)
-        return loop.run(self.structure, shapes)
+        d = self.declared
+        return loop.run(self.structure, shapes, (d.inertia_kg_m2, d.damping_nm_s_rad, d.stiffness_nm_rad))
 
     def _before(self, search: Search, shapes: Mapping[str, tuple[float, ...]]) -> Fitted:
         regressed = by_regression(

@@ -21,6 +21,7 @@ MOST_EFFECTS = 6
 SHORTLIST = 4
 WORTH = 0.2  # share of the excess error that an effect has to take away
 MISSED = 0.1  # share of the squared error by which nobody doubts that a term is needed
+BEGIN_AGAIN = 1.002  # times the floor above which the declared values are tried as a start as well
 FAR = 10.0  # times the horizon
 AGAIN = 2  # candidates of a round that are tried from other shapes
 RESTARTS = 5
@@ -75,13 +76,20 @@ class Loop:
         self.torque_free = all(t.torque is None for t in fitting)
         self.runs = 1 + max(t.number for t in (*fitting, *judging))
 
-    def run(self, declared: Structure, shapes: Shapes) -> Search:
-        """From the declared structure, with its declared shapes, to the one that the data support."""
+    def run(self, declared: Structure, shapes: Shapes, nominal: tuple[float, float, float] | None = None) -> Search:
+        """From the declared structure, with its declared shapes, to the one that the data support.
+
+        ``nominal`` are declared J, C, K: a second place to begin from, for data that hardly tell J from K.
+        """
         solution = best_rho(self.fitting, declared, shapes, self.start)
         horizon = horizon_s(solution.platform, self.fitting)
         length = horizon / self.fitting[0].step_s
         floor = self.noise * float(np.sqrt(max(1.0 - 2.0 / length, 0.25)))
         base = judge(self.fitting, self.judging, declared, start_values(solution, shapes, self.runs), horizon)
+        if nominal is not None and base.sigma > BEGIN_AGAIN * floor:
+            start = start_values(replace(solution, platform=nominal), shapes, self.runs)
+            other = judge(self.fitting, self.judging, declared, start, horizon)
+            base = min((base, other), key=lambda j: j.estimate.sigma)
         found = Search(base, base, horizon, floor)
         self._probation(found, solution)
         for round_ in range(1, MOST_EFFECTS + 1):

@@ -21,6 +21,7 @@ from rig.recording.run import Array, Run
 UPSAMPLING = 4  # nonlinear torques have corners between samples
 SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than it tells
 LEAD_S = 0.1
+LEAD_IN_S = 0.01  # at the start of a run that carry no weight
 LONGEST_FILL = 25  # missing samples that a spline may bridge
 STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
 
@@ -312,6 +313,11 @@ def prepare(run: Run, number: int = 0, noise: float | None = None) -> Trace:
         slow = np.abs(trace.fine[1][::UPSAMPLING]) <= run.min_rate_rad_s
         broken |= slow
     trace.keep = keep & ~broken
+    first = int(np.ceil(LEAD_IN_S / step))
+    if torque is not None and n > 100 * first:
+        # A delay reaches back to torque from before the record began, which nobody knows; what it did
+        # to the motion is part of the start state once these samples are past.
+        trace.keep[:first] = False
     trace.stretches = [(a, b) for a, b in _gaps(broken) if b - a + 1 >= SHORTEST_STRETCH]
     inside = np.zeros(n, dtype=bool)
     for a, b in trace.stretches:
