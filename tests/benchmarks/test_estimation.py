@@ -51,17 +51,17 @@ def test_twenty_campaigns_are_efficient(load: Any) -> None:
 
 
 def test_intervals_hold_where_samples_are_lost(load: Any) -> None:
-    coverage: ModuleType = load("coverage")
-    found = coverage.measure("lost", load("campaigns").white, 2, lost=True)
+    intervals: ModuleType = load("intervals")
+    found = intervals.measure("lost", load("campaigns").white, 2, lost=True)
     assert all(0.0 < spread < 4.0 for spread in found.spread.values())
-    assert "| lost | 2 |" in coverage.text([found])
+    assert "| lost | 2 |" in intervals.text([found])
 
 
 def test_real_gyro_noise_has_the_size_of_the_white_one(load: Any) -> None:
-    coverage: ModuleType = load("coverage")
-    if not coverage.GYRO.exists():
+    intervals: ModuleType = load("intervals")
+    if not intervals.GYRO.exists():
         pytest.skip("the record of a real gyro is not beside the project")
-    stretches = coverage.gyro_noise(coverage.GYRO)(np.random.default_rng(1))
+    stretches = intervals.gyro_noise(intervals.GYRO)(np.random.default_rng(1))
     assert len(stretches) == 5
     assert np.mean([np.std(s) for s in stretches]) == pytest.approx(math.radians(0.05), rel=0.15)
 

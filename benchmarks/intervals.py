@@ -1,6 +1,6 @@
 """How often the 95 % intervals hold the truth, over simulated campaigns.
 
-python benchmarks/coverage.py --white 500 --real 200 --lost 200 --gyro ../shared/data/adis16405_gyro/gyro_counts.npz
+python benchmarks/intervals.py --white 500 --real 200 --lost 200 --gyro ../shared/data/adis16405_gyro/gyro_counts.npz
 
 White noise; the noise of a real MEMS gyro at rest, scaled to 0.05 deg/s, each of its 100 Hz samples used as one
 of 1 kHz; and white noise with 2 % of the samples lost. Intervals are those of the final fit, noise estimated
