@@ -71,7 +71,8 @@ class StopRequests:
         earlier = {}
         for name in SIGNALS:
             number = getattr(signal, name, None)
-            if number is not None and signal.getsignal(number) is not signal.SIG_IGN:  # nohup means what it says
+            ignored = number is not None and signal.getsignal(number) is signal.SIG_IGN
+            if number is not None and not (ignored and name == "SIGHUP"):  # nohup means what it says; a stop is a stop
                 earlier[number] = signal.signal(number, self._heard)
         try:
             yield

@@ -273,8 +273,8 @@ def test_the_same_loop_runs_against_the_clock_on_the_wall() -> None:
     clock = MonotonicClock()
     before = clock.now_s()
     campaign = sequencer(ScriptedRig(), clock).play(plan((short,)))
-    assert clock.now_s() - before >= SETTLE_S + 0.05
     if campaign.cause is None:  # a machine under load may stall, and that is then a trip
+        assert clock.now_s() - before >= SETTLE_S + 0.05
         assert campaign.recording.runs[0].duration_s == pytest.approx(0.05, abs=0.01)
     else:
         assert isinstance(campaign.cause, SafetyTrip)
