@@ -58,7 +58,7 @@ def test_a_long_recording_is_thinned_to_pieces_that_keep_each_start_transient() 
     cut = pieces(long, found.fit, 0.3, 8000)
     assert 4000 < sum(t.count for t in cut) < 14_000
     assert {t.number for t in cut} == {0, 1}
-    assert {t.number for t in cut if t.offset_s == 0.0} == {0, 1}
+    assert {t.number for t in cut if t.offset_s < 0.02} == {0, 1}
     assert all(len(t.measured) >= SHORTEST_STRETCH for t in cut)
 
 

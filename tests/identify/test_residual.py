@@ -96,7 +96,7 @@ def test_a_known_added_inertia_is_part_of_the_model() -> None:
     heavy = replace(sine_run(104, 3, jck=(0.024, *TRUTH[1:]), noise=1e-9), added_inertia_kg_m2=0.004)
     part = torque_residual(prepare(heavy), Structure(), JCK, 100.0)
     assert part is not None
-    assert np.std(part.residual[300:-300]) < 1e-3
+    assert np.std(part.residual[300:-300]) < 2e-3, "of 104 N m"
 
 
 def test_a_run_without_torque_has_no_torque_residual() -> None:
