@@ -176,7 +176,7 @@ def planned_trace(
         planned.name, time, np.ones(len(time), dtype=bool), rate_rad_s=motion.sensed_rate_rad_s,
         torque_time_s=time, torque_nm=torque.torque_nm, frequency_hz=planned.frequency_hz,
     )  # fmt: skip
-    return prepare(run, number, noise_rad_s)
+    return prepare(run, number, noise_rad_s, lead_in_s=0.0)
 
 
 def vector_of(platform: Platform, runs: int) -> tuple[Structure, tuple[Name, ...], Array]:

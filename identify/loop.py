@@ -166,7 +166,7 @@ class _Identifier:
             effects=tuple(e for e in search.best.structure.effects if e not in self.structure.effects),
             confusable_with=search.rivals,
             never_separable=_never(search.best.structure),
-            unexplained_fraction=_fraction(measured_before, measured_after, floor),
+            unexplained_fraction=_fraction(measured_before, measured_after, floor) if unexplained else 0.0,
             unexplained=unexplained,
             candidates=tuple(search.candidates),
             sentences=(),
@@ -216,6 +216,8 @@ class _Identifier:
             if len(name) > 1:
                 parameter = next(p for p in effects.get(name[0]).parameters if p.name == name[1])
                 label, unit = ".".join(name), parameter.unit + (per if parameter.linear else "")
+                if self.recording.axis == "linear":
+                    unit = unit.replace("kg*m^2", "kg").replace("N*m", "N").replace("rad", "m")
             elif self.torque_free:
                 label, unit = TORQUE_FREE[name[0]]
             if not fitted.determined[i] or not np.isfinite(error) or (error > 0.5 * abs(value) and len(name) == 1):

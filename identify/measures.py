@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from identify.residual import TorqueResidual, relative, torque_noise_floor, torq
 from identify.results import Errors, NoiseFloor
 from identify.traces import Trace
 from rig.recording.run import Array
+
+EDGE_PERIODS = 3.0  # of the cut-off, left out at both ends of a run
 
 
 @dataclass(frozen=True)
@@ -32,8 +35,9 @@ def measure(traces: Sequence[Trace], split: Split, fitted: Fitted, cutoff_hz: fl
     if fitted.sensor_limited:  # friction along the model's own motion knows when it sticks; a noisy sign does not
         structure, along = Structure(structure.terms), linear_traces(traces, fitted)
     parts = [torque_residual(t, structure, fitted.values, cutoff_hz) for t in along]
-    everything = relative(parts, split.everything)
-    held = relative(parts, split.judge)
+    inside = [_inside(t, cutoff_hz) for t in traces]
+    everything = relative(parts, [m & i for m, i in zip(split.everything, inside, strict=True)])
+    held = relative(parts, [m & i for m, i in zip(split.judge, inside, strict=True)])
     if fitted.free_run is None:
         simulated = [np.full(len(t.measured), np.nan) for t in traces]
         rms = fit = None
@@ -49,6 +53,15 @@ def measure(traces: Sequence[Trace], split: Split, fitted: Fitted, cutoff_hz: fl
         lowpass_hz=cutoff_hz if everything else None,
     )
     return Measured(errors, parts, simulated)
+
+
+def _inside(trace: Trace, cutoff_hz: float) -> Any:
+    """Samples far enough from the ends of the run for a zero-phase filter to have settled, (n,)."""
+    edge = int(np.ceil(EDGE_PERIODS / (cutoff_hz * trace.step_s)))
+    out = np.ones(len(trace.measured), dtype=bool)
+    if len(out) > 20 * edge:
+        out[:edge] = out[-edge:] = False
+    return out
 
 
 def _free_run(traces: Sequence[Trace], split: Split, simulated: Sequence[Array]) -> tuple[float | None, float | None]:

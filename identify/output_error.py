@@ -124,7 +124,7 @@ def refine(
         Give up after three iterations where the root mean square is still above this.
     """
     names = names_of(structure, 1 + max(t.number for t in traces))
-    x = np.array([start[name] for name in names])
+    x = np.array([start.get(name, 0.0) if len(name) == 3 else start[name] for name in names])
     still = np.array([name in fixed for name in names])
     shots = _shots_for(traces, structure, names, x, shot_s, use, carry, coarse)
     workers = ThreadPoolExecutor(2)
@@ -176,6 +176,8 @@ def _levenberg(
     count = int(np.sum(counts))
     for k in range(iterations if np.all(np.isfinite(losses)) else 0):
         cost = _cost(losses, counts, outlier)
+        if not (np.all(np.isfinite(a)) and np.all(np.isfinite(b))):
+            break
         if k == 3 and cost > hopeless**2 * count:
             break
         step = None
@@ -184,6 +186,8 @@ def _levenberg(
             size = np.sqrt(np.maximum(np.diag(a), 1e-300))
             free = ~still
             scaled = (a / np.outer(size, size))[np.ix_(free, free)]
+            if not (np.all(np.isfinite(scaled)) and np.all(np.isfinite(b / size))):
+                break
             dx = np.zeros(len(x))
             dx[free] = np.linalg.lstsq(
                 scaled + damping * np.eye(int(free.sum())), (b / size)[free], rcond=1e-14

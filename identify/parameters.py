@@ -38,7 +38,10 @@ def platform_of(
 ) -> Platform:
     """The platform that a parameter vector stands for in one run."""
     terms = {"inertia": 0.0, "damping": 0.0, "stiffness": 0.0}
-    held: dict[str, dict[str, float]] = {name: {} for name in structure.effects}
+    # A run whose own gains were never fitted (it was held out) is simulated without them.
+    held: dict[str, dict[str, float]] = {
+        name: {p.name: 0.0 for p in effects.get(name).parameters if p.per_run} for name in structure.effects
+    }
     for name, value in zip(names, values, strict=True):
         if len(name) == 1:
             terms[name[0]] = float(value)

@@ -276,6 +276,8 @@ def residuals(blocks: Sequence[Block], x: Array) -> list[Array]:
 
 def solve(a: Array, b: Array) -> Array:
     """Least squares from normal equations, columns scaled; the direction that nothing determines stays zero."""
+    if not (np.all(np.isfinite(a)) and np.all(np.isfinite(b))):
+        return np.zeros(len(b))
     scale = np.sqrt(np.maximum(np.diag(a), 1e-300))
     scaled = a / np.outer(scale, scale)
     return np.asarray(np.linalg.lstsq(scaled, b / scale, rcond=1e-13)[0] / scale)

@@ -90,9 +90,12 @@ def torque_residual(
     residual = torque - model - low_pass(extra, cutoff_hz, trace.step_s)
     if trace.biased:
         t = trace.step_s * np.arange(len(angle))
-        nuisance = np.column_stack([np.ones_like(t), t])
-        fitted = np.linalg.lstsq(nuisance[trace.keep], residual[trace.keep], rcond=None)[0]
-        residual = residual - nuisance @ fitted
+        for first, last in trace.stretches:  # behind a gap the angle begins anew
+            here = slice(first, last + 1)
+            nuisance = np.column_stack([np.ones(last + 1 - first), t[here]])
+            keep = trace.keep[here]
+            fitted = np.linalg.lstsq(nuisance[keep], residual[here][keep], rcond=None)[0]
+            residual[here] -= nuisance @ fitted
     return TorqueResidual(residual, torque)
 
 
@@ -104,7 +107,10 @@ def _at_samples(pieces: Array | None, n: int, upsampling: int = UPSAMPLING) -> A
     """A piecewise polynomial at the sample instants, shape (n,)."""
     if pieces is None:
         return np.zeros(n)
-    at = pieces[::upsampling, 0]
+    values = pieces[:, 0]
+    if pieces.shape[1] == 1:  # held: at the instant of a jump its middle, or the torque would seem half a step early
+        values = np.concatenate([values[:1], 0.5 * (values[1:] + values[:-1])])
+    at = values[::upsampling]
     return np.append(at, np.full(n - len(at), at[-1]))[:n]
 
 

@@ -272,6 +272,8 @@ class Loop:
 
     def _possible(self, name: str) -> bool:
         """A constant torque only shifts the unseen rest angle of a gyro-only platform with a spring."""
+        if self.torque_free and effects.get(name).place is Place.DRIVE:
+            return False
         return not (name == "torque_offset" and all(t.biased for t in self.fitting))
 
     def _lines(self, judged: Judged) -> tuple[float, ...]:

@@ -270,7 +270,7 @@ def _channel(run: Run) -> Literal["rate", "angle"]:
     return "rate" if noise_of(run.rate_rad_s[ok]) < as_rate else "angle"
 
 
-def prepare(run: Run, number: int = 0, noise: float | None = None) -> Trace:
+def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: float = LEAD_IN_S) -> Trace:
     """Lay a run on a uniform grid and find its usable stretches.
 
     Parameters
@@ -279,6 +279,8 @@ def prepare(run: Run, number: int = 0, noise: float | None = None) -> Trace:
         Which run of the recording it is.
     noise
         One standard deviation of the measured channel; estimated where None.
+    lead_in_s
+        Samples at the start that carry no weight.
     """
     channel = _channel(run)
     values = run.rate_rad_s if channel == "rate" else run.angle_rad
@@ -301,23 +303,26 @@ def prepare(run: Run, number: int = 0, noise: float | None = None) -> Trace:
     for first, last in gaps:
         if last - first + 1 > LONGEST_FILL:
             broken[first : last + 1] = True
+    filled = np.where(broken, np.interp(grid, time[good], values[good]), filled)  # a spline would swing through a gap
     broken |= (grid < time[good][0] - 0.5 * step) | (grid > time[good][-1] + 0.5 * step)
+    quiet = max(_gaps(broken), key=lambda ab: ab[1] - ab[0])  # a jump over a gap would pass for noise
+    whole = filled[quiet[0] : quiet[1] + 1]
     torque = None
     if run.torque_nm is not None and run.torque_time_s is not None:
         torque = TorqueSignal(run.torque_time_s, run.torque_nm, run.torque_hold)
     trace = Trace(
-        run, channel, step, filled, keep, [], torque, noise if noise is not None else noise_of(filled[~broken]),
-        bandwidth_of(filled[~broken], step), number,
+        run, channel, step, filled, keep, [], torque, noise if noise is not None else noise_of(whole),
+        bandwidth_of(whole, step), number,
     )  # fmt: skip
     if run.min_rate_rad_s > 0.0:
         slow = np.abs(trace.fine[1][::UPSAMPLING]) <= run.min_rate_rad_s
         broken |= slow
-    trace.keep = keep & ~broken
-    first = int(np.ceil(LEAD_IN_S / step))
-    if torque is not None and n > 100 * first:
+    first = int(np.ceil(lead_in_s / step))
+    if torque is not None and first > 0 and n > 100 * first:
         # A delay reaches back to torque from before the record began, which nobody knows; what it did
         # to the motion is part of the start state once these samples are past.
-        trace.keep[:first] = False
+        broken[:first] = True
+    trace.keep = keep & ~broken
     trace.stretches = [(a, b) for a, b in _gaps(broken) if b - a + 1 >= SHORTEST_STRETCH]
     inside = np.zeros(n, dtype=bool)
     for a, b in trace.stretches:

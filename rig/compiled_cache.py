@@ -20,7 +20,13 @@ def ensure_compiled_cache(package: Path | None = None) -> None:
     if os.environ.get(VARIABLE):
         return
     source = package or Path(__file__).parent
-    if _can_write(source / "__pycache__") or _can_write(_user_cache()):
+    if "site-packages" in source.parts:
+        # Files that pip did not put there outlive an uninstall, and the folders that they keep alive would
+        # hide the package when it is installed anew from a source tree.
+        if _can_write(_user_cache()):
+            os.environ[VARIABLE] = str(_user_cache())
+            return
+    elif _can_write(source / "__pycache__") or _can_write(_user_cache()):
         return
     os.environ[VARIABLE] = str(_own_folder())
 
