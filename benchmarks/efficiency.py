@@ -120,9 +120,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--model", choices=("plain", "delay", "both"), default="both")
     given = parser.parse_args()
     with threadpool_limits(1):
         for delay, title in ((False, "J, C, K"), (True, "J, C, K and an unknown delay of 1.5 ms")):
+            if given.model == ("plain" if delay else "delay"):
+                continue
             rows = compare(delay, given.runs, given.seed)
             print(text(rows, f"{title}: {given.runs} campaigns"))
             joint = max(r.ratio for r in rows if r.fit == "all sets together" and r.parameter in TRUTH)

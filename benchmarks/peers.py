@@ -151,8 +151,8 @@ def jax_sysid(traces: Sequence[Trace], start: Array) -> Array:
     model.init(params=[np.ones(3), np.zeros(m)], x0=np.zeros(2 * m))
     model.loss(output_loss=lambda a, b: jnp.sum((a - b) ** 2), rho_x0=0.0, rho_th=0.0)
     model.optimization(adam_epochs=0, lbfgs_epochs=EPOCHS, iprint=-1, lbfgs_tol=1e-14, memory=20)
-    torque = np.stack([s(simulation.grid) for s in simulation.splines], axis=1)
-    model.fit(simulation.measured.T, torque, times(), Tu=simulation.grid)
+    torque = np.stack([s(times()) for s in simulation.splines], axis=1)
+    model.fit(simulation.measured.T, torque, times())
     return np.asarray(model.params[0]) * start
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from identify.output_error import Estimate
 from identify.parameters import equations_of
 from identify.shots import Shots
-from identify.traces import UPSAMPLING, Trace
+from identify.traces import Trace
 from rig.dynamics import TorqueSignal
 
 
@@ -34,10 +34,5 @@ def effect_free(trace: Trace, shots: Shots, estimate: Estimate) -> Trace:
         angle = 0.5 * (fine[1:, 0] + fine[:-1, 0]) - h * gained / 12.0
         mean[first:last] = (j * gained + c * turned) / h + k * angle
     mean[spans[-1][1] :] = mean[spans[-1][1] - 1]
-    # A mean that is held is flattened twice, by (w h)^2 / 24 each; the second difference gives that back.
-    m = max(1, ratio // UPSAMPLING)
-    bent = np.zeros_like(mean)
-    bent[m:-m] = mean[2 * m :] - 2.0 * mean[m:-m] + mean[: -2 * m]
-    mean = mean - bent / 12.0
     time = trace.start_s + h * np.arange(len(mean))
     return replace(trace, torque=TorqueSignal(time, mean, "zero_order"), _series={})
