@@ -16,7 +16,7 @@ from identify.output_error import Estimate, refine
 from identify.parameters import Name
 from identify.regression import Structure
 from identify.screen import best_rho, first_guess
-from identify.traces import Trace, prepare
+from identify.traces import LEAD_IN_S, Trace, prepare
 from rig.recording.run import Array, Run
 
 TRUTH = {"inertia": 0.02, "damping": 0.045, "stiffness": 677.3}
@@ -67,11 +67,12 @@ def traces_from(
     noise: Sequence[Array],
     lost: Sequence[Array] | None = None,
     sigma: float | None = SIGMA_RAD_S,
+    lead_in_s: float = LEAD_IN_S,
 ) -> list[Trace]:
     """The sets as the fit takes them; ``sigma`` None lets it estimate the noise."""
     parts = []
     for i, ((a, f), rate, e) in enumerate(zip(SETS, rates, noise, strict=True)):
-        parts.append(prepare(run_of(rate + e, a, f, None if lost is None else lost[i]), i, sigma))
+        parts.append(prepare(run_of(rate + e, a, f, None if lost is None else lost[i]), i, sigma, lead_in_s))
     return parts
 
 

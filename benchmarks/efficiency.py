@@ -64,7 +64,7 @@ def bounds(delay: bool) -> list[Information]:
     """The information of every set at the truth, then of all together."""
     platform = Platform(*TRUTH.values(), {DELAY: {"delay": DELAY_S}} if delay else {})
     rates = clean_rates(DELAY_S if delay else 0.0)
-    silent = traces_from(rates, [np.zeros_like(r) for r in rates])
+    silent = traces_from(rates, [np.zeros_like(r) for r in rates], lead_in_s=0.0)  # the start state holds at 0 s
     each = [information_of(t, platform, len(silent), (0.0, 0.0)) for t in silent]
     return [*each, together(each)]
 
