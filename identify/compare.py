@@ -171,6 +171,8 @@ def judge(
 
 def advantage(old: Judged, new: Judged) -> float:
     """By how many standard errors the new model's held-out error is lower, shots paired."""
+    if not (np.all(np.isfinite(old.losses)) and np.all(np.isfinite(new.losses))):
+        return 0.0 if np.all(np.isfinite(old.losses)) else float(np.all(np.isfinite(new.losses))) * np.inf
     d = (old.losses - new.losses) / np.maximum(np.sum(old.counts), 1)
     spread = float(np.std(d, ddof=1)) if len(d) > 1 else 0.0
     if spread == 0.0:

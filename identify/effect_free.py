@@ -8,9 +8,12 @@ import numpy as np
 
 from identify.output_error import Estimate
 from identify.parameters import equations_of
-from identify.shots import Shots
+from identify.shots import Shots, make_shots
 from identify.traces import Trace
 from rig.dynamics import TorqueSignal
+from rig.dynamics.simulate import MAX_SUBSTEPS
+
+FINER = 4  # times the simulator's steps: a jump's mean over its step must still ring the platform as the jump did
 
 
 def effect_free(trace: Trace, shots: Shots, estimate: Estimate) -> Trace:
@@ -19,6 +22,10 @@ def effect_free(trace: Trace, shots: Shots, estimate: Estimate) -> Trace:
     Along that motion friction knows when it sticks; a noisy measured rate does not.
     """
     equations = equations_of(estimate.structure, estimate.names, estimate.values, shots.number, shots.added)
+    substeps = min(MAX_SUBSTEPS, FINER * equations.substeps(trace.step_s))
+    fine_shots = make_shots(trace, substeps, None)
+    if len(fine_shots.first) == len(shots.first):
+        shots, fine_shots.starts = fine_shots, shots.starts
     grid = shots.grid
     ratio = round(trace.step_s / grid.step_s)
     ends = [*shots.first[1:].tolist(), len(trace.measured) - 1]

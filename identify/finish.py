@@ -16,6 +16,7 @@ from identify.regression import Regression, Solution, Structure, residuals
 from identify.screen import Start, best_rho
 from identify.sensitivities import jacobian
 from identify.shots import Shots
+from identify.start_doubt import least_std_errors
 from identify.traces import Trace
 from rig.recording.run import Array
 
@@ -177,7 +178,13 @@ def _output_covariance(estimate: Estimate, names: tuple[Name, ...]) -> tuple[Arr
             scores.append(columns[part].T @ residual[part])
     free = count - p - 2 * sum(len(s.first) for s in estimate.shots)
     sigma = float(np.sqrt(rss / max(free, 1)))
-    return _sandwich(information, np.array(scores), sigma, count, is_white(series))
+    covariance, determined = _sandwich(information, np.array(scores), sigma, count, is_white(series))
+    if len(estimate.shots) > 1:
+        return covariance, determined
+    # A single run has nothing beside it that tells what its ring may only seem to tell.
+    least = least_std_errors(estimate.shots[0], estimate, names, sigma)
+    wider = np.maximum(1.0, least / np.sqrt(np.maximum(np.diag(covariance), 1e-300)))
+    return covariance * np.outer(wider, wider), determined
 
 
 def _regression_covariance(

@@ -33,10 +33,11 @@ from identify.verdict import sentences_of
 from rig import effects
 from rig.config.identify import IdentifyConfig
 from rig.errors import RecordingError
-from rig.platform import Platform
+from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
 MOVES = 3.0  # times the sensor's noise that a motion has to reach
+SHOWS = 5.0  # standard errors from zero at which whole runs show damping
 UNEXPLAINED = 1.1  # times the noise floor in free run: above it, something is left that no effect here explains
 TORQUE_FREE = {"damping": ("damping_over_inertia", "1/s"), "stiffness": ("stiffness_over_inertia", "1/s^2")}
 
@@ -97,8 +98,8 @@ class _Identifier:
         shapes = {n: shape_values(n, _plain(self.declared, n)) for n in self.structure.effects}
         search = self._search(shapes)
         before = self._before(search, shapes)
-        changed = search.best.structure != self.structure
-        after = self._after(search) if changed else before
+        after = self._after(search) if search.best.structure != self.structure else before
+        changed = after.structure != self.structure
         cutoff = self.start.cutoff_hz
         measured_before = measure(self.traces, self.split, before, cutoff)
         measured_after = measure(self.traces, self.split, after, cutoff) if changed else measured_before
@@ -145,12 +146,31 @@ class _Identifier:
             self.traces, structure, search.best.values(), search.horizon,
             self.split.final, self.split.everything,
         )  # fmt: skip
-        if fitted.sensor_limited or self.torque_free:
+        if fitted.sensor_limited:
+            return self._with_dropped_damping(search, fitted)
+        if self.torque_free:
             return fitted
         return by_regression(
             self.traces, structure, search.best.shapes(), self.start, self.split.final, self.split.everything,
             search.best.std_errors(),
         )  # fmt: skip
+
+    def _with_dropped_damping(self, search: Search, fitted: Fitted) -> Fitted:
+        """The same with damping, where whole runs show what a few periods of the held-out part could not."""
+        terms = (*fitted.structure.terms, "damping")
+        if "damping" in fitted.structure.terms or "damping" not in self.declared.terms:
+            return fitted
+        structure = replace(fitted.structure, terms=tuple(t for t in TERMS if t in terms))
+        start = {**fitted.values, ("damping",): 0.0}
+        fuller = by_output_error(
+            self.traces, structure, start, search.horizon, self.split.final, self.split.everything
+        )  # fmt: skip
+        damping, error = fuller.values[("damping",)], fuller.std_error(("damping",))
+        if not fuller.sensor_limited or damping < SHOWS * error:
+            return fitted
+        search.dropped[:] = [d for d in search.dropped if d[0] != "damping"]
+        self.say(f"took damping back: {damping:.4g} +- {error:.2g} over whole runs")
+        return fuller
 
     def _conclude(
         self, search: Search, before: Fitted, after: Fitted, measured_before: Measured, measured_after: Measured,
@@ -177,11 +197,11 @@ class _Identifier:
                 f"the residual stays at {ratio:.3g} times the sensor's noise: "
                 "something acts that no effect of the library explains"
             )
-        if joint is not None and after.sensor_limited and not joint.accepted:
-            reasons.append(
-                f"the objective {joint.objective:.4g} stays above J_dec {joint.j_dec:.4g} "
-                f"after {joint.restarts} repeats"
-            )
+        searched = [s.genetic for s in per_set] + ([joint] if joint is not None else [])
+        reasons += [
+            f"{g.name}: the objective {g.objective:.4g} stays above J_dec {g.j_dec:.4g} after {g.restarts} repeats"
+            for g in searched if after.sensor_limited and not g.accepted
+        ]  # fmt: skip
         reasons += [f"{x.name} is not determined: {x.reason}" for x in final.not_determined]
         reference, per_set = self._against_reference(per_set)
         found = Identification(

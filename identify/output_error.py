@@ -145,7 +145,7 @@ def _shots_for(
         substeps = int(np.clip(substeps // 2, 2, COARSEST)) if coarse else substeps
         if trace.torque is not None and trace.torque.hold == "zero_order":
             # A step that spans several held values sees only their mean: that alone is a sigma or two.
-            held = trace.step_s / float(np.median(np.diff(trace.torque.time_s)))
+            held = trace.step_s / trace.torque.shortest_s
             substeps = min(MAX_SUBSTEPS, max(substeps, round(held)))
         length = None if shot_s is None else max(8, round(shot_s / trace.step_s))
         shots = make_shots(trace, substeps, length, None if use is None else use[i])

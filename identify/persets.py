@@ -15,10 +15,13 @@ import numpy as np
 from identify.effect_free import effect_free
 from identify.finish import Fitted, _regression_covariance
 from identify.genetic import QuadraticObjective, search
+from identify.output_error import Estimate, evaluate
+from identify.parameters import Name
 from identify.prefilter import Denominator
 from identify.regression import Regression, Structure, fit, normal
 from identify.results import UNITS, GeneticRun, ParameterEstimate, SetResult
 from identify.screen import Start
+from identify.start_doubt import least_std_errors
 from identify.traces import UPSAMPLING, Trace
 from rig import effects
 from rig.config.identify import IdentifyConfig
@@ -173,12 +176,22 @@ def each_set(
     return tuple(results), joint
 
 
+def _least_errors(trace: Trace, values: Mapping[str, float], labels: Sequence[Name]) -> Array:
+    """What the motion itself allows, (p,): the sensor's noise in the regression's columns passes for motion."""
+    structure = Structure(tuple(term for (term,) in labels))
+    held = Estimate(
+        structure, tuple(labels), np.array([values[term] for (term,) in labels]), np.inf, 0, np.zeros((0, 0)), (), True
+    )
+    settled = evaluate(held, [replace(trace, number=0)])
+    return least_std_errors(settled.shots[0], settled, labels, trace.noise)
+
+
 def _result(trace: Trace, run: GeneticRun, terms: tuple[str, ...], start: Start, rho: float, axis: str) -> SetResult:
     regression = Regression([trace], Structure(terms))
     solution = fit(regression, {}, start.platform, rho, 8)
     mask = [trace.keep]
     covariance, determined = _regression_covariance([trace], solution, mask)
-    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    errors = np.maximum(np.sqrt(np.maximum(np.diag(covariance), 0.0)), _least_errors(trace, run.parameters, solution.labels))
     parameters, identifiable = {}, []
     for i, (term,) in enumerate(solution.labels):
         value, error = run.parameters[term], float(errors[i])

@@ -15,6 +15,7 @@ from identify.prefilter import held_pieces, linear_pieces, smooth_pieces
 from rig import effects
 from rig.dynamics import TorqueSignal
 from rig.dynamics.integrator import _call, _pointer, addresses, run_filter
+from rig.dynamics.simulate import MAX_SUBSTEPS
 from rig.effects.base import Effect, Place
 from rig.recording.run import Array, Run
 
@@ -205,8 +206,12 @@ class Trace:
         held = self.torque.hold == "zero_order"
         if not drive and not held:
             return smooth_pieces(self.torque.at(start + self.step_s * np.arange(n)), self.step_s), 1
-        fine = self.step_s / UPSAMPLING
-        count = (n - 1) * UPSAMPLING
+        # A value held for less than a fine step keeps its own step: means over several lose what rings.
+        upsampling = UPSAMPLING
+        if held:
+            upsampling = int(np.clip(round(self.step_s / self.torque.shortest_s), UPSAMPLING, MAX_SUBSTEPS))
+        fine = self.step_s / upsampling
+        count = (n - 1) * upsampling
         lead = int(min(LEAD_S, self.offset_s) / fine)  # a drive with memory has seen what came before a piece
         x = self.torque.on_half_steps(start - lead * fine, fine, count + 1 + lead)
         for name, values in drive:
@@ -216,7 +221,7 @@ class Trace:
                 addresses([effect.kernel]), x, fine, np.zeros(size), np.array([0, size]),
                 np.array(values), np.array([0, len(values)]),
             )  # fmt: skip
-        return (held_pieces(x[lead : lead + count]) if held else linear_pieces(x[lead:], fine)), UPSAMPLING
+        return (held_pieces(x[lead : lead + count]) if held else linear_pieces(x[lead:], fine)), upsampling
 
     def effect_pieces(self, effect: Effect, shape: tuple[float, ...], unit: int) -> Array | None:
         """Torque of an effect with one linear parameter (or J, C, K: unit -3, -2, -1) at one, the rest at zero.

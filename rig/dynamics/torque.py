@@ -36,6 +36,11 @@ class TorqueSignal:
         return make_interp_spline(self.time_s, self.torque_nm, k=max(1, k))
 
     @cached_property
+    def shortest_s(self) -> float:
+        """Usual time between samples in s: the median, which gaps do not move."""
+        return float(np.median(np.diff(self.time_s)))
+
+    @cached_property
     def _impulse_nm_s(self) -> Array:
         return np.concatenate([[0.0], np.cumsum(self.torque_nm[:-1] * np.diff(self.time_s))])
 

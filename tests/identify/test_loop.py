@@ -149,7 +149,6 @@ def test_a_result_can_be_written_and_a_second_run_repeats_it() -> None:
     assert first["per_set"] == again["per_set"]
 
 
-@pytest.mark.xfail(strict=True, reason="noise in the columns passes for information on the inertia")
 def test_one_tone_without_its_ring_gives_no_inertia() -> None:
     time = np.arange(8001) * 1e-3
     tone = Sine(torque_nm=111, frequency_hz=0.5, duration_s=8, soft_start_s=2)
