@@ -79,13 +79,16 @@ def _run_recorded(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> in
 def _run_played(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> int:
     from rig.cli.campaign import play
     from rig.cli.exits import NOT_ACCEPTED, code_of
-    from rig.errors import UsageError
+    from rig.errors import Aborted, UsageError
 
     played = play(desk, loaded, folder)
     cause = played.cause
     if cause is None:
         try:
             found = _identified(desk, loaded, played.recording)
+        except (Aborted, KeyboardInterrupt):
+            desk.terminal.insist(f"Stopped before anything was identified. What was recorded is in {folder.path}")
+            raise
         except UsageError as error:  # the campaign was played, so this is no matter of usage any more
             desk.say_error(error)
             return NOT_ACCEPTED
@@ -123,7 +126,7 @@ def _conclude(
     """Write the results and the summary; returns 0 or 1."""
     from identify.summary import WIDTH, summary
     from identify.writing import write_results
-    from rig.cli.exits import NOT_ACCEPTED, OK
+    from rig.cli.exits import NOT_ACCEPTED, OK, STOPPED
 
     path = folder.made()
     with desk.stops.saving():
@@ -135,6 +138,9 @@ def _conclude(
         sys.stdout.write(summary(found, width, colour=is_terminal) + f"\nResults: {path}\n")
     if found.accepted:
         return OK
+    if found.aborted:
+        desk.terminal.insist("Stopped: torque is off, what was recorded is kept, the results are marked aborted.")
+        return STOPPED
     for reason in found.reasons:
         desk.terminal.insist(f"Not accepted: {reason}")
     return NOT_ACCEPTED

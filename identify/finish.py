@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy import signal
 from scipy.linalg import block_diag
 
 from identify.compare import start_values
@@ -22,6 +23,7 @@ from rig.recording.run import Array
 
 NEAR_FLOOR = 1.3  # times the sensor's noise: close enough for a free run over the whole set
 BLOCKS_PER_RUN = 20
+SEGMENT = 256  # samples of a stretch whose spectrum is averaged
 SINGULAR = 1e-11  # smallest over largest eigenvalue of the scaled information
 
 
@@ -136,14 +138,38 @@ def _inverse(information: Array) -> tuple[Array, tuple[bool, ...]]:
     return inverse / np.outer(scale, scale), tuple(bool(x) for x in ~(touched | dead))
 
 
-def _sandwich(information: Array, scores: Array, sigma: float, count: int, white: bool) -> tuple[Array, Any]:
+def _sandwich(parts: Sequence[tuple[Array, Array]], sigma: float) -> tuple[Array, Any]:
+    """Covariance from every run's columns (m, p) and residual (m,): plain where the residual is white.
+
+    Where it is coloured, scores of blocks carry what changes along a run, but are few; the residual's spectrum
+    uses every sample, but takes the colour for the same all along. Each parameter gets the larger of the two.
+    """
+    information = np.sum([x.T @ x for x, _ in parts], axis=0)
     inverse, determined = _inverse(information)
     plain = inverse * sigma**2
-    if white or len(scores) < 3 * len(information):
-        return plain, determined
+    blocks = [
+        x[part].T @ r[part]
+        for x, r in parts for part in np.array_split(np.arange(len(r)), min(BLOCKS_PER_RUN, max(len(r) // 50, 1)))
+    ]  # fmt: skip
+    scores = np.array(blocks)
     m = len(scores)
-    meat = scores.T @ scores * m / (m - 1.0)
-    return inverse @ meat @ inverse, determined
+    if is_white([r for _, r in parts]) or m < 3 * len(information):
+        return plain, determined
+    by_blocks = inverse @ (scores.T @ scores * m / (m - 1.0)) @ inverse
+    by_spectrum = inverse @ np.sum([_coloured(x, r) for x, r in parts], axis=0) @ inverse
+    ratio = np.diag(by_spectrum) / np.maximum(np.diag(by_blocks), 1e-300)
+    wider = np.sqrt(np.maximum(1.0, ratio))
+    return by_blocks * np.outer(wider, wider), determined
+
+
+def _coloured(columns: Array, residual: Array) -> Array:
+    """Variance of the scores of one run where its residual is stationary, (p, p): columns weighed by its spectrum."""
+    n = len(residual)
+    f, power = signal.welch(residual, nperseg=min(n, SEGMENT), detrend=False)
+    transformed = np.fft.rfft(columns, 2 * n, axis=0)
+    level = np.interp(np.fft.rfftfreq(2 * n), f[1:-1], 0.5 * power[1:-1])  # two-sided
+    weight = level * np.where(np.arange(n + 1) % n == 0, 1.0, 2.0) / (2 * n)
+    return np.asarray(np.real(np.conj(transformed).T @ (transformed * weight[:, None])))
 
 
 def is_white(series: Sequence[Array]) -> bool:
@@ -162,23 +188,14 @@ def is_white(series: Sequence[Array]) -> bool:
 
 def _output_covariance(estimate: Estimate, names: tuple[Name, ...]) -> tuple[Array, tuple[bool, ...]]:
     keep = [estimate.names.index(n) for n in names]
-    p = len(names)
-    information, scores, series = np.zeros((p, p)), [], []
-    count, rss = 0, 0.0
+    parts = []
     for shots in estimate.shots:
         if not np.any(shots.weight):
             continue
         columns, residual = jacobian(shots, estimate.structure, estimate.names, estimate.values)
-        columns = columns[:, keep]
-        information += columns.T @ columns
-        count += len(residual)
-        rss += float(residual @ residual)
-        series.append(residual)
-        for part in np.array_split(np.arange(len(residual)), min(BLOCKS_PER_RUN, max(len(residual) // 50, 1))):
-            scores.append(columns[part].T @ residual[part])
-    free = count - p - 2 * sum(len(s.first) for s in estimate.shots)
-    sigma = float(np.sqrt(rss / max(free, 1)))
-    covariance, determined = _sandwich(information, np.array(scores), sigma, count, is_white(series))
+        parts.append((columns[:, keep], residual))
+    sigma = _rms(parts, len(names) + 2 * sum(len(s.first) for s in estimate.shots))
+    covariance, determined = _sandwich(parts, sigma)
     if len(estimate.shots) > 1:
         return covariance, determined
     # A single run has nothing beside it that tells what its ring may only seem to tell.
@@ -193,17 +210,16 @@ def _regression_covariance(
     regression = Regression(traces, solution.structure)
     blocks = regression.blocks(solution.denominator, solution.shapes)
     p = len(solution.labels)
-    information, scores, series, count, rss = np.zeros((p, p)), [], [], 0, 0.0
+    parts = []
     for block, whole in zip(blocks, residuals(blocks, solution.values), strict=True):
         mask = use[block.trace][block.rows]
         if not np.any(mask):
             continue
-        columns, r = block.projected[mask][:, :p], whole[mask]
-        information += columns.T @ columns
-        count += len(r)
-        rss += float(r @ r)
-        series.append(r)
-        for part in np.array_split(np.arange(len(r)), min(BLOCKS_PER_RUN, max(len(r) // 50, 1))):
-            scores.append(columns[part].T @ r[part])
-    sigma = float(np.sqrt(rss / max(count - p, 1)))
-    return _sandwich(information, np.array(scores), sigma, count, is_white(series))
+        parts.append((block.projected[mask][:, :p], whole[mask]))
+    return _sandwich(parts, _rms(parts, p))
+
+
+def _rms(parts: Sequence[tuple[Array, Array]], fitted: int) -> float:
+    """Root mean square residual, ``fitted`` degrees of freedom taken off."""
+    count = sum(len(r) for _, r in parts)
+    return float(np.sqrt(sum(float(r @ r) for _, r in parts) / max(count - fitted, 1)))

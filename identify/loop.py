@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from identify import persets
-from identify.compare import horizon_s
+from identify.compare import Judged, horizon_s
 from identify.finish import Fitted, by_output_error, by_regression
 from identify.holdout import Split, pieces, split
 from identify.measures import Measured, floor_of, measure
@@ -32,11 +32,12 @@ from identify.traces import UPSAMPLING, Trace, prepare
 from identify.verdict import sentences_of
 from rig import effects
 from rig.config.identify import IdentifyConfig
-from rig.errors import RecordingError
+from rig.errors import Aborted, RecordingError
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
 MOVES = 3.0  # times the sensor's noise that a motion has to reach
+STOPPED = "stopped before the search was through: what is missing may still be unnamed"
 SHOWS = 5.0  # standard errors from zero at which whole runs show damping
 UNEXPLAINED = 1.1  # times the noise floor in free run: above it, something is left that no effect here explains
 TORQUE_FREE = {"damping": ("damping_over_inertia", "1/s"), "stiffness": ("stiffness_over_inertia", "1/s^2")}
@@ -94,45 +95,55 @@ class _Identifier:
             self.start = replace(self.start, cutoff_hz=settings.lowpass_hz)
 
     def run(self) -> Identification:
-        self.say("fitting the declared model")
+        """The whole way; where somebody stops it in the middle, what there is so far."""
         shapes = {n: shape_values(n, _plain(self.declared, n)) for n in self.structure.effects}
-        search = self._search(shapes)
-        before = self._before(search, shapes)
-        after = self._after(search) if search.best.structure != self.structure else before
-        changed = after.structure != self.structure
-        cutoff = self.start.cutoff_hz
-        measured_before = measure(self.traces, self.split, before, cutoff)
-        measured_after = measure(self.traces, self.split, after, cutoff) if changed else measured_before
-        floor = floor_of(self.traces, self.split, after, cutoff, self.recording.noise is not None)
-        self.say("each set for itself")
-        centre = {
-            "inertia": self.declared.inertia_kg_m2,
-            "damping": self.declared.damping_nm_s_rad,
-            "stiffness": self.declared.stiffness_nm_rad,
-        }
-        per_set, joint = persets.each_set(self.traces, after, self.start, centre, self.settings, self.recording.axis)
-        return self._conclude(search, before, after, measured_before, measured_after, floor, per_set, joint, changed)
-
-    def _search(self, shapes: Mapping[str, tuple[float, ...]]) -> Search:
         horizon = horizon_s(self.start.platform, self.traces)
         fitting = pieces(self.traces, self.split.fit, 3.0 * horizon)
         judging = pieces(self.traces, self.split.judge, 3.0 * horizon, 5_000)
         allowed = self.settings.candidates or effects.names()
         loop = Loop(fitting, judging, self.start, allowed, self.say, self.traces)
         d = self.declared
-        return loop.run(self.structure, shapes, (d.inertia_kg_m2, d.damping_nm_s_rad, d.stiffness_nm_rad))
+        try:
+            self.say("fitting the declared model")
+            search = loop.run(self.structure, shapes, (d.inertia_kg_m2, d.damping_nm_s_rad, d.stiffness_nm_rad))
+            before = self._before(search)
+            after = self._after(search) if search.best.structure != self.structure else before
+            return self._report(search, before, after)
+        except (Aborted, KeyboardInterrupt):
+            if loop.so_far is None:
+                raise
+            self.say("stopped: reporting what there is")
+            search = loop.so_far
+            found = self._report(search, self._regressed(search.base), self._regressed(search.best), in_full=False)
+            return replace(found, aborted=True, accepted=False, reasons=(STOPPED,))
 
-    def _before(self, search: Search, shapes: Mapping[str, tuple[float, ...]]) -> Fitted:
-        regressed = by_regression(
-            self.traces, self.structure, shapes, self.start, self.split.final, self.split.everything,
-            search.base.std_errors(),
-        )  # fmt: skip
+    def _report(self, search: Search, before: Fitted, after: Fitted, in_full: bool = True) -> Identification:
+        changed = after.structure != self.structure
+        after = after if changed else before
+        cutoff = self.start.cutoff_hz
+        measured_before = measure(self.traces, self.split, before, cutoff)
+        measured_after = measure(self.traces, self.split, after, cutoff) if changed else measured_before
+        floor = floor_of(self.traces, self.split, after, cutoff, self.recording.noise is not None)
+        per_set: tuple[SetResult, ...] = ()
+        joint = None
+        if in_full:
+            self.say("each set for itself")
+            d = self.declared
+            centre = {
+                "inertia": d.inertia_kg_m2, "damping": d.damping_nm_s_rad, "stiffness": d.stiffness_nm_rad
+            }  # fmt: skip
+            per_set, joint = persets.each_set(
+                self.traces, after, self.start, centre, self.settings, self.recording.axis
+            )  # fmt: skip
+        return self._conclude(search, before, after, measured_before, measured_after, floor, per_set, joint, changed)
+
+    def _before(self, search: Search) -> Fitted:
         if search.base.sigma < 2.0 * search.floor or self.structure.effects:
             return by_output_error(
                 self.traces, self.structure, search.base.values(), search.horizon,
                 self.split.final, self.split.everything,
             )  # fmt: skip
-        return regressed
+        return self._regressed(search.base)
 
     def _after(self, search: Search) -> Fitted:
         """Output error where the model runs free at the sensor's noise; else regression in torque units.
@@ -148,11 +159,12 @@ class _Identifier:
         )  # fmt: skip
         if fitted.sensor_limited:
             return self._with_dropped_damping(search, fitted)
-        if self.torque_free:
-            return fitted
+        return fitted if self.torque_free else self._regressed(search.best)
+
+    def _regressed(self, best: Judged) -> Fitted:
         return by_regression(
-            self.traces, structure, search.best.shapes(), self.start, self.split.final, self.split.everything,
-            search.best.std_errors(),
+            self.traces, best.structure, best.shapes(), self.start, self.split.final, self.split.everything,
+            best.std_errors(),
         )  # fmt: skip
 
     def _with_dropped_damping(self, search: Search, fitted: Fitted) -> Fitted:
@@ -197,7 +209,7 @@ class _Identifier:
                 f"the residual stays at {ratio:.3g} times the sensor's noise: "
                 "something acts that no effect of the library explains"
             )
-        searched = [s.genetic for s in per_set] + ([joint] if joint is not None else [])
+        searched = [g for g in (*(s.genetic for s in per_set), joint) if g is not None]
         reasons += [
             f"{g.name}: the objective {g.objective:.4g} stays above J_dec {g.j_dec:.4g} after {g.restarts} repeats"
             for g in searched if after.sensor_limited and not g.accepted

@@ -191,7 +191,8 @@ def _result(trace: Trace, run: GeneticRun, terms: tuple[str, ...], start: Start,
     solution = fit(regression, {}, start.platform, rho, 8)
     mask = [trace.keep]
     covariance, determined = _regression_covariance([trace], solution, mask)
-    errors = np.maximum(np.sqrt(np.maximum(np.diag(covariance), 0.0)), _least_errors(trace, run.parameters, solution.labels))
+    least = _least_errors(trace, run.parameters, solution.labels)
+    errors = np.maximum(np.sqrt(np.maximum(np.diag(covariance), 0.0)), least)
     parameters, identifiable = {}, []
     for i, (term,) in enumerate(solution.labels):
         value, error = run.parameters[term], float(errors[i])

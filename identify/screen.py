@@ -201,12 +201,10 @@ class Screen:
 
         start = np.log(np.maximum(np.array(shape), 1e-12))
         simplex = np.vstack([start, start + 0.25 * np.eye(len(start))])
+        options: Any = {"maxfev": SHAPE_EVALUATIONS, "initial_simplex": simplex, "xatol": 1e-3, "fatol": 0.5}
         found = minimize(
-            lambda u: -self.quick(effect.name, inside(u), k),
-            start,
-            method="Nelder-Mead",
-            options={"maxfev": SHAPE_EVALUATIONS, "initial_simplex": simplex, "xatol": 1e-3, "fatol": 0.5},
-        )
+            lambda u: -self.quick(effect.name, inside(u), k), start, method="Nelder-Mead", options=options
+        )  # fmt: skip
         return inside(found.x)
 
     def all(self, names: Sequence[str]) -> list[Screened]:

@@ -75,6 +75,7 @@ class Loop:
         self.noise = float(np.sqrt(np.mean([t.noise**2 for t in fitting])))
         self.torque_free = all(t.torque is None for t in fitting)
         self.runs = 1 + max(t.number for t in (*fitting, *judging))
+        self.so_far: Search | None = None  # for whoever is stopped in the middle
 
     def run(self, declared: Structure, shapes: Shapes, nominal: tuple[float, float, float] | None = None) -> Search:
         """From the declared structure, with its declared shapes, to the one that the data support.
@@ -90,7 +91,7 @@ class Loop:
             start = start_values(replace(solution, platform=nominal), shapes, self.runs)
             other = judge(self.fitting, self.judging, declared, start, horizon)
             base = min((base, other), key=lambda j: j.estimate.sigma)
-        found = Search(base, base, horizon, floor)
+        found = self.so_far = Search(base, base, horizon, floor)
         self._probation(found, solution)
         for round_ in range(1, MOST_EFFECTS + 1):
             if not self._round(found, round_):

@@ -47,7 +47,8 @@ def noise_of(values: Array) -> float:
 def bandwidth_of(values: Array, step_s: float) -> float:
     """Highest frequency in Hz at which a signal stands clearly above its noise."""
     nyquist = 0.5 / step_s
-    f, power = signal.welch(values, 1.0 / step_s, nperseg=min(len(values), 1024), detrend="linear")
+    detrend: Any = "linear"  # the stubs of some versions know no name for it
+    f, power = signal.welch(values, 1.0 / step_s, nperseg=min(len(values), 1024), detrend=detrend)
     floor = 2.0 * noise_of(values) ** 2 * step_s + 1e-300
     above = np.nonzero(power > 12.0 * floor)[0]
     highest = f[above[-1]] if len(above) else 0.05 * nyquist

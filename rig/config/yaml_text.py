@@ -68,7 +68,7 @@ def dotted(path: KeyPath) -> str:
 class _Loader(yaml.SafeLoader):
     """The pure-Python composer (its recursion fails cleanly) with YAML 1.2's idea of scalars."""
 
-    yaml_implicit_resolvers: Mapping[str, Any] = {}
+    yaml_implicit_resolvers: dict[Any, Any] = {}  # noqa: RUF012 (as the base class declares it)
 
 
 _NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"

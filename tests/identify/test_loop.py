@@ -10,12 +10,12 @@ from typing import get_type_hints
 import numpy as np
 import pytest
 
-from identify.loop import identify
+from identify.loop import STOPPED, identify
 from identify.results import Identification
 from identify.writing import result_json
 from rig.config.identify import IdentifyConfig
 from rig.dynamics import TorqueSignal, simulate
-from rig.errors import RecordingError
+from rig.errors import Aborted, RecordingError
 from rig.excitation import Sine
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording, Run
@@ -174,3 +174,25 @@ def test_a_recording_without_anything_to_identify_is_refused_with_its_reason(fau
         run = replace(run, rate_rad_s=np.sin(9 * time), torque_nm=np.full(len(time), 3.0))
     with pytest.raises(RecordingError, match=said[fault]):
         identify(Recording((run,)), LOW, SETTINGS)
+
+
+@pytest.mark.parametrize("stop", [Aborted("Stopped by Ctrl-C."), KeyboardInterrupt()])
+def test_who_stops_the_search_gets_what_there_is_and_is_told_so(stop: BaseException) -> None:
+    def interrupt(text: str) -> None:
+        if text.startswith("added"):
+            raise stop
+
+    found = identify(campaign({"coulomb_friction": {"level": 1.0}}, duration_s=4), LOW, SETTINGS, interrupt)
+    assert found.aborted
+    assert not found.accepted
+    assert found.reasons == (STOPPED,)
+    assert found.per_set == ()
+    assert found.before.parameters["stiffness"].value == pytest.approx(TRUTH[2], rel=0.01)
+
+
+def test_who_stops_before_anything_is_fitted_gets_nothing() -> None:
+    def interrupt(text: str) -> None:
+        raise Aborted("Stopped by Ctrl-C.")
+
+    with pytest.raises(Aborted):
+        identify(campaign(duration_s=4), LOW, SETTINGS, interrupt)
