@@ -199,12 +199,14 @@ class Screen:
         def inside(u: Array) -> tuple[float, ...]:
             return tuple(float(np.clip(np.exp(x), lo, hi)) for x, (lo, hi) in zip(u, bounds, strict=True))
 
-        start = np.log(np.maximum(np.array(shape), 1e-12))
+        start: Any = np.log(np.maximum(np.array(shape), 1e-12))
         simplex = np.vstack([start, start + 0.25 * np.eye(len(start))])
         options: Any = {"maxfev": SHAPE_EVALUATIONS, "initial_simplex": simplex, "xatol": 1e-3, "fatol": 0.5}
-        found = minimize(
-            lambda u: -self.quick(effect.name, inside(u), k), start, method="Nelder-Mead", options=options
-        )  # fmt: skip
+
+        def loss(u: Any) -> float:
+            return -self.quick(effect.name, inside(u), k)
+
+        found: Any = minimize(loss, start, method="Nelder-Mead", options=options)
         return inside(found.x)
 
     def all(self, names: Sequence[str]) -> list[Screened]:
