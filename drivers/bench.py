@@ -24,7 +24,7 @@ from drivers.ports import SerialPort
 from rig import realtime
 from rig.config.bench import BenchConfig
 from rig.errors import ConfigError, DeviceFault, RigError
-from rig.interface import Exchange, GyroSample, Rig, Statement, Torque, TorqueOfTime, TorqueSample
+from rig.interface import Exchange, GyroSample, LowPass, Rig, Statement, Torque, TorqueOfTime, TorqueSample
 from rig.recording.run import TorqueHold
 
 CONTACT_TIME_S = 0.002
@@ -110,6 +110,11 @@ class BenchRig(Rig):
         return self.gyroscope.noise_rad_s
 
     @property
+    def rate_low_pass(self) -> LowPass | None:
+        """Of the gyroscope."""
+        return self.gyroscope.low_pass
+
+    @property
     def rate_full_scale_rad_s(self) -> float | None:
         """Of the gyroscope."""
         return self.gyroscope.full_scale_rad_s
@@ -165,6 +170,7 @@ class BenchRig(Rig):
         try:
             self._link = CanLink(open_bus(self._config.amplifier.can), self._time)
             self._link.idle = lambda: self._gather([])
+            self._link.on_sent = self.amplifier.note_sent
             self._link.record = self._capture.can if self._capture is not None else None
             self._notes = self.amplifier.contact(self._link)
         except RigError as fault:

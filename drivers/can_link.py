@@ -56,6 +56,7 @@ class CanLink:
         self.record: Record | None = None
         self.idle: Callable[[], None] = lambda: None
         self.listeners: list[Callable[[Heard], None]] = []
+        self.on_sent: Callable[[float, CanFrame], None] = lambda time_s, frame: None
 
     def send(self, frames: Sequence[CanFrame], urgent: bool = False) -> float:
         """Send all frames; the host time at which the last one had been handed over.
@@ -74,9 +75,10 @@ class CanLink:
         except can.CanError as problem:
             raise DeviceFault(f"CAN on {self.name}: {problem}") from None
         now_s = self.clock()
-        if self.record is not None:
-            for frame in frames:
+        for frame in frames:
+            if self.record is not None:
                 self.record(now_s, True, frame)
+            self.on_sent(now_s, frame)
         return now_s
 
     def poll(self) -> list[Heard]:

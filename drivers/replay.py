@@ -19,7 +19,7 @@ from drivers.codecs.lawicel import CanFrame
 from drivers.gyroscopes import make_gyroscope
 from rig.config.bench import BenchConfig
 from rig.errors import RecordingError
-from rig.interface import Exchange, GyroSample, Rig, Statement, Torque, TorqueSample
+from rig.interface import Exchange, GyroSample, LowPass, Rig, Statement, Torque, TorqueSample
 from rig.recording.run import TorqueHold
 
 
@@ -116,6 +116,11 @@ class ReplayRig(Rig):
         return self.gyroscope.noise_rad_s
 
     @property
+    def rate_low_pass(self) -> LowPass | None:
+        """Of the gyroscope."""
+        return self.gyroscope.low_pass
+
+    @property
     def rate_full_scale_rad_s(self) -> float | None:
         """As on the bench."""
         return self.gyroscope.full_scale_rad_s
@@ -133,6 +138,8 @@ class ReplayRig(Rig):
             self._time_s = entry.time_s
             if entry.kind == capture.GYRO_READ:
                 self.gyroscope.feed(entry.payload, entry.time_s)
+            elif entry.kind == capture.CAN_SENT:
+                self.amplifier.note_sent(entry.time_s, unpack_frame(entry.payload))
             elif entry.kind == capture.CAN_READ:
                 return unpack_frame(entry.payload)
         return None
@@ -168,7 +175,9 @@ class ReplayRig(Rig):
             elif entry.kind == capture.CAN_READ:
                 self.amplifier.receive(Heard(entry.time_s, unpack_frame(entry.payload)))
             elif entry.kind == capture.CAN_SENT:
-                nm = self.amplifier.sent_torque_nm(unpack_frame(entry.payload))
+                frame = unpack_frame(entry.payload)
+                self.amplifier.note_sent(entry.time_s, frame)
+                nm = self.amplifier.sent_torque_nm(frame)
                 sent += [] if nm is None else [TorqueSample(entry.time_s, nm)]
             elif entry.kind == capture.TICK:
                 return answer(self.config, self.amplifier, gyro, sent)

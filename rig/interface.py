@@ -67,6 +67,13 @@ class TorqueSample(NamedTuple):
     torque_nm: float
 
 
+class LowPass(NamedTuple):
+    """A gyro's own filter: its -3 dB corner and its group delay, which its samples' times have taken off."""
+
+    corner_hz: float
+    delay_s: float
+
+
 class Exchange(NamedTuple):
     """What came back in one tick, oldest first; either may be empty.
 
@@ -94,6 +101,11 @@ class Rig(ABC):
     @property
     def noise_rad_s(self) -> float | None:
         """One standard deviation of a gyro sample where the gyro's data sheet gives it, else None."""
+        return None
+
+    @property
+    def rate_low_pass(self) -> LowPass | None:
+        """The gyro's own low-pass where its data sheet gives it, else None."""
         return None
 
     @property

@@ -9,6 +9,7 @@ import numpy as np
 
 from rig.excitation import PlannedSet
 from rig.guard import Tick
+from rig.interface import LowPass
 from rig.recording.journal import Journal
 from rig.recording.run import Array, Run, TorqueHold
 
@@ -43,12 +44,22 @@ class SetStatistics:
 class SetRecorder:
     """One set while it plays. Times are kept in seconds since ``start_s``."""
 
-    def __init__(self, planned: PlannedSet, start_s: float, torque_hold: TorqueHold, journal: Journal | None) -> None:
+    def __init__(
+        self,
+        planned: PlannedSet,
+        start_s: float,
+        torque_hold: TorqueHold,
+        journal: Journal | None,
+        low_pass: LowPass | None = None,
+    ) -> None:
         self._planned = planned
         self._start_s = start_s
         self._end_s = planned.duration_s + EDGE_S
         self._torque_hold = torque_hold
         self._journal = journal
+        self._low_pass: dict[str, float] = (
+            {} if low_pass is None else {"rate_corner_hz": low_pass.corner_hz, "rate_delay_s": low_pass.delay_s}
+        )
         self._open = False
         self._samples: list[tuple[float, float, bool]] = []
         self._commands: list[tuple[float, float, float]] = []
@@ -96,7 +107,7 @@ class SetRecorder:
                 "torque_hold": self._torque_hold,
                 "frequency_hz": self._planned.frequency_hz,
                 "scale": self._planned.scale,
-            }
+            } | self._low_pass
             columns = {"ticks": ("time_s", "late_s", *self._channel_names)}
             self._journal.begin_run(self._planned.name, meta, columns)
             self._open = True
@@ -144,6 +155,8 @@ class SetRecorder:
             use=self._planned.use,
             frequency_hz=self._planned.frequency_hz,
             channels=channels,
+            rate_corner_hz=self._low_pass.get("rate_corner_hz"),
+            rate_delay_s=self._low_pass.get("rate_delay_s"),
         )
 
 

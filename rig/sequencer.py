@@ -143,7 +143,8 @@ class Sequencer:
     def _play_set(self, planned: PlannedSet) -> None:
         start_s = self._clock.now_s() + self._period_s
         self._guard.begin(start_s, self._resting())
-        recorder = SetRecorder(planned, start_s, self._rig.torque_hold, self._journal)
+        rig = self._rig
+        recorder = SetRecorder(planned, start_s, rig.torque_hold, self._journal, rig.rate_low_pass)
         complete = False
         try:
             self._rig.begin_set(planned.torque, start_s)

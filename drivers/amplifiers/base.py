@@ -73,6 +73,9 @@ class Amplifier(ABC):
     def sent_torque_nm(self, frame: CanFrame) -> float | None:
         """Torque at the shaft that a frame of ours commands, read back from its bytes; None if none."""
 
+    def note_sent(self, time_s: float, frame: CanFrame) -> None:  # noqa: B027 (only clocks need it)
+        """A frame of ours was handed over at this time; called for every one of them."""
+
     @abstractmethod
     def receive(self, heard: Heard) -> None:
         """Take note of a frame from the bus."""

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from drivers.codecs.framing import Matcher, StreamFramer
 from drivers.source_clock import SourceClock
 from rig.config.bench import GyroscopeConfig
-from rig.interface import GyroSample
+from rig.interface import GyroSample, LowPass
 
 AXES = "xyz"
 BITS_PER_BYTE = 10  # start, eight data bits, stop
@@ -89,6 +89,11 @@ class Gyroscope(ABC):
     @abstractmethod
     def delay_s(self) -> float:
         """From the motion to the instant that the clock gives a sample: group delay of the filter."""
+
+    @property
+    def low_pass(self) -> LowPass | None:
+        """Corner and group delay of the filter that rounds the rate, where the data sheet gives both."""
+        return None
 
     @property
     def full_scale_rad_s(self) -> float:

@@ -17,6 +17,7 @@ from drivers.gyroscopes.base import Gyroscope, Reading
 from drivers.settings import Settings, read_settings
 from rig.config.bench import GyroscopeConfig
 from rig.errors import ConfigError
+from rig.interface import LowPass
 
 SAMPLE_RATES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0)
 
@@ -83,6 +84,11 @@ class Stim300(Gyroscope):
         delay = wire.GROUP_DELAY_S[self.settings.filter_hz]
         delay += wire.DELAYED_OUTPUT_S if self.settings.delayed_output else 0.0
         return delay + (0.5 / self.sample_rate_hz if self.settings.output == "incremental_angle" else 0.0)
+
+    @property
+    def low_pass(self) -> LowPass:
+        """As set; the rest of the delay is no averaging."""
+        return LowPass(float(self.settings.filter_hz), wire.GROUP_DELAY_S[self.settings.filter_hz])
 
     @property
     def full_scale_rad_s(self) -> float:

@@ -23,7 +23,8 @@ from rig.recording.run import Recording, Run
 FORMAT = "isp-rig recording"
 VERSION = 1
 _ARRAYS = ("time_s", "valid", "rate_rad_s", "angle_rad", "torque_time_s", "torque_nm")
-_VALUES = ("name", "torque_hold", "use", "min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz")
+_NUMBERS = ("min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "rate_corner_hz", "rate_delay_s")
+_VALUES = ("name", "torque_hold", "use", *_NUMBERS)
 # What h5py raises over a damaged file; a link that leads nowhere reads as None.
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError)
 
@@ -113,7 +114,7 @@ def read_recording_h5(path: str | Path) -> Recording:
 
 def _read_run(group: h5py.Group) -> Run:
     values: dict[str, Any] = {name: group.attrs[name] for name in _VALUES if name in group.attrs}
-    for name in ("min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz"):
+    for name in _NUMBERS:
         if name in values:
             values[name] = float(values[name])
     arrays = {name: group[name][()] for name in _ARRAYS if name in group}

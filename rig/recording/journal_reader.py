@@ -27,7 +27,9 @@ from rig.recording.journal import (
 )
 from rig.recording.run import Array, Recording, Run
 
-RUN_META = ("torque_hold", "use", "min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz")
+RUN_META = (
+    "torque_hold", "use", "min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "rate_corner_hz", "rate_delay_s",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

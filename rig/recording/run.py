@@ -46,6 +46,9 @@ class Run:
         The excitation frequency of a sine set, for the per-set table; None otherwise.
     channels
         Further measured channels by name, each of shape (n,).
+    rate_corner_hz, rate_delay_s
+        The gyro's own low-pass where its data sheet gives it: -3 dB corner and group delay. The delay is
+        already taken off ``time_s``; the rounding is in ``rate_rad_s`` (see ``rig.dynamics.low_pass``).
     """
 
     name: str
@@ -61,6 +64,8 @@ class Run:
     added_inertia_kg_m2: float = 0.0
     frequency_hz: float | None = None
     channels: Mapping[str, Array] = field(default_factory=dict)
+    rate_corner_hz: float | None = None
+    rate_delay_s: float | None = None
 
     @property
     def duration_s(self) -> float:

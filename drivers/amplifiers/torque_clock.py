@@ -1,0 +1,70 @@
+"""When a torque that a drive reports was on the shaft: the drive's own time stamps on the host's clock.
+
+What comes back is heard late, so the fastest answers alone put every stamp late by the shortest way back.
+What was asked left early. Half of the shortest way there and back is the error that is left when the two
+ways are taken as equally long (the two-way transfer that NTP uses too).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivers.source_clock import SourceClock
+
+BLOCK_S = 0.25
+BLOCKS_KEPT = 240
+
+
+class TorqueClock:
+    """Fed with every request and every stamped answer.
+
+    Parameters
+    ----------
+    unit_s
+        Time of one count of the drive's clock.
+    modulus
+        Its counter wraps here.
+    """
+
+    def __init__(self, unit_s: float, modulus: int) -> None:
+        self._back = SourceClock(unit_s)
+        self._unit_s, self._modulus = unit_s, modulus
+        self._stamp: int | None = None
+        self._asked_s = 0.0
+        self._unanswered = 0
+        self._there_and_back_s: list[float] = []
+        self._best_s = np.inf
+        self._block_end_s = 0.0
+        self._last_s = -np.inf
+        self.way_s = 0.0
+
+    def asked(self, at_s: float) -> None:
+        """A request to apply and stamp was handed over."""
+        self._asked_s = at_s
+        self._unanswered += 1
+
+    def heard(self, stamp: int, heard_s: float) -> float:
+        """Host time of a stamp that was heard at ``heard_s``; later than every one before."""
+        before = self._stamp if self._stamp is not None else stamp
+        self._stamp = before + (stamp - before) % self._modulus
+        self._back.observe(self._stamp, heard_s)
+        stamped_s = self._back.host_time_s(self._stamp)
+        if self._unanswered == 1:  # two at once cannot be told apart
+            self._note_way(stamped_s - self._asked_s, heard_s)
+        self._unanswered = 0
+        # Set points that the drive took up together carry one stamp; the last of them is the one that holds.
+        self._last_s = max(stamped_s - 0.5 * self.way_s, self._last_s + self._unit_s)
+        return self._last_s
+
+    def _note_way(self, way_s: float, now_s: float) -> None:
+        """Per block the shortest way there and back; of the blocks the faster half, as the clocks are fitted."""
+        self._best_s = min(self._best_s, way_s)
+        if now_s < self._block_end_s:
+            return
+        if self._block_end_s:
+            blocks = self._there_and_back_s
+            blocks.append(self._best_s)
+            del blocks[:-BLOCKS_KEPT]
+            faster = sorted(blocks)[: (len(blocks) + 1) // 2]
+            self.way_s = max(0.0, sum(faster) / len(faster))
+        self._block_end_s, self._best_s = now_s + BLOCK_S, np.inf
