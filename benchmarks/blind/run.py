@@ -1,0 +1,112 @@
+"""The blind bench: `python benchmarks/blind/run.py --seed N --cases 40 --out DIR`.
+
+Every case is generated, given to `identify-run` as a folder of recordings, and scored. DIR/cases holds what the
+tool reads, DIR/truth what it does not, DIR/results what it wrote. A bench that was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+if __name__ == "__main__":
+    sys.path[0] = str(Path(__file__).parents[2])  # this folder's names must not hide those of libraries
+
+from benchmarks.blind.cases import make, orders
+from benchmarks.blind.hidden import Diverged
+from benchmarks.blind.recordings import write_case
+from benchmarks.blind.score import Score, score
+from benchmarks.blind.tables import listing, table
+
+TIME_LIMIT_S = 600.0
+
+
+def identify(case: Path, results: Path) -> tuple[float, float, int]:
+    """Run the installed command on a case. Returns wall and processor seconds and the exit code."""
+    command = [str(Path(sys.executable).parent / "identify-run"), str(case / "rig.yaml"), "--out", str(results)]
+    if shutil.which("nice"):
+        command = ["nice", "-n", "15", *command]
+    results.parent.mkdir(parents=True, exist_ok=True)
+    before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
+    try:
+        done = subprocess.run([*command, "--quiet"], capture_output=True, text=True, timeout=TIME_LIMIT_S, check=False)
+        code, said = done.returncode, done.stdout + done.stderr
+    except subprocess.TimeoutExpired as late:
+        code, said = -1, f"no end after {late.timeout:g} s"
+    wall = time.monotonic() - begin
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    results.with_suffix(".log").write_text(said, encoding="utf-8")
+    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, code
+
+
+def one(seed: int, number: int, order: object, out: Path, again: bool) -> Score | None:
+    """Generate, run and score one case; what stands there already is not made again."""
+    name = f"case_{number:04d}"
+    case, truth, results = out / "cases" / name, out / "truth" / f"{name}.json", out / "results" / name
+    if not truth.exists():
+        try:
+            write_case(make(seed, number, order), case, truth)  # type: ignore[arg-type]
+        except Diverged as error:
+            print(error, file=sys.stderr)
+            return None
+    clock = results.with_suffix(".seconds.json")
+    if again and results.exists():
+        shutil.rmtree(results)
+    if again or not clock.exists():
+        figures = identify(case, results)
+        clock.write_text(json.dumps(figures), encoding="utf-8")
+    wall, cpu, code = json.loads(clock.read_text(encoding="utf-8"))
+    path = results / "result.json"
+    result = json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
+    return score(json.loads(truth.read_text(encoding="utf-8")), result, wall, cpu, code)
+
+
+def write(scores: Sequence[Score], seed: int, out: Path) -> str:
+    """The tables, also as files."""
+    text = table(scores, f"seed {seed}, {len(scores)} cases")
+    (out / "table.md").write_text(text + "\n" + listing(scores), encoding="utf-8")
+    (out / "scores.json").write_text(json.dumps([asdict(s) for s in scores], indent=1) + "\n", encoding="utf-8")
+    return text
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--cases", type=int, default=40)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--kinds", nargs="*", default=[], help="single, pair, outside, clean, torque_scale")
+    parser.add_argument("--effects", nargs="*", default=[], help="only these effects")
+    parser.add_argument("--only", nargs="*", type=int, default=[], help="only the cases of these numbers")
+    parser.add_argument("--again", action="store_true", help="run the tool once more on cases that stand there")
+    parser.add_argument("--generate", action="store_true", help="write the cases and stop")
+    a = parser.parse_args()
+    a.out.mkdir(parents=True, exist_ok=True)
+    scores = []
+    for number, order in enumerate(orders(a.seed, a.cases, a.kinds, a.effects)):
+        if a.only and number not in a.only:
+            continue
+        if a.generate:
+            write_case(make(a.seed, number, order), a.out / "cases" / f"case_{number:04d}",
+                       a.out / "truth" / f"case_{number:04d}.json")  # fmt: skip
+            continue
+        found = one(a.seed, number, order, a.out, a.again)
+        if found is not None:
+            scores.append(found)
+            said = f"{found.wrong or 'right'}: {'+'.join(found.truth) or found.kind} -> {'+'.join(found.named) or '-'}"
+            print(f"{number:4d} {found.seconds:5.1f} s  {said}", file=sys.stderr, flush=True)
+            write(scores, a.seed, a.out)
+    if scores:
+        print(write(scores, a.seed, a.out))
+
+
+if __name__ == "__main__":
+    main()

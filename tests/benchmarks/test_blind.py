@@ -1,0 +1,248 @@
+"""The blind bench: knows nothing of the product, agrees with its equations, hides the truth, scores honestly."""
+
+from __future__ import annotations
+
+import ast
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from benchmarks.blind import cases, library
+from benchmarks.blind.bound import DETECTABLE
+from benchmarks.blind.excitations import Excitation, multisine, read, sine
+from benchmarks.blind.hidden import ORDER, Hidden
+from benchmarks.blind.play import play
+from benchmarks.blind.recordings import write_case
+from benchmarks.blind.score import score
+from rig import effects
+from rig.config.excitation import ExcitationConfig
+from rig.dynamics import TorqueSignal, simulate
+from rig.excitation import planned
+from rig.platform import Platform
+
+FOLDER = Path(__file__).parents[2] / "benchmarks" / "blind"
+ALLOWED = {"numpy", "scipy", "numba", "h5py", "yaml", "benchmarks"}
+SIGMA = math.radians(0.05)
+JCK = (0.02, 0.045, 677.3)
+SETS = (sine(111.0, 1.0, 2.0), sine(42.0, 9.0, 2.0), multisine(60.0, (2.0, 7.0, 13.0, 19.0), 2.0, 0.5, 4))
+VALUES: dict[str, dict[str, float]] = {
+    "coulomb_friction": {"level": 1.2},
+    "stribeck_friction": {"coulomb": 1.2, "static": 2.4, "speed": 0.08},
+    "presliding_friction": {"level": 1.0, "displacement": 0.004},
+    "load_dependent_friction": {"factor": 0.013},
+    "quadratic_damping": {"factor": 0.02},
+    "directional_damping": {"step": 0.05},
+    "cubic_stiffness": {"factor": 500.0},
+    "quadratic_stiffness": {"factor": -100.0},
+    "bilinear_stiffness": {"step": 30.0},
+    "backlash": {"half_gap": 0.003},
+    "hysteresis": {"level": 2.0, "yield_angle": 0.02, "exponent": 1.7, "share": 0.6},
+    "creep": {"stiffness": 30.0, "time": 0.1},
+    "stiffness_drift": {"slope": 1.7},
+    "unbalance": {"sine": 10.0, "cosine": 20.0},
+    "cogging": {"sine": 0.5, "cosine": 0.3, "order": 40.0},
+    "torque_delay": {"delay": 0.00077},
+    "actuator_lag": {"time": 0.0013},
+    "torque_saturation": {"limit": 40.0},
+    "torque_deadzone": {"width": 0.7},
+    "torque_offset": {"level": 1.1},
+    "flexible_mode": {"inertia": 0.003, "frequency": 40.0, "ratio": 0.02},
+    "sensor_lag": {"time": 0.0017},
+    "rate_bias": {"bias": 0.02},
+    "periodic_disturbance": {"amplitude": 0.5, "frequency": 13.3},
+}
+
+
+def imported(path: Path) -> set[str]:
+    """Packages that a file imports, wherever in the file, save from the standard library."""
+    import sys  # noqa: PLC0415
+
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+    found = {n for n in names if not n.startswith("benchmarks.blind")}
+    return {n.split(".")[0] for n in found} - set(sys.stdlib_module_names)
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda p: p.name)
+def test_the_bench_imports_nothing_of_the_product(path: Path) -> None:
+    assert imported(path) <= ALLOWED - {"benchmarks"}
+
+
+def test_every_effect_of_the_product_can_be_hidden() -> None:
+    assert set(library.LIBRARY) == set(effects.names()) == set(VALUES)
+    for name in effects.names():
+        if name != "periodic_disturbance":  # the bench draws a phase where the product fits sine and cosine
+            assert ORDER[name] == tuple(p.name for p in effects.get(name).parameters)
+    assert not set(library.OUTSIDE) & set(effects.names())
+
+
+@pytest.mark.parametrize("name", sorted(VALUES))
+def test_the_bench_and_the_product_move_the_same_platform_alike(name: str) -> None:
+    hidden = Hidden(*JCK, {name: VALUES[name]}, phase_seed=3)
+    for number, (excitation, record) in enumerate(zip(SETS, hidden.play(SETS), strict=True)):
+        given, start = {name: VALUES[name]}, (hidden.rest_angle(), 0.0)
+        if name == "periodic_disturbance":
+            v, phase = VALUES[name], hidden._phase(number)
+            parts = {"sine": v["amplitude"] * math.cos(phase), "cosine": v["amplitude"] * math.sin(phase)}
+            given = {name: {**parts, "frequency": v["frequency"]}}
+            start = (float(record.angle_rad[0]), float(record.rate_rad_s[0]))
+        torque = TorqueSignal(record.time_s, record.torque_nm)
+        motion = simulate(Platform(*JCK, given), record.time_s, torque, start=start, substeps=24)
+        # The product knows the torque at its samples only: a kink between two of them costs a little.
+        assert np.abs(motion.sensed_rate_rad_s - record.sensed_rate_rad_s).max() < 0.05 * SIGMA, excitation.name
+
+
+@pytest.mark.parametrize("name", ["cubic_stiffness", "backlash", "flexible_mode", "actuator_lag", "torque_deadzone"])
+def test_halving_the_step_changes_nothing(name: str) -> None:
+    hidden = Hidden(*JCK, {name: VALUES[name]})
+    coarse, fine = hidden._one(SETS[1], 0), hidden._one(SETS[1], 0, substeps=8)
+    assert fine.rate_rad_s == pytest.approx(coarse.rate_rad_s, abs=1e-9)
+
+
+def test_dry_friction_holds_the_platform_until_the_torque_exceeds_it() -> None:
+    hidden = Hidden(*JCK, {"coulomb_friction": {"level": 5.0}})
+    (held,) = hidden.play([sine(4.99, 1.0, 2.0)])
+    assert not np.any(held.rate_rad_s)
+    assert held.parts[:, 0] == pytest.approx(held.torque_nm, abs=1e-12)
+    (moved,) = hidden.play([sine(6.0, 1.0, 2.0)])
+    breaks = math.asin(5.0 / 6.0) / (2.0 * math.pi)
+    assert moved.time_s[np.flatnonzero(moved.rate_rad_s)[0]] == pytest.approx(breaks, abs=1.1e-3)
+
+
+def test_an_excitation_file_is_played_as_the_product_would(tmp_path: Path) -> None:
+    sets = [
+        {
+            "kind": "sine",
+            "torque_nm": 50,
+            "frequency_hz": 3,
+            "duration_s": 2,
+            "soft_start_s": 0.5,
+            "repeat_scales": [0.4],
+        },
+        {"kind": "multisine", "torque_nm": 40, "from_hz": 1, "to_hz": 30, "tones": 9, "duration_s": 3},
+        {"kind": "multisine", "torque_nm": 40, "frequencies_hz": [2, 5, 11], "phases": "random", "seed": 5},
+        {"kind": "chirp", "torque_nm": 20, "from_hz": 0.5, "to_hz": 20, "duration_s": 4, "soft_start_s": 1},
+        {"kind": "chirp", "torque_nm": 20, "from_hz": 0.5, "to_hz": 20, "duration_s": 4, "sweep": "logarithmic"},
+        {"kind": "ramp_hold_release", "torque_nm": 60, "ramp_s": 1, "hold_s": 0.5, "release_s": 2, "cycles": 2},
+        {"kind": "free_decay", "torque_nm": 60, "pull_s": 1, "hold_s": 0.5, "duration_s": 4, "travel_cap_deg": 3},
+    ]
+    (tmp_path / "plan.yaml").write_text(yaml.safe_dump({"excitation": {"sets": sets}}), encoding="utf-8")
+    mine, rate_hz = read(tmp_path / "plan.yaml")
+    theirs = planned(ExcitationConfig.model_validate({"sets": sets}).sets)
+    assert rate_hz == 1000.0
+    for one, other in zip(mine, theirs, strict=True):
+        t = one.times(1e-3)
+        assert one.torque(t) == pytest.approx(other.torque(t), abs=0.1 * 0.01)
+    played, records = play(Hidden(*JCK), mine)
+    assert math.degrees(np.abs(records[-1].angle_rad).max()) <= 3.0
+    assert played[-1].numbers[0] < mine[-1].numbers[0]
+
+
+ORDER_OF_ONE = cases.Order("single", ("backlash",), 0.01, 1, "five_sines")
+
+
+@pytest.fixture(scope="module")
+def case() -> cases.Case:
+    return cases.make(11, 4, ORDER_OF_ONE)
+
+
+def test_a_case_keeps_its_size_and_the_limits_and_hides_its_truth(case: cases.Case, tmp_path: Path) -> None:
+    assert case.sizes["backlash"] == pytest.approx(0.01, rel=0.04)
+    assert case.energy["backlash"].energy > DETECTABLE
+    for record in case.records:
+        assert np.abs(record.angle_rad).max() < math.radians(10.0)
+        assert np.abs(record.rate_rad_s).max() < math.radians(400.0)
+    write_case(case, tmp_path / "case", tmp_path / "elsewhere" / "truth.json")
+    shown = (tmp_path / "case" / "rig.yaml").read_text(encoding="utf-8")
+    assert "backlash" not in shown
+    assert set(yaml.safe_load(shown)["model"]) == {"inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"}
+    assert not list((tmp_path / "case").glob("*.json"))
+
+
+def test_the_same_seed_gives_the_same_case_and_another_seed_another(case: cases.Case) -> None:
+    again, other = cases.make(11, 4, ORDER_OF_ONE), cases.make(12, 4, ORDER_OF_ONE)
+    assert np.array_equal(again.measured[0], case.measured[0])
+    assert other.hidden.inertia != case.hidden.inertia
+
+
+def test_every_effect_comes_at_every_size_before_any_comes_twice() -> None:
+    plan = cases.orders(3, 200, kinds=["single"])
+    first = [(o.effects, o.size) for o in plan[: 3 * len(library.LIBRARY)]]
+    assert len(set(first)) == len(first)
+
+
+def result(case: cases.Case, named: dict[str, dict[str, float]], rivals: tuple[str, ...] = ()) -> dict[str, Any]:
+    """A result.json that finds J, C, K and says ``named``."""
+    terms = dict(zip(("inertia", "damping", "stiffness"), case.reference(), strict=True))
+    model = {
+        "parameters": {n: {"value": v, "ci95": [0.99 * v, 1.01 * v]} for n, v in terms.items()},
+        "effect_parameters": {n: {k: {"value": x} for k, x in v.items()} for n, v in named.items()},
+        "error": {"holdout_rate_rms": case.hidden.noise},
+    }
+    verdict = {
+        "effects": list(named), "confusable_with": {n: list(rivals) for n in named}, "unexplained": False,
+        "never_separable": {},
+    }  # fmt: skip
+    return {"accepted": True, "before": model, "after": model, "verdict": verdict}
+
+
+def scored(case: cases.Case, found: dict[str, Any] | None, code: int = 0) -> Any:
+    truth = json.loads(json.dumps(case.truth()))
+    return score(truth, found, 1.0, 1.0, code)
+
+
+def test_the_truth_scores_as_right(case: cases.Case) -> None:
+    s = scored(case, result(case, {k: dict(v) for k, v in case.hidden.effects.items()}))
+    assert s.wrong == ""
+    assert s.exact and s.first
+    assert s.replayed == pytest.approx(1.0, abs=1e-6)
+    assert s.covered == (True, True, True)
+
+
+def test_a_wrong_name_an_extra_name_silence_and_a_crash_score_as_wrong(case: cases.Case) -> None:
+    truth = {k: dict(v) for k, v in case.hidden.effects.items()}
+    cubic = {"cubic_stiffness": {"factor": 3.0}}
+    assert scored(case, result(case, cubic)).wrong == "single: wrong name"
+    assert scored(case, result(case, cubic, ("backlash",))).wrong == "single: wrong name"  # physics parts these two
+    assert scored(case, result(case, truth | cubic)).wrong == "single: more besides"
+    assert scored(case, result(case, {})).wrong == "single: nothing named"
+    assert scored(case, None, 70).wrong == "exit code 70"
+
+
+def test_a_pair_that_physics_cannot_part_counts_where_both_are_named() -> None:
+    lag = cases.make(11, 1, cases.Order("single", ("sensor_lag",), 0.01, 1, "five_sines"))
+    other = {"actuator_lag": dict(lag.hidden.effects["sensor_lag"])}
+    alone, both = scored(lag, result(lag, other)), scored(lag, result(lag, other, ("sensor_lag",)))
+    assert alone.wrong and not alone.first
+    assert both.wrong == "" and both.declared
+
+
+def test_anything_named_on_a_clean_platform_is_a_false_alarm() -> None:
+    clean = cases.make(11, 2, cases.Order("torque_scale", (), 0.01, 1, "five_sines"))
+    assert clean.reference()[0] == pytest.approx(clean.hidden.inertia * clean.hidden.torque_scale)
+    assert scored(clean, result(clean, {})).wrong == ""
+    assert scored(clean, result(clean, {"torque_delay": {"delay": 1e-5}})).wrong == "false alarm"
+
+
+def test_an_effect_outside_the_library_has_to_stay_unexplained() -> None:
+    bump = cases.make(11, 3, cases.Order("outside", ("bump_stop",), 0.01, 1, "five_sines"))
+    silent = result(bump, {})
+    assert scored(bump, silent).wrong == "outside: not unexplained"
+    silent["verdict"]["unexplained"] = True
+    assert scored(bump, silent).wrong == ""
+    assert scored(bump, result(bump, {"backlash": {"half_gap": 1e-4}})).wrong == "outside: named"
+
+
+def test_an_effect_far_below_the_noise_counts_as_undetectable() -> None:
+    hidden = Hidden(*JCK, {"cubic_stiffness": {"factor": 1e-3}})
+    sets: tuple[Excitation, ...] = SETS
+    assert not cases.energies(hidden, sets, hidden.play(sets))["cubic_stiffness"].detectable
