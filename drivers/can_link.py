@@ -59,13 +59,16 @@ class CanLink:
         self.on_sent: Callable[[float, CanFrame], None] = lambda time_s, frame: None
 
     def send(self, frames: Sequence[CanFrame], urgent: bool = False) -> float:
-        """Send all frames; the host time at which the last one had been handed over.
+        """Send all frames; the host time just before they were handed over.
+
+        Before, because whoever hears them may already have acted when this thread runs again.
 
         Raises
         ------
         DeviceFault
             If the adapter refuses, stalls or is gone.
         """
+        now_s = self.clock()
         try:
             if self._lines is not None:
                 self._lines(frames, SEND_TIMEOUT_S, urgent)
@@ -74,7 +77,6 @@ class CanLink:
                     self._bus.send(_message(frame), SEND_TIMEOUT_S)
         except can.CanError as problem:
             raise DeviceFault(f"CAN on {self.name}: {problem}") from None
-        now_s = self.clock()
         for frame in frames:
             if self.record is not None:
                 self.record(now_s, True, frame)
