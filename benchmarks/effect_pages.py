@@ -145,7 +145,8 @@ def index() -> str:
     out = [
         "# Effects", "",
         "One object each in `rig/effects/`, read by simulator, identifier, report and these pages",
-        "(`python benchmarks/effect_pages.py`).", "", "| effect | family | equation |", "|---|---|---|",
+        "(`python benchmarks/effect_pages.py`). [An effect of your own](your-own.md) is a file of thirty lines.", "",
+        "| effect | family | equation |", "|---|---|---|",
     ]  # fmt: skip
     for name in effects.names():
         e = effects.get(name)

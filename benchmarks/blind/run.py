@@ -58,9 +58,8 @@ def one(seed: int, number: int, order: object, out: Path, again: bool) -> Score 
             print(error, file=sys.stderr)
             return None
     clock = results.with_suffix(".seconds.json")
-    if again and results.exists():
-        shutil.rmtree(results)
     if again or not clock.exists():
+        shutil.rmtree(results, ignore_errors=True)  # what a stopped bench has left
         figures = identify(case, results)
         clock.write_text(json.dumps(figures), encoding="utf-8")
     wall, cpu, code = json.loads(clock.read_text(encoding="utf-8"))

@@ -19,13 +19,14 @@ from rig.errors import ConfigError
 MAX_FAULTS_SHOWN = 25
 # Places where the path of a model.yaml may stand for the mapping that it holds.
 INCLUDES: tuple[KeyPath, ...] = (("model",), ("simulated", "platform"))
+MODELS = INCLUDES  # and where effects of the user's own may be named
 
 
 @dataclass(frozen=True)
 class LoadedConfig:
     """A checked configuration and what it was read from.
 
-    ``text`` is the file as read, ``included`` the text of each model.yaml it names, ``overrides`` the
+    ``text`` is the file as read, ``included`` the text of each model.yaml and effect file it names, ``overrides`` the
     ``--set`` texts in order: together they say exactly what was asked.
     """
 
@@ -58,6 +59,7 @@ def load_config(path: str | Path, overrides: Sequence[str] = ()) -> LoadedConfig
     for override in overrides:
         apply_override(document, override)
     _include_models(document, path.parent, included)
+    _read_effects(document, path.parent, included)
     config = _validate(document, name_from_stem(path.stem))
     return LoadedConfig(config, text, path, tuple(overrides), included)
 
@@ -87,12 +89,43 @@ def _included(document: Document, key: KeyPath, path: Path, included: dict[str, 
         text = f"has to hold a mapping (inertia_kg_m2: ...), not {shown(model.data)}"
         document.faults.append(Fault(where, key, text))
         return {}
+    _count_from(model.data, path.parent)
     for path_in_file, place in model.places.items():
         if path_in_file[: len(inside)] == inside:
             document.places[key + path_in_file[len(inside) :]] = place
     for fault in model.faults:
         document.faults.append(Fault(fault.place, key + fault.path[len(inside) :], fault.text))
     return model.data
+
+
+def _count_from(model: dict[str, Any], folder: Path) -> None:
+    """Effect files named by a model.yaml are relative to it, not to the file that names the model."""
+    files = model.get("effects_from")
+    files = [files] if isinstance(files, str) else files
+    if isinstance(files, list):
+        model["effects_from"] = [str(folder / file) if isinstance(file, str) else file for file in files]
+
+
+def _read_effects(document: Document, folder: Path, included: dict[str, str]) -> None:
+    """Run the files named under ``effects_from``: the names that they define may stand anywhere in the file."""
+    for key in MODELS:
+        section: Any = document.data
+        for part in key:
+            section = section.get(part) if isinstance(section, dict) else None
+        files = section.get("effects_from") if isinstance(section, dict) else None
+        if isinstance(files, str):
+            files = section["effects_from"] = [files]
+        for file in files if isinstance(files, list) else ():
+            if not isinstance(file, str):
+                continue  # said by the check of the whole
+            from rig import effects  # noqa: PLC0415  compiled kernels: only where there is a file
+
+            path = folder / file
+            try:
+                included[str(path)] = effects.read_file(path)
+            except ConfigError as error:
+                where = (*key, "effects_from")
+                document.faults.append(Fault(place_of(document, where), where, str(error)))
 
 
 def _validate(document: Document, default_name: str) -> Config:

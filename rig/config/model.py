@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 import yaml
 from pydantic import Field, field_validator
@@ -21,6 +21,7 @@ class ModelConfig(Section):
     damping_nm_s_rad: float = 0.045
     stiffness_nm_rad: float = 677.3
     terms: tuple[Term, ...] = TERMS  # type: ignore[assignment]
+    effects_from: tuple[Annotated[str, Field(min_length=1, max_length=4096)], ...] = ()  # files with effects of yours
     effects: EffectsConfig = Field(default_factory=dict)
 
     @field_validator("terms")
@@ -65,6 +66,9 @@ def model_yaml(platform: Platform, comment: str = "") -> str:
     if platform.effects:
         from rig import effects  # noqa: PLC0415  compiled kernels: only where there is an effect
 
+        files = {str(path): None for name in section.effects if (path := effects.file_of(name))}
+        if files:
+            content["effects_from"] = list(files)
         content["effects"] = {
             name: {p.key: float(section.effects[name][p.name]) for p in effects.get(name).parameters}
             for name in section.effects

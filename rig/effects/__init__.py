@@ -1,11 +1,16 @@
-"""Every effect the product knows, one file each; a new one is a new file and a line in ``_MODULES``."""
+"""Every effect the product knows, one file each; a new one is a new file and a line in ``_MODULES``.
+
+Effects from outside the package (installed ones, and files that a rig.yaml names) stand behind them.
+"""
 
 from __future__ import annotations
 
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 
-from rig.effects.base import Effect, Parameter, Place, Scale
+from rig.effects import _outside
+from rig.effects.base import Effect, Parameter, Place, Scale, filter_kernel, kernel
 
 _MODULES = {
     "coulomb_friction": "coulomb",
@@ -36,11 +41,10 @@ _MODULES = {
 
 
 def names() -> tuple[str, ...]:
-    """Names of all effects, in the order of the docs."""
-    return tuple(_MODULES)
+    """Names of all effects, in the order of the docs, those from outside the package last."""
+    return (*_MODULES, *_outside.names(_MODULES))
 
 
-@cache
 def get(name: str) -> Effect:
     """The effect of that name; its module is loaded when first asked for.
 
@@ -48,9 +52,34 @@ def get(name: str) -> Effect:
     ------
     KeyError
         Where no effect has that name.
+    ConfigError
+        Where it comes from an installed package and cannot be loaded.
     """
+    return _own(name) if name in _MODULES else _outside.get(name)
+
+
+@cache
+def _own(name: str) -> Effect:
     effect: Effect = import_module(f"rig.effects.{_MODULES[name]}").EFFECT
     return effect
 
 
-__all__ = ["Effect", "Parameter", "Place", "Scale", "get", "names"]
+def read_file(path: Path) -> str:
+    """Make the effects of a Python file known (it is run). Returns its text.
+
+    Raises
+    ------
+    ConfigError
+        Where it holds no effect that works; the message says the file, the line and the cure.
+    """
+    return _outside.read_file(path, _MODULES)
+
+
+def file_of(name: str) -> Path | None:
+    """The file that an effect was read from; None for those of the package and of installed ones."""
+    return _outside.file_of(name)
+
+
+__all__ = [
+    "Effect", "Parameter", "Place", "Scale", "file_of", "filter_kernel", "get", "kernel", "names", "read_file",
+]  # fmt: skip

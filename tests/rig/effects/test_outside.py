@@ -1,0 +1,156 @@
+"""Effects from outside the package: a Python file named in rig.yaml, and an entry point of an installed package."""
+
+from __future__ import annotations
+
+import re
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rig import effects
+from rig.config.load import load_config
+from rig.config.model import model_yaml
+from rig.dynamics import TorqueSignal, simulate
+from rig.effects import _outside
+from rig.errors import ConfigError
+from rig.platform import Platform
+
+PAGE = Path(__file__).parents[3] / "docs" / "effects" / "your-own.md"
+EXAMPLE = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[0]
+RIG = "backend: simulated\nsimulated: {}\nmodel:\n  effects_from: my_effect.py\n"
+
+
+@pytest.fixture(autouse=True)
+def forget(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What one test reads, the next must not know."""
+    monkeypatch.setattr(_outside, "_FILES", {})
+    _outside._of_package.cache_clear()
+
+
+def written(folder: Path, text: str = EXAMPLE, name: str = "my_effect.py") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def load(folder: Path, text: str = RIG) -> Any:
+    path = folder / "rig.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load_config(path)
+
+
+def test_the_example_of_the_docs_is_under_thirty_lines() -> None:
+    assert len(EXAMPLE.splitlines()) < 30
+
+
+def test_the_example_of_the_docs_acts_by_its_equation(tmp_path: Path) -> None:
+    effects.read_file(written(tmp_path))
+    assert "eddy_brake" in effects.names()
+    time = np.arange(2001) * 1e-3
+    torque = TorqueSignal(time, 80.0 * np.sin(2 * np.pi * 3 * time))
+    brake, slow = (
+        Platform(effects={"eddy_brake": {"level": 2.0, "speed": 1e4}}),
+        Platform(damping_nm_s_rad=0.045 + 4e-4),
+    )
+    rates = [simulate(p, time, torque).rate_rad_s for p in (brake, slow)]
+    assert rates[0] == pytest.approx(rates[1], abs=1e-6)  # far below its speed it is 2 level / speed of damping
+
+
+def test_a_file_named_in_the_yaml_is_known_wherever_an_effect_may_stand(tmp_path: Path) -> None:
+    written(tmp_path)
+    text = (
+        "backend: simulated\nmodel: {effects_from: [my_effect.py]}\nidentify: {candidates: [eddy_brake]}\n"
+        "simulated: {platform: {effects: {eddy_brake: {level_nm: 2, speed_rad_s: 3}}}}\n"
+    )
+    loaded = load(tmp_path, text)
+    assert loaded.config.simulated.platform.platform().effects == {"eddy_brake": {"level": 2.0, "speed": 3.0}}
+    assert EXAMPLE in loaded.included.values()
+    load(tmp_path, text)  # a second time is no second effect of that name
+
+
+def test_the_twin_says_where_its_effect_is_written(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    effects.read_file(path)
+    model = model_yaml(Platform(effects={"eddy_brake": {"level": 2.0, "speed": 3.0}}))
+    (tmp_path / "results").mkdir()
+    (tmp_path / "results" / "model.yaml").write_text(model, encoding="utf-8")
+    loaded = load(tmp_path, "backend: simulated\nsimulated: {}\nmodel: results/model.yaml\n")
+    assert loaded.config.model.effects_from == (str(path.resolve()),)
+    assert loaded.config.model.platform().effects["eddy_brake"]["speed"] == 3.0
+
+
+def test_a_model_file_counts_its_effect_files_from_where_it_stands(tmp_path: Path) -> None:
+    (tmp_path / "twin").mkdir()
+    written(tmp_path / "twin")
+    (tmp_path / "twin" / "model.yaml").write_text("effects_from: my_effect.py\n", encoding="utf-8")
+    load(tmp_path, "backend: simulated\nsimulated: {}\nmodel: twin/model.yaml\n")
+    assert "eddy_brake" in effects.names()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("EFFECT = Effect", "OTHER = Effect"), "holds no effect"),
+        (('name="eddy_brake"', 'name="creep"'), "the name 'creep' is taken"),
+        (('name="eddy_brake"', 'name="Eddy brake"'), "lower-case"),
+        (("@kernel", "@(lambda f: f)"), "decorated with @kernel"),
+        (("place=Place.LOAD", "place=Place.DRIVE"), "decorated with @filter_kernel"),
+        (("start=lambda scale: (0.1 * scale.rate_rad_s, 0.4 * scale.rate_rad_s)", "start=None"), "`start=`"),
+        (("family=", "family"), r"my_effect.py:\d+: SyntaxError"),
+        (("from rig.effects import", "raise ValueError('no')  #"), "my_effect.py:1: ValueError: no"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said_with_its_line(tmp_path: Path, change: tuple[str, str], said: str) -> None:
+    assert change[0] in EXAMPLE
+    written(tmp_path, EXAMPLE.replace(*change))
+    with pytest.raises(ConfigError, match=r"rig.yaml:4: model.effects_from: .*my_effect.py.*") as caught:
+        load(tmp_path)
+    assert re.search(said, str(caught.value))
+    assert "eddy_brake" not in effects.names()
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"model.effects_from: .*cannot be read"):
+        load(tmp_path)
+
+
+def test_two_files_must_not_bring_the_same_name(tmp_path: Path) -> None:
+    written(tmp_path)
+    written(tmp_path, name="again.py")
+    with pytest.raises(ConfigError, match=r"again.py: the name 'eddy_brake' is taken"):
+        load(tmp_path, RIG.replace("my_effect.py", "[my_effect.py, again.py]"))
+
+
+def test_an_installed_package_brings_its_effect_without_a_line_in_the_yaml(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written(tmp_path, name="brakes_of_ours.py")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    point = EntryPoint("eddy_brake", "brakes_of_ours:EFFECT", _outside.GROUP)
+    monkeypatch.setattr(_outside, "installed", lambda: {"eddy_brake": point})
+    assert effects.names()[-1] == "eddy_brake"
+    assert effects.get("eddy_brake").family == "friction"
+    assert effects.file_of("eddy_brake") is None
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("creep", "brakes_of_ours:EFFECT", "name is taken"),
+        ("wind", "brakes_of_ours:EFFECT", "its name is 'eddy_brake'"),
+        ("wind", "no_such_package:EFFECT", "cannot be loaded: ModuleNotFoundError"),
+        ("wind", "brakes_of_ours:drag", "not a rig.effects.Effect"),
+    ],
+)
+def test_a_package_that_is_broken_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, value: str, said: str
+) -> None:
+    written(tmp_path, name="brakes_of_ours.py")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(_outside, "installed", lambda: {name: EntryPoint(name, value, _outside.GROUP)})
+    with pytest.raises(ConfigError, match=said):
+        assert name in effects.names()
+        effects.get(name)
