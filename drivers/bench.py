@@ -138,6 +138,7 @@ class BenchRig(Rig):
         self._grant = realtime.acquire(real_time.priority, real_time.lock_memory)
         if self._raw_folder is not None:
             self._capture = Capture(self._raw_folder)
+            self._capture.start()
             self._mark("config", {"bench": self._config.model_dump(mode="json")})
         begin_s = self._time()
         faults = [fault for fault in (self._open_gyro(), self._open_drive()) if fault is not None]

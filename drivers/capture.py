@@ -13,6 +13,8 @@ from __future__ import annotations
 import json
 import os
 import struct
+import threading
+from collections import deque
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -55,13 +57,21 @@ def unpack_frame(payload: bytes) -> CanFrame:
     return CanFrame(identifier, data, bool(flags & _EXTENDED), bool(flags & _REMOTE), length, -1, bool(flags & _FD))
 
 
+def unpack_torque(payload: bytes) -> float:
+    """The torque that a tick asked for, in N m."""
+    return float(_TORQUE.unpack(payload)[0])
+
+
 class Capture:
-    """Writer. Records are gathered in memory and written at most 50 ms later, without a thread.
+    """Writer. Records are gathered in memory and written at most 50 ms later.
+
+    After ``start`` a thread does the writing: a busy disk may hold a write up for longer than a tick, and
+    the control loop must not wait for it. What fails there is raised by the next ``flush_if_due``.
 
     Raises
     ------
     Aborted
-        If the file cannot be made, or (from ``flush``) the disk takes no more.
+        If the file cannot be made, or the disk takes no more.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -72,13 +82,30 @@ class Capture:
             self._descriptor = os.open(self.path, flags, 0o644)
         except OSError as problem:
             raise Aborted(f"cannot write the raw capture {self.path}: {problem.strerror}") from None
-        self._pending = bytearray(MAGIC)
+        # A deque because appending and taking are each done at once, whichever thread is at it.
+        self._pending: deque[bytes] = deque((MAGIC,))
         self._flushed_at_s = 0.0
         self._open = True
+        self._writing = threading.Lock()
+        self._enough = threading.Event()
+        self._writer: threading.Thread | None = None
+        self._failure: Aborted | None = None
+
+    def start(self) -> None:
+        """Let a thread write from here on."""
+        self._writer = threading.Thread(target=self._write_on, name="capture", daemon=True)
+        self._writer.start()
+
+    def _write_on(self) -> None:
+        while not self._enough.wait(FLUSH_INTERVAL_S):
+            try:
+                self.flush()
+            except Aborted as failure:
+                self._failure = failure
+                return
 
     def _add(self, kind: int, time_s: float, payload: bytes) -> None:
-        self._pending += _HEAD.pack(kind, time_s, len(payload))
-        self._pending += payload
+        self._pending.append(_HEAD.pack(kind, time_s, len(payload)) + payload)
 
     def gyro_read(self, time_s: float, data: bytes) -> None:
         """Bytes that came from the gyro, and when they were there."""
@@ -105,25 +132,37 @@ class Capture:
         self._add(MARK, time_s, json.dumps({"mark": what, **(values or {})}).encode())
 
     def flush_if_due(self, now_s: float) -> None:
-        """Write what is pending if the last time was long enough ago."""
+        """Write what is pending if the last time was long enough ago and no thread does it."""
+        if self._failure is not None:
+            failure, self._failure = self._failure, None
+            raise failure
+        if self._writer is not None:
+            return
         if now_s - self._flushed_at_s >= FLUSH_INTERVAL_S:
             self._flushed_at_s = now_s
             self.flush()
 
     def flush(self) -> None:
         """Write what is pending."""
-        if not self._open:
-            return
-        try:
-            while self._pending:
-                del self._pending[: os.write(self._descriptor, self._pending)]
-        except OSError as problem:
-            self._open = False  # once is enough: the way out must not stumble over it again
-            os.close(self._descriptor)
-            raise Aborted(f"the raw capture {self.path} cannot be written: {problem.strerror}") from None
+        with self._writing:
+            if not self._open:
+                self._pending.clear()
+                return
+            data = memoryview(b"".join(self._pending.popleft() for _ in range(len(self._pending))))
+            try:
+                while data:
+                    data = data[os.write(self._descriptor, data) :]
+            except OSError as problem:
+                self._open = False  # once is enough: the way out must not stumble over it again
+                os.close(self._descriptor)
+                raise Aborted(f"the raw capture {self.path} cannot be written: {problem.strerror}") from None
 
     def close(self) -> None:
         """Write the rest and close; safe twice."""
+        self._enough.set()
+        if self._writer is not None:
+            self._writer.join()
+            self._writer = None
         if self._open:
             self.flush()
             self._open = False

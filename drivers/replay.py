@@ -14,13 +14,15 @@ from drivers import capture
 from drivers.amplifiers import make_amplifier
 from drivers.bench import answer
 from drivers.can_link import CanLink, Heard
-from drivers.capture import Entry, read_capture, unpack_frame
+from drivers.capture import Entry, read_capture, unpack_frame, unpack_torque
 from drivers.codecs.lawicel import CanFrame
 from drivers.gyroscopes import make_gyroscope
 from rig.config.bench import BenchConfig
 from rig.errors import RecordingError
 from rig.interface import Exchange, GyroSample, LowPass, Rig, Statement, Torque, TorqueSample
 from rig.recording.run import TorqueHold
+
+SAME_TORQUE_NM = 1e-6
 
 
 class ReplayLink(CanLink):
@@ -180,8 +182,17 @@ class ReplayRig(Rig):
                 nm = self.amplifier.sent_torque_nm(frame)
                 sent += [] if nm is None else [TorqueSample(entry.time_s, nm)]
             elif entry.kind == capture.TICK:
+                self._same_campaign(torque_nm, unpack_torque(entry.payload))
                 return answer(self.config, self.amplifier, gyro, sent)
         raise RecordingError(f"{self._path} ends here: the campaign that it holds was cut short")
+
+    def _same_campaign(self, asked_nm: float, played_nm: float) -> None:
+        """The guard and the plan have to ask for the torque that was played, or the answers belong to another set."""
+        if abs(asked_nm - played_nm) > SAME_TORQUE_NM:
+            raise RecordingError(
+                f"{self._path} holds another campaign: {played_nm:.6g} N m were played where this configuration asks "
+                f"for {asked_nm:.6g} N m. Replay it with the model, limits and excitation that it was played with."
+            )
 
     def torque_off(self) -> None:
         """There is no torque."""

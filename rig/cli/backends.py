@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.clock import Clock, VirtualClock
+from rig.config.load import LoadedConfig
 from rig.config.root import Config
 from rig.errors import ConfigError, UsageError
 from rig.interface import Rig, Torque
@@ -40,21 +41,25 @@ class Stage:
     account: Callable[[], dict[str, Any]] = no_account
 
 
-Backend = Callable[[Config, Path], AbstractContextManager[Stage]]
+Backend = Callable[[LoadedConfig, Path], AbstractContextManager[Stage]]
 
 
 @contextmanager
-def simulated(config: Config, raw_folder: Path) -> Iterator[Stage]:
+def simulated(loaded: LoadedConfig, raw_folder: Path) -> Iterator[Stage]:
     """The rig made of equations, in time that jumps."""
     from sim_backend.simulated import SimulatedRig
 
+    config = loaded.config
     yield Stage(SimulatedRig(config.simulated, config.excitation.sample_rate_hz), VirtualClock())
 
 
 @contextmanager
-def bench(config: Config, raw_folder: Path) -> Iterator[Stage]:
-    """Real devices."""
-    section = _bench_section(config)
+def bench(loaded: LoadedConfig, raw_folder: Path) -> Iterator[Stage]:
+    """Real devices, or the raw capture of a campaign that was played on them."""
+    section = _bench_section(loaded.config)
+    if section.replay is not None:
+        yield _replayed(_capture_of(loaded.folder, section.replay))
+        return
     for key, value in (
         ("gyroscope.port", section.gyroscope.port),
         ("amplifier.can.channel", section.amplifier.can.channel),
@@ -65,9 +70,13 @@ def bench(config: Config, raw_folder: Path) -> Iterator[Stage]:
 
 
 @contextmanager
-def emulated(config: Config, raw_folder: Path) -> Iterator[Stage]:
+def emulated(loaded: LoadedConfig, raw_folder: Path) -> Iterator[Stage]:
     """The same drivers on devices that are emulated at wire level in a process of their own."""
-    _bench_section(config)
+    config = loaded.config
+    if _bench_section(config).replay is not None:
+        raise UsageError(
+            "--emulate and bench.replay exclude each other: the first emulates devices, the second has none."
+        )
     require_emulators()
     from sim_backend.emulators.launch import on_emulated_ports, started
 
@@ -99,6 +108,27 @@ def _bench_section(config: Config) -> BenchConfig:
     if config.bench is None:
         raise UsageError("this needs a `bench:` section, which the file has not: see examples/bench.yaml.")
     return config.bench
+
+
+def _capture_of(folder: Path, named: str) -> Path:
+    """The capture in a results folder, in its raw folder, or named itself; raises ConfigError where there is none."""
+    from drivers.capture import FILE_NAME
+
+    for base in (folder / named, Path(named)):
+        for path in (base / "raw" / FILE_NAME, base / FILE_NAME, base):
+            if path.is_file():
+                return path
+    raise ConfigError(
+        f"bench.replay: there is no raw capture in {folder / named}: give the results folder of a bench run "
+        f"(it holds raw/{FILE_NAME}), relative to the yaml or absolute"
+    )
+
+
+def _replayed(path: Path) -> Stage:
+    from drivers.replay import ReplayRig
+
+    rig = ReplayRig(path)
+    return Stage(rig, rig.clock, lambda: {"replay_of": str(path)})
 
 
 def _bench_stage(section: BenchConfig, torque: Torque, raw_folder: Path) -> Stage:

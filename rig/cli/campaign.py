@@ -93,7 +93,7 @@ def play(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> Played:
         )
     if backend == EMULATED:
         desk.terminal.tell("Starting the emulated devices ...")
-    with BACKENDS[backend](config, folder.path / RAW_FOLDER) as stage:
+    with BACKENDS[backend](loaded, folder.path / RAW_FOLDER) as stage:
         sets = plan(config.model.platform(), config.excitation, config.limits, stage.rig.rate_full_scale_rad_s)
         _open(desk, stage, loaded, sets, folder.path)
         return _record(desk, stage, loaded, sets, folder)

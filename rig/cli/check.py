@@ -142,5 +142,5 @@ def _known(desk: Desk, loaded: LoadedConfig, scratch: Path) -> Iterator[Known]:
     if name == RECORDED:
         yield Known(loaded, None)
         return
-    with BACKENDS[name](loaded.config, scratch / "raw") as stage:
+    with BACKENDS[name](loaded, scratch / "raw") as stage:
         yield Known(loaded, stage)

@@ -102,7 +102,8 @@ class BenchConfig(Section):
     """Real devices, or their emulators at wire level.
 
     ``settle_s`` is how long the gyro's clock is compared with the host's before anything moves.
-    ``raw_capture`` keeps every byte and frame with its time in `raw/` of the results folder.
+    ``raw_capture`` keeps every byte and frame with its time in `raw/` of the results folder. ``replay``
+    names such a folder (relative to this yaml): it is played through the same drivers, no device is touched.
     """
 
     gyroscope: GyroscopeConfig = GyroscopeConfig()
@@ -110,6 +111,7 @@ class BenchConfig(Section):
     real_time: RealTimeConfig = RealTimeConfig()
     settle_s: Annotated[float, Field(ge=0.2, le=60)] = 3.0
     raw_capture: bool = True
+    replay: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
     emulator: EmulatorConfig = EmulatorConfig()
 
     @model_validator(mode="after")

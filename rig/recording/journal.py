@@ -112,7 +112,7 @@ class Journal:
         self._columns = {**DEFAULT_COLUMNS, **{k: tuple(v) for k, v in (columns or {}).items()}}
         self._in_run = True
         self._queue(frame(RUN, _json({"name": name, "meta": dict(meta), "columns": self._columns})))
-        self.flush()
+        self._flush_unless_in_background()
 
     def append(self, kind: str, rows: ArrayLike) -> None:
         """Add one row, shape (columns,), or several, shape (n, columns), of ``kind`` to the open run.
@@ -135,12 +135,19 @@ class Journal:
         self._flush_if_due()
 
     def end_run(self) -> None:
-        """Close the open run and write it out."""
+        """Close the open run and write it out (a flush later, where that is done in the background)."""
         if not self._in_run:
             raise ValueError("end_run() without begin_run()")
         self._in_run = False
         self._queue(frame(RUN_END, b""))
-        self.flush()
+        self._flush_unless_in_background()
+
+    def _flush_unless_in_background(self) -> None:
+        """A set begins and ends within the control loop, which must not wait for a disk that is busy."""
+        if self._background:
+            self._raise_failure()
+        else:
+            self.flush()
 
     def flush(self, *, to_disk: bool = False) -> None:
         """Write all that is buffered; ``to_disk`` also survives a power cut.

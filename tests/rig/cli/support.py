@@ -13,7 +13,7 @@ from typer.testing import CliRunner, Result
 from rig.cli import backends
 from rig.cli.backends import Stage
 from rig.clock import VirtualClock
-from rig.config.root import Config
+from rig.config.load import LoadedConfig
 from rig.interface import Rig
 
 TWO_SETS = """
@@ -44,7 +44,7 @@ def put_on_stage(monkeypatch: pytest.MonkeyPatch, rig: Rig, name: str = "simulat
     """Let ``rig`` stand in for the backend of that name."""
 
     @contextmanager
-    def scripted(config: Config, raw_folder: Path) -> Iterator[Stage]:
+    def scripted(loaded: LoadedConfig, raw_folder: Path) -> Iterator[Stage]:
         yield Stage(rig, VirtualClock())
 
     monkeypatch.setattr(backends, "BACKENDS", {**backends.BACKENDS, name: scripted})
