@@ -20,6 +20,7 @@ from drivers.can_link import CanLink, open_bus
 from drivers.capture import Capture, export
 from drivers.gyro_line import GyroLine, GyroReport
 from drivers.gyroscopes import make_gyroscope
+from drivers.listening import ListeningPort
 from drivers.ports import SerialPort
 from rig import realtime
 from rig.config.bench import BenchConfig
@@ -144,7 +145,7 @@ class BenchRig(Rig):
         faults = [fault for fault in (self._open_gyro(), self._open_drive()) if fault is not None]
         if self._line is not None:
             while self._time() - begin_s < self._config.settle_s:
-                self._listen(CONTACT_TIME_S)
+                time.sleep(CONTACT_TIME_S)
                 self._gather(faults)
                 self._settle_drive(faults)
             self._line.note_noise()
@@ -160,7 +161,7 @@ class BenchRig(Rig):
                 "bench.gyroscope.port is empty: name its serial port (`rig devices` lists them) or run with --emulate"
             )
         try:
-            serial = SerialPort(port, self.gyroscope.baud)
+            serial = ListeningPort(SerialPort(port, self.gyroscope.baud), self._time)
             self._line = GyroLine(self.gyroscope, serial, self._capture, self._time)
             self._line.greet()
         except RigError as fault:
@@ -200,23 +201,16 @@ class BenchRig(Rig):
             del self._waiting[:-1000]  # while nothing is played only the newest matter
 
     def _listen(self, timeout_s: float) -> bool:
-        """Wait for the gyro or the drive, and stamp what they sent when it arrives."""
-        if self._line is None:
-            time.sleep(timeout_s)
+        """Wait for a bus that has no ear of its own, and stamp its frames as they arrive; False if none came."""
+        link = self._link
+        descriptor = -1 if link is None or self._link_fault is not None else link.fileno()
+        if link is None or descriptor < 0 or not select.select((descriptor,), (), (), timeout_s)[0]:
             return False
-        link, line = self._link, self._line
-        gyro, can = line.fileno(), -1 if link is None else link.fileno()
-        if gyro < 0 or can < 0 or link is None or self._link_fault is not None:
-            return line.listen(timeout_s)
-        readable = select.select((gyro, can), (), (), timeout_s)[0]
-        if gyro in readable:
-            line.take_in()
-        if can in readable:
-            try:
-                link.poll()
-            except DeviceFault as fault:
-                self._link_fault = fault
-        return bool(readable)
+        try:
+            link.poll()
+        except DeviceFault as fault:
+            self._link_fault = fault
+        return True
 
     # -- torque ----------------------------------------------------------------------------------
 

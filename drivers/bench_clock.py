@@ -1,7 +1,8 @@
-"""The bench's clock: absolute deadlines, and an ear on the gyro while it waits.
+"""The bench's clock: absolute deadlines, and an ear on a CAN bus that has none of its own while it waits.
 
-A datagram is stamped when it arrives, not when the next tick looks for it. Otherwise the beat between the
-gyro's clock and the ticks moves every time stamp by up to a tick.
+What arrives is stamped when it arrives, not when the next tick looks for it. Otherwise the beat between a
+device's clock and the ticks moves every time stamp by up to a tick. Serial ports are listened to by a thread
+(``drivers.listening``), and then nothing but sleep happens here.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ class BenchClock:
     Parameters
     ----------
     listen
-        Waits at most so many seconds for the gyro and takes in what has arrived; True if something has.
+        Waits at most so many seconds for a frame and takes it in; False at once where there is nothing to wait for.
     spin_s
         Looked at the clock instead of asleep for so long before each deadline.
     on_reading
@@ -51,8 +52,8 @@ class BenchClock:
     def wait_until(self, deadline_s: float) -> float:
         """Listen, sleep, then spin, until the deadline."""
         listen_until_s = deadline_s - max(STOP_LISTENING_S, self._spin_s)
-        while (left_s := listen_until_s - self._time()) > 0.0:
-            self._listen(left_s)
+        while (left_s := listen_until_s - self._time()) > 0.0 and self._listen(left_s):
+            continue
         asleep_s = deadline_s - self._spin_s - self._time()
         if asleep_s > 0.0:
             time.sleep(asleep_s)

@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import can
 
 from drivers.codecs.lawicel import CanFrame
+from drivers.listening import ListeningPort
+from drivers.ports import SerialPort
 from drivers.slcan import SlcanBulkBus
 from rig.config.bench import CanConfig
 from rig.errors import ConfigError, DeviceFault
@@ -50,6 +52,8 @@ class CanLink:
         self.clock = clock
         # Our own bus sends a tick in one write and hands frames over without a message object each.
         own = bus if isinstance(bus, SlcanBulkBus) else None
+        if own is not None:
+            own.clock = clock
         self._lines = own.send_lines if own is not None else None
         self._take = own.take_frames if own is not None else None
         self.name = str(bus.channel_info)
@@ -86,13 +90,9 @@ class CanLink:
     def poll(self) -> list[Heard]:
         """Frames that have arrived, handed to every listener too; never waits."""
         try:
-            frames = self._take() if self._take is not None else self._receive()
+            heard = [Heard(*item) for item in self._take()] if self._take is not None else self._receive()
         except can.CanError as problem:
             raise DeviceFault(f"CAN on {self.name}: {problem}") from None
-        if not frames:
-            return []
-        now_s = self.clock()
-        heard = [Heard(now_s, frame) for frame in frames]
         for item in heard:
             if self.record is not None:
                 self.record(item.time_s, False, item.frame)
@@ -100,15 +100,15 @@ class CanLink:
                 listener(item)
         return heard
 
-    def _receive(self) -> list[CanFrame]:
-        frames: list[CanFrame] = []
-        while len(frames) < MOST_FRAMES_A_POLL:
+    def _receive(self) -> list[Heard]:
+        heard: list[Heard] = []
+        while len(heard) < MOST_FRAMES_A_POLL:
             message = self._bus.recv(0)
             if message is None:
                 break
             if not message.is_error_frame:
-                frames.append(_frame(message))
-        return frames
+                heard.append(Heard(self.clock(), _frame(message)))
+        return heard
 
     def fileno(self) -> int:
         """File descriptor on which arriving frames show, or -1 where the bus has none."""
@@ -178,8 +178,8 @@ def open_bus(config: CanConfig) -> can.BusABC:
     options: dict[str, Any] = {"bitrate": config.bitrate, **config.options}
     try:
         if config.interface == "slcan_bulk":
-            options.setdefault("tty_baudrate", config.tty_baud)
-            return SlcanBulkBus(config.channel, **options)
+            baud = options.pop("tty_baudrate", config.tty_baud)
+            return SlcanBulkBus(ListeningPort(SerialPort(config.channel, baud)), **options)
         return can.Bus(channel=config.channel, interface=config.interface, **options)
     except can.CanInterfaceNotImplementedError as problem:
         raise ConfigError(f"bench.amplifier.can.interface: {config.interface!r}: {problem}") from None

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from drivers.capture import Capture
 from drivers.gyroscopes.base import Gyroscope
+from drivers.listening import arrivals
 from drivers.ports import BytePort
 from rig.errors import DeviceFault
 from rig.interface import GyroSample
@@ -85,40 +86,11 @@ class GyroLine:
             if self._capture is not None:
                 self._capture.gyro_sent(self._clock(), greeting)
 
-    def fileno(self) -> int:
-        """File descriptor on which arriving bytes show, or -1 where the port has none."""
-        number = getattr(self._port, "fileno", lambda: None)()
-        return -1 if number is None or self.fault is not None else number
-
-    def take_in(self) -> None:
-        """Take in what has arrived; a vanished port is kept for ``collect``."""
-        try:
-            self._take()
-        except DeviceFault as fault:
-            self.fault = fault
-
-    def listen(self, timeout_s: float) -> bool:
-        """Wait for bytes at most so long and take them in; a vanished port is kept for ``collect``."""
-        if self.fault is not None:
-            time.sleep(timeout_s)
-            return False
-        try:
-            if not self._port.wait_readable(timeout_s):
-                return False
-            return self._take()
-        except DeviceFault as fault:
-            self.fault = fault
-            return False
-
-    def _take(self) -> bool:
-        data = self._port.read()
-        if not data:
-            return False
-        now_s = self._clock()
-        self._chunks.append((now_s, data))
-        if self._capture is not None:
-            self._capture.gyro_read(now_s, data)
-        return True
+    def _take(self) -> None:
+        for at_s, data in arrivals(self._port, self._clock):
+            self._chunks.append((at_s, data))
+            if self._capture is not None:
+                self._capture.gyro_read(at_s, data)
 
     def collect(self) -> list[GyroSample]:
         """Samples since the last call. Raises DeviceFault once the port has vanished."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import can
@@ -19,6 +19,7 @@ from can import CanInitializationError, CanOperationError, Message
 
 from drivers.codecs import lawicel
 from drivers.codecs.lawicel import Answer, CanFrame, LawicelDecoder
+from drivers.listening import arrivals
 from drivers.ports import BytePort, SerialPort
 from rig.errors import DeviceFault
 
@@ -60,7 +61,8 @@ class SlcanBulkBus(can.BusABC):
             raise ValueError(f"bitrate {bitrate} is not one of a Lawicel adapter: {allowed}")
         self._answer_timeout_s = answer_timeout_s
         self._decoder = LawicelDecoder()
-        self._frames: deque[tuple[float, CanFrame]] = deque()
+        self._frames: deque[tuple[float, CanFrame]] = deque()  # with the time of their arrival
+        self.clock: Callable[[], float] = time.monotonic
         self._unanswered = 0
         self._last_answer_s = 0.0
         self._answers_frames: bool | None = None
@@ -112,15 +114,18 @@ class SlcanBulkBus(can.BusABC):
                     f"{self._port.name}: no answer to {command!r} within {self._answer_timeout_s} s. "
                     "Is it a Lawicel (slcan) adapter, and is the baud rate right?"
                 )
-            self._take(self._port.read())
+            self._take()
 
-    def _take(self, data: bytes) -> None:
-        """Sort bytes from the adapter into frames and answers."""
-        now = time.time()
+    def _take(self) -> None:
+        """Sort what has come from the adapter into frames and answers."""
+        for at_s, data in arrivals(self._port, self.clock):
+            self._sort(at_s, data)
+
+    def _sort(self, at_s: float, data: bytes) -> None:
         refused = 0
         for item in self._decoder.feed(data):
             if isinstance(item, CanFrame):
-                self._frames.append((now, item))
+                self._frames.append((at_s, item))
             elif self._unanswered and item.kind in ("sent", "ok", "error"):
                 self._unanswered -= 1
                 self._last_answer_s = time.monotonic()
@@ -186,7 +191,7 @@ class SlcanBulkBus(can.BusABC):
         self._count_unanswered(len(frames))  # before the write: a fast adapter answers during it
         try:
             self._port.write(lawicel.OK + lines if urgent else lines, timeout)
-            self._take(self._port.read())
+            self._take()
         except DeviceFault as problem:
             raise CanOperationError(str(problem)) from None
 
@@ -204,18 +209,20 @@ class SlcanBulkBus(can.BusABC):
     def _recv_internal(self, timeout: float | None) -> tuple[Message | None, bool]:
         if not self._frames:
             try:
-                self._take(self._port.read())
+                self._take()
                 if not self._frames and timeout != 0:
                     self._wait_for_frame(timeout)
             except DeviceFault as problem:
                 raise CanOperationError(str(problem)) from None
         if not self._frames:
             return None, False
-        read_at_s, frame = self._frames.popleft()
-        return self._message(frame, read_at_s), False
+        at_s, frame = self._frames.popleft()
+        return self._message(frame, time.time() - (self.clock() - at_s)), False
 
-    def take_frames(self) -> list[CanFrame]:
-        """Every frame that has arrived, without the cost of a message object each; filters do not apply.
+    def take_frames(self) -> list[tuple[float, CanFrame]]:
+        """Every frame that has arrived, with the time of its arrival on ``clock`` and without a message object each.
+
+        Filters do not apply.
 
         Raises
         ------
@@ -223,10 +230,10 @@ class SlcanBulkBus(can.BusABC):
             As ``recv`` does.
         """
         try:
-            self._take(self._port.read())
+            self._take()
         except DeviceFault as problem:
             raise CanOperationError(str(problem)) from None
-        frames = [frame for _, frame in self._frames]
+        frames = list(self._frames)
         self._frames.clear()
         return frames
 
@@ -237,7 +244,7 @@ class SlcanBulkBus(can.BusABC):
             if left <= 0:
                 return
             if self._port.wait_readable(left):
-                self._take(self._port.read())
+                self._take()
 
     @property
     def dropped_lines(self) -> int:
