@@ -99,14 +99,20 @@ def of_set(information: Information, others: Sequence[Information] = ()) -> str:
             f"about {number(worst / AIM, 2)} times the torque would give {100 * AIM:g} %" if worst < 1e6 else "raise it"
         )
         return f"{i.name}: below the noise: {told} ({expected(i)}); {cure}"
-    missing = weak(i)
-    if not missing:
+    if not weak(i):
         return f"{i.name}: {expected(i)} expected{_about_zeros(i)}"
+    return f"{of_weak_set(i, others)} ({expected(i)} expected){_about_zeros(i)}"
+
+
+def of_weak_set(information: Information, others: Sequence[Information] = ()) -> str:
+    """What a set alone does not determine, and which other set it should be fitted with."""
+    missing = weak(information)
     terms = [n[0] for n in missing if n[0] in TERMS]
-    told = undetermined(i.name, terms, _partner(i, missing, others)) if terms else f"{i.name} alone leaves effects open"
+    if not terms:
+        return f"{information.name} alone leaves effects open"
+    told = undetermined(information.name, terms, _partner(information, missing, others))
     rest = [label(n) for n in missing if n[0] not in TERMS]
-    more = f"; {' and '.join(rest)} need another set" if rest and terms else ""
-    return f"{told}{more} ({expected(i)} expected){_about_zeros(i)}"
+    return told + (f"; {' and '.join(rest)} need another set" if rest else "")
 
 
 def _about_zeros(information: Information) -> str:
@@ -146,7 +152,7 @@ def of_campaign(each: Sequence[Information]) -> str:
     told = f"all sets together: {expected(total)} expected{_about_zeros(total)}; {_figures(total)}"
     missing = weak(total)
     if missing:
-        told += f"; NOT determined: {' and '.join(label(n) for n in missing)}. {_cure(total, missing)}"
+        told += f"; NOT determined: {' and '.join(label(n) for n in missing)}. {cure(total)}"
     return told
 
 
@@ -162,7 +168,9 @@ def _figures(total: Information) -> str:
     return f"{told}, strongest correlation {number(float(total.correlation[i, k]), 3)} ({names})"
 
 
-def _cure(total: Information, missing: Sequence[Name]) -> str:
+def cure(total: Information) -> str:
+    """What to add to a campaign that leaves something open."""
+    missing = weak(total)
     if below_noise(total):
         return "Raise the torque."
     if ("inertia",) in missing and ("stiffness",) in missing:

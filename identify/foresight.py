@@ -59,7 +59,7 @@ def _lines(late: Sequence[Information], delay_declared: bool) -> list[str]:
 def of_recorded_campaign(recording: Recording, declared: Platform) -> list[str]:
     """Lines on every run and on all together, at J, C, K that a quick regression finds in the data itself."""
     usable = [r for r in recording.runs if r.use != "holdout"] or list(recording.runs)
-    traces = [prepare(_silent(r), i, recording.noise) for i, r in enumerate(usable)]
+    traces = [prepare(silent(r), i, recording.noise) for i, r in enumerate(usable)]
     traces = [t for t in traces if t.stretches and t.count > FEWEST]
     if not traces or not any(np.ptp(t.measured) > 0.0 for t in traces):
         return []
@@ -74,7 +74,7 @@ def of_recorded_campaign(recording: Recording, declared: Platform) -> list[str]:
     return _lines(late, bool(late[0].torque_free))
 
 
-def _silent(run: Run) -> Run:
+def silent(run: Run) -> Run:
     """A run whose torque is zero throughout tells as much as one without."""
     return run if run.torque_nm is None or np.any(run.torque_nm) else replace(run, torque_nm=None, torque_time_s=None)
 

@@ -18,10 +18,15 @@ from scipy.interpolate import CubicSpline
 from identify.compare import Judged
 from identify.parameters import Name
 from identify.regression import Structure
+from identify.results import RunTraces
 from identify.traces import UPSAMPLING, Trace
 from rig import effects
 from rig.effects.base import Place
 from rig.recording.run import Array
+
+EDGE_PERIODS = 3.0  # of the low-pass: that much at either end of a run it has not settled
+BINS = 30
+FEWEST = 20  # samples in a bin
 
 
 def low_pass(values: Array, cutoff_hz: float, step_s: float) -> Array:
@@ -171,3 +176,53 @@ def residual_lines_hz(traces: Sequence[Trace], judged: Judged) -> tuple[float, .
             found.append((float(size[i] / np.sqrt(len(x))), float(f[i])))
     found.sort(reverse=True)
     return tuple(f for _, f in found[:12])
+
+
+def dependence(traces: Sequence[RunTraces], cutoff_hz: float) -> dict[str, float]:
+    """What the final residual goes with: share of its power that is a function of each quantity, largest first.
+
+    ``rate``, ``angle`` and ``torque`` are cut into bins, ``time`` into stretches of a run; the power of the bins'
+    means, less what their scatter alone would make, is the share. ``time`` counts how the residual's size grows or
+    falls over a run; its mean wanders with an integrated gyro anyway, and counts for an encoder alone. Runs without
+    torque are judged by measured less simulated.
+    """
+    left, known = [], []
+    for trace in traces:
+        y = trace.torque_residual_after
+        values = trace.measured - trace.simulated_after if y is None else np.asarray(y)
+        time = trace.time_s - trace.time_s[0]
+        edge = EDGE_PERIODS / cutoff_hz if y is not None else 0.0
+        edge = edge if time[-1] > 20.0 * edge else 0.0
+        use = (trace.keep > 0.0) & np.isfinite(values) & (time >= edge) & (time <= time[-1] - edge)
+        left.append(np.where(use, values, 0.0))
+        known.append(use)
+    use = np.concatenate(known) if known else np.zeros(0, dtype=bool)
+    if int(np.sum(use)) < FEWEST * BINS:
+        return {}
+    y = np.concatenate(left)[use]
+
+    def joined(of: str) -> Array:
+        return np.concatenate([np.asarray(getattr(t, of)) for t in traces])[use]
+
+    shares = {"rate": _share(joined("rate_rad_s"), y), "angle": _share(joined("angle_rad"), y)}
+    if all(t.torque_nm is not None for t in traces):
+        shares["torque"] = _share(joined("torque_nm"), y)
+    through = np.concatenate([np.linspace(0.0, 1.0, len(t.time_s)) + 2.0 * i for i, t in enumerate(traces)])[use]
+    grown = float(abs(np.corrcoef(through % 2.0, np.abs(y))[0, 1])) if np.ptp(y) > 0.0 else 0.0
+    absolute = all(t.channel == "angle" for t in traces)
+    shares["time"] = max(_share(through, y) if absolute else 0.0, grown**2)
+    return dict(sorted(shares.items(), key=lambda item: -item[1]))
+
+
+def _share(x: Array, y: Array) -> float:
+    """Share of the mean square of y, (n,), that its mean over bins of x explains; scatter taken off."""
+    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
+    if len(edges) < 3 or not np.any(y):
+        return 0.0
+    at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
+    count = np.maximum(np.bincount(at, minlength=len(edges) - 1), 1)
+    mean = np.bincount(at, y, minlength=len(edges) - 1) / count
+    square = float(np.mean(y * y))
+    explained = float(np.sum(count * mean * mean)) / len(y)
+    chance = (square - explained) * len(count) / len(y)
+    return float(np.clip((explained - chance) / square, 0.0, 1.0))

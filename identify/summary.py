@@ -11,17 +11,20 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from identify.next_steps import next_steps
 from identify.results import Identification, ModelResult, ParameterEstimate
 from identify.wording import (
     SYMBOLS,
     bent_percent,
     bent_sentences,
+    capital,
     not_reported,
     number,
     pairs,
     percent,
     plain,
     printable,
+    readable,
     title,
     unit,
     value_of,
@@ -53,13 +56,14 @@ def summary(identification: Identification, width: int = WIDTH, colour: bool = F
 def _whole(identification: Identification) -> Group:
     final, verdict = identification.final, identification.verdict
     floor = identification.noise_floor
+    note = printable(capital(identification.holdout_note))
     parts: list[RenderableType] = [
         *_listed("Verdict", verdict.sentences, bullet=""),
         Text(),
         _parameters(identification),
         Text(),
         _errors(identification),
-        Padding(Text(f"The noise floor is {floor.source}. {printable(identification.holdout_note)}"), (0, 0, 0, 2)),
+        Padding(Text(f"The noise floor is {floor.source}. {note}"), (0, 0, 0, 2)),
         *_listed("What this did to the declared model", bent_sentences(identification)),
         *_listed("Dropped, since the data do not support it", not_reported(final.dropped)),
         *_listed("Not determined by these data", not_reported(final.not_determined)),
@@ -84,7 +88,8 @@ def _outcome(identification: Identification) -> list[RenderableType]:
         head = Text("ACCEPTED", style="bold green")
     else:
         head = Text("NOT ACCEPTED", style="bold red")
-    return [head, *[Padding(Text(printable(f"- {reason}")), (0, 0, 0, 2)) for reason in identification.reasons]]
+    why = [Padding(Text(printable(f"- {reason}")), (0, 0, 0, 2)) for reason in identification.reasons]
+    return [head, *why, *_listed("What to run next", next_steps(identification))]
 
 
 def _table(heading: str, columns: Sequence[str], words: Sequence[int] = (0,)) -> Table:
@@ -115,8 +120,10 @@ def _parameters(identification: Identification) -> Table:
     for effect, parameters in (after or before).effect_parameters.items():
         for name, found in parameters.items():
             earlier = before.effect_parameters.get(effect, {}).get(name)
-            more = ["", _estimate(found)] if after else []
-            table.add_row(f"{plain(effect)}, {name.replace('_', ' ')}", _estimate(earlier), *more, unit(found.unit))
+            shown = found if earlier is not None and readable(earlier).unit != readable(found).unit else readable(found)
+            first = earlier if earlier is None or shown is found else readable(earlier)
+            more = ["", _estimate(shown)] if after else []
+            table.add_row(f"{plain(effect)}, {name.replace('_', ' ')}", _estimate(first), *more, unit(shown.unit))
     return table
 
 

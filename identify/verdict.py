@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from identify.results import Identification
-from identify.wording import capital, number, plain, title, unit, value_of
+from identify.wording import capital, joined, number, percent, plain, readable, title, told_apart, unit, value_of
 from rig import effects
+
+SHOWN_PERCENT = 0.05  # a change below that is not worth a sentence
 
 
 def sentences_of(found: Identification) -> tuple[str, ...]:
@@ -26,34 +28,46 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
         )
     if found.after is not None:
         out += [f"{capital(plain(d.name))} was left out of the refit: {d.reason}." for d in found.after.dropped]
-    out += [f"{pair} cannot be told apart: {why}." for pair, why in found.verdict.never_separable.items()]
+    out += [
+        f"{capital(joined([plain(n) for n in pair.split(' / ')]))} cannot be told apart: {why}."
+        for pair, why in found.verdict.never_separable.items()
+    ]
     return tuple(out)
 
 
 def _named(found: Identification, name: str) -> str:
     values = (found.after or found.before).effect_parameters.get(name, {})
-    numbers = ", ".join(f"{k.replace('_', ' ')} {value_of(v)} {unit(v.unit)}" for k, v in list(values.items())[:4])
+    shown = {k.replace("_", " "): readable(v) for k, v in list(values.items())[:4]}
+    numbers = ", ".join(f"{k} {value_of(v)} {unit(v.unit)}" for k, v in shown.items())
     rivals = found.verdict.confusable_with.get(name, ())
     text = f"The model lacked {plain(name)} ({numbers})."
     if rivals:
         separate = effects.get(name).separated_by
         text += f" These data cannot exclude {' or '.join(plain(r) for r in rivals)}"
-        text += f"; to separate: {separate}." if separate else "."
+        text += f"; {told_apart(separate)}." if separate else "."
     return text
 
 
 def _bent(found: Identification) -> list[str]:
+    """What the change of the model did to each parameter, in one sentence that names the change."""
     if found.after is None:
         return []
-    out = []
+    moved = []
     for name, before in found.before.parameters.items():
         after = found.after.parameters.get(name)
         if after is None or after.value == 0.0:
             continue
-        percent = 100.0 * (before.value / after.value - 1.0)
-        if abs(percent) >= 0.05:
-            out.append(
-                f"Without it, {title(name, found.axis)} came out {number(abs(percent), 3)} % too "
-                f"{'high' if percent > 0 else 'low'}."
-            )
-    return out
+        off = 100.0 * (before.value / after.value - 1.0)
+        if abs(off) >= SHOWN_PERCENT:
+            way = "high" if off > 0 else "low"
+            moved.append(f"{title(name, found.axis)} came out {percent(abs(off)).lstrip('+')} too {way}")
+    return [f"{_change(found)}, {joined(moved)}."] if moved else []
+
+
+def _change(found: Identification) -> str:
+    """The model as declared against the final one: "Without Coulomb friction and torque delay"."""
+    added = [plain(name) for name in found.verdict.effects]
+    if added:
+        return f"Without {joined(added)} in the model"
+    dropped = [plain(item.name) for item in found.after.dropped] if found.after else []
+    return f"With {joined(dropped)} in the model" if dropped else "In the model as declared"

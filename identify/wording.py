@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from identify.results import Identification, NotReported, ParameterEstimate
 
@@ -61,6 +62,20 @@ def digits_for(value: float, uncertainty: float) -> int:
     if not (math.isfinite(value) and math.isfinite(uncertainty)) or value == 0.0 or uncertainty <= 0.0:
         return 4
     return min(9, max(3, math.floor(math.log10(abs(value))) - math.floor(math.log10(uncertainty)) + 2))
+
+
+def readable(estimate: ParameterEstimate) -> ParameterEstimate:
+    """A time below a tenth of a second in ms; all else as it is."""
+    if estimate.unit != "s" or not 0.0 < abs(estimate.value) < 0.1:
+        return estimate
+    low, high = estimate.ci95
+    return replace(
+        estimate,
+        value=1e3 * estimate.value,
+        std_error=1e3 * estimate.std_error,
+        ci95=(1e3 * low, 1e3 * high),
+        unit="ms",
+    )
 
 
 def value_of(estimate: ParameterEstimate) -> str:
@@ -145,3 +160,13 @@ def pairs(several: Mapping[str, Sequence[str]]) -> list[str]:
 def not_reported(several: Sequence[NotReported]) -> list[str]:
     """Parameters that stand in no table, with the reason, one sentence each."""
     return [capital(f"{plain(item.name.replace('.', ', '))}: {item.reason}") for item in several]
+
+
+def told_apart(how: str) -> str:
+    """What separates an effect from its rivals, as part of a sentence: "what tells it from a delay: ..."."""
+    return f"what tells it {how}" if how.startswith("from ") else f"to separate: {how}"
+
+
+def joined(words: Sequence[str]) -> str:
+    """ "a", "a and b", "a, b and c"."""
+    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)

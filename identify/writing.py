@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from identify.json_values import finite
+from identify.next_steps import next_steps
 from identify.report import report_html
 from identify.results import (
     Errors,
@@ -37,6 +38,7 @@ def result_json(identification: Identification) -> dict[str, Any]:
         "schema_version": SCHEMA_VERSION,
         "accepted": identification.accepted,
         "reasons": list(identification.reasons),
+        "next": list(next_steps(identification)),
         "aborted": identification.aborted,
         "axis": identification.axis,
         "before": _model(identification.before),

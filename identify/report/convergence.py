@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -69,8 +69,8 @@ def convergence_table(identification: Identification) -> Markup:
         gaps = [run.gap_percent.get(name) for name in names]
         alone = [_off(run.roulette_only, run.closed_form, name) for name in names]
         rough = [_off(run.plain_objective, run.closed_form, name) for name in names]
-        values = [", ".join(_percent(value) for value in several) for several in (gaps, alone, rough)]
-        rows.append([run.name, number(run.objective, 6), number(run.j_dec, 6), str(run.restarts), passed, *values])
+        values = [_each(several) for several in (gaps, alone, rough)]
+        rows.append([run.name, number(run.objective), number(run.j_dec), str(run.restarts), passed, *values])
     caption = (
         "Distance of the best individual from the closed-form optimum, in percent: with elitism and a shrinking "
         "mutation step; with the roulette of Eq. 13 alone; and with e(k) as plain equation error instead of rate units."
@@ -82,6 +82,10 @@ def _off(values: Mapping[str, float], closed: Mapping[str, float], name: str) ->
     if name not in values or not closed.get(name):
         return None
     return 100.0 * abs(values[name] / closed[name] - 1.0)
+
+
+def _each(several: Sequence[float | None]) -> str:
+    return "-" if all(value is None for value in several) else ", ".join(_percent(value) for value in several)
 
 
 def _percent(value: float | None) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from identify.report.figure import AFTER, BEFORE, MEASURED, Figure, Panel, Trace, grid, level
 from identify.results import Identification, ParameterEstimate
-from identify.wording import title, value_of
+from identify.wording import percent, title, value_of
 
 FAR = 3.0  # an estimate further out than this many times the spread of the others is named, not drawn
 
@@ -34,9 +34,7 @@ def estimates_figure(identification: Identification) -> Figure | None:
             if inside and point:
                 drawn.append(_point(point, at, label, color, panel))
             else:
-                notes.append(
-                    _note("not determined" if point is None else f"{point[0]:+.3g} %", at, panel, color, point)
-                )
+                notes.append(_note("not determined" if point is None else percent(point[0]), at, panel, color, point))
         labels = [label[:20] for label, _, _ in rows]
         ticks = {"tickvals": list(range(len(rows))), "ticktext": labels, "range": [len(rows) - 0.5, -0.5]}
         away = f"% from {value_of(final[name])}"

@@ -11,13 +11,17 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs
 
+from identify.hindsight import hindsight
 from identify.json_values import finite
+from identify.next_steps import next_steps
 from identify.report.convergence import convergence_figure, convergence_table
+from identify.report.determined import determined_table
 from identify.report.estimates import estimates_figure
 from identify.report.figure import Figure
 from identify.report.markup import Markup, Piece, bullets, element, join, paragraph, section
 from identify.report.motion import RUNS, motion_figures
 from identify.report.residual import residual_figures
+from identify.report.response import response_figure
 from identify.report.tables import (
     candidate_table,
     correlation_table,
@@ -31,7 +35,9 @@ from identify.wording import (
     SYMBOLS,
     bent_percent,
     bent_sentences,
+    capital,
     half_interval,
+    joined,
     not_reported,
     number,
     pairs,
@@ -58,7 +64,8 @@ def report_html(identification: Identification, recording: Recording, name: str)
             _verdict(identification, gallery),
             _errors(identification, gallery),
             _candidates(identification),
-            _sets(identification, gallery),
+            _response(identification, recording, gallery),
+            _sets(identification, recording, gallery),
             _motion(identification, gallery),
             _origin(recording),
         ]
@@ -106,15 +113,22 @@ def _header(identification: Identification, name: str) -> Markup:
 
 def _verdict(identification: Identification, gallery: _Gallery) -> Markup:
     verdict, final = identification.verdict, identification.final
+    steps = next_steps(identification)
     reasons = [
-        element("div", element("h3", "Why not, and what to run next"), bullets(identification.reasons), class_="next")
+        element(
+            "div",
+            element("h3", "Why not, and what to run next"),
+            bullets(identification.reasons),
+            *([element("h3", "Next"), bullets(steps)] if steps else []),
+            class_="next",
+        )
     ]
     missing = not_reported(final.dropped), not_reported(final.not_determined)
     return section(
         "verdict",
         "What was found",
         element("div", *[paragraph(sentence) for sentence in verdict.sentences], class_="sentences"),
-        *(reasons if identification.reasons else []),
+        *(reasons if identification.reasons or steps else []),
         _tiles(identification),
         parameter_table(identification),
         _titled("What this did to the declared model", bent_sentences(identification)),
@@ -139,8 +153,7 @@ def _tiles(identification: Identification) -> Markup:
             element(
                 "div",
                 element("span", SYMBOLS.get(name, plain(name)), class_="symbol"),
-                element("span", value_of(found), class_="value"),
-                element("span", unit(found.unit), class_="unit"),
+                element("span", value_of(found), element("small", f" {unit(found.unit)}"), class_="value"),
                 element("span", f"± {number(half, 2)} (95 %)" if math.isfinite(half) else "", class_="half"),
                 element("span", before, class_="bent"),
                 class_="tile",
@@ -162,14 +175,17 @@ def _errors(identification: Identification, gallery: _Gallery) -> Markup:
         "What is left unexplained",
         paragraph(state),
         error_table(identification),
-        paragraph(identification.holdout_note, class_="note"),
+        paragraph(capital(identification.holdout_note), class_="note"),
         *figures,
     )
 
 
 def _candidates(identification: Identification) -> Markup:
     verdict = identification.verdict
-    never = [f"{names.replace('_', ' ')}: {why}" for names, why in verdict.never_separable.items()]
+    never = [
+        capital(f"{joined([plain(n) for n in names.split(' / ')])}: {why}")
+        for names, why in verdict.never_separable.items()
+    ]
     return section(
         "candidates",
         "What was tried",
@@ -179,16 +195,23 @@ def _candidates(identification: Identification) -> Markup:
     )
 
 
-def _sets(identification: Identification, gallery: _Gallery) -> Markup:
+def _sets(identification: Identification, recording: Recording, gallery: _Gallery) -> Markup:
+    determined = determined_table(hindsight(identification, recording))
     if not identification.per_set and identification.joint is None:
-        return Markup("")
+        return section("sets", "What the data could determine", determined) if determined.html else determined
     return section(
         "sets",
         "Set by set, and the genetic algorithm",
         set_table(identification) if identification.per_set else Markup(""),
+        determined,
         gallery.place(convergence_figure(identification)),
         convergence_table(identification),
     )
+
+
+def _response(identification: Identification, recording: Recording, gallery: _Gallery) -> Markup:
+    figure = response_figure(identification, recording)
+    return Markup("") if figure is None else section("response", "Frequency response", gallery.place(figure))
 
 
 def _motion(identification: Identification, gallery: _Gallery) -> Markup:
@@ -222,7 +245,7 @@ def _flat(info: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
             out[name] = ", ".join(str(item) for item in value)
         elif value is not None:
             out[name] = str(value)
-    return out
+    return {name: text for name, text in out.items() if text}
 
 
 def embedded(value: Any) -> str:

@@ -30,6 +30,8 @@ from rig.recording.run import Array
 
 LINE_POINTS = 4000
 CLOUD_POINTS = 1500
+EDGE_PERIODS = 3.0  # of the low-pass, not drawn at either end of a run: there the filter looks into nothing
+SHORTEST_EDGES = 20.0  # a run has to be this many times longer
 SEGMENT = 4096  # samples of one Welch segment at most
 Which = Literal["before", "after"]
 NAMES = {"before": "declared model", "after": "final model"}
@@ -57,11 +59,21 @@ def _torque_known(traces: Sequence[RunTraces]) -> bool:
     return all(t.torque_residual_before is not None and t.torque_residual_after is not None for t in traces)
 
 
-def _residual(trace: RunTraces, which: Which, torque: bool) -> Array:
+def settled(trace: RunTraces, lowpass_hz: float | None) -> Array:
+    """1.0 where the zero-phase low-pass stands clear of the ends of the run, (n,)."""
+    inside = np.ones(len(trace.time_s))
+    edge = 0.0 if not lowpass_hz else EDGE_PERIODS / lowpass_hz
+    time = trace.time_s - trace.time_s[0]
+    if time[-1] > SHORTEST_EDGES * edge:
+        inside[(time < edge) | (time > time[-1] - edge)] = 0.0
+    return inside
+
+
+def _residual(trace: RunTraces, which: Which, torque: bool, lowpass_hz: float | None = None) -> Array:
     """Torque residual where there is one, else measured less simulated; NaN where a sample does not count."""
     if torque:
         found = trace.torque_residual_before if which == "before" else trace.torque_residual_after
-        return np.where(trace.keep > 0.0, np.asarray(found), np.nan)
+        return np.where(trace.keep * settled(trace, lowpass_hz) > 0.0, np.asarray(found), np.nan)
     return left_over(trace, trace.simulated_before if which == "before" else trace.simulated_after)
 
 
@@ -81,12 +93,13 @@ def _lowpass_note(identification: Identification, torque: bool) -> str:
 def _against_time(identification: Identification) -> Figure:
     title, torque = _titled(identification)
     traces, models = identification.traces, _models(identification)
+    cutoff = identification.final.error.lowpass_hz
     starts = np.cumsum([0.0, *[1.02 * float(t.time_s[-1] - t.time_s[0]) for t in traces]])
     drawn: list[Trace] = []
     budget = max(200, LINE_POINTS // len(traces))
     for panel, which in enumerate(models, 1):
         for start, trace in zip(starts, traces, strict=False):
-            x, y = line(start + trace.time_s - trace.time_s[0], _residual(trace, which, torque), budget)
+            x, y = line(start + trace.time_s - trace.time_s[0], _residual(trace, which, torque, cutoff), budget)
             drawn.append(lines(x, y, NAMES[which], COLORS[which], panel, width=0.9))
     panels = [Panel("runs laid end to end (s)", title) for which in models]
     layout = grid(panels, shared_x=True, gap=0.12)
@@ -116,9 +129,10 @@ def _against(
 ) -> Figure:
     title, torque = _titled(identification)
     models, drawn = _models(identification), []
+    cutoff = identification.final.error.lowpass_hz
     for panel, which in enumerate(models, 1):
         x = np.concatenate([getattr(t, which_x) for t in identification.traces])
-        y = np.concatenate([_residual(t, which, torque) for t in identification.traces])
+        y = np.concatenate([_residual(t, which, torque, cutoff) for t in identification.traces])
         drawn.append(points(*cloud(x, y, CLOUD_POINTS), NAMES[which], COLORS[which], panel))
         mean = binned_mean(x, y)
         drawn.append(lines(*mean, f"mean, {NAMES[which]}", COLORS[which], panel, width=3))

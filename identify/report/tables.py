@@ -18,13 +18,16 @@ from identify.wording import (
     number,
     percent,
     plain,
+    readable,
     title,
+    told_apart,
     unit,
     value_of,
 )
 from rig import effects
 
 ROWS = 60  # of the candidates, best first
+SCREENED = "screened out"
 
 
 def parameter_table(identification: Identification) -> Markup:
@@ -51,11 +54,17 @@ def _effect_rows(before: ModelResult, after: ModelResult | None) -> list[list[Pi
     rows: list[list[Piece]] = []
     for effect, parameters in (after or before).effect_parameters.items():
         for name, estimate in parameters.items():
-            earlier = _cells(before.effect_parameters.get(effect, {}).get(name))
-            cells: list[Piece] = [f"{plain(effect)}, {name.replace('_', ' ')}", *earlier]
-            cells += [*_cells(estimate), ""] if after else []
-            rows.append([*cells, unit(estimate.unit)])
+            earlier = before.effect_parameters.get(effect, {}).get(name)
+            cells: list[Piece] = [f"{plain(effect)}, {name.replace('_', ' ')}", *_cells(_scaled_as(earlier, estimate))]
+            cells += [*_cells(readable(estimate)), ""] if after else []
+            rows.append([*cells, unit(readable(estimate).unit)])
     return rows
+
+
+def _scaled_as(earlier: ParameterEstimate | None, shown: ParameterEstimate) -> ParameterEstimate | None:
+    """In the unit that the row is shown in."""
+    both = earlier is not None and readable(earlier).unit == readable(shown).unit
+    return readable(earlier) if earlier is not None and both else earlier
 
 
 def _estimate(model: ModelResult | None, name: str) -> tuple[Piece, Piece]:
@@ -83,15 +92,17 @@ def error_table(identification: Identification) -> Markup:
         (f"held-out {name} error, free run", "holdout_rate_rms", channel_unit, floor.holdout_rate_rms),
         ("held-out fit", "holdout_fit_percent", "%", None),
         (f"{q.torque} residual, rms", "residual_rms_torque", q.torque_unit, floor.residual_rms_torque),
-        (f"{q.torque} residual over {q.torque}", "residual_torque_relative", "", None),
-        ("the same, held-out samples", "holdout_torque_relative", "", None),
+        (f"{q.torque} residual over {q.torque}", "residual_torque_relative", "%", None),
+        ("the same, held-out samples", "holdout_torque_relative", "%", None),
     ]
     rows: list[list[Piece]] = []
     for words, key, its_unit, least in kinds:
         values = [getattr(model.error, key) for model in (identification.before, identification.after) if model]
         if all(value is None for value in values):
             continue
-        rows.append([words, *[number(value) for value in values], number(least), its_unit])
+        times = 100.0 if key.endswith("_relative") else 1.0
+        shown = [number(None if value is None else times * value) for value in values]
+        rows.append([words, *shown, number(least), its_unit])
     head = ["", "declared model", *(["final model"] if identification.after else []), "noise floor", "unit"]
     cutoff = identification.final.error.lowpass_hz
     note = f" Torque figures behind a zero-phase low-pass at {cutoff:g} Hz." if cutoff else ""
@@ -102,7 +113,8 @@ def candidate_table(candidates: Sequence[Candidate], floor: float) -> Markup:
     """All that was tried, by round, best first."""
     if not candidates:
         return paragraph("No effect was tried.")
-    order = sorted(candidates, key=lambda c: (c.round, c.delta_bic))
+    fitted = [c for c in candidates if c.status != SCREENED]
+    order = sorted(fitted, key=lambda c: (c.round, c.delta_bic))
     rows: list[list[Piece]] = [
         [
             plain(c.effect),
@@ -119,9 +131,21 @@ def candidate_table(candidates: Sequence[Candidate], floor: float) -> Markup:
         "What was tried, on the model as it then stood. Delta BIC: negative is better. Held-out error in units of the "
         f"measured channel; the noise floor is {number(floor)}.{more}"
     )
-    return table(
+    tried = table(
         ["effect", "round", "delta BIC", "held-out error", "times the floor", "outcome"], rows, caption, words=(4, 5)
     )
+    return join([tried, _screened_out([c for c in candidates if c.status == SCREENED])])
+
+
+def _screened_out(several: Sequence[Candidate]) -> Markup:
+    """What a quick look at the residual ruled out, folded away: one line a round."""
+    rounds = sorted({c.round for c in several})
+    told = [
+        f"Round {r}: " + ", ".join(plain(c.effect) for c in sorted(several, key=lambda c: c.delta_bic) if c.round == r)
+        for r in rounds
+    ]
+    head = f"Screened out by the residual, without a full fit ({len(several)})"
+    return element("details", element("summary", head), bullets(told)) if told else Markup("")
 
 
 def _times(value: float | None, floor: float) -> Piece:
@@ -156,6 +180,9 @@ def set_table(identification: Identification) -> Markup:
         head.pop(1)  # the name says it already
         for row in rows:
             row.pop(1)
+    if not any(row[-1] for row in rows):
+        head, rows = head[:-1], [row[:-1] for row in rows]
+        return table(head, rows, caption)
     return table(head, rows, caption, words=(len(head) - 1,))
 
 
@@ -168,8 +195,13 @@ def _with_half(estimate: ParameterEstimate | None) -> Piece:
 def correlation_table(correlation: Mapping[str, float]) -> Markup:
     """Pairs of parameters that the data tie together, strongest first."""
     strong = sorted(correlation.items(), key=lambda item: -abs(item[1]))
-    rows: list[list[Piece]] = [[names.replace("_", " "), f"{value:+.4f}"] for names, value in strong[:12]]
+    rows: list[list[Piece]] = [[_pair(names), f"{value:+.3f}"] for names, value in strong[:12]]
     return table(["pair", "correlation"], rows, "Correlation of the final estimates.") if rows else Markup("")
+
+
+def _pair(names: str) -> str:
+    """ "damping, coulomb_friction.level" as "damping and Coulomb friction level"."""
+    return " and ".join(plain(name.replace(".", " ")) for name in names.split(", "))
 
 
 def effect_cards(identification: Identification) -> Markup:
@@ -181,17 +213,18 @@ def effect_cards(identification: Identification) -> Markup:
 def _card(identification: Identification, name: str) -> Markup:
     effect, verdict = effects.get(name), identification.verdict
     numbers = [
-        f"{parameter.name.replace('_', ' ')} = {value_of(found)} {unit(found.unit)} "
-        f"(95 %: {interval_of(found)}), {parameter.meaning}"
+        f"{parameter.name.replace('_', ' ')} = {value_of(shown)} {unit(shown.unit)} "
+        f"(95 %: {interval_of(shown)}), {parameter.meaning}"
         for parameter in effect.parameters
         if (found := identification.final.effect_parameters.get(name, {}).get(parameter.name)) is not None
+        for shown in [readable(found)]
     ]
     lines: list[Piece] = [effect.sign, f"Source: {effect.source}."]
     if name in verdict.contribution:
-        lines.append(f"Without it the error is {number(verdict.contribution[name], 3)} times as large.")
+        lines.append(f"Without {plain(name)} the error is {number(verdict.contribution[name], 3)} times as large.")
     rivals = verdict.confusable_with.get(name, ())
     if rivals:
-        parted = f" What parts them: {effect.separated_by}." if effect.separated_by else ""
+        parted = f" {capital(told_apart(effect.separated_by))}." if effect.separated_by else ""
         lines.append(f"On these data hard to tell from {', '.join(plain(r) for r in rivals)}.{parted}")
     return element(
         "article",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from identify.wording import interval_of, number, percent, plain, title, unit, value_of, with_interval
+from identify.wording import interval_of, joined, number, percent, plain, readable, title, unit, value_of, with_interval
 from tests.identify.sample import estimate
 
 
@@ -51,3 +51,18 @@ def test_names_and_units_are_those_of_the_field() -> None:
     assert plain("stribeck_friction") == "Stribeck friction"
     assert title("inertia", "linear") == "mass J"
     assert unit("N*m*s^2/rad^2") == "N·m·s²/rad²"
+
+
+def test_a_short_time_is_read_in_milliseconds_and_a_long_one_in_seconds() -> None:
+    short = readable(estimate(6e-4, 4e-7, "s"))
+    assert f"{value_of(short)} {short.unit}" == "0.60000 ms"
+    assert interval_of(short) == "0.59922 to 0.60078"
+    assert readable(estimate(0.89, 0.01, "s")).unit == "s"
+    assert readable(estimate(0.02, 0.01, "N*m")).unit == "N*m"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"), [([], ""), (["a"], "a"), (["a", "b"], "a and b"), (list("abc"), "a, b and c")]
+)
+def test_lists_read_like_speech(words: list[str], said: str) -> None:
+    assert joined(words) == said

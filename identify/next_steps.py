@@ -1,0 +1,103 @@
+"""What to run next after a campaign that was not accepted: for the summary, the report and result.json alike."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from identify.residual import dependence
+from identify.results import GeneticRun, Identification, NotReported
+from identify.sign_check import SENTENCE, signs
+from identify.wording import capital, joined, number, percent, plain
+
+TELLING = 0.1  # share of the residual's power from which it is said to go with something
+USUAL_CUTOFF_HZ = 50.0
+RUN = {
+    "rate": "Friction and damping show at other speeds: add a slow ramp_hold_release set, and repeat one set at a "
+    "quarter and at half of its torque (repeat_scales: [0.5, 0.25]).",
+    "angle": "Spring, gap, cogging or gravity show along the travel: add a slow ramp_hold_release set over the whole "
+    "travel, and repeat one set at half of its torque; where gravity may act, once more with the base turned.",
+    "torque": "The drive shows at other torques: repeat the sets at half of their torque (repeat_scales: [0.5]), and "
+    "record the measured current instead of the command where the drive reports one.",
+    "time": "Something drifts: play the first set once more at the end, after a warm-up of ten minutes, and look at "
+    "temperature and clamping.",
+}
+OTHERWISE = (
+    "The rest goes with none of rate, angle, torque and time: add a multisine (0.5 Hz to beyond the resonance) and one "
+    "run with zero torque, and look in the frequency response and the residual's spectrum for where it sits."
+)
+
+
+def next_steps(found: Identification) -> tuple[str, ...]:
+    """One sentence a step, the most telling first; nothing where the identification was accepted."""
+    if found.accepted:
+        return ()
+    if opposite_signs(found):
+        return (f"{capital(SENTENCE)}, then identify again.",)
+    steps = []
+    if found.final.not_determined:
+        steps.append(_to_determine(found.final.not_determined))
+    if found.verdict.unexplained:
+        steps += _to_explain(found)
+    failed = [one.genetic for one in found.per_set if one.genetic and not one.accepted]
+    if found.joint is not None and not found.joint.accepted:
+        failed.append(found.joint)
+    if failed and not found.verdict.unexplained:
+        steps.append(_to_reach(failed))
+    if found.aborted:
+        steps.append("The campaign was aborted: run it again to its end.")
+    return tuple(steps) or ("Run the campaign once more and compare: `rig check` says what each set can determine.",)
+
+
+def opposite_signs(found: Identification) -> bool:
+    """Whether torque and motion were recorded with opposite sign conventions."""
+    seen = signs(found.traces, found.final.error.lowpass_hz or USUAL_CUTOFF_HZ) if found.traces else None
+    return seen is not None and seen.opposite
+
+
+def unexplained_reason(ratio: float, found: Identification) -> str:
+    """Why a residual that stays is no matter of noise: in units of the sensor's noise, and of the signal.
+
+    ``ratio`` is the residual over the sensor's noise.
+    """
+    error, share = found.final.error, ""
+    force = "force" if found.axis == "linear" else "torque"
+    relative = error.holdout_torque_relative
+    if relative is not None and math.isfinite(relative):
+        share = f"{percent(100.0 * relative).lstrip('+')} of the {force}"
+    elif error.holdout_fit_percent is not None and math.isfinite(error.holdout_fit_percent):
+        share = f"{percent(100.0 - error.holdout_fit_percent).lstrip('+')} of the motion"
+    size = f"{number(ratio, 3)} times the sensor's noise"
+    told = f"{share} ({size})" if share else size
+    return f"the model leaves {told} unexplained: something acts that no effect of the library describes"
+
+
+def _to_determine(several: Sequence[NotReported]) -> str:
+    names = joined([plain(item.name.replace(".", " ")) for item in several])
+    return (
+        f"To determine {names}: add a set at another frequency or a multisine (0.5 Hz to beyond the resonance), let it "
+        "start at once (soft_start_s: 0) so that the platform rings, and raise the torque as far as the limits allow; "
+        "`rig check` says beforehand what each set will give."
+    )
+
+
+def _to_explain(found: Identification) -> list[str]:
+    shares = dependence(found.traces, found.final.error.lowpass_hz or USUAL_CUTOFF_HZ)
+    name, share = next(iter(shares.items()), ("", 0.0))
+    if share < TELLING:
+        return [OTHERWISE]
+    word = {"linear": {"rate": "speed", "angle": "position", "torque": "force"}}.get(found.axis, {}).get(name, name)
+    return [f"{number(100.0 * share, 2)} % of the residual's power goes with the {word}. {RUN[name]}"]
+
+
+def _to_reach(runs: Sequence[GeneticRun]) -> str:
+    hopeless = [r.name for r in runs if r.closed_form_objective is not None and r.closed_form_objective >= r.j_dec]
+    if hopeless:
+        return (
+            f"{capital(joined(hopeless))}: even the closed-form optimum stays above J_dec, so more generations do not "
+            "help; look at the residual of these sets first, and record them once more."
+        )
+    return (
+        f"{capital(joined([r.name for r in runs]))}: the closed-form optimum lies below J_dec, the search has not got "
+        "there: raise identify.genetic.generations or identify.genetic.restarts."
+    )
