@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 _PR_SET_TIMERSLACK = 29
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
+HAND_OVER_S = 100e-6  # how long the loop waits at most for another thread of ours to leave the interpreter to it
+_usual_hand_over_s = sys.getswitchinterval()
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,7 @@ def acquire(priority: int, lock_memory: bool) -> RealTimeGrant:
     """
     gc.collect()
     gc.freeze()
+    sys.setswitchinterval(HAND_OVER_S)
     refused = []
     libc = _libc()
     fine_timers = bool(libc and hasattr(libc, "prctl") and libc.prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0) == 0)
@@ -79,4 +82,5 @@ def release() -> None:
     libc = _libc()
     if libc is not None and hasattr(libc, "munlockall"):
         libc.munlockall()
+    sys.setswitchinterval(_usual_hand_over_s)
     gc.unfreeze()

@@ -19,6 +19,7 @@ from rig.interface import GyroSample, LowPass
 
 AXES = "xyz"
 BITS_PER_BYTE = 10  # start, eight data bits, stop
+CATCHES_UP_S = 0.03  # a kernel that was busy hands out what it kept back within this time
 MOST_LOST_MARKED = 20_000  # ten seconds at 2 kHz: more is a new start, not a gap
 
 
@@ -79,6 +80,7 @@ class Gyroscope(ABC):
         self.said: list[str] = []
         self._count: int | None = None
         self._replaced = 0
+        self._late_since_s = math.inf
 
     @property
     def counts_per_sample(self) -> int:
@@ -187,8 +189,8 @@ class Gyroscope(ABC):
     def _unwrap(self, counts: list[int | None], last_taken_at_s: float) -> list[int]:
         """Counters of one read as running numbers.
 
-        A counter that wraps after 128 ms cannot tell a gap from none; the last datagram of a bulk read is
-        fresh, so its time shows how many turns are missing.
+        A counter that wraps after 128 ms cannot tell a gap from none; how late its datagrams seem to be
+        shows how many turns are missing. What only was held up somewhere catches up within ``CATCHES_UP_S``.
         """
         step, modulus = self.counts_per_sample, self.count_modulus
         previous, unwrapped, gap_at = self._count, [], 0
@@ -209,6 +211,13 @@ class Gyroscope(ABC):
             return unwrapped
         late_s = last_taken_at_s - self.clock.host_time_s(unwrapped[-1])
         turns = max(round(late_s / (modulus * self.clock.period_s)), 0)
+        if not turns:
+            self._late_since_s = math.inf
+            return unwrapped
+        self._late_since_s = min(self._late_since_s, last_taken_at_s)
+        if last_taken_at_s - self._late_since_s < CATCHES_UP_S:
+            return unwrapped
+        self._late_since_s = math.inf
         return [value + turns * modulus if k >= gap_at else value for k, value in enumerate(unwrapped)]
 
     def restart(self) -> None:

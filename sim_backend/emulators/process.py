@@ -49,7 +49,9 @@ def run_emulators(config: Config) -> None:
         signal.signal(number, stop)
     assert config.bench is not None
     priority = config.bench.real_time.priority
-    realtime.acquire(priority + PRIORITY_ABOVE_THE_LOOP if priority else 0, lock_memory=False)
+    realtime.acquire(
+        priority + PRIORITY_ABOVE_THE_LOOP if priority else 0, lock_memory=config.bench.real_time.lock_memory
+    )
     try:
         _say({"event": "listening", "gyro": bench.gyro_port.path, "can": bench.can_port.path})
         bench.run(lambda: stopping)
