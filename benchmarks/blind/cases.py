@@ -254,6 +254,13 @@ def _with(plain: Hidden, numbers: Mapping[str, Mapping[str, float]], size: float
     return replace(plain, damping=damping, stiffness=stiffness, effects=numbers)
 
 
+def lagged(x: Any, steps: float) -> Any:
+    """A series behind a first-order lag of so many steps, exact where it runs linearly between samples."""
+    a = math.exp(-1.0 / steps)
+    now = 1.0 - steps * (1.0 - a)
+    return lfilter([now, 1.0 - a - now], [1.0, -a], x)
+
+
 def size_of(hidden: Hidden, records: Sequence[Record], name: str) -> float:
     """Rms of what an effect adds to the torque over the rms of the torque asked for, over all sets.
 
@@ -263,8 +270,7 @@ def size_of(hidden: Hidden, records: Sequence[Record], name: str) -> float:
     """
     u = np.concatenate([r.torque_nm for r in records])
     if name == "sensor_lag":
-        keep = math.exp(-hidden.step_s / hidden.effects[name]["time"])
-        late = np.concatenate([lfilter([1.0 - keep], [1.0, -keep], r.torque_nm) for r in records])
+        late = np.concatenate([lagged(r.torque_nm, hidden.effects[name]["time"] / hidden.step_s) for r in records])
         return rms(u - late) / rms(u)
     if name in {"rate_bias", "aliased_vibration", "cubic_gyro"}:
         rate = np.concatenate([r.rate_rad_s for r in records])

@@ -73,8 +73,16 @@ class Score:
         return "single: more besides" if self.first else "single: wrong name"
 
 
-def score(truth: Mapping[str, Any], result: Mapping[str, Any] | None, seconds: float, cpu: float, code: int) -> Score:
-    """Score one result.json (None where there is none)."""
+def score(
+    truth: Mapping[str, Any], result: Mapping[str, Any] | None, seconds: float, cpu: float, code: int,
+    alike: Mapping[str, Sequence[str]] | None = None,
+) -> Score:  # fmt: skip
+    """Score one result.json (None where there is none).
+
+    ``alike`` are, for every true effect, others that pass for it in this very record (see ``imitation``): they have
+    to be declared, and naming one of them counts where the true one is declared beside it.
+    """
+    alike = alike or {}
     hidden = Hidden.from_json(truth["hidden"])
     effects = tuple(truth["effects"])
     detectable = all(e["energy"] >= DETECTABLE for e in truth["energy"].values())
@@ -90,15 +98,18 @@ def score(truth: Mapping[str, Any], result: Mapping[str, Any] | None, seconds: f
     rivals = _rivals(verdict, named)
     final = result["after"] or result["before"]
     replayed, imitates = _replay(hidden, truth, final)
-    alike = imitates is not None and imitates < DETECTABLE
+    same = imitates is not None and imitates < DETECTABLE
+    stand_ins = {
+        e: set(INSEPARABLE.get(e, ())) | set(alike.get(e, ())) | (set(named) if same else set()) for e in effects
+    }
     first = exact = declared = None
     if effects and truth["kind"] in {"single", "pair"} and not set(effects) <= NEVER_NAMED:
-        matched = _matched(effects, named, rivals, alike)
+        matched = _matched(effects, named, rivals, stand_ins)
         first = bool(named) and (named[0] in effects or (bool(matched) and named[0] in matched.values()))
         exact = len(matched) == len(effects) and set(matched.values()) == set(named)
-        pairs = [e for e in effects if e in INSEPARABLE]
+        pairs = [e for e in matched if e in INSEPARABLE or alike.get(e)]
         if pairs and first:
-            declared = all(_declared(e, matched, rivals) for e in pairs if e in matched)
+            declared = all(_declared(e, matched[e], rivals, set(alike.get(e, ()))) for e in pairs)
     errors, covered = _parameters(truth["reference"], final["parameters"])
     holdout = final["error"].get("holdout_rate_rms")
     return replace(
@@ -117,24 +128,23 @@ def _rivals(verdict: Mapping[str, Any], named: Sequence[str]) -> set[str]:
     return out - set(named)
 
 
-def _matched(effects: Sequence[str], named: Sequence[str], rivals: set[str], alike: bool) -> dict[str, str]:
-    """True effect -> the name that stands for it.
-
-    Another name stands for it where the physics never parts the two, or where the tool's model cannot be told
-    from the truth in this record; and only where the true name is declared beside it.
-    """
+def _matched(
+    effects: Sequence[str], named: Sequence[str], rivals: set[str], stand_ins: Mapping[str, set[str]]
+) -> dict[str, str]:
+    """True effect -> the name that stands for it: its own, or a stand-in where the true one is declared beside it."""
     out = {e: e for e in effects if e in named}
-    free = [n for n in named if n not in effects]
     for effect in effects:
-        for name in free:
-            if effect not in out and effect in rivals and (name in INSEPARABLE.get(effect, ()) or alike):
+        for name in named:
+            if effect not in out and name not in effects and effect in rivals and name in stand_ins[effect]:
                 out[effect] = name
     return out
 
 
-def _declared(effect: str, matched: Mapping[str, str], rivals: set[str]) -> bool:
-    both = {effect} | INSEPARABLE[effect]
-    return bool((rivals | {matched[effect]}) & both - {matched[effect]})
+def _declared(effect: str, name: str, rivals: set[str], alike: set[str]) -> bool:
+    """Whether the verdict says with whom ``name`` may be confused: one of those never parted, all alike here."""
+    never = ({effect} | INSEPARABLE.get(effect, frozenset())) - {name}
+    here = ({effect} | alike) - {name}
+    return (effect not in INSEPARABLE or bool(rivals & never)) and (not alike or here <= rivals)
 
 
 def _parameters(reference: Sequence[float], found: Mapping[str, Any]) -> tuple[Any, Any]:

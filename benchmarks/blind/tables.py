@@ -5,6 +5,7 @@ from __future__ import annotations
 import statistics
 from collections.abc import Callable, Iterable, Sequence
 
+from benchmarks.blind.library import INSEPARABLE
 from benchmarks.blind.score import LIMITS_PERCENT, Score
 
 Pick = Callable[[Score], bool]
@@ -78,9 +79,19 @@ def rows(scores: Sequence[Score]) -> list[tuple[str, str, str]]:
     ]  # fmt: skip
 
 
-def table(scores: Sequence[Score], title: str) -> str:
-    """The table of the bench."""
-    body = "".join(f"| {what} | {asked} | {found} |\n" for what, asked, found in rows(scores))
+def _resolved(s: Score) -> bool:
+    """Rightly named, and no rival left but those that no record of torque and rate ever parts."""
+    never = {r for e in s.truth for r in INSEPARABLE.get(e, ())} | set(s.truth)
+    return _right(s) and set(s.rivals) <= never
+
+
+def table(scores: Sequence[Score], title: str, followed: Sequence[tuple[Score, Score]] = ()) -> str:
+    """The table of the bench; ``followed`` are cases before and after the follow-up that the tool asked for."""
+    given = rows(scores)
+    if followed:
+        open_ = [after for before, after in followed if not _resolved(before) and after.kind in {"single", "pair"}]
+        given.append(("resolved after the follow-up", "95 %", _share(open_, lambda s: True, _resolved)))
+    body = "".join(f"| {what} | {asked} | {found} |\n" for what, asked, found in given)
     return f"Blind bench, {title}\n\n| measured | asked | found |\n|---|---|---|\n{body}"
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import yaml
 
-from benchmarks.blind import cases, library
+from benchmarks.blind import cases, imitation, library, run
 from benchmarks.blind.bound import DETECTABLE
 from benchmarks.blind.excitations import Excitation, multisine, read, sine
 from benchmarks.blind.hidden import ORDER, Hidden
@@ -224,6 +224,45 @@ def test_a_pair_that_physics_cannot_part_counts_where_both_are_named() -> None:
     alone, both = scored(lag, result(lag, other)), scored(lag, result(lag, other, ("sensor_lag",)))
     assert alone.wrong and not alone.first
     assert both.wrong == "" and both.declared
+
+
+def test_a_rival_that_passes_for_the_truth_in_this_record_has_to_be_declared() -> None:
+    late = Hidden(*JCK, {"torque_delay": {"delay": 5e-5}}, noise=math.radians(0.2))
+    (energy,) = imitation.confusable(late, SETS, "torque_delay").values()
+    assert energy < DETECTABLE, "a lag that short is a delay"
+    gap = Hidden(*JCK, {"backlash": {"half_gap": 0.003}})
+    assert imitation.imitation(gap, SETS, "backlash", "cubic_stiffness") > DETECTABLE
+    case = cases.make(11, 6, cases.Order("single", ("torque_delay",), 0.003, 2, "five_sines"))
+    truth = {k: dict(v) for k, v in case.hidden.effects.items()}
+    alike = {"torque_delay": ["actuator_lag"]}
+    assert score(case.truth(), result(case, truth), 1.0, 1.0, 0).declared is None
+    assert score(case.truth(), result(case, truth), 1.0, 1.0, 0, alike).declared is False
+    assert score(case.truth(), result(case, truth, ("actuator_lag",)), 1.0, 1.0, 0, alike).declared is True
+
+
+def test_a_follow_up_is_played_and_judged_with_all_the_data(
+    case: cases.Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = []
+
+    def tool(folder: Path, results: Path) -> tuple[float, float, int]:
+        results.mkdir(parents=True)
+        files = [
+            run["file"] for run in yaml.safe_load((folder / "rig.yaml").read_text(encoding="utf-8"))["recorded"]["runs"]
+        ]
+        seen.append(files)
+        assert all((folder / file).is_file() for file in files)
+        (results / "follow_up.yaml").write_text(
+            "sets: [{torque_nm: 30, frequency_hz: 4, duration_s: 1}]\n", encoding="utf-8"
+        )
+        return 1.0, 1.0, 0
+
+    monkeypatch.setattr(run, "identify", tool)
+    monkeypatch.setattr(run, "make", lambda seed, number, order: case)
+    first = run.one(11, 4, ORDER_OF_ONE, tmp_path, again=False, rivals=False)
+    after = run.follow(4, tmp_path, "follow_up.yaml", again=False)
+    assert first and after and first.wrong and after.wrong  # this tool finds nothing
+    assert seen[1] == [*seen[0], "run101.npz"]
 
 
 def test_anything_named_on_a_clean_platform_is_a_false_alarm() -> None:
