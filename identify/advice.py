@@ -94,7 +94,7 @@ def of_set(information: Information, others: Sequence[Information] = ()) -> str:
         return f"{i.name}: without torque only ratios show, {expected(i)} expected; for J, C and K record the torque"
     if below_noise(i):
         worst = max(i.relative(n) for k, n in enumerate(i.names) if i.values[k] != 0.0)
-        told = f"its motion is {number(i.loudness, 2)} times the gyro's noise, and nothing comes out well"
+        told = f"its motion is {number(i.loudness, 2)} times the sensor's noise, and nothing comes out well"
         cure = (
             f"about {number(worst / AIM, 2)} times the torque would give {100 * AIM:g} %" if worst < 1e6 else "raise it"
         )

@@ -22,9 +22,11 @@ RUN = {
     "time": "Something drifts: play the first set once more at the end, after a warm-up of ten minutes, and look at "
     "temperature and clamping.",
 }
+LINEAR = {"rate": "speed", "angle": "position", "torque": "force"}
 OTHERWISE = (
-    "The rest goes with none of rate, angle, torque and time: add a multisine (0.5 Hz to beyond the resonance) and one "
-    "run with zero torque, and look in the frequency response and the residual's spectrum for where it sits."
+    "The rest goes with none of rate, angle, torque and time: look in the residual's spectrum and the frequency "
+    "response for where it sits; add a multisine (0.5 Hz to beyond the resonance) if none was played, and one run with "
+    "zero torque and the drive enabled."
 )
 
 
@@ -86,8 +88,11 @@ def _to_explain(found: Identification) -> list[str]:
     name, share = next(iter(shares.items()), ("", 0.0))
     if share < TELLING:
         return [OTHERWISE]
-    word = {"linear": {"rate": "speed", "angle": "position", "torque": "force"}}.get(found.axis, {}).get(name, name)
-    return [f"{number(100.0 * share, 2)} % of the residual's power goes with the {word}. {RUN[name]}"]
+    told = f"{number(100.0 * share, 2)} % of the residual's power goes with the {name}. {RUN[name]}"
+    if found.axis == "linear":
+        for rotary, linear in LINEAR.items():
+            told = told.replace(f" {rotary}", f" {linear}")
+    return [told]
 
 
 def _to_reach(runs: Sequence[GeneticRun]) -> str:

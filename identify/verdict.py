@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from identify.next_steps import opposite_signs
 from identify.results import Identification
+from identify.sign_check import SENTENCE
 from identify.wording import capital, joined, number, percent, plain, readable, title, told_apart, unit, value_of
 from rig import effects
 
@@ -11,7 +13,7 @@ SHOWN_PERCENT = 0.05  # a change below that is not worth a sentence
 
 def sentences_of(found: Identification) -> tuple[str, ...]:
     """One finding a sentence, the most important first."""
-    out: list[str] = []
+    out: list[str] = [f"{capital(SENTENCE)}."] if not found.accepted and opposite_signs(found) else []
     for name in found.verdict.effects:
         out.append(_named(found, name))
     if not found.verdict.effects:
@@ -69,5 +71,6 @@ def _change(found: Identification) -> str:
     added = [plain(name) for name in found.verdict.effects]
     if added:
         return f"Without {joined(added)} in the model"
-    dropped = [plain(item.name) for item in found.after.dropped] if found.after else []
+    before = {*found.before.parameters, *found.before.effect_parameters}
+    dropped = [plain(item.name) for item in found.after.dropped if item.name in before] if found.after else []
     return f"With {joined(dropped)} in the model" if dropped else "In the model as declared"

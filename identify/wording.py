@@ -84,10 +84,14 @@ def value_of(estimate: ParameterEstimate) -> str:
 
 
 def interval_of(estimate: ParameterEstimate) -> str:
-    """The 95 % interval with the digits of the value: "0.01999 to 0.02001"."""
-    digits = digits_for(estimate.value, estimate.std_error)
-    low, high = (number(bound, digits) for bound in estimate.ci95)
-    return f"{low} to {high}"
+    """The 95 % interval with the decimals of the value: "0.01999 to 0.02001"."""
+    shown = value_of(estimate)
+    decimals = len(shown.partition(".")[2])
+    if "e" in shown or not all(math.isfinite(bound) for bound in estimate.ci95):
+        digits = digits_for(estimate.value, estimate.std_error)
+        low, high = (number(bound, digits) for bound in estimate.ci95)
+        return f"{low} to {high}"
+    return f"{estimate.ci95[0]:.{decimals}f} to {estimate.ci95[1]:.{decimals}f}"
 
 
 def half_interval(estimate: ParameterEstimate) -> float:

@@ -48,6 +48,7 @@ from identify.wording import (
 )
 from rig.recording.run import Recording
 
+KICKER = {"rotary": "Identification of an inertial stability platform", "linear": "Identification of a linear axis"}
 # Nothing may be fetched and nothing sent: the browser itself holds the page to it.
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 
@@ -105,7 +106,7 @@ def _header(identification: Identification, name: str) -> Markup:
         badge, state = ("ACCEPTED", "good") if identification.accepted else ("NOT ACCEPTED", "bad")
     return element(
         "header",
-        element("p", "Identification of an inertial stability platform", class_="kicker"),
+        element("p", KICKER[identification.axis], class_="kicker"),
         element("h1", name),
         element("p", badge, class_=f"badge {state}"),
     )

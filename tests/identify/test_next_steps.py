@@ -49,6 +49,12 @@ def test_the_step_follows_from_what_the_rest_goes_with(rest: str, words: str) ->
     assert words in step
 
 
+def test_a_linear_axis_is_spoken_of_in_its_own_words() -> None:
+    (step,) = next_steps(replace(with_rest(LOST, "rate"), axis="linear"))
+    assert "goes with the speed" in step
+    assert "half of its force" in step
+
+
 @pytest.mark.parametrize("rest", ["rate", "angle", "torque", "time"])
 def test_the_quantity_that_the_rest_goes_with_comes_first(rest: str) -> None:
     traces = with_rest(LOST, rest).traces[4:]  # at 9 Hz angle and torque differ by the ring

@@ -39,6 +39,13 @@ def test_a_rival_is_named_with_what_would_separate_it() -> None:
     assert "slow ramp" in said
 
 
+def test_opposite_signs_are_the_first_thing_said() -> None:
+    turned = tuple(replace(t, torque_nm=-t.torque_nm) for t in FOUND.traces if t.torque_nm is not None)
+    first, *_ = sentences_of(replace(FOUND, accepted=False, traces=turned))
+    assert first.startswith("Torque and rate have opposite sign conventions")
+    assert not any("sign conventions" in s for s in sentences_of(replace(FOUND, accepted=False)))
+
+
 def test_nothing_found_is_said_as_plainly_whether_the_floor_is_reached_or_not() -> None:
     empty = replace(FOUND.verdict, effects=(), unexplained=False)
     assert "reaches the noise floor" in sentences_of(replace(FOUND, verdict=empty, after=None))[0]

@@ -31,6 +31,7 @@ def test_a_value_has_the_digits_that_its_standard_error_deserves() -> None:
     assert value_of(estimate(677.3123456, 0.012)) == "677.312"
     assert value_of(estimate(677.3123456, 40.0)) == "677"
     assert interval_of(estimate(0.045, 0.0005)) == "0.04402 to 0.04598"
+    assert interval_of(estimate(-0.274, 0.144)) == "-0.556 to 0.008"
 
 
 def test_an_uneven_or_open_interval_is_written_with_both_ends() -> None:
