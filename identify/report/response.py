@@ -185,7 +185,7 @@ def _measured_points(one: SetResponse, f: Array, model: Complex) -> list[Trace]:
         at = found.trusted == trusted
         if not np.any(at):
             continue
-        name = "measured" if trusted else f"measured, coherence below {TRUSTED:g}"
+        name = "measured" if trusted else f"measured, coherence < {TRUSTED:g}"
         style = {"size": 6 if trusted else 5, "opacity": 0.95 if trusted else 0.45}
         phase = _beside(found, f, model)
         for panel, values, unit in ((1, found.gain_db, "dB"), (2, phase, "deg"), (4, found.coherence, "")):
@@ -217,7 +217,7 @@ def _model_points(one: SetResponse, f: Array, phase_of: Complex, two: bool, ampl
         ring = {"symbol": "circle-open", "size": 9, "color": last[2], "line": {"width": 1.3}}
         simulated = last[1]
         for panel, values in ((1, simulated.gain_db), (2, _beside(simulated, f, phase_of))):
-            drawn = points(hertz, values[known], f"{last[0]}, simulated with all effects", last[2], panel)
+            drawn = points(hertz, values[known], f"{last[0]}, all effects", last[2], panel)
             out.append(drawn | {"marker": ring})
     return out
 

@@ -30,7 +30,7 @@ def test_the_final_models_simulation_answers_as_measured_and_the_declared_one_do
 def test_measured_declared_and_final_are_drawn_with_gain_phase_deviation_and_coherence() -> None:
     figure = response_figure(FOUND, RECORDING)
     assert figure is not None
-    assert {"measured", "declared model", "final model", "final model, simulated with all effects"} <= {
+    assert {"measured", "declared model", "final model", "final model, all effects"} <= {
         t["name"] for t in figure.traces
     }
     titles = [figure.layout[f"yaxis{n}"]["title"]["text"] for n in ("", "2", "3", "4")]
