@@ -120,6 +120,11 @@ class BenchRig(Rig):
         """Of the gyroscope."""
         return self.gyroscope.full_scale_rad_s
 
+    @property
+    def rate_full_scale_key(self) -> str:
+        """The device decides, by its data sheet."""
+        return "bench.gyroscope.device"
+
     # -- contact ---------------------------------------------------------------------------------
 
     def open(self) -> None:

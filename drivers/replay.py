@@ -127,6 +127,11 @@ class ReplayRig(Rig):
         """As on the bench."""
         return self.gyroscope.full_scale_rad_s
 
+    @property
+    def rate_full_scale_key(self) -> str:
+        """As on the bench."""
+        return "bench.gyroscope.device"
+
     def _is_mark(self, entry: Entry, what: str) -> bool:
         return entry.kind == capture.MARK and json.loads(entry.payload)["mark"] == what
 

@@ -38,7 +38,12 @@ class RecordingError(UsageError):
 
 
 class PreflightRefusal(UsageError):
-    """The campaign would break a limit, or its devices are not ready."""
+    """The campaign would break a limit, or its devices are not ready.
+
+    ``keys`` are those of the configuration that say what is allowed, as far as one of them does.
+    """
+
+    keys: tuple[str, ...] = ()
 
 
 class DeviceFault(RigError):

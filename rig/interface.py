@@ -113,6 +113,11 @@ class Rig(ABC):
         """The largest rate that the gyro can report, known before anything is opened; None for no limit."""
         return None
 
+    @property
+    def rate_full_scale_key(self) -> str:
+        """The key of the configuration that decides the full scale of the gyro."""
+        return "the gyro's full scale"
+
     @abstractmethod
     def open(self) -> None:
         """Contact all devices; no torque. Raises one DeviceFault that lists everything that failed."""

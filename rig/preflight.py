@@ -22,6 +22,7 @@ from rig.excitation import PlannedSet, planned
 from rig.platform import Platform
 from rig.recording.run import Array
 
+LIMIT_KEYS = ("limits.travel_deg", "limits.rate_deg_s", "limits.torque_nm")
 PEAK_RATE_HZ = 4000.0  # the crest of a 29 Hz ring read at 4 kHz is low by 0.03 %
 BISECTIONS = 24
 
@@ -48,12 +49,15 @@ class Prediction:
         The limits it was held against, margin included where the set is scaled.
     scale
         The largest factor (at most 1) on the torque with which all limits hold; 0 where none does.
+    keys
+        Of the configuration: what decides the allowed travel, rate and torque.
     """
 
     planned: PlannedSet
     peaks: Peaks
     allowed: Peaks
     scale: float
+    keys: tuple[str, str, str] = LIMIT_KEYS
 
     @property
     def passes(self) -> bool:
@@ -65,6 +69,12 @@ class Prediction:
         """The peak torque of the set that would pass."""
         return self.peaks.torque_nm * self.scale
 
+    @property
+    def broken(self) -> tuple[str, ...]:
+        """The keys whose limits the set as asked for would break."""
+        found = zip(self.keys, self.peaks, self.allowed, strict=True)
+        return tuple(key for key, value, limit in found if not value <= limit)
+
     def sentence(self) -> str:
         """One line for the operator."""
         told = (
@@ -73,10 +83,11 @@ class Prediction:
         )
         if self.passes:
             return f"{told}: passes"
+        units = zip(_UNITS, self.allowed, self.keys, strict=True)
         broken = [
-            f"the {name} limit of {limit:g} {unit}"
-            for (name, unit), value, limit in zip(_UNITS, self.peaks, self.allowed, strict=True)
-            if not value <= limit
+            f"the {name} limit of {limit:g} {unit} ({key}{'' if key in LIMIT_KEYS else ', the full scale of the gyro'})"
+            for (name, unit), limit, key in units
+            if key in self.broken
         ]
         cure = f"{_rounded_down(self.largest_torque_nm)} N m passes" if self.scale > 0 else "no torque passes"
         return f"{told}: beyond {' and '.join(broken)}; {cure}"
@@ -121,7 +132,9 @@ def _within(found: Peaks, allowed: Peaks) -> bool:
     return all(value <= limit for value, limit in zip(found, allowed, strict=True))
 
 
-def predict(platform: Platform, planned_set: PlannedSet, allowed: Peaks) -> Prediction:
+def predict(
+    platform: Platform, planned_set: PlannedSet, allowed: Peaks, keys: tuple[str, str, str] = LIMIT_KEYS
+) -> Prediction:
     """Predict one set and the largest factor on its torque with which every limit holds.
 
     A linear platform answers in proportion; with effects the factor is found by bisection.
@@ -132,10 +145,10 @@ def predict(platform: Platform, planned_set: PlannedSet, allowed: Peaks) -> Pred
     forecast = _Forecast(platform, planned_set)
     found = forecast.peaks(1.0)
     if _within(found, allowed):
-        return Prediction(planned_set, found, allowed, 1.0)
+        return Prediction(planned_set, found, allowed, 1.0, keys)
     if not platform.effects:
         ratios = [limit / value for value, limit in zip(found, allowed, strict=True) if value > 0.0]
-        return Prediction(planned_set, found, allowed, min(1.0, *ratios))
+        return Prediction(planned_set, found, allowed, min(1.0, *ratios), keys)
     low, high = 0.0, 1.0
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
@@ -143,7 +156,7 @@ def predict(platform: Platform, planned_set: PlannedSet, allowed: Peaks) -> Pred
             low = middle
         else:
             high = middle
-    return Prediction(planned_set, found, allowed, low)
+    return Prediction(planned_set, found, allowed, low, keys)
 
 
 def allowed_peaks(limits: LimitsConfig, margin: float = 1.0, rate_full_scale_rad_s: float | None = None) -> Peaks:
@@ -159,11 +172,14 @@ def predict_all(
     excitation: ExcitationConfig,
     limits: LimitsConfig,
     rate_full_scale_rad_s: float | None = None,
+    full_scale_key: str = LIMIT_KEYS[1],
 ) -> tuple[Prediction, ...]:
     """Predict every set of a campaign, repeats included, against the limits (times the margin if scaled)."""
     margin = excitation.margin if excitation.scale_to_limits else 1.0
     allowed = allowed_peaks(limits, margin, rate_full_scale_rad_s)
-    return tuple(predict(platform, s, allowed) for s in planned(excitation.sets))
+    clips = rate_full_scale_rad_s is not None and math.degrees(rate_full_scale_rad_s) < limits.rate_deg_s
+    keys = (LIMIT_KEYS[0], full_scale_key if clips else LIMIT_KEYS[1], LIMIT_KEYS[2])
+    return tuple(predict(platform, s, allowed, keys) for s in planned(excitation.sets))
 
 
 def plan(
@@ -171,6 +187,7 @@ def plan(
     excitation: ExcitationConfig,
     limits: LimitsConfig,
     rate_full_scale_rad_s: float | None = None,
+    full_scale_key: str = LIMIT_KEYS[1],
 ) -> tuple[PlannedSet, ...]:
     """The sets to play, scaled where the configuration allows it.
 
@@ -179,11 +196,13 @@ def plan(
     PreflightRefusal
         Listing every set with its predicted travel and the torque that would pass.
     """
-    predictions = predict_all(platform, excitation, limits, rate_full_scale_rad_s)
+    predictions = predict_all(platform, excitation, limits, rate_full_scale_rad_s, full_scale_key)
     playable = [_playable(p, excitation.scale_to_limits) for p in predictions]
     sets = tuple(s for s in playable if s is not None)
     if len(sets) < len(predictions):
-        raise PreflightRefusal(refusal(predictions, platform, excitation.scale_to_limits))
+        error = PreflightRefusal(refusal(predictions, platform, excitation.scale_to_limits))
+        error.keys = tuple(dict.fromkeys(key for p in predictions for key in p.broken))
+        raise error
     return sets
 
 

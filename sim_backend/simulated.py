@@ -69,6 +69,11 @@ class SimulatedRig(Rig):
         full_scale = self._config.gyro.full_scale_deg_s
         return None if full_scale is None else math.radians(full_scale)
 
+    @property
+    def rate_full_scale_key(self) -> str:
+        """Where it is declared."""
+        return "simulated.gyro.full_scale_deg_s"
+
     def open(self) -> None:
         """Build the plant, at rest, and its devices."""
         config = self._config

@@ -64,6 +64,15 @@ class Stim300Configuration:
     gyro_filter_hz: tuple[int, int, int]
     acceleration_range_g: tuple[int, int, int]
 
+    def __str__(self) -> str:
+        rate = f"{self.sample_rate_hz} samples/s" if self.sample_rate_hz else "external trigger or a rate of its own"
+        filters = "/".join(map(str, self.gyro_filter_hz))
+        return (
+            f"firmware {self.firmware} (revision {self.revision}), datagram 0x{self.identifier:02X} "
+            f"{'with' if self.line_ending else 'without'} line ending, {rate}, {self.bit_rate} baud, "
+            f"{self.gyro_unit.replace('_', ' ')}, filters {filters} Hz"
+        )
+
 
 def _payload(packet: bytes, identifiers: tuple[int, ...]) -> bytes:
     if not packet or packet[0] not in identifiers or len(packet) < SPECIAL_LENGTHS[packet[0]] + 4:

@@ -20,14 +20,15 @@ from rig.cli.backends import BACKENDS, EMULATED, Stage, backend_name
 from rig.cli.desk import Desk
 from rig.cli.exits import as_known
 from rig.cli.opening import ask_consent, opening
+from rig.cli.places import with_places
 from rig.cli.provenance import provenance
 from rig.cli.results_folder import JOURNAL_FILE, RAW_FOLDER, RECORDING_FILE, ResultsFolder
 from rig.cli.terminal import SetBars, Terminal
 from rig.config.load import LoadedConfig
-from rig.errors import RigError, UsageError
+from rig.errors import PreflightRefusal, RigError, UsageError
 from rig.excitation import PlannedSet
 from rig.guard import Guard
-from rig.interface import Torque
+from rig.interface import Rig, Torque
 from rig.preflight import plan
 from rig.recorder import SetStatistics
 from rig.recording.hdf5 import write_recording_h5
@@ -94,9 +95,19 @@ def play(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> Played:
     if backend == EMULATED:
         desk.terminal.tell("Starting the emulated devices ...")
     with BACKENDS[backend](loaded, folder.path / RAW_FOLDER) as stage:
-        sets = plan(config.model.platform(), config.excitation, config.limits, stage.rig.rate_full_scale_rad_s)
+        sets = planned_sets(stage.rig, loaded)
         _open(desk, stage, loaded, sets, folder.path)
         return _record(desk, stage, loaded, sets, folder)
+
+
+def planned_sets(rig: Rig, loaded: LoadedConfig) -> tuple[PlannedSet, ...]:
+    """The sets to play. Raises PreflightRefusal that says where the limits stand which they would break."""
+    config = loaded.config
+    scale, key = rig.rate_full_scale_rad_s, rig.rate_full_scale_key
+    try:
+        return plan(config.model.platform(), config.excitation, config.limits, scale, key)
+    except PreflightRefusal as error:
+        raise with_places(error, loaded) from None
 
 
 def _open(desk: Desk, stage: Stage, loaded: LoadedConfig, sets: Sequence[PlannedSet], path: Path) -> None:

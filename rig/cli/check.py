@@ -15,13 +15,14 @@ from pathlib import Path
 from typing import Any
 
 from rig.cli.backends import BACKENDS, RECORDED, Stage, backend_name
+from rig.cli.campaign import planned_sets
 from rig.cli.desk import Desk
 from rig.cli.exits import OK
 from rig.cli.terminal import plain
 from rig.config.load import LoadedConfig
 from rig.errors import RecordingError, RigError
 from rig.interface import Torque
-from rig.preflight import plan, predict_all
+from rig.preflight import predict_all
 
 
 @dataclass(frozen=True)
@@ -47,9 +48,10 @@ def forecast(known: Known) -> list[str]:
         return []
     config = known.loaded.config
     platform = config.model.platform()
-    full_scale = known.stage.rig.rate_full_scale_rad_s
-    plan(platform, config.excitation, config.limits, full_scale)
-    predictions = predict_all(platform, config.excitation, config.limits, full_scale)
+    rig = known.stage.rig
+    planned_sets(rig, known.loaded)
+    scale, key = rig.rate_full_scale_rad_s, rig.rate_full_scale_key
+    predictions = predict_all(platform, config.excitation, config.limits, scale, key)
     return [
         f"forecast {plain(p.sentence())}" + ("" if p.passes else f", scaled to {100 * p.scale:.1f} % as asked")
         for p in predictions

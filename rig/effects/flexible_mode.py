@@ -42,7 +42,7 @@ EFFECT = Effect(
             suffix="hz",
             start=_frequencies,
         ),
-        Parameter("ratio", "1", "its damping ratio", low=1e-4, high=2.0, start=lambda scale: (0.01, 0.05)),
+        Parameter("ratio", "1", "its damping ratio", low=1e-4, high=2.0, start=lambda scale: (0.03,)),
     ),
     kernel=_torque,
     states=2,

@@ -14,7 +14,7 @@ def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-unt
 
 
 def _frequencies(scale: Scale) -> tuple[float, ...]:
-    return scale.lines_hz or (0.1 / scale.step_s,)
+    return scale.lines_hz
 
 
 EFFECT = Effect(
