@@ -16,8 +16,8 @@ import numpy as np
 
 from identify.parameters import Name, names_of
 from identify.regression import Structure
-from identify.sensitivities import sensitivities
-from identify.shots import Shots, make_shots
+from identify.sensitivities import nuisance_basis, sensitivities
+from identify.shots import make_shots
 from identify.traces import Trace, prepare
 from rig import effects
 from rig.dynamics import Equations, TorqueSignal, simulate
@@ -217,8 +217,8 @@ def information_of(
     columns, state, _ = sensitivities(shots, structure, names, values, scale, fixed)
     used = shots.weight
     bare = columns[used][:, ~fixed] / trace.noise
-    nuisances = _nuisances(shots, state)[used]
-    clean = bare - nuisances @ np.linalg.lstsq(nuisances, bare)[0]
+    basis = nuisance_basis(shots, state)
+    clean = bare - basis @ (basis.T @ bare)
     motion = trace.measured[used] / trace.noise
     kept = tuple(n for n, out in zip(names, fixed, strict=True) if not out)
     matrix, energy = clean.T @ clean, float(motion @ motion)
@@ -226,19 +226,6 @@ def information_of(
         trace.run.name, kept, values[~fixed], matrix, bare.T @ bare, energy * matrix, energy, len(motion),
         trace.run.frequency_hz, free,
     )  # fmt: skip
-
-
-def _nuisances(shots: Shots, state: Array) -> Array:
-    """What start states (two a shot) and bias add to the measured channel, (n, nuisances), scaled to unit length."""
-    columns = []
-    for begin, end in shots.edges:
-        block = np.zeros_like(state)
-        block[begin:end] = state[begin:end]
-        columns += list(block.T)
-    if shots.trace.biased:
-        columns.append(np.ones(len(state)))
-    lengths = [float(np.linalg.norm(c)) for c in columns]
-    return np.stack([c / size for c, size in zip(columns, lengths, strict=True) if size > 0.0], axis=1)
 
 
 def of_planned(

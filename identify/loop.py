@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from identify import persets
 from identify.compare import Judged, horizon_s
+from identify.fine import FineSearch
 from identify.finish import Fitted, by_output_error, by_regression
 from identify.holdout import Split, pieces, split
 from identify.measures import Measured, floor_of, measure
@@ -105,7 +106,10 @@ class _Identifier:
         d = self.declared
         try:
             self.say("fitting the declared model")
-            search = loop.run(self.structure, shapes, (d.inertia_kg_m2, d.damping_nm_s_rad, d.stiffness_nm_rad))
+            nominal = (d.inertia_kg_m2, d.damping_nm_s_rad, d.stiffness_nm_rad)
+            fine = FineSearch(self.traces, self.split, allowed, self.say)
+            search = loop.run(self.structure, shapes, nominal, fine.take_over)
+            search.drop_a_bad_lot()
             before = self._before(search)
             after = self._after(search) if search.best.structure != self.structure else before
             return self._report(search, before, after)

@@ -182,6 +182,8 @@ class Screen:
             return None
         middle = 1
         tried = [(self.quick(name, shape, middle), shape) for shape in grid_of(effect, self.scale)]
+        if not tried:  # nowhere to look: no spectral line, no periodic torque
+            return None
         _, shape = max(tried, key=lambda t: t[0])
         if shape:
             shape = self._search(effect, shape, middle)

@@ -31,6 +31,8 @@ MOST = 0.4  # share of the excess error beyond which one standard error is lead 
 TWICE = 2.0
 STRONG = 4.0  # standard errors by which every parameter of a new effect must differ from zero
 CERTAIN = 100.0  # standard errors beyond which nobody asks whether a term is needed
+LEFT = 1.2  # times the noise floor: below, nothing to speak of is left
+BULK = 0.9  # share of the excess that what is named explains at least, where something is left
 SUPPORT = 0.02  # share of the error by which a term must be missed to stay
 
 
@@ -56,6 +58,26 @@ class Search:
     rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
     dropped: list[tuple[str, str]] = field(default_factory=list)
 
+    @property
+    def share(self) -> float:
+        """Share of the excess over the noise floor that the effects found take away, held-out squares."""
+        return share_explained(self.base, self.best, self.floor)
+
+    def drop_a_bad_lot(self) -> None:
+        """Name nothing where all effects together leave much of what they were to explain.
+
+        Something that is not in the library is always resembled by something that is: part of it goes away,
+        and more of it with every further effect.
+        """
+        if self.best.sigma < LEFT * self.floor or self.share > BULK or not self.best.structure.effects:
+            return
+        kept = set(self.base.structure.effects)
+        self.candidates = [
+            replace(c, status="best of a bad lot") if c.status == "added" and c.effect not in kept else c
+            for c in self.candidates
+        ]  # fmt: skip
+        self.best, self.rivals, self.dropped = self.base, {}, []
+
 
 class Loop:
     """The search over structures on one recording's pieces."""
@@ -77,10 +99,14 @@ class Loop:
         self.runs = 1 + max(t.number for t in (*fitting, *judging))
         self.so_far: Search | None = None  # for whoever is stopped in the middle
 
-    def run(self, declared: Structure, shapes: Shapes, nominal: tuple[float, float, float] | None = None) -> Search:
+    def run(
+        self, declared: Structure, shapes: Shapes, nominal: tuple[float, float, float] | None = None,
+        take_over: Callable[[Search], bool] = lambda found: False,
+    ) -> Search:  # fmt: skip
         """From the declared structure, with its declared shapes, to the one that the data support.
 
         ``nominal`` are declared J, C, K: a second place to begin from, for data that hardly tell J from K.
+        ``take_over`` is asked before every round whether it goes on alone from what is found so far.
         """
         solution = best_rho(self.fitting, declared, shapes, self.start)
         horizon = horizon_s(solution.platform, self.fitting)
@@ -94,6 +120,8 @@ class Loop:
         found = self.so_far = Search(base, base, horizon, floor)
         self._probation(found, solution)
         for round_ in range(1, MOST_EFFECTS + 1):
+            if take_over(found):
+                return found
             if not self._round(found, round_):
                 break
             self._prune(found, found.best.structure.effects[:-1])

@@ -58,6 +58,20 @@ def jacobian(s: Shots, structure: Structure, names: Sequence[Name], x: Array) ->
     return both[:, :-1], both[:, -1]
 
 
+def nuisance_basis(s: Shots, state: Array) -> Array:
+    """Orthonormal basis of what start states (two a shot) and bias add to the samples that count, (m, nuisances)."""
+    columns = []
+    for begin, end in s.edges:
+        block = np.zeros_like(state)
+        block[begin:end] = state[begin:end]
+        columns += list(block[s.weight].T)
+    if s.trace.biased:
+        columns.append(np.ones(int(s.weight.sum())))
+    lengths = [float(np.linalg.norm(c)) for c in columns]
+    kept = [c / size for c, size in zip(columns, lengths, strict=True) if size > 0.0]
+    return np.asarray(np.linalg.qr(np.stack(kept, axis=1))[0]) if kept else np.zeros((int(s.weight.sum()), 0))
+
+
 @RUNAWAY
 def sensitivities(
     s: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any

@@ -1,0 +1,315 @@
+"""The search where the model can run free: scores over whole runs pick candidates, likelihood decides.
+
+Near the data every effect, however small, shows in a free run over the whole of each set: what a short horizon
+loses in start states is most of what a small effect tells. So each round scores all candidates, fits the best of
+them by output error over whole runs, and takes the best one if chi square falls by more than chance and a
+penalty for its parameters explain, on the samples fitted and on the held-out ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import signal
+
+from identify.compare import Judged
+from identify.holdout import Split
+from identify.output_error import Estimate, evaluate, refine
+from identify.parameters import Name
+from identify.regression import Structure
+from identify.results import Candidate
+from identify.scores import Scored, Scores
+from identify.screen import scale_of
+from identify.search import MOST_EFFECTS, Search
+from identify.traces import Trace
+from rig import effects
+from rig.effects.base import Place, Scale
+from rig.platform import TERMS
+from rig.recording.run import Array
+
+NEAR_SIGNAL = 0.3  # of the signal that a free run may leave for this search to begin
+TRIED = 5  # candidates of a round that are fitted
+WORTH_A_FIT = 15.0  # expected fall of chi square
+CHANCE = 20.0  # fall of chi square, beyond the penalty, that no chance among all candidates and shapes makes
+HELD = 4.0  # the same on the held-out samples
+RIVAL = 10.0  # what parts two candidates for good
+STRONG = 4.0  # standard errors by which every parameter of a new effect must differ from zero
+SHARE = 0.2  # of the excess over the noise that an effect has to take away
+FARTHEST = 3000.0  # times the noise: beyond, the sensor's noise is not what limits this record
+CLOSER = 0.01  # of the mean square at the last attempt
+ENDS_NEAR = 2.0  # mean square over the noise's variance at the end for what was found to be believed
+PATIENCE = 3  # effects after which the end must be near
+AT_FLOOR = 1.1  # mean square over the noise's variance: who is there has found what there is
+FAR_BEHIND = 0.7  # of the best score: not fitted any more once another candidate is at the floor
+HOPELESS = 3.0  # times the best error of the round after three steps
+LINE = 4.0  # times the noise at which a spectral line is one: e^-16 is the chance of a bin
+TOLERANCE = 3e-4
+
+
+@dataclass(frozen=True)
+class Whole:
+    """One structure fitted over whole runs; squares in units of the noise's variance."""
+
+    estimate: Estimate
+    squares: float  # on the samples fitted
+    count: int
+    held: float  # on the held-out samples
+    held_count: int
+    losses: Array  # held-out squares of every run, (runs,), in units of the channel squared
+    counts: Array
+
+    @property
+    def structure(self) -> Structure:
+        """Its terms and effects."""
+        return self.estimate.structure
+
+    @property
+    def level(self) -> float:
+        """Mean square over the noise's variance, one at least."""
+        return max(1.0, self.squares / max(self.count, 1))
+
+    @property
+    def penalised(self) -> float:
+        """Chi square and the penalty for parameters (Schwarz 1978)."""
+        return self.squares + len(self.estimate.names) * float(np.log(max(self.count, 2)))
+
+    def judged(self) -> Judged:
+        """As the rest of the search sees a model."""
+        return Judged(self.structure, self.estimate, self.losses, self.counts)
+
+    def values(self) -> dict[Name, float]:
+        """Parameter values by name."""
+        return dict(zip(self.estimate.names, self.estimate.values.tolist(), strict=True))
+
+
+class FineSearch:
+    """The search over whole runs of one recording."""
+
+    def __init__(
+        self, traces: Sequence[Trace], split: Split, allowed: Sequence[str], say: Callable[[str], None]
+    ) -> None:
+        self.traces, self.say = traces, say
+        self.fit = [i for i, m in enumerate(split.fit) if np.any(m)]
+        self.apart = [i for i, m in enumerate(split.judge) if np.any(m) and i not in self.fit]
+        self.split = split
+        self.noise = float(np.sqrt(np.mean([t.noise**2 for t in traces])))
+        self.torque_free = all(t.torque is None for t in traces)
+        self.fixed: list[Name] = [("inertia",)] if self.torque_free else []
+        self.allowed = [n for n in allowed if self._possible(n)]
+        self.tried_at = np.inf
+
+    def _possible(self, name: str) -> bool:
+        """Sensor effects are nuisances; a constant torque only shifts the unseen rest angle behind a gyro."""
+        effect = effects.get(name)
+        if effect.place is Place.SENSOR or (self.torque_free and effect.place is Place.DRIVE):
+            return False
+        return not (name == "torque_offset" and all(t.biased for t in self.traces))
+
+    def whole(self, structure: Structure, start: Mapping[Name, float], hopeless: float = np.inf) -> Whole | None:
+        """A structure fitted over whole runs; None where it runs away."""
+        traces = [self.traces[i] for i in self.fit]
+        use = [self.split.fit[i] for i in self.fit]
+        estimate = refine(
+            traces, structure, start, None, 15, use, fixed=self.fixed, coarse=True, tolerance=TOLERANCE,
+            hopeless=hopeless,
+        )  # fmt: skip
+        return self._measured(estimate) if np.isfinite(estimate.sigma) else None
+
+    def _measured(self, estimate: Estimate) -> Whole | None:
+        squares, count, losses, counts = 0.0, 0, [], []
+        for i, r in zip(self.fit, estimate.residuals(), strict=True):
+            fitted, judged = self.split.fit[i], self.split.judge[i]
+            squares += float(r[fitted] @ r[fitted])
+            count += int(np.sum(fitted))
+            if np.any(judged):
+                losses.append(float(r[judged] @ r[judged]))
+                counts.append(float(np.sum(judged)))
+        if self.apart:
+            held = evaluate(
+                estimate, [self.traces[i] for i in self.apart], [self.split.judge[i] for i in self.apart], coarse=True
+            )
+            for i, r in zip(self.apart, held.residuals(), strict=True):
+                m = self.split.judge[i]
+                losses.append(float(r[m] @ r[m]))
+                counts.append(float(np.sum(m)))
+        if not (np.isfinite(squares) and np.all(np.isfinite(losses))):
+            return None
+        variance = self.noise**2
+        return Whole(
+            estimate, squares / variance, count, float(np.sum(losses)) / variance, int(np.sum(counts)),
+            np.array(losses), np.array(counts),
+        )  # fmt: skip
+
+    def take_over(self, found: Search) -> bool:
+        """Go on from the model at hand, if it runs free near the data; ``found`` is brought up to date.
+
+        Where no library can bring the model down to the sensor's noise, whole runs magnify what is wrong with it,
+        and nothing found here is kept.
+        """
+        begin = self.whole(found.best.structure, found.best.values())
+        if begin is None or not self._near(begin):
+            return False
+        self.tried_at = begin.level
+        trial = replace(
+            found, candidates=list(found.candidates), rivals=dict(found.rivals), dropped=list(found.dropped)
+        )  # fmt: skip
+        if not self._rounds(trial, begin):
+            return False
+        found.best, found.floor = trial.best, trial.floor
+        found.candidates, found.rivals, found.dropped = trial.candidates, trial.rivals, trial.dropped
+        return True
+
+    def _near(self, model: Whole) -> bool:
+        """Whether the free run stays close enough, and closer than where this was tried before."""
+        moving = np.concatenate([self.traces[i].measured[self.split.fit[i]] for i in self.fit])
+        close = model.estimate.sigma < NEAR_SIGNAL * float(np.std(moving)) and model.level < FARTHEST**2
+        return close and model.level < CLOSER * self.tried_at
+
+    def _rounds(self, found: Search, now: Whole) -> bool:
+        """Rounds until nothing is worth adding; whether that ended near the sensor's noise."""
+        declared = found.base.structure
+        first = 1 + max((c.round for c in found.candidates), default=0)
+        for round_ in range(first, first + MOST_EFFECTS):
+            if round_ - first >= PATIENCE and now.level > ENDS_NEAR:
+                return False
+            chosen = self._round(found, now, round_)
+            if chosen is None:
+                break
+            now = self._pruned(found, chosen, chosen.structure.effects[:-1])
+        if now.level > ENDS_NEAR:
+            return False
+        now = self._restored(found, now, declared.terms)
+        now = self._pruned(found, now, (*now.structure.terms, *now.structure.effects))
+        found.best, found.floor = now.judged(), self.noise
+        return True
+
+    def _restored(self, found: Search, now: Whole, terms: Sequence[str]) -> Whole:
+        """With a declared term that was set aside, where it is missed now that the effects are there."""
+        for name in terms:
+            if name in now.structure.terms:
+                continue
+            structure = replace(now.structure, terms=tuple(t for t in TERMS if t in (*now.structure.terms, name)))
+            fuller = self.whole(structure, {**now.values(), (name,): 0.0})
+            if fuller is not None and self._worth(name, fuller, now):
+                found.dropped[:] = [d for d in found.dropped if d[0] != name]
+                self.say(f"took {name} back: free-run error {now.estimate.sigma:.4g} -> {fuller.estimate.sigma:.4g}")
+                now = fuller
+        return now
+
+    def _round(self, found: Search, now: Whole, round_: int) -> Whole | None:
+        names = [n for n in self.allowed if n not in now.structure.effects]
+        scores = Scores(now.estimate, self.fixed, self.noise * float(np.sqrt(now.level)), self._scale(now))
+        looks = scores.all(names)
+        tried: dict[str, Whole] = {}
+        short = self._shortlist(looks, now)
+        for look in short:
+            best = min(tried.values(), key=lambda w: w.squares, default=now)
+            if best.level < AT_FLOOR and look.gain < FAR_BEHIND * short[0].gain:
+                continue
+            start = {**now.values(), **look.start}
+            fitted = self.whole(now.structure.plus(look.effect), start, HOPELESS * best.estimate.sigma)
+            if fitted is not None:
+                tried[look.effect] = fitted
+        name = self._chosen(tried, now)
+        self._keep_books(found, now, tried, looks, name, round_)
+        if name is None:
+            return None
+        best = tried[name]
+        self.say(f"added {name}: free-run error {now.estimate.sigma:.3g} -> {best.estimate.sigma:.3g}")
+        return best
+
+    def _scale(self, now: Whole) -> Scale:
+        values = now.values()
+        platform = tuple(values.get((t,), 0.0) for t in TERMS)
+        return scale_of([self.traces[i] for i in self.fit], platform, self._lines(now))  # type: ignore[arg-type]
+
+    def _lines(self, now: Whole) -> tuple[float, ...]:
+        """Frequencies of the strongest lines in what the free runs leave."""
+        found: list[tuple[float, float]] = []
+        for i, r in zip(self.fit, now.estimate.residuals(), strict=True):
+            trace = self.traces[i]
+            x = np.where(trace.keep, r, 0.0) * signal.windows.hann(len(r))
+            size = np.abs(np.fft.rfft(x, 8 * len(x))) / (self.noise * np.sqrt(0.375 * len(x)))
+            f = np.fft.rfftfreq(8 * len(x), trace.step_s)
+            size[f < 2.0 / (trace.step_s * len(x))] = 0.0
+            peaks = signal.find_peaks(size, height=LINE)[0]
+            found += [(float(size[k]), float(f[k])) for k in peaks[np.argsort(size[peaks])[-3:]]]
+        found.sort(reverse=True)
+        return tuple(f for _, f in found[:8])
+
+    def _shortlist(self, looks: Sequence[Scored], now: Whole) -> list[Scored]:
+        """The largest gains beyond their penalty, and what comes first by order or simplicity."""
+        penalty = float(np.log(max(now.count, 2)))
+        worth = sorted((s for s in looks if s.gain > WORTH_A_FIT), key=lambda s: s.count * penalty - s.gain)
+        short = worth[:TRIED]
+        wanted = {n for s in short for n in (*effects.get(s.effect).nests, *effects.get(s.effect).lower_order)}
+        return short + [s for s in worth[TRIED:] if s.effect in wanted]
+
+    def _chosen(self, tried: Mapping[str, Whole], now: Whole) -> str | None:
+        """The candidate to add: the likeliest, or the simplest of those that are as likely."""
+        good = {n: w for n, w in tried.items() if self._worth(n, w, now)}
+        if not good:
+            return None
+        best = min(good, key=lambda n: good[n].penalised)
+        level = good[best].level
+        alike = [n for n in good if good[n].penalised - good[best].penalised < RIVAL * level]
+        best = min(alike, key=lambda n: (len(effects.get(n).parameters), good[n].penalised))
+        for first in effects.get(best).lower_order:
+            if first in good:
+                return first
+        return best
+
+    def _worth(self, name: str, new: Whole, now: Whole) -> bool:
+        """Whether chi square falls by more than chance, also where nothing was fitted, with parameters that stand out."""
+        fall, held = (now.penalised - new.penalised) / new.level, (now.held - new.held) / new.level
+        excess = now.squares - now.count
+        large = excess > 5.0 * np.sqrt(2.0 * now.count)
+        enough = not large or now.squares - new.squares > SHARE * excess
+        return fall > CHANCE and held > HELD and enough and new.judged().strength(name) > STRONG
+
+    def _pruned(self, found: Search, now: Whole, names: Sequence[str]) -> Whole:
+        """Without every term or effect that the data do as well without."""
+        for name in names:
+            kept_by = [e for e in now.structure.effects if name in effects.get(e).lower_order]
+            last = len(now.structure.terms) - len(self.fixed) + len(now.structure.effects) <= 1
+            if name == "inertia" or kept_by or last or now.judged().strength(name) > 30.0:
+                continue
+            start = {n: v for n, v in now.values().items() if n[0] != name}
+            without = self.whole(now.structure.minus(name), start)
+            if without is None or without.penalised - now.penalised > RIVAL * now.level:
+                continue
+            reason = (
+                f"free-run error {now.estimate.sigma:.4g} with it, {without.estimate.sigma:.4g} without it"
+            )
+            found.dropped.append((name, reason))
+            found.rivals.pop(name, None)
+            self.say(f"dropped {name}: {reason}")
+            now = without
+        return now
+
+    def _keep_books(
+        self, found: Search, now: Whole, tried: Mapping[str, Whole], looks: Sequence[Scored], name: str | None,
+        round_: int,
+    ) -> None:  # fmt: skip
+        """Every candidate of the round with its figures; rivals of the one added."""
+        if name is not None:
+            best = tried[name]
+            alike = [
+                n for n, w in tried.items() if n != name and w.penalised - best.penalised < RIVAL * best.level
+            ]
+            found.rivals[name] = tuple(alike)
+        for other, w in tried.items():
+            if other == name:
+                status = "added"
+            elif name is None:
+                status = "not worth it"
+            else:
+                status = "rival" if other in found.rivals[name] else "no better"
+            held = float(np.sqrt(w.held / max(w.held_count, 1))) * self.noise
+            found.candidates.append(Candidate(other, round_, w.penalised - now.penalised, held, status))
+        for s in looks:
+            if s.effect not in tried:
+                penalty = s.count * float(np.log(max(now.count, 2)))
+                found.candidates.append(Candidate(s.effect, round_, penalty - s.gain, None, "screened out"))

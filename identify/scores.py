@@ -1,0 +1,239 @@
+"""What every candidate could take of the residual of a model that already runs free near the data (score test).
+
+The model is simulated over whole runs. A candidate's direction is what a little of it adds to the simulated
+channel; J, C, K, the gains of the effects at hand, start states and bias are projected out of it. The part of the
+residual along what is left is the candidate's gain in chi square, without fitting it (Rao 1948; Engle 1984).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identify.output_error import Estimate
+from identify.parameters import Name, platform_of
+from identify.screen import grid_of
+from identify.sensitivities import nuisance_basis, sensitivities
+from identify.shots import RUNAWAY, Shots, predict
+from rig import effects
+from rig.dynamics import Equations, Grid
+from rig.dynamics.simulate import MAX_SUBSTEPS
+from rig.effects.base import Effect, Place, Scale
+from rig.platform import Platform
+from rig.recording.run import Array
+
+LITTLE = 1e-4  # of the torque: more of a candidate would shift the ring beyond where sensitivities hold
+SCALED = (0.1, 10.0)  # by how much the score may scale a shape that means "none" at zero
+
+
+@dataclass(frozen=True)
+class Scored:
+    """One candidate at one set of shapes.
+
+    Attributes
+    ----------
+    gain
+        Expected fall of chi square.
+    start
+        Parameter values for a fit to begin from.
+    count
+        Its number of parameters.
+    """
+
+    effect: str
+    gain: float
+    start: dict[Name, float]
+    count: int
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One run around the model: projector, projected sensitivities and residual."""
+
+    shots: Shots
+    base: Array
+    basis: Array
+    columns: Array
+    residual: Array
+
+    def project(self, values: Array) -> Array:
+        used = values[self.shots.weight]
+        return np.asarray(used - self.basis @ (self.basis.T @ used))
+
+
+class Scores:
+    """Gains of candidates on top of one model.
+
+    Parameters
+    ----------
+    estimate
+        The model, fitted over whole runs; samples that count are those of its shots.
+    fixed
+        Parameters that were not fitted.
+    sigma
+        One standard deviation of the measured channel's noise.
+    scale
+        How large the motion is.
+    """
+
+    def __init__(self, estimate: Estimate, fixed: Sequence[Name], sigma: float, scale: Scale) -> None:
+        self.estimate, self.sigma, self.scale = estimate, sigma, scale
+        self.keep = np.array([n not in fixed for n in estimate.names])
+        self._finer_ones: dict[tuple[int, int], tuple[Shots, Array]] = {}
+        with ThreadPoolExecutor(2) as workers:
+            self.runs = list(workers.map(self._around, estimate.shots))
+        information = np.sum([r.columns.T @ r.columns for r in self.runs], axis=0)
+        self.size = np.sqrt(np.maximum(np.diag(information), 1e-300))
+        self.inverse = np.linalg.pinv(information / np.outer(self.size, self.size), rcond=1e-12, hermitian=True)
+        self.toward = np.sum([r.columns.T @ r.residual for r in self.runs], axis=0) / self.size
+
+    def _around(self, shots: Shots) -> _Run:
+        e = self.estimate
+        scale = np.where(np.abs(e.values) > 0, np.abs(e.values), 1.0)
+        columns, state, residual = sensitivities(shots, e.structure, e.names, e.values, scale, ~self.keep)
+        basis = nuisance_basis(shots, state)
+        run = _Run(shots, shots.trace.measured - residual, basis, np.zeros((0, 0)), np.zeros(0))
+        return replace(run, columns=run.project(columns[:, self.keep]), residual=run.project(residual))
+
+    def all(self, names: Sequence[str]) -> list[Scored]:
+        """Every candidate at its best shapes, the largest gain first."""
+        tasks = [(effects.get(n), shape) for n in names for shape in grid_of(effects.get(n), self.scale)]
+        with ThreadPoolExecutor(2) as workers:
+            found = [s for s in workers.map(lambda t: self.score(*t), tasks) if s is not None]
+        best: dict[str, Scored] = {}
+        for s in found:
+            if s.effect not in best or s.gain > best[s.effect].gain:
+                best[s.effect] = s
+        return sorted(best.values(), key=lambda s: -s.gain)
+
+    @RUNAWAY
+    def score(self, effect: Effect, shape: tuple[float, ...]) -> Scored | None:
+        """One candidate at given shapes; None where it does nothing or its motion runs away."""
+        pushes = self._pushes(effect, shape)
+        if not pushes:
+            return None
+        columns = [self._direction(effect, push) for push in pushes]
+        if any(c is None for c in columns):
+            return None
+        square = np.zeros((len(pushes),) * 2)
+        across, along = np.zeros((int(self.keep.sum()), len(pushes))), np.zeros(len(pushes))
+        for k, run in enumerate(self.runs):
+            d = np.stack([c[k] for c in columns if c is not None], axis=1)
+            square += d.T @ d
+            across += run.columns.T @ d / self.size[:, None]
+            along += d.T @ run.residual
+        square -= across.T @ self.inverse @ across
+        along -= across.T @ self.inverse @ self.toward
+        lowest = np.array([-np.inf if p[-1] else 0.0 for p in pushes])
+        share, gain = _bounded(square, along, lowest)
+        return Scored(effect.name, gain / self.sigma**2, self._start(effect, shape, pushes, share), len(effect.parameters))
+
+    def _pushes(self, effect: Effect, shape: tuple[float, ...]) -> list[tuple[dict[Name, float], bool]]:
+        """A little of the candidate, once for every gain: its parameter values, and whether they may turn their sign."""
+        shapes = iter(shape)
+        held: dict[Name, float] = {(effect.name, p.name): next(shapes) for p in effect.parameters if not p.linear}
+        gains = [(i, p) for i, p in enumerate(effect.parameters) if p.linear]
+        if not gains:
+            return [(held, False)]
+        larger = dict(effect.ordered)
+        out = []
+        for i, p in gains:
+            unit = self._unit(effect, shape, i)
+            if unit == 0.0:
+                continue
+            little = LITTLE * self.scale.torque_nm / unit
+            rest: dict[Name, float] = {(effect.name, q.name): 0.0 for _, q in gains}
+            for run in self.runs if p.per_run else self.runs[:1]:
+                number = run.shots.number
+                push = {k: v for k, v in rest.items()}
+                push[(effect.name, p.name)] = little
+                if p.name in larger:
+                    push[(effect.name, larger[p.name])] = little
+                named = {(*k, str(number)) if p.per_run and k in rest else k: v for k, v in {**held, **push}.items()}
+                out.append((named, p.low < 0.0))
+        return out
+
+    def _unit(self, effect: Effect, shape: tuple[float, ...], gain: int) -> float:
+        """Root mean square torque of a gain of one along the measured motion."""
+        if effect.place in (Place.DRIVE, Place.SENSOR):
+            return 1.0
+        squares = []
+        for run in self.runs:
+            pieces = run.shots.trace.effect_pieces(effect, shape, gain)
+            squares.append(0.0 if pieces is None else float(np.mean(pieces[:, 0] ** 2)))
+        return float(np.sqrt(np.mean(squares)))
+
+    def _direction(self, effect: Effect, push: tuple[dict[Name, float], bool]) -> list[Array] | None:
+        """What the push adds to the simulated channel of every run, projected."""
+        out = []
+        for run in self.runs:
+            mine = [n for n in push[0] if len(n) < 3 or int(n[2]) == run.shots.number]
+            if not any(push[0][n] for n in mine if len(n) == 3) and any(len(n) == 3 for n in push[0]):
+                out.append(np.zeros(len(run.residual)))
+                continue
+            held = {n[1]: push[0][n] for n in mine}
+            e = self.estimate
+            bare = platform_of(e.structure, e.names, e.values, run.shots.number, run.shots.added)
+            platform = replace(bare, effects={**bare.effects, effect.name: held})
+            equations = Equations(platform)
+            shots, base = self._finer(run, bare, equations)
+            moved = predict(shots, equations, shots.starts, shots.bias) - base
+            if not np.all(np.isfinite(moved[shots.weight])):
+                return None
+            out.append(run.project(moved))
+        return out
+
+    def _finer(self, run: _Run, bare: Platform, equations: Equations) -> tuple[Shots, Array]:
+        """The same shots on a grid that a fast candidate needs, and the model's own motion there."""
+        trace = run.shots.trace
+        here = round(trace.step_s / run.shots.grid.step_s)
+        needed = int(np.clip(equations.substeps(trace.step_s) // 2, 2, MAX_SUBSTEPS))
+        if needed <= here:
+            return run.shots, run.base
+        needed = min(MAX_SUBSTEPS, 2 ** int(np.ceil(np.log2(needed))))
+        key = (run.shots.number, needed)
+        if key not in self._finer_ones:
+            time = trace.start_s + trace.step_s * np.arange(len(trace.measured))
+            shots = replace(run.shots, grid=Grid(time, trace.torque, needed, 0.0))
+            self._finer_ones[key] = shots, predict(shots, Equations(bare), shots.starts, shots.bias)
+        return self._finer_ones[key]
+
+    def _start(
+        self, effect: Effect, shape: tuple[float, ...], pushes: Sequence[tuple[dict[Name, float], bool]], share: Array
+    ) -> dict[Name, float]:
+        out: dict[Name, float] = {}
+        for (push, _), s in zip(pushes, share, strict=True):
+            for name, value in push.items():
+                p = next(q for q in effect.parameters if q.name == name[1])
+                if p.linear:
+                    out[name] = float(np.clip(out.get(name, 0.0) + s * value, p.low, p.high))
+                elif len(effect.parameters) == 1 and p.low == 0.0:
+                    out[name] = float(np.clip(value * np.clip(s, *SCALED), p.low, p.high))
+                else:
+                    out[name] = value
+        for p in effect.parameters:  # gains whose unit does nothing stay at zero
+            if p.linear and not p.per_run:
+                out.setdefault((effect.name, p.name), max(p.low, 0.0))
+        return out
+
+
+def _bounded(square: Array, along: Array, lowest: Array) -> tuple[Array, float]:
+    """Least squares with lower bounds of zero on some unknowns, and the fall of the sum of squares."""
+    active = np.ones(len(along), dtype=bool)
+    x = np.zeros(len(along))
+    for _ in range(len(along) + 1):
+        x[:] = 0.0
+        if not np.any(active):
+            break
+        part = square[np.ix_(active, active)]
+        size = np.sqrt(np.maximum(np.diag(part), 1e-300))
+        inverse = np.linalg.pinv(part / np.outer(size, size), rcond=1e-9, hermitian=True)
+        x[active] = inverse @ (along[active] / size) / size
+        wrong = active & (x < lowest)
+        if not np.any(wrong):
+            break
+        active &= ~wrong
+    return x, max(0.0, float(2.0 * along @ x - x @ square @ x))
