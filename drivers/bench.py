@@ -7,7 +7,6 @@ by the same frames as the torque, so a loop that hangs looks dead to the drive.
 
 from __future__ import annotations
 
-import select
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,19 +15,16 @@ from pathlib import Path
 from drivers.amplifiers import make_amplifier
 from drivers.amplifiers.base import Amplifier
 from drivers.bench_clock import BenchClock
-from drivers.can_link import CanLink, open_bus
+from drivers.bench_devices import BenchDevices
+from drivers.can_link import CanLink
 from drivers.capture import Capture, export
-from drivers.gyro_line import GyroLine, GyroReport
+from drivers.gyro_line import GyroReport
 from drivers.gyroscopes import make_gyroscope
-from drivers.listening import ListeningPort
-from drivers.ports import SerialPort
 from rig import realtime
 from rig.config.bench import BenchConfig
-from rig.errors import ConfigError, DeviceFault, RigError
+from rig.errors import DeviceFault
 from rig.interface import Exchange, GyroSample, LowPass, Rig, Statement, Torque, TorqueOfTime, TorqueSample
 from rig.recording.run import TorqueHold
-
-CONTACT_TIME_S = 0.002
 
 
 @dataclass(frozen=True)
@@ -79,14 +75,9 @@ class BenchRig(Rig):
         self.gyroscope = make_gyroscope(config.gyroscope)
         self.amplifier: Amplifier = make_amplifier(config.amplifier)
         self._capture: Capture | None = None
-        self._line: GyroLine | None = None
-        self._link: CanLink | None = None
+        self._devices: BenchDevices | None = None
         self._armed = False
         self._grant: realtime.RealTimeGrant | None = None
-        self._notes: list[str] = []
-        self._waiting: list[GyroSample] = []
-        self._settle_due_s = 0.0
-        self._link_fault: DeviceFault | None = None
         self.clock = BenchClock(self._listen, config.real_time.spin_us * 1e-6, self._note_clock, clock)
 
     def statement(self) -> Statement:
@@ -146,104 +137,46 @@ class BenchRig(Rig):
             self._capture = Capture(self._raw_folder)
             self._capture.start()
             self._mark("config", {"bench": self._config.model_dump(mode="json")})
-        begin_s = self._time()
-        faults = [fault for fault in (self._open_gyro(), self._open_drive()) if fault is not None]
-        if self._line is not None:
-            while self._time() - begin_s < self._config.settle_s:
-                time.sleep(CONTACT_TIME_S)
-                self._gather(faults)
-                self._settle_drive(faults)
-            self._line.note_noise()
-            faults += [DeviceFault(text) for text in self._line.problems(self._time() - begin_s)]
-        if faults:
-            raise _together(faults)
+        self._devices = BenchDevices(self._config, self.gyroscope, self.amplifier, self._capture, self._time)
+        self._devices.contact()
         self._mark("opened")
 
-    def _open_gyro(self) -> RigError | None:
-        port = self._config.gyroscope.port
-        if port is None:
-            return ConfigError(
-                "bench.gyroscope.port is empty: name its serial port (`rig devices` lists them) or run with --emulate"
-            )
-        try:
-            serial = ListeningPort(SerialPort(port, self.gyroscope.baud), self._time)
-            self._line = GyroLine(self.gyroscope, serial, self._capture, self._time)
-            self._line.greet()
-        except RigError as fault:
-            return fault
-        return None
-
-    def _open_drive(self) -> RigError | None:
-        try:
-            self._link = CanLink(open_bus(self._config.amplifier.can), self._time)
-            self._link.idle = lambda: self._gather([])
-            self._link.on_sent = self.amplifier.note_sent
-            self._link.record = self._capture.can if self._capture is not None else None
-            self._notes = self.amplifier.contact(self._link)
-        except RigError as fault:
-            return fault
-        return None
-
-    def _settle_drive(self, faults: list[RigError]) -> None:
-        if self._link is None or faults or self._time() < self._settle_due_s:
-            return
-        self._settle_due_s = self._time() + CONTACT_TIME_S
-        try:
-            self.amplifier.settle(self._link)
-            self._link.poll()
-        except RigError as fault:
-            faults.append(fault)
-
-    def _gather(self, faults: list[RigError]) -> None:
-        """Decode what has arrived, so that no buffer overflows; samples wait for the next exchange."""
-        if self._line is None or self._line.fault is not None:
-            return
-        try:
-            self._waiting += self._line.collect()
-        except DeviceFault as fault:
-            faults.append(fault)
-        if len(self._waiting) > 2000:
-            del self._waiting[:-1000]  # while nothing is played only the newest matter
-
     def _listen(self, timeout_s: float) -> bool:
-        """Wait for a bus that has no ear of its own, and stamp its frames as they arrive; False if none came."""
-        link = self._link
-        descriptor = -1 if link is None or self._link_fault is not None else link.fileno()
-        if link is None or descriptor < 0 or not select.select((descriptor,), (), (), timeout_s)[0]:
-            return False
-        try:
-            link.poll()
-        except DeviceFault as fault:
-            self._link_fault = fault
-        return True
+        return self._devices is not None and self._devices.listen(timeout_s)
+
+    @property
+    def _link(self) -> CanLink | None:
+        return None if self._devices is None else self._devices.link
 
     # -- torque ----------------------------------------------------------------------------------
 
     def arm(self) -> None:
         """The drive enabled at zero torque, its watchdog running."""
-        if self._link is None:
+        devices = self._devices
+        if devices is None or devices.link is None:
             raise DeviceFault("the bench is armed before it is open: open it first")
         self._armed = True
-        self.amplifier.arm(self._link)
-        self._gather([])
-        self._waiting.clear()
+        self.amplifier.arm(devices.link)
+        devices.gather([])
+        devices.waiting.clear()
         self.amplifier.take_reported()
         self._mark("armed", {"real_time": str(self._grant)})
 
     def exchange(self, now_s: float, torque_nm: float) -> Exchange:
         """One tick. Raises DeviceFault if a device failed; then nothing more is sent."""
-        link, line = self._link, self._line
-        if not self._armed or link is None or line is None:
+        devices = self._devices
+        if not self._armed or devices is None or devices.link is None or devices.line is None:
             raise DeviceFault("torque was sent to a bench that is not armed: arm it first")
-        fault = line.fault or self._link_fault
+        link, line = devices.link, devices.line
+        fault = line.fault or devices.link_fault
         if fault is not None:
             raise fault
         amplifier = self.amplifier
         frames = amplifier.frames(torque_nm, now_s)
         sent_s = link.send(frames)
         sent = [nm for frame in frames if (nm := amplifier.sent_torque_nm(frame)) is not None]
-        gyro = self._waiting + line.collect() if self._waiting else line.collect()
-        self._waiting.clear()
+        gyro = devices.waiting + line.collect() if devices.waiting else line.collect()
+        devices.waiting.clear()
         link.poll()
         amplifier.check(now_s)
         if self._capture is not None:
@@ -273,11 +206,9 @@ class BenchRig(Rig):
     def close(self) -> None:
         """Let go of both ports and finish the capture; safe twice."""
         try:
-            for device in (self._link, self._line):
-                if device is not None:
-                    device.close()
+            if self._devices is not None:
+                self._devices.close()
         finally:
-            self._link = None
             if self._grant is not None:
                 realtime.release()
             if self._capture is not None:
@@ -297,12 +228,13 @@ class BenchRig(Rig):
 
     def report(self) -> BenchReport:
         """What is known of the devices so far. Raises DeviceFault before the bench was open."""
-        if self._line is None:
+        devices = self._devices
+        if devices is None or devices.line is None:
             raise DeviceFault("there is nothing to report of a bench that was never open")
         emergencies = getattr(self.amplifier, "emergencies", [])
         return BenchReport(
-            self._line.report(),
-            tuple(self._notes),
+            devices.line.report(),
+            tuple(devices.notes),
             str(self._grant) if self._grant is not None else "not open yet",
             tuple(text for _, text in emergencies),
         )
@@ -331,12 +263,3 @@ def answer(
     from_drive = source == "actual" or (source == "auto" and amplifier.stamps_torque)
     channels = {"drive_torque_nm": actual, "sent_torque_nm": sent[-1].torque_nm if sent else 0.0}
     return Exchange(gyro, reported if from_drive else sent, channels)
-
-
-def _together(faults: list[RigError]) -> RigError:
-    """One error that lists all; a usage error only where nothing else is wrong."""
-    if len(faults) == 1:
-        return faults[0]
-    text = "\n".join(f"  {fault}" for fault in faults)
-    kind = ConfigError if all(isinstance(fault, ConfigError) for fault in faults) else DeviceFault
-    return kind(f"{len(faults)} things are wrong on the bench:\n{text}")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-import drivers.bench
+import drivers.bench_devices
 import drivers.can_link
 from drivers import capture
 from drivers.bench import BenchRig
@@ -68,9 +68,11 @@ def bench(monkeypatch, tmp_path):
     time = FakeTime()
     drive = Cia402Drive(1, 100.0, 150.0)
     monkeypatch.setattr(drivers.can_link.time, "sleep", lambda s: None)
-    monkeypatch.setattr(drivers.bench, "open_bus", lambda config: EmulatedBus(drive, time))
-    monkeypatch.setattr(drivers.bench, "ListeningPort", lambda port, clock: port)  # threads have no place in fake time
-    monkeypatch.setattr(drivers.bench, "SerialPort", lambda path, baud: GyroPort(time))
+    monkeypatch.setattr(drivers.bench_devices, "open_bus", lambda config: EmulatedBus(drive, time))
+    monkeypatch.setattr(
+        drivers.bench_devices, "ListeningPort", lambda port, clock: port
+    )
+    monkeypatch.setattr(drivers.bench_devices, "SerialPort", lambda path, baud: GyroPort(time))
     rig = BenchRig(CONFIG, Torque.EMULATED, tmp_path / "raw", time)
     rig.time, rig.drive = time, drive
     return rig
@@ -140,7 +142,7 @@ def test_vanished_gyro_stops_the_next_tick_before_any_torque(bench):
     with bench.opened(), pytest.raises(DeviceFault, match="wire has vanished"), bench.armed():
         play(bench, 20, lambda k: 5.0)
         assert bench.drive.torque_nm == 5.0
-        bench._line._port.vanished = True
+        bench._devices.line._port.vanished = True
         with pytest.raises(DeviceFault):
             bench.exchange(bench.time(), 5.0)
         bench.exchange(bench.time(), 7.0)
@@ -152,7 +154,7 @@ def test_all_that_is_wrong_is_listed_at_once(bench, monkeypatch):
         def read(self):
             return b""
 
-    monkeypatch.setattr(drivers.bench, "SerialPort", lambda path, baud: Silent(bench.time))
+    monkeypatch.setattr(drivers.bench_devices, "SerialPort", lambda path, baud: Silent(bench.time))
     bench.drive.receive = lambda frame, now_s: None
     with pytest.raises(DeviceFault, match=r"(?s)2 things are wrong.*does not answer.*no byte in 1"), bench.opened():
         pass
