@@ -24,7 +24,8 @@ def low_pass_kernel(corner_hz: float, delay_s: float, step_s: float) -> Array:
     """Weights on a grid, shape (2 n + 1,): symmetric over twice the delay, -3 dB at the corner, sum one.
 
     A power of a cosine times (a + b t^2) whose second moment is zero: flat to fourth order in its pass band
-    (the paper's ring at 29 Hz passes a 262 Hz filter to 7e-5).
+    (the paper's ring at 29 Hz passes a 262 Hz filter to 7e-5). Where the delay is too short for a filter that
+    flat, the power alone.
     """
     n = round(delay_s / step_s)
     if n < 1:
@@ -32,18 +33,23 @@ def low_pass_kernel(corner_hz: float, delay_s: float, step_s: float) -> Array:
     t = step_s * np.arange(-n, n + 1)
     bell = np.cos(0.5 * np.pi * t / ((n + 0.5) * step_s))
 
-    def weights(power: float) -> Array:
+    def flat(power: float) -> Array:
         g = bell**power
         m0, m2, m4 = (float(np.sum(g * t**k)) for k in (0, 2, 4))
         return np.asarray(g * (m4 - m2 * t**2) / (m0 * m4 - m2 * m2))
 
+    def plain(power: float) -> Array:
+        return np.asarray(bell**power / np.sum(bell**power))
+
+    def passes(weights: Array) -> bool:
+        return float(np.sum(weights * np.cos(2.0 * math.pi * corner_hz * t))) > math.sqrt(0.5)
+
+    shape = plain if passes(flat(0.0)) else flat
     wide, narrow = 0.0, _STEEPEST  # a steeper bell is a shorter average and passes more
-    cosine = np.cos(2.0 * math.pi * corner_hz * t)
     for _ in range(_BISECTIONS):
         power = 0.5 * (wide + narrow)
-        passes = float(np.sum(weights(power) * cosine)) > math.sqrt(0.5)
-        wide, narrow = (wide, power) if passes else (power, narrow)
-    return weights(0.5 * (wide + narrow))
+        wide, narrow = (wide, power) if passes(shape(power)) else (power, narrow)
+    return shape(0.5 * (wide + narrow))
 
 
 def smoothed(rate: Array, kernel: Array) -> Array:

@@ -69,9 +69,7 @@ def bench(monkeypatch, tmp_path):
     drive = Cia402Drive(1, 100.0, 150.0)
     monkeypatch.setattr(drivers.can_link.time, "sleep", lambda s: None)
     monkeypatch.setattr(drivers.bench_devices, "open_bus", lambda config: EmulatedBus(drive, time))
-    monkeypatch.setattr(
-        drivers.bench_devices, "ListeningPort", lambda port, clock: port
-    )
+    monkeypatch.setattr(drivers.bench_devices, "ListeningPort", lambda port, clock: port)
     monkeypatch.setattr(drivers.bench_devices, "SerialPort", lambda path, baud: GyroPort(time))
     rig = BenchRig(CONFIG, Torque.EMULATED, tmp_path / "raw", time)
     rig.time, rig.drive = time, drive

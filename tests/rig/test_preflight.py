@@ -55,6 +55,13 @@ def test_the_gyros_full_scale_is_a_limit_too() -> None:
     assert [p.largest_torque_nm for p in allowed[3:]] == pytest.approx([67.1, 42.0], abs=0.1)
 
 
+def test_a_refusal_for_the_gyros_full_scale_says_that_it_is_the_gyros() -> None:
+    with pytest.raises(PreflightRefusal) as refused:
+        plan(PAPER, ExcitationConfig(), WIDE, math.radians(100), "simulated.gyro.full_scale_deg_s")
+    assert "rate limit of 100 deg/s (simulated.gyro.full_scale_deg_s, the full scale of the gyro)" in str(refused.value)
+    assert refused.value.keys == ("limits.travel_deg", "simulated.gyro.full_scale_deg_s")
+
+
 def test_a_refusal_lists_every_set_with_its_travel_and_the_torque_that_passes() -> None:
     with pytest.raises(PreflightRefusal) as refused:
         plan(PAPER, ExcitationConfig(), LimitsConfig())

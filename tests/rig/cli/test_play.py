@@ -222,3 +222,13 @@ def test_recordings_cannot_be_played_but_their_campaign_can_be_simulated(tmp_pat
     refused = command(app, "play", config, "--out", tmp_path / "out")
     assert refused.exit_code == 2 and "nothing to play" in refused.stderr
     assert command(app, "play", config, "--dry-run", "--out", tmp_path / "out").exit_code == 0
+
+
+def test_a_refusal_says_where_the_limit_stands(tmp_path: Path) -> None:
+    text = TWO_SETS.replace("simulated: {}", "simulated: {gyro: {full_scale_deg_s: 10}}")
+    path, out = write_config(tmp_path, text), tmp_path / "out"
+    refused = command(app, "play", path, "--out", out)
+    assert refused.exit_code == 2
+    assert f"{path}:3: simulated.gyro.full_scale_deg_s is 10" in refused.stderr
+    stricter = command(app, "play", path, "--out", out, "--set", "limits.rate_deg_s=5")
+    assert "--set limits.rate_deg_s=5: limits.rate_deg_s is 5" in stricter.stderr
