@@ -22,11 +22,11 @@ from identify.regression import Structure
 from identify.results import Candidate
 from identify.scores import Scored, Scores
 from identify.screen import scale_of
-from identify.search import MOST_EFFECTS, Search
+from identify.search import MOST_EFFECTS, MOST_NAMED, Search
 from identify.traces import Trace
 from rig import effects
 from rig.effects.base import Place, Scale
-from rig.platform import TERMS
+from rig.platform import TERMS, Platform
 from rig.recording.run import Array
 
 NEAR_SIGNAL = 0.3  # of the signal that a free run may leave for this search to begin
@@ -101,9 +101,8 @@ class FineSearch:
         self.tried_at = np.inf
 
     def _possible(self, name: str) -> bool:
-        """Sensor effects are nuisances; a constant torque only shifts the unseen rest angle behind a gyro."""
-        effect = effects.get(name)
-        if effect.place is Place.SENSOR or (self.torque_free and effect.place is Place.DRIVE):
+        """A bias is a nuisance; a constant torque only shifts the unseen rest angle behind a gyro."""
+        if name == "rate_bias" or (self.torque_free and effects.get(name).place is Place.DRIVE):
             return False
         return not (name == "torque_offset" and all(t.biased for t in self.traces))
 
@@ -153,12 +152,14 @@ class FineSearch:
             return False
         self.tried_at = begin.level
         trial = replace(
-            found, candidates=list(found.candidates), rivals=dict(found.rivals), dropped=list(found.dropped)
+            found, candidates=list(found.candidates), rivals=dict(found.rivals), dropped=list(found.dropped),
+            rival_models=dict(found.rival_models),
         )  # fmt: skip
         if not self._rounds(trial, begin):
             return False
         found.best, found.floor = trial.best, trial.floor
         found.candidates, found.rivals, found.dropped = trial.candidates, trial.rivals, trial.dropped
+        found.rival_models = trial.rival_models
         return True
 
     def _near(self, model: Whole) -> bool:
@@ -178,12 +179,27 @@ class FineSearch:
             if chosen is None:
                 break
             now = self._pruned(found, chosen, chosen.structure.effects[:-1])
-        if now.level > ENDS_NEAR:
+        if now.level > ENDS_NEAR or len(now.structure.effects) > len(declared.effects) + MOST_NAMED:
             return False
         now = self._restored(found, now, declared.terms)
         now = self._pruned(found, now, (*now.structure.terms, *now.structure.effects))
+        now = self._asked_again(found, now)
         found.best, found.floor = now.judged(), self.noise
         return True
+
+    def _asked_again(self, found: Search, now: Whole) -> Whole:
+        """Rivals of effects that were added early, now in the place of the named one in the finished model."""
+        for name in now.structure.effects[len(found.base.structure.effects) : -1]:
+            models: dict[str, Platform] = {}
+            for rival, platform in found.rival_models.get(name, {}).items():
+                start = {n: v for n, v in now.values().items() if n[0] != name}
+                start |= {(rival, p): v for p, v in platform.effects[rival].items()}
+                swapped = self.whole(_swapped(now.structure, name, rival), start)
+                if swapped is not None and swapped.penalised - now.penalised < RIVAL * now.level:
+                    models[rival] = swapped.estimate.platform()
+            if name in found.rivals:
+                found.rivals[name], found.rival_models[name] = tuple(models), models
+        return now
 
     def _restored(self, found: Search, now: Whole, terms: Sequence[str]) -> Whole:
         """With a declared term that was set aside, where it is missed now that the effects are there."""
@@ -255,14 +271,14 @@ class FineSearch:
         best = min(good, key=lambda n: good[n].penalised)
         level = good[best].level
         alike = [n for n in good if good[n].penalised - good[best].penalised < RIVAL * level]
-        best = min(alike, key=lambda n: (len(effects.get(n).parameters), good[n].penalised))
+        best = min(alike, key=lambda n: (*_simplicity(n), good[n].penalised))
         for first in effects.get(best).lower_order:
             if first in good:
                 return first
         return best
 
     def _worth(self, name: str, new: Whole, now: Whole) -> bool:
-        """Whether chi square falls by more than chance, also where nothing was fitted, with parameters that stand out."""
+        """Whether chi square falls beyond chance, also where nothing was fitted, with parameters that stand out."""
         fall, held = (now.penalised - new.penalised) / new.level, (now.held - new.held) / new.level
         excess = now.squares - now.count
         large = excess > 5.0 * np.sqrt(2.0 * now.count)
@@ -280,9 +296,7 @@ class FineSearch:
             without = self.whole(now.structure.minus(name), start)
             if without is None or without.penalised - now.penalised > RIVAL * now.level:
                 continue
-            reason = (
-                f"free-run error {now.estimate.sigma:.4g} with it, {without.estimate.sigma:.4g} without it"
-            )
+            reason = f"free-run error {now.estimate.sigma:.4g} with it, {without.estimate.sigma:.4g} without it"
             found.dropped.append((name, reason))
             found.rivals.pop(name, None)
             self.say(f"dropped {name}: {reason}")
@@ -296,10 +310,9 @@ class FineSearch:
         """Every candidate of the round with its figures; rivals of the one added."""
         if name is not None:
             best = tried[name]
-            alike = [
-                n for n, w in tried.items() if n != name and w.penalised - best.penalised < RIVAL * best.level
-            ]
+            alike = [n for n, w in tried.items() if n != name and w.penalised - best.penalised < RIVAL * best.level]
             found.rivals[name] = tuple(alike)
+            found.rival_models[name] = {n: tried[n].estimate.platform() for n in alike}
         for other, w in tried.items():
             if other == name:
                 status = "added"
@@ -313,3 +326,14 @@ class FineSearch:
             if s.effect not in tried:
                 penalty = s.count * float(np.log(max(now.count, 2)))
                 found.candidates.append(Candidate(s.effect, round_, penalty - s.gain, None, "screened out"))
+
+
+def _swapped(structure: Structure, name: str, other: str) -> Structure:
+    """The same structure with another effect in the place of one."""
+    return replace(structure, effects=tuple(other if e == name else e for e in structure.effects))
+
+
+def _simplicity(name: str) -> tuple[int, bool]:
+    """What goes first among candidates that do as well: fewer parameters, and the drive before the sensor."""
+    effect = effects.get(name)
+    return len(effect.parameters), effect.place is Place.SENSOR

@@ -14,6 +14,7 @@ from identify.fine import FineSearch
 from identify.finish import Fitted, by_output_error, by_regression
 from identify.holdout import Split, pieces, split
 from identify.measures import Measured, floor_of, measure
+from identify.next_steps import opposite_signs, unexplained_reason
 from identify.parameters import platform_of
 from identify.regression import Structure, shape_values
 from identify.results import (
@@ -29,10 +30,12 @@ from identify.results import (
 )
 from identify.screen import Start, first_guess
 from identify.search import Loop, Search
+from identify.sign_check import SENTENCE
 from identify.traces import UPSAMPLING, Trace, prepare
 from identify.verdict import sentences_of
 from rig import effects
 from rig.config.identify import IdentifyConfig
+from rig.effects.base import Place
 from rig.errors import Aborted, RecordingError
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
@@ -40,6 +43,7 @@ from rig.recording.run import Recording
 MOVES = 3.0  # times the sensor's noise that a motion has to reach
 STOPPED = "stopped before the search was through: what is missing may still be unnamed"
 SHOWS = 5.0  # standard errors from zero at which whole runs show damping
+STRAYED = 3.0  # times the sensor's noise: a free run with friction may have gone astray
 UNEXPLAINED = 1.1  # times the noise floor in free run: above it, something is left that no effect here explains
 TORQUE_FREE = {"damping": ("damping_over_inertia", "1/s"), "stiffness": ("stiffness_over_inertia", "1/s^2")}
 
@@ -206,13 +210,9 @@ class _Identifier:
             unexplained=unexplained,
             candidates=tuple(search.candidates),
             sentences=(),
+            rival_models=search.rival_models,
         )
         reasons = []
-        if unexplained:
-            reasons.append(
-                f"the residual stays at {ratio:.3g} times the sensor's noise: "
-                "something acts that no effect of the library explains"
-            )
         searched = [g for g in (*(s.genetic for s in per_set), joint) if g is not None]
         reasons += [
             f"{g.name}: the objective {g.objective:.4g} stays above J_dec {g.j_dec:.4g} after {g.restarts} repeats"
@@ -221,11 +221,16 @@ class _Identifier:
         reasons += [f"{x.name} is not determined: {x.reason}" for x in final.not_determined]
         reference, per_set = self._against_reference(per_set)
         found = Identification(
-            accepted=not reasons, reasons=tuple(reasons), axis=self.recording.axis, before=result_before,
+            accepted=not reasons and not unexplained, reasons=(), axis=self.recording.axis, before=result_before,
             verdict=verdict, after=result_after, noise_floor=floor, per_set=per_set, joint=joint,
             traces=self._series(measured_before, measured_after), holdout_note=self.split.note,
             max_error_percent=reference,
         )  # fmt: skip
+        if unexplained:
+            reasons.insert(0, unexplained_reason(ratio, found))
+        if opposite_signs(found):
+            reasons.insert(0, SENTENCE)
+        found = replace(found, accepted=not reasons, reasons=tuple(reasons))
         return replace(found, verdict=replace(verdict, sentences=sentences_of(found)))
 
     def _ratio(self, after: Fitted, search: Search) -> float:
@@ -234,11 +239,10 @@ class _Identifier:
         if after.free_run is not None and after.sensor_limited:
             return after.sigma / noise
         free = after.free_run.sigma / noise if after.free_run is not None else np.inf
-        return (
-            float(min(free, search.best.sigma / search.floor))
-            if np.isfinite(free)
-            else search.best.sigma / search.floor
-        )
+        short = search.best.sigma / search.floor
+        frictions = [e for e in after.structure.effects if effects.get(e).place is Place.FRICTION]
+        # One wrong standstill throws a free run off for good; else what a free run leaves is what is missing.
+        return float(free) if np.isfinite(free) and (free < STRAYED or not frictions) else float(min(free, short))
 
     def _model(self, fitted: Fitted, measured: Measured, dropped: tuple[NotReported, ...]) -> ModelResult:
         units = UNITS[self.recording.axis]

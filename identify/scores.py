@@ -129,10 +129,12 @@ class Scores:
         along -= across.T @ self.inverse @ self.toward
         lowest = np.array([-np.inf if p[-1] else 0.0 for p in pushes])
         share, gain = _bounded(square, along, lowest)
-        return Scored(effect.name, gain / self.sigma**2, self._start(effect, shape, pushes, share), len(effect.parameters))
+        return Scored(
+            effect.name, gain / self.sigma**2, self._start(effect, shape, pushes, share), len(effect.parameters)
+        )
 
     def _pushes(self, effect: Effect, shape: tuple[float, ...]) -> list[tuple[dict[Name, float], bool]]:
-        """A little of the candidate, once for every gain: its parameter values, and whether they may turn their sign."""
+        """A little of the candidate, once for every gain: parameter values, and whether they may turn their sign."""
         shapes = iter(shape)
         held: dict[Name, float] = {(effect.name, p.name): next(shapes) for p in effect.parameters if not p.linear}
         gains = [(i, p) for i, p in enumerate(effect.parameters) if p.linear]
@@ -148,7 +150,7 @@ class Scores:
             rest: dict[Name, float] = {(effect.name, q.name): 0.0 for _, q in gains}
             for run in self.runs if p.per_run else self.runs[:1]:
                 number = run.shots.number
-                push = {k: v for k, v in rest.items()}
+                push = dict(rest)
                 push[(effect.name, p.name)] = little
                 if p.name in larger:
                     push[(effect.name, larger[p.name])] = little
@@ -168,7 +170,7 @@ class Scores:
 
     def _direction(self, effect: Effect, push: tuple[dict[Name, float], bool]) -> list[Array] | None:
         """What the push adds to the simulated channel of every run, projected."""
-        out = []
+        out: list[Array] = []
         for run in self.runs:
             mine = [n for n in push[0] if len(n) < 3 or int(n[2]) == run.shots.number]
             if not any(push[0][n] for n in mine if len(n) == 3) and any(len(n) == 3 for n in push[0]):

@@ -15,7 +15,7 @@ from identify.screen import Screen, Screened, Start, best_rho, grid_of
 from identify.traces import Trace
 from rig import effects
 from rig.effects.base import Place
-from rig.platform import TERMS
+from rig.platform import TERMS, Platform
 
 MOST_EFFECTS = 6
 SHORTLIST = 4
@@ -31,8 +31,9 @@ MOST = 0.4  # share of the excess error beyond which one standard error is lead 
 TWICE = 2.0
 STRONG = 4.0  # standard errors by which every parameter of a new effect must differ from zero
 CERTAIN = 100.0  # standard errors beyond which nobody asks whether a term is needed
+MOST_NAMED = 3  # effects; more of them together resemble anything
 LEFT = 1.2  # times the noise floor: below, nothing to speak of is left
-BULK = 0.9  # share of the excess that what is named explains at least, where something is left
+BULK = 0.95  # share of the excess that what is named explains at least, where something is left
 SUPPORT = 0.02  # share of the error by which a term must be missed to stay
 
 
@@ -46,6 +47,8 @@ class Search:
         The declared model; ``best`` the model at the end.
     rivals
         Effect -> other effects that did as well in its round.
+    rival_models
+        Effect -> rival -> the platform fitted with the rival in its place.
     dropped
         Terms of the declared model and effects that the data do not support, with the reason.
     """
@@ -56,6 +59,7 @@ class Search:
     floor: float
     candidates: list[Candidate] = field(default_factory=list)
     rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    rival_models: dict[str, dict[str, Platform]] = field(default_factory=dict)
     dropped: list[tuple[str, str]] = field(default_factory=list)
 
     @property
@@ -69,9 +73,10 @@ class Search:
         Something that is not in the library is always resembled by something that is: part of it goes away,
         and more of it with every further effect.
         """
-        if self.best.sigma < LEFT * self.floor or self.share > BULK or not self.best.structure.effects:
-            return
         kept = set(self.base.structure.effects)
+        few = len(self.best.structure.effects) <= len(kept) + MOST_NAMED
+        if few and (self.best.sigma < LEFT * self.floor or self.share > BULK):
+            return
         self.candidates = [
             replace(c, status="best of a bad lot") if c.status == "added" and c.effect not in kept else c
             for c in self.candidates
@@ -169,8 +174,8 @@ class Loop:
         if not added:
             return False
         self.say(f"added {name}: held-out error {now.sigma:.3g} -> {best.sigma:.3g}")
-        close = tuple(o for o, j in tried if status_of(o, j) == "rival")
-        found.rivals[name] = close
+        close = {o: j.estimate.platform() for o, j in tried if status_of(o, j) == "rival"}
+        found.rivals[name], found.rival_models[name] = tuple(close), close
         if not best.estimate.converged:
             again = judge(self.fitting, self.judging, best.structure, best.values(), found.horizon, rough_start=False)
             best = again if again.estimate.sigma <= best.estimate.sigma else best

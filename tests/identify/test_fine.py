@@ -1,0 +1,86 @@
+"""The search over whole runs: what it names near the data, and when it leaves the field."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identify.fine import FineSearch
+from identify.holdout import split
+from identify.regression import Structure
+from identify.search import Search
+from rig import effects
+from rig.recording.run import Recording
+from tests.identify.simulated import NOISE_RAD_S, campaign, traces_of
+
+START = {("inertia",): 0.0201, ("damping",): 0.05, ("stiffness",): 676.0}
+ALLOWED = (
+    "coulomb_friction", "stribeck_friction", "cubic_stiffness", "quadratic_stiffness", "torque_delay",
+    "actuator_lag", "sensor_lag", "creep", "torque_offset", "rate_bias", "directional_damping",
+)  # fmt: skip
+
+
+def searched(recording: Recording, allowed: tuple[str, ...] = ALLOWED) -> tuple[Search, bool]:
+    traces = traces_of(recording)
+    fine = FineSearch(traces, split(traces), allowed, lambda text: None)
+    begin = fine.whole(Structure(), START)
+    assert begin is not None
+    found = Search(begin.judged(), begin.judged(), 0.1, fine.noise)
+    return found, fine.take_over(found)
+
+
+@pytest.mark.parametrize(
+    ("hidden", "named"),
+    [
+        ({}, ()),
+        ({"coulomb_friction": {"level": 0.05}}, ("coulomb_friction",)),
+        ({"torque_delay": {"delay": 2e-5}}, ("torque_delay",)),
+        ({"cubic_stiffness": {"factor": 300.0}, "coulomb_friction": {"level": 0.1}},
+         ("coulomb_friction", "cubic_stiffness")),
+    ],
+)  # fmt: skip
+def test_small_effects_are_named_and_nothing_besides(
+    hidden: Mapping[str, Mapping[str, float]], named: tuple[str, ...]
+) -> None:
+    found, took = searched(campaign(hidden, duration_s=4))
+    assert took
+    assert set(found.best.structure.effects) == set(named)
+    assert found.best.sigma < 1.1 * NOISE_RAD_S
+
+
+def test_a_lag_is_named_in_the_drive_and_the_sensor_stands_beside_it() -> None:
+    found, took = searched(campaign({"sensor_lag": {"time": 3e-4}}, duration_s=4))
+    assert took
+    assert found.best.structure.effects == ("actuator_lag",)
+    assert "sensor_lag" in found.rivals["actuator_lag"]
+
+
+def test_what_no_candidate_brings_down_to_the_noise_is_left_to_others_untouched() -> None:
+    found, took = searched(campaign({"hysteresis": {"level": 1.0, "yield_angle": 0.05, "exponent": 1.5, "share": 0.5}}))
+    assert not took
+    assert found.best.structure.effects == ()
+    assert found.candidates == []
+
+
+def test_a_record_far_above_the_sensors_noise_is_left_to_others() -> None:
+    recording = campaign({"coulomb_friction": {"level": 1.0}}, duration_s=4)
+    quiet = replace(recording, noise=1e-7)
+    found, took = searched(quiet)
+    assert not took
+    assert found.best is found.base
+
+
+def test_held_out_runs_take_no_part_in_the_fit() -> None:
+    recording = campaign({"coulomb_friction": {"level": 0.1}}, duration_s=4)
+    runs = [replace(r, use="holdout" if i == 4 else "fit") for i, r in enumerate(recording.runs)]
+    runs[4].rate_rad_s[:] += 0.5 * np.sin(runs[4].time_s)  # type: ignore[index]
+    found, took = searched(Recording(tuple(runs)), ("coulomb_friction",))
+    level = found.best.values().get(("coulomb_friction", "level"))
+    assert not took or level == pytest.approx(0.1, rel=0.05)
+
+
+def test_every_name_it_may_try_is_an_effect() -> None:
+    assert set(ALLOWED) <= set(effects.names())

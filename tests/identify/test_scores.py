@@ -1,0 +1,71 @@
+"""What a candidate is expected to take of the residual, before it is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+
+import numpy as np
+import pytest
+
+from identify.output_error import Estimate, refine
+from identify.regression import Structure
+from identify.scores import Scores, _bounded
+from identify.screen import scale_of
+from rig import effects
+from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
+
+START = {("inertia",): 0.0201, ("damping",): 0.05, ("stiffness",): 676.0}
+CANDIDATES = [n for n in effects.names() if n not in ("rate_bias", "torque_offset", "periodic_disturbance")]
+HIDDEN: dict[str, Mapping[str, float]] = {
+    "coulomb_friction": {"level": 0.1},
+    "cubic_stiffness": {"factor": 600.0},
+    "torque_delay": {"delay": 1e-4},
+    "creep": {"stiffness": 3.0, "time": 0.2},
+    "stiffness_drift": {"slope": 0.5},
+    "directional_damping": {"step": 0.006},
+}
+
+
+@cache
+def fitted(name: str) -> Estimate:
+    traces = traces_of(campaign({name: HIDDEN[name]} if name else None, duration_s=4))
+    return refine(traces, Structure(), START, None, 15, coarse=True)
+
+
+def scores_of(name: str) -> Scores:
+    estimate = fitted(name)
+    scale = scale_of([s.trace for s in estimate.shots], TRUTH, ())
+    return Scores(estimate, (), NOISE_RAD_S, scale)
+
+
+@pytest.mark.parametrize("name", HIDDEN)
+def test_the_hidden_effect_promises_the_most_or_what_contains_it_does(name: str) -> None:
+    looks = scores_of(name).all(CANDIDATES)
+    best = looks[0]
+    assert name == best.effect or name in effects.get(best.effect).nests
+
+
+@pytest.mark.parametrize("name", ["cubic_stiffness", "creep", "directional_damping"])
+def test_a_fit_from_where_the_score_points_gains_what_it_promised(name: str) -> None:
+    estimate = fitted(name)
+    look = next(s for s in scores_of(name).all([name]))
+    start = {**dict(zip(estimate.names, estimate.values.tolist(), strict=True)), **look.start}
+    better = refine([s.trace for s in estimate.shots], Structure(effects=(name,)), start, None, 15, coarse=True)
+    fall = (estimate.sigma**2 - better.sigma**2) * estimate.count / NOISE_RAD_S**2
+    assert fall == pytest.approx(look.gain, rel=0.35)
+    assert better.sigma < 1.05 * NOISE_RAD_S
+
+
+def test_where_nothing_is_hidden_nothing_promises_more_than_chance() -> None:
+    looks = scores_of("").all(CANDIDATES)
+    assert max(s.gain for s in looks) < 20.0
+
+
+def test_a_gain_that_may_not_turn_its_sign_promises_nothing_where_it_would_have_to() -> None:
+    square, lowest = np.array([[2.0, 0.5], [0.5, 1.0]]), np.array([0.0, -np.inf])
+    x, fall = _bounded(square, np.array([-1.0, 0.3]), lowest)
+    assert x[0] == 0.0
+    assert x[1] == pytest.approx(0.3)
+    assert fall == pytest.approx(0.09)
+    assert _bounded(square[:1, :1], np.array([-1.0]), lowest[:1])[1] == 0.0
