@@ -69,7 +69,10 @@ def play(
 
 @app.command()
 def emulate(config: ConfigFile, overrides: Overrides = None) -> None:
-    """Emulate the devices of CONFIG's `bench` section at wire level until Ctrl-C; JSON lines say what they do."""
+    """Emulate the devices of CONFIG's `bench` section at wire level until Ctrl-C; JSON lines say what they do.
+
+    JSON lines on standard input let faults take hold: {"fault": "gyro_silent", "lasts_s": 0.2}.
+    """
 
     def command() -> int:
         from rig.cli.backends import require_emulators
@@ -77,7 +80,8 @@ def emulate(config: ConfigFile, overrides: Overrides = None) -> None:
         require_emulators()
         from sim_backend.emulators.process import run_emulators
 
-        run_emulators(Options(config, overrides=tuple(overrides or ())).load().config)
+        requests = sys.stdin.fileno() if sys.stdin is not None and not sys.stdin.closed else None
+        run_emulators(Options(config, overrides=tuple(overrides or ())).load().config, requests)
         return 0
 
     raise typer.Exit(conclude(command))

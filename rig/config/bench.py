@@ -80,6 +80,18 @@ class RealTimeConfig(Section):
     spin_us: Annotated[float, Field(ge=0, le=1000)] = 0.0
 
 
+class InjectedFault(Section):
+    """A fault that takes hold of the emulated devices ``after_s`` the drive was enabled, for ``lasts_s``.
+
+    ``value`` is what the fault is about, where it is about a number; docs/devices/emulators.md lists them.
+    """
+
+    fault: Annotated[str, Field(min_length=1, max_length=80)]
+    after_s: Annotated[float, Field(ge=0, le=1e6)] = 0.0
+    lasts_s: Annotated[float, Field(gt=0, le=1e6)] = 1e6
+    value: float | None = None
+
+
 class EmulatorConfig(Section):
     """The devices that `rig emulate` and `--emulate` put in the place of the real ones.
 
@@ -87,7 +99,7 @@ class EmulatorConfig(Section):
     ``gyro_drift_ppm``, ``drive_drift_ppm``: their clocks against the host's. ``rated_torque_nm`` and
     ``peak_torque_nm``: nameplate of the drive; the command's step is a thousandth of the former.
     ``drive_delay_ms``: from the frame to the torque. ``start_up_s`` of start-up status precede the first
-    good gyro sample.
+    good gyro sample. ``faults`` are injected on request.
     """
 
     gyro_drift_ppm: Annotated[float, Field(ge=-500, le=500)] = 20.0
@@ -96,6 +108,7 @@ class EmulatorConfig(Section):
     rated_torque_nm: Positive = 150.0
     peak_torque_nm: Positive = 300.0
     drive_delay_ms: Annotated[float, Field(ge=0, le=20)] = 0.0
+    faults: tuple[InjectedFault, ...] = ()
 
 
 class BenchConfig(Section):

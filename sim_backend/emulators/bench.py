@@ -13,11 +13,13 @@ from collections.abc import Callable
 import numpy as np
 
 from drivers.codecs.lawicel import CanFrame
+from rig.config.bench import InjectedFault
 from rig.config.root import Config
 from rig.errors import ConfigError
 from sim_backend.emulators.adapter import LawicelAdapter
 from sim_backend.emulators.device import EmulatedDrive, Event
 from sim_backend.emulators.drive import Cia402Drive
+from sim_backend.emulators.faults import Faults
 from sim_backend.emulators.gyro import GYROS, AnyGyro, GyroSettings, flat_low_pass
 from sim_backend.emulators.odrive import OdriveAxis
 from sim_backend.emulators.pty_port import PtyPort
@@ -101,7 +103,8 @@ class EmulatedBench:
     ) -> None:
         if config.bench is None:
             raise ConfigError("there is no `bench` section to emulate: add one that names the devices")
-        self._gyro, self._drive = _make_gyro(config), _make_drive(config)
+        self._gyro, self.drive = _make_gyro(config), _make_drive(config)
+        self._faults = Faults(config.bench.emulator.faults, self._tell_of_fault, config.simulated.seed)
         emulator = config.bench.emulator
         rate_hz = config.bench.gyroscope.sample_rate_hz or DEFAULT_RATE_HZ
         self._period_s = 1.0 / rate_hz / (1.0 + emulator.gyro_drift_ppm * 1e-6)
@@ -120,45 +123,71 @@ class EmulatedBench:
         self._shaft_nm = 0.0
 
     def _from_host(self, frame: CanFrame) -> None:
-        self._drive.receive(frame, self._now_s)
+        self.drive.receive(frame, self._now_s)
+
+    def _tell_of_fault(self, now_s: float, what: str) -> None:
+        self._on_event(Event("injected", now_s, self.drive.torque_nm, self.drive.torque_nm, what))
+
+    def inject(self, fault: InjectedFault) -> None:
+        """Let a fault take hold from now on. Raises ConfigError for one that does not exist."""
+        self._faults.plan(fault, self._clock())
+
+    def unplug_gyro(self) -> None:
+        """Its port vanishes."""
+        self.gyro_port.close()
+
+    def unplug_adapter(self) -> None:
+        """Its port vanishes."""
+        self.can_port.close()
+
+    def command_gyro(self, data: bytes) -> None:
+        """As if the host had sent this to the gyro."""
+        self._gyro.command(data)
+
+    def freeze_gyro(self, frozen: bool) -> None:
+        """Take its noise away, or give it back."""
+        self._gyro.frozen = frozen
 
     def run(self, stop: Callable[[], bool]) -> None:
         """Emulate until ``stop()``, asked at least every 2 ms."""
-        gyro, can = self.gyro_port.fileno(), self.can_port.fileno()
         lag_s = self._gyro.latency_s + self._gyro.transmission_s
         while not stop():
             due_s = self._start_s + (self._samples + 1) * self._period_s + lag_s
             wait_s = min(max(due_s - self._clock(), 0.0), LONGEST_SLEEP_S)
-            readable = select.select([can, gyro], [], [], wait_s)[0]
+            ports = [port for port in (self.can_port, self.gyro_port) if port.plugged_in]
+            readable = select.select(ports, [], [], wait_s)[0]
             self._now_s = self._clock()
-            if can in readable:
-                answer = self._adapter.feed(self.can_port.read())
-                self._serve_drive(answer)
+            self._faults.pass_time(self, self._now_s)
+            if self.can_port in readable and self.can_port.plugged_in:
+                data = self._faults.to_adapter(self.can_port.read())
+                self._serve_drive(self._adapter.feed(data) if data else b"")
             else:
                 self._serve_drive(b"")
-            if gyro in readable:
+            if self.gyro_port in readable and self.gyro_port.plugged_in:
                 self._gyro.command(self.gyro_port.read())
             self._send_samples(lag_s)
 
     def _serve_drive(self, answer: bytes) -> None:
         now_s = self._now_s
-        self._drive.tick(now_s)
-        shaft_nm = self._sign * self._drive.torque_nm
+        self.drive.tick(now_s)
+        shaft_nm = self._faults.torque(self._sign * self.drive.torque_nm)
         if shaft_nm != self._shaft_nm:
             self._shaft_nm = shaft_nm
             self._world.change_torque(now_s + self._delay_s, shaft_nm)
-        out = answer + b"".join(self._adapter.to_host(frame) for frame in self._drive.take_frames())
+        out = answer + b"".join(self._adapter.to_host(frame) for frame in self.drive.take_frames())
         if out:
-            self.can_port.write(out)
-        for event in self._drive.take_events(now_s):
+            self.can_port.write(self._faults.to_host(out))
+        for event in self.drive.take_events(now_s):
+            if event.name == "enabled":
+                self._faults.enabled(event.time_s)
             self._on_event(event)
 
     def _send_samples(self, lag_s: float) -> None:
         while self._start_s + (self._samples + 1) * self._period_s + lag_s <= self._now_s:
             for rate in self._world.advance(WORLD_STEPS_PER_SAMPLE):
-                self._remember(rate)
+                self._remember(self._faults.rate(rate))
             self._samples += 1
-            self.gyro_port.write(self._gyro.sample(self._filtered()))
+            self.gyro_port.write(self._faults.gyro_bytes(self._gyro.sample(self._filtered())))
 
     def _remember(self, rate_rad_s: float) -> None:
         # Written twice, so that the last len(kernel) values always stand side by side.

@@ -84,6 +84,10 @@ class CanopenNode:
         if before == OPERATIONAL != self.state:
             self.on_leaving_operational(now_s)
 
+    def restart(self, now_s: float) -> None:
+        """As after a dip of the supply."""
+        self._command(0x81, now_s)
+
     def _heard(self, node: int, now_s: float) -> None:
         watched, _ = self._consumer()
         if node == watched:

@@ -12,7 +12,7 @@ SETTLED_ZERO_S = 0.005  # a sine through zero is no event; torque that stays at 
 
 @dataclass(frozen=True)
 class Event:
-    """Something the drive did: "enabled", "torque_zero", "watchdog", "fault", "disabled"."""
+    """Something the drive did ("enabled", "torque_zero", "watchdog", "fault", "disabled"), or an "injected" fault."""
 
     name: str
     time_s: float
@@ -44,6 +44,14 @@ class EmulatedDrive(Protocol):
 
     def tick(self, now_s: float) -> None:
         """Let time pass: watchdogs, heartbeats, timers."""
+        ...
+
+    def fail(self, code: int, now_s: float) -> None:
+        """Go to fault by itself, with a code of the maker's."""
+        ...
+
+    def restart(self, now_s: float) -> None:
+        """As after a dip of the supply."""
         ...
 
     def take_frames(self) -> list[CanFrame]:

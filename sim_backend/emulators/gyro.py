@@ -83,6 +83,7 @@ class Stim300Emulator:
         self._sent = 0
         self._rng = np.random.default_rng([config.seed, 402])
         self._noise: list[float] = []
+        self.frozen = False
         self._waiting: list[bytes] = []
         length = self._layout.length + 2 * self._line_ending
         self.latency_s = 506e-6
@@ -124,6 +125,8 @@ class Stim300Emulator:
         return round(rate_deg_s / stim300.RATE_LSB_DEG_S), overload
 
     def _next_noise(self) -> float:
+        if self.frozen:
+            return 0.0
         if not self._noise:
             self._noise = (self._config.noise_deg_s * self._rng.standard_normal(4096)).tolist()
         return self._noise.pop()
@@ -165,13 +168,15 @@ class VectorNavEmulator:
         self._sign = -1.0 if config.invert else 1.0
         self._sent = 0
         self._rng = np.random.default_rng([config.seed, 100])
+        self.frozen = False
         self.latency_s = 300e-6
         self.transmission_s = 30 * BITS_PER_BYTE / config.baud
 
     def sample(self, rate_rad_s: float) -> bytes:
         """The packet of this sample."""
         self._sent += 1
-        noise = math.radians(self._config.noise_deg_s) * float(self._rng.standard_normal())
+        sigma = 0.0 if self.frozen else math.radians(self._config.noise_deg_s)
+        noise = sigma * float(self._rng.standard_normal())
         rates = [0.0, 0.0, 0.0]
         rates[self._axis] = self._sign * rate_rad_s + math.radians(self._config.bias_deg_s) + noise
         time_ns = round(self._sent / self._config.sample_rate_hz * 1e9)

@@ -93,6 +93,15 @@ class OdriveAxis:
         elif was == wire.AXIS_CLOSED_LOOP != state:
             self._output.apply(0.0, now_s, "disabled")
 
+    def fail(self, code: int, now_s: float) -> None:
+        """Go to fault by itself, with a code of the maker's."""
+        self._fail(code, now_s, f"error 0x{code:X}")
+
+    def restart(self, now_s: float) -> None:
+        """As after a dip of the supply."""
+        self._change_state(wire.AXIS_IDLE, now_s)
+        self._error, self._mode = 0, (0, 0)
+
     def _fail(self, error: int, now_s: float, detail: str) -> None:
         self._error |= error
         self._axis_state = wire.AXIS_IDLE

@@ -12,6 +12,7 @@ from rig.config.root import Config
 from rig.errors import RigError
 from sim_backend.emulators.bench import EmulatedBench
 from sim_backend.emulators.device import Event
+from sim_backend.emulators.requests import FaultRequests
 
 PRIORITY_ABOVE_THE_LOOP = 5
 
@@ -21,10 +22,15 @@ def _say(line: dict[str, object]) -> None:
     sys.stdout.flush()
 
 
-def run_emulators(config: Config) -> None:
+def _refused(why: str) -> None:
+    _say({"event": "refused", "detail": why})
+
+
+def run_emulators(config: Config, requests: int | None = None) -> None:
     """Emulate the devices of the configuration's `bench` section until SIGINT or SIGTERM.
 
-    Prints one JSON line with the ports, then one for each event of the drive.
+    Prints one JSON line with the ports, then one for each event of the drive. ``requests`` is a descriptor
+    on which faults are asked for, one JSON line each.
 
     Raises
     ------
@@ -54,7 +60,14 @@ def run_emulators(config: Config) -> None:
     )
     try:
         _say({"event": "listening", "gyro": bench.gyro_port.path, "can": bench.can_port.path})
-        bench.run(lambda: stopping)
+        faults = FaultRequests(requests, bench.inject, _refused) if requests is not None else None
+
+        def stop_asked() -> bool:
+            if faults is not None:
+                faults.poll()
+            return stopping
+
+        bench.run(stop_asked)
     finally:
         bench.close()
         realtime.release()

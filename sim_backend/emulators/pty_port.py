@@ -23,6 +23,7 @@ class PtyPort:
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
         self.lost_bytes = 0
+        self.plugged_in = True
 
     def fileno(self) -> int:
         """Descriptor to wait on."""
@@ -37,6 +38,8 @@ class PtyPort:
 
     def write(self, data: bytes) -> None:
         """Send; what does not fit is lost."""
+        if not self.plugged_in:
+            return
         try:
             sent = os.write(self._master, data)
         except BlockingIOError:
@@ -44,7 +47,10 @@ class PtyPort:
         self.lost_bytes += len(data) - sent
 
     def close(self) -> None:
-        """Unplug: the other end sees a hang-up."""
+        """Unplug: the other end sees a hang-up; safe twice."""
+        if not self.plugged_in:
+            return
+        self.plugged_in = False
         for descriptor in (self._master, self._slave):
             try:
                 os.close(descriptor)

@@ -22,7 +22,8 @@ IDENTIFY_RUN = (sys.executable, "-c", "from identify.cli import main; main()")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="emulated devices need pseudo terminals")
 # Short, and patient with a machine that others use: what is asserted is never how fast it was.
 SHORT = (
-    "excitation.sets=[{torque_nm: 40, frequency_hz: 3, duration_s: 1.5}, {torque_nm: 20, frequency_hz: 6, duration_s: 1}]",
+    "excitation.sets=[{torque_nm: 40, frequency_hz: 3, duration_s: 1.5}, "
+    "{torque_nm: 20, frequency_hz: 6, duration_s: 1.5}]",
     "excitation.rest_s=0.5", "bench.settle_s=2", "limits.missed_ticks=200", "limits.stale_gyro_ms=500",
     "limits.rate_deg_s=1000", "bench.amplifier.settings.drive_heartbeat_ms=1000",
     "identify.candidates=[coulomb_friction]", "identify.genetic.generations=5",
