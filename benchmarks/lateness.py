@@ -104,7 +104,8 @@ def main(given: Sequence[str] | None = None) -> None:
     played = f"excitation.sets=[{{torque_nm: 40, frequency_hz: 1, duration_s: {arguments.seconds}}}]"
     # What a busy machine does to the devices' processes is not what is measured here.
     beat = "bench.amplifier.settings.drive_heartbeat_ms=1000"
-    patient = ("limits.missed_ticks=1000", "limits.stale_gyro_ms=1000", beat)
+    watchdog = "bench.amplifier.watchdog_ms=1000"
+    patient = ("limits.missed_ticks=1000", "limits.stale_gyro_ms=1000", beat, watchdog)
     config = load_config(arguments.config, [played, *patient]).config
     print(f"{'':6s} {'p50':>8s}  {'p99':>8s}  {'p99.9':>8s}  {'max us':>8s}   {'CPU':>5s}")
     ratios: list[float] = []
