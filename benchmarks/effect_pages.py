@@ -39,6 +39,7 @@ SIZES: dict[str, dict[str, float]] = {  # what the pictures draw: large enough t
     "actuator_lag": {"time": 0.03},
     "torque_saturation": {"limit": 70.0},
     "torque_deadzone": {"width": 20.0},
+    "torque_scale": {"scale": 1.1},
     "torque_offset": {"level": 1.0},
     "flexible_mode": {"inertia": 0.0005, "frequency": 6.0, "ratio": 0.1},
     "sensor_lag": {"time": 0.03},

@@ -14,13 +14,17 @@ from rig.cli.exits import leave_warnings_to_developers
 from rig.cli.options import ConfigFile, DryRun, Emulate, Out, Overrides, Quiet, Seed, Version, Yes, new_app
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from identify.results import Identification
     from rig.cli.campaign import Played
     from rig.cli.results_folder import ResultsFolder
     from rig.config.load import LoadedConfig
+    from rig.preflight import Peaks
     from rig.recording.run import Recording
 
 app = new_app("")
+STOPPED_AGAIN = "stopped while all the data were identified: these are the results without the follow-up"
 
 
 @app.command()
@@ -73,7 +77,20 @@ def _run_recorded(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> in
     desk.terminal.tell(opening_recorded(len(set(files)), len(recording.runs), folder.path))
     recording = dataclasses.replace(recording, info=dict(recording.info) | provenance(loaded))
     found = _identified(desk, loaded, recording)
+    if not found.aborted:
+        from identify.follow_up_rounds import limits_of
+
+        allowed = limits_of(found, loaded.config.limits, found.axis == "linear")
+        found = _planned(desk, loaded, recording, found, allowed, _sample_rate_hz(recording))
     return _conclude(desk, loaded, folder, recording, found)
+
+
+def _sample_rate_hz(recording: Recording) -> float:
+    """Of the first run, to four digits, within what a rig plays at."""
+    import numpy as np
+
+    rate = 1.0 / float(np.median(np.diff(recording.runs[0].time_s)))
+    return float(f"{min(max(rate, 10.0), 20_000.0):.4g}")
 
 
 def _run_played(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> int:
@@ -92,12 +109,89 @@ def _run_played(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> int:
         except UsageError as error:  # the campaign was played, so this is no matter of usage any more
             desk.say_error(error)
             return NOT_ACCEPTED
-        return _conclude(desk, loaded, folder, played.recording, found)
+        if not found.aborted:
+            played, found = _followed_up(desk, loaded, folder, played, found)
+        code = _conclude(desk, loaded, folder, played.recording, found)
+        return code if played.cause is None else code_of(played.cause)
     try:
         _conclude_aborted(desk, loaded, folder, played)
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (what ended the campaign decides; this is said)
         desk.say_error(error)
     return code_of(cause)
+
+
+def _followed_up(
+    desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, played: Played, found: Identification
+) -> tuple[Played, Identification]:
+    """Plan a follow-up where a name has a rival, play it where it may be played, identify again from all the data.
+
+    Whatever a follow-up ends in, what stood before it stands: results are written before it is played.
+    """
+    from identify.follow_up_rounds import after_playing, promises_more
+    from rig.cli.follow_up import play_follow_up
+    from rig.errors import Aborted, UsageError
+    from rig.preflight import allowed_peaks
+
+    config = loaded.config
+    allowed = allowed_peaks(config.limits, config.excitation.margin, played.rate_full_scale_rad_s)
+    rate_hz, earlier_model = config.excitation.sample_rate_hz, found.final.platform
+    found = _planned(desk, loaded, played.recording, found, allowed, rate_hz)
+    for number in (1, 2):
+        plan = found.follow_up.plan if found.follow_up else None
+        if plan is None or found.aborted or not promises_more(found):
+            break
+        _write(desk, loaded, folder, played.recording, found)
+        try:
+            more = play_follow_up(
+                desk, loaded, folder, played, plan.excitation, found.final.platform, number, plan.why
+            )  # fmt: skip
+        except UsageError as refused:
+            return played, _noted(found, str(refused))
+        if more.cause is not None:
+            return more, _noted(
+                found, f"the follow-up was cut short, so these are the results without it: {more.cause}"
+            )
+        played = more
+        try:
+            newer = _identified(desk, loaded, played.recording)
+        except (Aborted, KeyboardInterrupt) as stopped:
+            return dataclasses.replace(played, cause=stopped), _noted(found, STOPPED_AGAIN)
+        except UsageError as error:
+            return played, _noted(found, f"the follow-up was played, but is of no use: {error}")
+        if newer.aborted:
+            return dataclasses.replace(played, cause=Aborted(STOPPED_AGAIN)), _noted(found, STOPPED_AGAIN)
+        found = after_playing(found, newer, earlier_model, played.recording)
+        found = _planned(desk, loaded, played.recording, found, allowed, rate_hz)
+    return played, found
+
+
+def _noted(found: Identification, note: str) -> Identification:
+    """With a word on why the plan was not played, or what came of it."""
+    follow_up = found.follow_up
+    return found if follow_up is None else dataclasses.replace(
+        found, follow_up=dataclasses.replace(follow_up, note=note)
+    )  # fmt: skip
+
+
+def _planned(
+    desk: Desk, loaded: LoadedConfig, recording: Recording, found: Identification, allowed: Peaks, rate_hz: float
+) -> Identification:
+    """With a follow-up planned, where a name has a rival; a stop on the way leaves what was found, marked aborted."""
+    from identify.follow_up import plan_follow_up, with_follow_up
+    from rig.errors import Aborted
+
+    rounds = len(found.follow_up.rounds) if found.follow_up else 0
+    prefix = "follow-up" if rounds == 0 else f"follow-up {rounds + 1}"
+    if any(found.verdict.confusable_with.values()):
+        desk.terminal.note("planning what would part the rivals")
+    try:
+        planned = plan_follow_up(
+            found, dataclasses.replace(recording, info={}), allowed, rate_hz, loaded.config.excitation.rest_s, prefix
+        )
+    except (Aborted, KeyboardInterrupt):
+        reasons = ("stopped while a follow-up was planned", *found.reasons)
+        return dataclasses.replace(found, aborted=True, accepted=False, reasons=reasons)
+    return with_follow_up(found, planned)
 
 
 def _conclude_aborted(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, played: Played) -> None:
@@ -125,12 +219,9 @@ def _conclude(
 ) -> int:
     """Write the results and the summary; returns 0 or 1."""
     from identify.summary import WIDTH, summary
-    from identify.writing import write_results
     from rig.cli.exits import NOT_ACCEPTED, OK, STOPPED
 
-    path = folder.made()
-    with desk.stops.saving():
-        write_results(path, found, recording, loaded.config.model.platform(), loaded.config.name)
+    path = _write(desk, loaded, folder, recording, found)
     desk.terminal.settle()
     if not desk.options.quiet:
         is_terminal = sys.stdout.isatty()
@@ -144,3 +235,15 @@ def _conclude(
     for reason in found.reasons:
         desk.terminal.insist(f"Not accepted: {reason}")
     return NOT_ACCEPTED
+
+
+def _write(
+    desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, recording: Recording, found: Identification
+) -> Path:
+    """Write the results; returns the folder."""
+    from identify.writing import write_results
+
+    path = folder.made()
+    with desk.stops.saving():
+        write_results(path, found, recording, loaded.config.model.platform(), loaded.config.name)
+    return path

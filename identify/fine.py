@@ -26,7 +26,7 @@ from identify.search import MOST_EFFECTS, MOST_NAMED, Search
 from identify.traces import Trace
 from rig import effects
 from rig.effects.base import Place, Scale
-from rig.platform import TERMS, Platform
+from rig.platform import TERMS
 from rig.recording.run import Array
 
 NEAR_SIGNAL = 0.3  # of the signal that a free run may leave for this search to begin
@@ -34,6 +34,7 @@ TRIED = 5  # candidates of a round that are fitted
 WORTH_A_FIT = 15.0  # expected fall of chi square
 CHANCE = 20.0  # fall of chi square, beyond the penalty, that no chance among all candidates and shapes makes
 HELD = 4.0  # the same on the held-out samples
+EQUAL = 4.0  # fall of chi square that says nothing: the library's order, simple before special, decides
 RIVAL = 10.0  # what parts two candidates for good
 STRONG = 4.0  # standard errors by which every parameter of a new effect must differ from zero
 SHARE = 0.2  # of the excess over the noise that an effect has to take away
@@ -103,6 +104,8 @@ class FineSearch:
     def _possible(self, name: str) -> bool:
         """A bias is a nuisance; a constant torque only shifts the unseen rest angle behind a gyro."""
         if name == "rate_bias" or (self.torque_free and effects.get(name).place is Place.DRIVE):
+            return False
+        if effects.get(name).needs_added_inertia and not _loads_differ(self.traces):
             return False
         return not (name == "torque_offset" and all(t.biased for t in self.traces))
 
@@ -188,17 +191,24 @@ class FineSearch:
         return True
 
     def _asked_again(self, found: Search, now: Whole) -> Whole:
-        """Rivals of effects that were added early, now in the place of the named one in the finished model."""
-        for name in now.structure.effects[len(found.base.structure.effects) : -1]:
-            models: dict[str, Platform] = {}
-            for rival, platform in found.rival_models.get(name, {}).items():
-                start = {n: v for n, v in now.values().items() if n[0] != name}
-                start |= {(rival, p): v for p, v in platform.effects[rival].items()}
-                swapped = self.whole(_swapped(now.structure, name, rival), start)
-                if swapped is not None and swapped.penalised - now.penalised < RIVAL * now.level:
-                    models[rival] = swapped.estimate.platform()
-            if name in found.rivals:
-                found.rivals[name], found.rival_models[name] = tuple(models), models
+        """Effects that were added while others were still missing, each against all others in the finished model."""
+        added = now.structure.effects[len(found.base.structure.effects) :]
+        for name in added[:-1]:
+            start = {n: v for n, v in now.values().items() if n[0] != name}
+            without = self.whole(now.structure.minus(name), start)
+            if without is None:
+                continue
+            tried, _ = self._tried(without)
+            tried[name] = now
+            chosen = self._chosen(tried, without)
+            if chosen is None:
+                continue
+            if chosen != name:
+                self.say(f"{chosen} in the place of {name}, now that the others are there")
+            now = tried[chosen]
+            found.rivals.pop(name, None)
+            found.rival_models.pop(name, None)
+            self._note_rivals(found, chosen, tried)
         return now
 
     def _restored(self, found: Search, now: Whole, terms: Sequence[str]) -> Whole:
@@ -215,6 +225,17 @@ class FineSearch:
         return now
 
     def _round(self, found: Search, now: Whole, round_: int) -> Whole | None:
+        tried, looks = self._tried(now)
+        name = self._chosen(tried, now)
+        self._keep_books(found, now, tried, looks, name, round_)
+        if name is None:
+            return None
+        best = tried[name]
+        self.say(f"added {name}: free-run error {now.estimate.sigma:.3g} -> {best.estimate.sigma:.3g}")
+        return best
+
+    def _tried(self, now: Whole) -> tuple[dict[str, Whole], list[Scored]]:
+        """The most promising candidates, fitted on top of a model, and all that were looked at."""
         names = [n for n in self.allowed if n not in now.structure.effects]
         scores = Scores(now.estimate, self.fixed, self.noise * float(np.sqrt(now.level)), self._scale(now))
         looks = scores.all(names)
@@ -228,13 +249,7 @@ class FineSearch:
             fitted = self.whole(now.structure.plus(look.effect), start, HOPELESS * best.estimate.sigma)
             if fitted is not None:
                 tried[look.effect] = fitted
-        name = self._chosen(tried, now)
-        self._keep_books(found, now, tried, looks, name, round_)
-        if name is None:
-            return None
-        best = tried[name]
-        self.say(f"added {name}: free-run error {now.estimate.sigma:.3g} -> {best.estimate.sigma:.3g}")
-        return best
+        return tried, looks
 
     def _scale(self, now: Whole) -> Scale:
         values = now.values()
@@ -270,8 +285,9 @@ class FineSearch:
             return None
         best = min(good, key=lambda n: good[n].penalised)
         level = good[best].level
-        alike = [n for n in good if good[n].penalised - good[best].penalised < RIVAL * level]
-        best = min(alike, key=lambda n: (*_simplicity(n), good[n].penalised))
+        behind = {n: (good[n].penalised - good[best].penalised) / level for n in good}
+        alike = [n for n in good if behind[n] < RIVAL]
+        best = min(alike, key=lambda n: (*_simplicity(n), behind[n] > EQUAL, effects.names().index(n)))
         for first in effects.get(best).lower_order:
             if first in good:
                 return first
@@ -303,16 +319,22 @@ class FineSearch:
             now = without
         return now
 
+    def _note_rivals(self, found: Search, name: str, tried: Mapping[str, Whole]) -> None:
+        """Who did as well as the one named, and with which model."""
+        best = tried[name]
+        alike = {
+            n: w.estimate.platform()
+            for n, w in tried.items() if n != name and w.penalised - best.penalised < RIVAL * best.level
+        }  # fmt: skip
+        found.rivals[name], found.rival_models[name] = tuple(alike), alike
+
     def _keep_books(
         self, found: Search, now: Whole, tried: Mapping[str, Whole], looks: Sequence[Scored], name: str | None,
         round_: int,
     ) -> None:  # fmt: skip
         """Every candidate of the round with its figures; rivals of the one added."""
         if name is not None:
-            best = tried[name]
-            alike = [n for n, w in tried.items() if n != name and w.penalised - best.penalised < RIVAL * best.level]
-            found.rivals[name] = tuple(alike)
-            found.rival_models[name] = {n: tried[n].estimate.platform() for n in alike}
+            self._note_rivals(found, name, tried)
         for other, w in tried.items():
             if other == name:
                 status = "added"
@@ -328,9 +350,9 @@ class FineSearch:
                 found.candidates.append(Candidate(s.effect, round_, penalty - s.gain, None, "screened out"))
 
 
-def _swapped(structure: Structure, name: str, other: str) -> Structure:
-    """The same structure with another effect in the place of one."""
-    return replace(structure, effects=tuple(other if e == name else e for e in structure.effects))
+def _loads_differ(traces: Sequence[Trace]) -> bool:
+    """Whether a known inertia was mounted for some of the runs."""
+    return len({t.run.added_inertia_kg_m2 for t in traces}) > 1
 
 
 def _simplicity(name: str) -> tuple[int, bool]:

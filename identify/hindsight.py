@@ -60,7 +60,7 @@ def hindsight(found: Identification, recording: Recording) -> tuple[Told, ...]:
     platform = found.final.platform
     if platform is None or platform.inertia_kg_m2 <= 0.0:
         return ()
-    traces = _traces(recording)
+    traces = usable_traces(recording)
     with np.errstate(all="ignore"):
         each = [information_of(t, platform, len(traces)) for t in traces]
     if not each or not all(np.all(np.isfinite(i.matrix)) for i in each) or len({i.names for i in each}) > 1:
@@ -73,7 +73,8 @@ def hindsight(found: Identification, recording: Recording) -> tuple[Told, ...]:
     return (*out, whole)
 
 
-def _traces(recording: Recording) -> list[Trace]:
+def usable_traces(recording: Recording) -> list[Trace]:
+    """The runs that are long enough to tell anything, all with the noise of the quietest."""
     found = [prepare(silent(run), i, recording.noise) for i, run in enumerate(recording.runs)]
     usable = [t for t in found if t.stretches and t.count > FEWEST]
     quietest = {c: min((t.noise for t in usable if t.channel == c), default=0.0) for c in ("rate", "angle")}

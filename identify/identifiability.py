@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -166,17 +167,20 @@ def with_delay(platform: Platform) -> Platform:
 
 
 def planned_trace(
-    platform: Platform, planned: PlannedSet, sample_rate_hz: float, noise_rad_s: float, number: int = 0
-) -> Trace:
-    """A planned set as the fit would see it, played from rest on ``platform``, its gyro free of noise."""
+    platform: Platform, planned: PlannedSet, sample_rate_hz: float, noise: float, number: int = 0,
+    channel: Literal["rate", "angle"] = "rate",
+) -> Trace:  # fmt: skip
+    """A planned set as the fit would see it, played from rest on ``platform``, its sensor free of noise."""
     time = np.arange(round(planned.duration_s * sample_rate_hz) + 1) / sample_rate_hz
     torque = TorqueSignal(time, np.asarray(planned.torque(time), dtype=float))
     motion = simulate(platform, time, torque)
+    sees_rate = channel == "rate"
     run = Run(
-        planned.name, time, np.ones(len(time), dtype=bool), rate_rad_s=motion.sensed_rate_rad_s,
+        planned.name, time, np.ones(len(time), dtype=bool),
+        rate_rad_s=motion.sensed_rate_rad_s if sees_rate else None, angle_rad=None if sees_rate else motion.angle_rad,
         torque_time_s=time, torque_nm=torque.torque_nm, frequency_hz=planned.frequency_hz,
     )  # fmt: skip
-    return prepare(run, number, noise_rad_s, lead_in_s=0.0)
+    return prepare(run, number, noise, lead_in_s=0.0)
 
 
 def vector_of(platform: Platform, runs: int) -> tuple[Structure, tuple[Name, ...], Array]:

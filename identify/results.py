@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from rig.platform import Platform
 from rig.recording.run import Array
@@ -147,6 +147,54 @@ class NoiseFloor:
 
 
 @dataclass(frozen=True)
+class Parting:
+    """How far an excitation is expected to part an effect from its rival: chi square that the loser cannot take up."""
+
+    effect: str
+    rival: str
+    separation: float
+
+
+@dataclass(frozen=True)
+class Unparted:
+    """A pair for which no excitation is planned, and why."""
+
+    effect: str
+    rival: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class FollowUpPlan:
+    """The excitation that parts what the data so far cannot."""
+
+    excitation: Mapping[str, Any]  # an `excitation` section as rig.yaml has it
+    partings: tuple[Parting, ...]
+    duration_s: float  # of torque, rests apart
+    why: str
+
+
+@dataclass(frozen=True)
+class FollowUpRound:
+    """A follow-up that was played: what it was to part, and what became of each pair."""
+
+    plan: FollowUpPlan
+    separated: tuple[tuple[str, str], ...]
+    open: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class FollowUp:
+    """What to play next, what was played, and what came of it."""
+
+    plan: FollowUpPlan | None
+    unparted: tuple[Unparted, ...] = ()
+    rounds: tuple[FollowUpRound, ...] = ()
+    note: str = ""  # why the plan was not played
+    error_without: Errors | None = None  # of the model from before the first follow-up, on all the data
+
+
+@dataclass(frozen=True)
 class Identification:
     """Everything that came out of one recording."""
 
@@ -163,6 +211,7 @@ class Identification:
     holdout_note: str
     max_error_percent: Mapping[str, float] | None = None  # Eq. 15 over the sets
     aborted: bool = False
+    follow_up: FollowUp | None = None  # where a name has a rival
 
     @property
     def final(self) -> ModelResult:

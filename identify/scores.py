@@ -85,6 +85,7 @@ class Scores:
         self._finer_ones: dict[tuple[int, int], tuple[Shots, Array]] = {}
         with ThreadPoolExecutor(2) as workers:
             self.runs = list(workers.map(self._around, estimate.shots))
+        self.largest_first = sorted(self.runs, key=lambda r: -float(np.std(r.base)))
         information = np.sum([r.columns.T @ r.columns for r in self.runs], axis=0)
         self.size = np.sqrt(np.maximum(np.diag(information), 1e-300))
         self.inverse = np.linalg.pinv(information / np.outer(self.size, self.size), rcond=1e-12, hermitian=True)
@@ -159,14 +160,14 @@ class Scores:
         return out
 
     def _unit(self, effect: Effect, shape: tuple[float, ...], gain: int) -> float:
-        """Root mean square torque of a gain of one along the measured motion."""
+        """Root mean square torque of a gain of one along the measured motion of the run that moves most."""
         if effect.place in (Place.DRIVE, Place.SENSOR):
             return 1.0
-        squares = []
-        for run in self.runs:
+        for run in self.largest_first:
             pieces = run.shots.trace.effect_pieces(effect, shape, gain)
-            squares.append(0.0 if pieces is None else float(np.mean(pieces[:, 0] ** 2)))
-        return float(np.sqrt(np.mean(squares)))
+            if pieces is not None:
+                return float(np.sqrt(np.mean(pieces[:, 0] ** 2)))
+        return 0.0
 
     def _direction(self, effect: Effect, push: tuple[dict[Name, float], bool]) -> list[Array] | None:
         """What the push adds to the simulated channel of every run, projected."""

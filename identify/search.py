@@ -98,7 +98,11 @@ class Loop:
     ) -> None:
         self.whole = whole or fitting  # spectral lines want the longest stretches there are
         self.fitting, self.judging, self.start, self.say = fitting, judging, start, say
-        self.allowed = [n for n in allowed if effects.get(n).place is not Place.SENSOR]
+        several = len({t.run.added_inertia_kg_m2 for t in (*fitting, *judging)}) > 1
+        self.allowed = [
+            n for n in allowed
+            if effects.get(n).place is not Place.SENSOR and (several or not effects.get(n).needs_added_inertia)
+        ]  # fmt: skip
         self.noise = float(np.sqrt(np.mean([t.noise**2 for t in fitting])))
         self.torque_free = all(t.torque is None for t in fitting)
         self.runs = 1 + max(t.number for t in (*fitting, *judging))

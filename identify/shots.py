@@ -15,6 +15,7 @@ from identify.traces import LEAD_S, Trace
 from rig.dynamics import Equations, Grid
 from rig.recording.run import Array
 
+SENSOR_LEAD_S = 0.02  # longer than a gyro's filter remembers
 RUNAWAY = np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a simulation may; its error is then infinite
 
 
@@ -84,9 +85,19 @@ def predict(shots: Shots, equations: Equations, starts: Array, bias: float) -> A
     active = [(a * ratio, min(b, n - 1) * ratio) for (a, b), on in zip(shots.edges, shots.active, strict=True) if on]
     fine = equations.integrate_shots(torque, grid.step_s, active, starts[shots.active], shots.trace.offset_s)
     if rate and equations.sensor.names:
-        return np.asarray(equations.sensor.apply(fine[:, 1], grid.step_s)[: n * ratio : ratio] + bias)
+        sensed = _sensed(equations, fine[:, 1], active[0][0] if active else 0, grid.step_s)
+        return np.asarray(sensed[: n * ratio : ratio] + bias)
     out = fine[: n * ratio : ratio, 1 if rate else 0]
     return out + bias if rate else out
+
+
+def _sensed(equations: Equations, rate: Array, first: int, step_s: float) -> Array:
+    """The rate behind the sensor's filters, which have seen the motion before it is simulated: straight backwards."""
+    lead = round(SENSOR_LEAD_S / step_s)
+    slope = rate[first + 1] - rate[first] if first + 1 < len(rate) else 0.0
+    before = rate[first] + slope * np.arange(-lead, 0)
+    sensed = equations.sensor.apply(np.concatenate([before, rate[first:]]), step_s)
+    return np.concatenate([rate[:first], sensed[lead:]])
 
 
 @RUNAWAY

@@ -11,13 +11,15 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from identify.follow_up_wording import lines as follow_up_lines
 from identify.next_steps import next_steps
-from identify.results import Identification, ModelResult, ParameterEstimate
+from identify.results import Identification, ParameterEstimate
 from identify.wording import (
     SYMBOLS,
     bent_percent,
     bent_sentences,
     capital,
+    errors_in_turn,
     not_reported,
     number,
     pairs,
@@ -68,6 +70,7 @@ def _whole(identification: Identification) -> Group:
         *_listed("Dropped, since the data do not support it", not_reported(final.dropped)),
         *_listed("Not determined by these data", not_reported(final.not_determined)),
         *_listed("Confusable on these data", pairs(verdict.confusable_with)),
+        *_listed("Follow-up", follow_up_lines(identification.follow_up) if identification.follow_up else ()),
     ]
     if identification.per_set:
         parts += [Text(), _sets(identification)]
@@ -132,7 +135,7 @@ def _estimate(estimate: ParameterEstimate | None) -> str:
 
 
 def _errors(identification: Identification) -> Table:
-    models: list[ModelResult] = [identification.before, *([identification.after] if identification.after else [])]
+    models = errors_in_turn(identification)
     floor = identification.noise_floor
     linear = identification.axis == "linear"
     angle = bool(identification.traces) and identification.traces[0].channel == "angle"
@@ -145,10 +148,10 @@ def _errors(identification: Identification) -> Table:
         (f"{torque} residual", "residual_rms_torque", floor.residual_rms_torque, torque_unit),
         (f"{torque} residual / {torque}, held out", "holdout_torque_relative", None, ""),
     ]
-    head = ["", "declared model", *(["final model"] if identification.after else []), "noise floor", "unit"]
+    head = ["", *models, "noise floor", "unit"]
     table = _table("Error", head, words=(0, len(head) - 1))
     for words, key, least, its_unit in kinds:
-        values = [getattr(model.error, key) for model in models]
+        values = [getattr(error, key) for error in models.values()]
         if any(value is not None for value in values):
             table.add_row(words, *[number(value) for value in values], number(least), its_unit)
     return table

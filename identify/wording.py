@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from identify.results import Identification, NotReported, ParameterEstimate
+from identify.results import Errors, Identification, NotReported, ParameterEstimate
 
 SYMBOLS = {
     "inertia": "J",
@@ -117,6 +117,20 @@ def percent(value: float | None) -> str:
     if value is None or not math.isfinite(value):
         return "-"
     return f"{'+' if value > 0 else '-' if value < 0 else ''}{number(abs(value), 3 if abs(value) >= 10 else 2)} %"
+
+
+def errors_in_turn(identification: Identification) -> dict[str, Errors]:
+    """What each model in turn leaves, by what a table calls it: declared, before a follow-up where one was played, final.
+
+    All on the same samples.
+    """
+    follow_up = identification.follow_up
+    out = {"declared model": identification.before.error}
+    if follow_up is not None and follow_up.error_without is not None:
+        return out | {
+            "without follow-up": follow_up.error_without, "after follow-up": identification.final.error
+        }  # fmt: skip
+    return out | ({"final model": identification.after.error} if identification.after else {})
 
 
 def bent_percent(identification: Identification) -> dict[str, float]:

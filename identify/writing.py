@@ -1,4 +1,4 @@
-"""The results folder: result.json, model.yaml, report.html and recording.h5."""
+"""The results folder: result.json, model.yaml, follow_up.yaml, report.html and recording.h5."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from identify.follow_up_wording import file_name, follow_up_yaml
 from identify.json_values import finite
 from identify.next_steps import next_steps
 from identify.report import report_html
 from identify.results import (
     Errors,
+    FollowUp,
+    FollowUpPlan,
     GeneticRun,
     Identification,
     ModelResult,
@@ -52,6 +55,7 @@ def result_json(identification: Identification) -> dict[str, Any]:
         "bent_percent": bent_percent(identification),
         "genetic": _genetic(identification.joint) if identification.joint else None,
         "holdout": identification.holdout_note,
+        "follow_up": _follow_up(identification) if identification.follow_up else None,
     }
     if identification.max_error_percent is None:
         del content["max_error_percent"]
@@ -89,6 +93,43 @@ def _listed(several: Sequence[NotReported]) -> list[dict[str, str]]:
 
 def _verdict(verdict: Verdict) -> dict[str, Any]:
     return dict(vars(verdict)) | {"candidates": [dict(vars(candidate)) for candidate in verdict.candidates]}
+
+
+def _follow_up(identification: Identification) -> dict[str, Any] | None:
+    """What to play next, what was played, what became of each pair, and the error at each step on the same samples."""
+    found: FollowUp | None = identification.follow_up
+    if found is None:
+        return None
+    errors = None
+    if found.error_without is not None:
+        models = {
+            "before": identification.before.error, "after": found.error_without,
+            "after_follow_up": identification.final.error,
+        }  # fmt: skip
+        errors = {name: _error(error) for name, error in models.items()}
+    return {
+        "planned": _plan(found.plan, file_name(len(found.rounds))) if found.plan else None,
+        "not_planned": [dict(vars(one)) for one in found.unparted],
+        "played": bool(found.rounds),
+        "rounds": [
+            {"plan": _plan(r.plan, file_name(n)), "separated": _pairs(r.separated), "open": _pairs(r.open)}
+            for n, r in enumerate(found.rounds)
+        ],
+        "separated": [pair for r in found.rounds for pair in _pairs(r.separated)],
+        "note": found.note,
+        "error": errors,
+    }  # fmt: skip
+
+
+def _plan(plan: FollowUpPlan, file: str) -> dict[str, Any]:
+    return {
+        "file": file, "why": plan.why, "duration_s": plan.duration_s, "excitation": plan.excitation,
+        "pairs": [dict(vars(one)) for one in plan.partings],
+    }  # fmt: skip
+
+
+def _pairs(several: Sequence[tuple[str, str]]) -> list[dict[str, str]]:
+    return [{"effect": effect, "rival": rival} for effect, rival in several]
 
 
 def _set(one: SetResult) -> dict[str, Any]:
@@ -172,11 +213,12 @@ def write_results(
     name: str,
     journal: JournalContents | None = None,
 ) -> tuple[Path, ...]:
-    """Write recording.h5, model.yaml, report.html and result.json into ``folder``, in that order.
+    """Write recording.h5, model.yaml, follow_up.yaml, report.html and result.json into ``folder``, in that order.
 
     ``declared`` is the platform of the configuration, ``name`` the campaign's. A recording.h5 that stands
     there already is left alone. Each file appears whole or not at all, and result.json last: where it
-    stands, the others do. Returns the paths written; model.yaml is left out where no valid model came out.
+    stands, the others do. Returns the paths written; model.yaml is left out where no valid model came out, follow_up.yaml
+    where nothing is planned.
 
     Raises
     ------
@@ -193,6 +235,9 @@ def write_results(
         texts = {"model.yaml": model_text(identification, declared)}
     except ValueError:
         texts = {}
+    follow_up = identification.follow_up
+    if follow_up is not None and follow_up.plan is not None:
+        texts[file_name(len(follow_up.rounds))] = follow_up_yaml(follow_up.plan)
     texts["report.html"] = report_html(identification, recording, name)
     texts["result.json"] = json.dumps(result_json(identification), indent=1, allow_nan=False) + "\n"
     for file, text in texts.items():

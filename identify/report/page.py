@@ -11,6 +11,7 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs
 
+from identify.follow_up_wording import lines as follow_up_lines
 from identify.hindsight import hindsight
 from identify.json_values import finite
 from identify.next_steps import next_steps
@@ -193,6 +194,7 @@ def _candidates(identification: Identification) -> Markup:
         candidate_table(verdict.candidates, identification.noise_floor.holdout_rate_rms),
         _titled("Confusable on these data", pairs(verdict.confusable_with)),
         _titled("Not to be told apart by any torque and rate", never),
+        _titled("Follow-up", follow_up_lines(identification.follow_up) if identification.follow_up else ()),
     )
 
 

@@ -12,6 +12,7 @@ from identify.wording import (
     SYMBOLS,
     bent_percent,
     capital,
+    errors_in_turn,
     frequency,
     half_interval,
     interval_of,
@@ -95,15 +96,16 @@ def error_table(identification: Identification) -> Markup:
         (f"{q.torque} residual over {q.torque}", "residual_torque_relative", "%", None),
         ("the same, held-out samples", "holdout_torque_relative", "%", None),
     ]
+    models = errors_in_turn(identification)
     rows: list[list[Piece]] = []
     for words, key, its_unit, least in kinds:
-        values = [getattr(model.error, key) for model in (identification.before, identification.after) if model]
+        values = [getattr(error, key) for error in models.values()]
         if all(value is None for value in values):
             continue
         times = 100.0 if key.endswith("_relative") else 1.0
         shown = [number(None if value is None else times * value) for value in values]
         rows.append([words, *shown, number(least), its_unit])
-    head = ["", "declared model", *(["final model"] if identification.after else []), "noise floor", "unit"]
+    head = ["", *models, "noise floor", "unit"]
     cutoff = identification.final.error.lowpass_hz
     note = f" Torque figures behind a zero-phase low-pass at {cutoff:g} Hz." if cutoff else ""
     return table(head, rows, f"Error before and after. The noise floor is {floor.source}.{note}")

@@ -33,6 +33,7 @@ _MODULES = {
     "torque_saturation": "torque_saturation",
     "torque_deadzone": "torque_deadzone",
     "torque_offset": "torque_offset",
+    "torque_scale": "torque_scale",
     "flexible_mode": "flexible_mode",
     "sensor_lag": "sensor_lag",
     "rate_bias": "rate_bias",

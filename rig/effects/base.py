@@ -112,6 +112,7 @@ class Effect:
     lower_order: tuple[str, ...] = ()  # effects that come first by marginality: a constant before a slope
     nests: tuple[str, ...] = ()  # simpler effects that this one contains as a special case
     never_separable: Mapping[str, str] | None = None  # rival -> why no torque-to-rate data can tell
+    needs_added_inertia: bool = False  # shows only where runs carry a known inertia besides the platform's own
     separated_by: str = ""
 
     def values(self, given: Mapping[str, float]) -> tuple[float, ...]:

@@ -24,6 +24,7 @@ VALUES: Mapping[str, Mapping[str, float]] = {
     "actuator_lag": {"time": 0.003},
     "torque_saturation": {"limit": 70.0},
     "torque_deadzone": {"width": 1.0},
+    "torque_scale": {"scale": 1.07},
     "torque_offset": {"level": 1.0},
     "flexible_mode": {"inertia": 0.0005, "frequency": 70.0, "ratio": 0.02},
     "sensor_lag": {"time": 0.002},

@@ -1,0 +1,245 @@
+"""The follow-up: for a name that has a rival, the excitation that parts the two best within the limits.
+
+Every shape at every amplitude is simulated on both models; what the loser could still take up is projected off
+(``follow_up_separation``), and the sets that part all pairs in the shortest time make the plan. Nothing here plays.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from identify.follow_up_pairs import Pair, pairs_of
+from identify.follow_up_separation import Sensor, Share, Way, coarser, measured, raw, settled, share_of
+from identify.follow_up_shapes import Candidate, candidates, passes, shapes
+from identify.follow_up_wording import verdict_sentences, why_of
+from identify.hindsight import usable_traces
+from identify.results import FollowUp, FollowUpPlan, Identification, Parting, Unparted
+from identify.wording import number
+from rig import effects
+from rig.config.excitation import ExcitationConfig
+from rig.platform import Platform
+from rig.preflight import Peaks
+from rig.recording.run import Recording
+
+LEAST = 25.0  # chi square that a plan has to promise: five standard errors
+GOOD = 400.0  # from which more sets are not worth their time
+BEST = 1e4  # from which more of it proves nothing more
+ALIKE = 0.5  # of the best score: the shorter of two such sets is played
+MOST_SETS = 4
+LOOKED_AT = 14  # candidates of a pair whose sensitivities are taken
+LOOK_HZ = 2000.0  # sample rate that is fine enough for a first look
+USUAL_HZ = 5.0  # where nothing swings
+CAP = 1.3  # times the predicted travel: what a set may reach on a rig whose declared model is another one
+
+
+@dataclass(frozen=True)
+class Table:
+    """What the rig allows, and how a set is read."""
+
+    allowed: Peaks
+    sensor: Sensor
+    rest_s: float
+    prefix: str = "follow-up"
+    linear: bool = False
+
+
+def plan_follow_up(
+    found: Identification, recording: Recording, allowed: Peaks, sample_rate_hz: float, rest_s: float,
+    prefix: str = "follow-up",
+) -> FollowUp | None:  # fmt: skip
+    """What to play next so that no name has a rival; None where none has one.
+
+    Parameters
+    ----------
+    recording
+        What ``found`` was identified from: its information stays, and is added to.
+    allowed
+        Travel in degrees, rate in degrees per second and torque in N m that no set may exceed (on a linear axis a
+        metre counts as a radian).
+    sample_rate_hz
+        Of the sets to come.
+    prefix
+        What the names of the sets begin with; names of one campaign have to differ.
+    """
+    if not any(found.verdict.confusable_with.values()):
+        return None
+    if any(run.torque_nm is None or not np.any(run.torque_nm) for run in recording.runs):
+        why = "no torque was recorded, so none can be planned: record a decay from another amplitude"
+        return FollowUp(None, tuple(Unparted(e, r, why) for e, rivals in _all(found) for r in rivals))
+    traces = usable_traces(recording)
+    noise = max(found.noise_floor.holdout_rate_rms, found.final.error.holdout_rate_rms or 0.0)
+    with np.errstate(all="ignore"):
+        pairs, without = pairs_of(found, traces, noise)
+        if not pairs:
+            return FollowUp(None, tuple(without))
+        sensor = Sensor(sample_rate_hz, noise, traces[0].channel)
+        return _planned(pairs, without, Table(allowed, sensor, rest_s, prefix, found.axis == "linear"))
+
+
+def _all(found: Identification) -> list[tuple[str, tuple[str, ...]]]:
+    return list(found.verdict.confusable_with.items())
+
+
+def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table) -> FollowUp:
+    platforms = list(dict.fromkeys(_Key(m) for p in pairs for m in p.models))
+    models = [k.platform for k in platforms]
+    look, weight = coarser(table.sensor, LOOK_HZ)
+    several = shapes(natural_hz(models[0]), table.sensor.sample_rate_hz)
+    choice = candidates(several, models, table.allowed, look.sample_rate_hz)
+    choice = [c for c in choice if passes(c.planned, models, table.allowed)] if choice else []
+    if not choice:
+        why = "no set of any kind stays within the limits"
+        return FollowUp(None, (*without, *(Unparted(p.effect, p.rival, why) for p in pairs)))
+    looks = _Looks(pairs, choice, look, weight)
+    chosen = _choose(looks)
+    partings, failed = [], list(without)
+    for k, pair in enumerate(pairs):
+        best = min(settled(w, [choice[i].planned for i in chosen], look) * weight for w in pair.ways) if chosen else 0.0
+        if best >= LEAST:
+            partings.append(Parting(pair.effect, pair.rival, best))
+            continue
+        failed.append(Unparted(pair.effect, pair.rival, _too_little(pair, max(best, looks.best_of(k)), best)))
+    if not partings:
+        return FollowUp(None, tuple(failed))
+    sets = [choice[i] for i in chosen]
+    plan = FollowUpPlan(
+        _section(sets, table), tuple(partings), sum(c.planned.duration_s for c in sets), why_of(partings, sets)
+    )
+    return FollowUp(plan, tuple(failed))
+
+
+class _Key:
+    """A platform that can be told from others: its effects make it no key by itself."""
+
+    def __init__(self, platform: Platform) -> None:
+        self.platform = platform
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Key) and self.platform == other.platform
+
+    def __hash__(self) -> int:
+        return hash((self.platform.inertia_kg_m2, tuple(self.platform.effects)))
+
+
+def _too_little(pair: Pair, promised: float, reached: float) -> str:
+    """Why a pair has no part in the plan."""
+    cure = effects.get(pair.effect).separated_by
+    told = f" (what would tell it {cure})" if cure.startswith("from ") else ""
+    return (
+        f"no excitation within the limits parts them: the best leaves chi square {number(min(promised, reached), 2)}, "
+        f"{LEAST:g} are needed{told}"
+    )
+
+
+def natural_hz(platform: Platform) -> float:
+    """The frequency that a platform swings at, or a usual one where it has no spring."""
+    j, k = platform.inertia_kg_m2, platform.stiffness_nm_rad
+    return float(np.sqrt(k / j) / (2.0 * np.pi)) if k > 0.0 and j > 0.0 else USUAL_HZ
+
+
+class _Looks:
+    """Chi square between the models of each pair under each candidate, computed where it is asked for."""
+
+    def __init__(self, pairs: Sequence[Pair], choice: Sequence[Candidate], sensor: Sensor, weight: float) -> None:
+        self.pairs, self.choice, self._sensor, self._weight = pairs, choice, sensor, weight
+        self._shares: dict[tuple[int, int, int], Share] = {}
+        self.shortlist = sorted({i for p in pairs for i in self._promising(p)})
+
+    def _promising(self, pair: Pair) -> list[int]:
+        """The candidates with the largest difference of each amplitude: a small one may tell more in the end."""
+        size = [self._weight * raw(pair.ways[0], c.planned, self._sensor) for c in self.choice]
+        shares = sorted({c.share for c in self.choice}, reverse=True)
+        per = max(1, LOOKED_AT // len(shares))
+        out = []
+        for share in shares:
+            mine = [i for i, c in enumerate(self.choice) if c.share == share and size[i] > LEAST]
+            out += sorted(mine, key=lambda i: -size[i])[:per]
+        return out
+
+    def _share(self, i: int, k: int, w: int, way: Way) -> Share:
+        key = (i, k, w)
+        if key not in self._shares:
+            found = share_of(way.model, measured(way.truth, self.choice[i].planned, self._sensor))
+            g = self._weight
+            self._shares[key] = Share(g * found.squares, g * found.gradient, g * found.information)
+        return self._shares[key]
+
+    def separation(self, chosen: Sequence[int], k: int) -> float:
+        """Chi square between the models of pair ``k`` after all chosen sets, in the worse direction."""
+        left = []
+        for w, way in enumerate(self.pairs[k].ways):
+            several = [self._share(i, k, w, way) for i in chosen]
+            total = several[0]
+            for one in several[1:]:
+                total = total + one
+            left.append(total.left(way.prior))
+        return min(left)
+
+    def best_of(self, k: int) -> float:
+        """The most that a single candidate does for a pair."""
+        return max((self.separation([i], k) for i in self.shortlist), default=0.0)
+
+    def score(self, chosen: Sequence[int]) -> float:
+        """How well all pairs are parted: more of what is enough counts nothing."""
+        return float(sum(np.log1p(np.clip(self.separation(chosen, k), 0.0, BEST)) for k in range(len(self.pairs))))
+
+    def duration(self, i: int) -> float:
+        """Length of a candidate in seconds."""
+        return self.choice[i].planned.duration_s
+
+
+def _choose(looks: _Looks) -> list[int]:
+    """Set by set, each the one that parts most; the shortest of those that do nearly as well."""
+    chosen: list[int] = []
+    while looks.shortlist and len(chosen) < MOST_SETS:
+        reached = [looks.separation(chosen, k) for k in range(len(looks.pairs))] if chosen else [0.0]
+        if chosen and min(reached) >= GOOD:
+            break
+        now = looks.score(chosen) if chosen else 0.0
+        gains = {i: looks.score([*chosen, i]) - now for i in looks.shortlist}
+        best = max(gains.values())
+        if best < 0.1:  # of the logarithm: nothing that would be seen
+            break
+        alike = [i for i, g in gains.items() if g > best - ALIKE]
+        chosen.append(min(alike, key=lambda i: (looks.duration(i), -gains[i])))
+    return chosen
+
+
+def _section(sets: Sequence[Candidate], table: Table) -> dict[str, Any]:
+    """The plan as an `excitation` section of a rig.yaml, checked as such."""
+    entries = []
+    for candidate in sets:
+        entry = candidate.planned.excitation.model_dump(mode="json", exclude_defaults=True)
+        entry = {"kind": candidate.planned.excitation.model_dump()["kind"]} | entry
+        entry["name"] = f"{table.prefix}: {_described(candidate)}"
+        if not table.linear:
+            entry["travel_cap_deg"] = float(f"{min(CAP * candidate.travel_deg, table.allowed.travel_deg):.3g}")
+        entries.append(entry)
+    section = {
+        "sample_rate_hz": table.sensor.sample_rate_hz, "rest_s": table.rest_s, "scale_to_limits": True, "sets": entries
+    }  # fmt: skip
+    ExcitationConfig.model_validate_json(json.dumps(section), strict=True)
+    return section
+
+
+def _described(candidate: Candidate) -> str:
+    excitation = candidate.planned.excitation
+    torque = excitation.model_dump()["torque_nm"]
+    words = excitation.describe()
+    return words if "N m" in words else f"{words}, {torque:g} N m"
+
+
+def with_follow_up(found: Identification, planned: FollowUp | None) -> Identification:
+    """The identification with what is planned now, behind what was played; said in the verdict too."""
+    if planned is None:
+        return found
+    before = found.follow_up
+    if before is not None:
+        planned = replace(before, plan=planned.plan, unparted=planned.unparted, note="")
+    told = (*found.verdict.sentences, *verdict_sentences(planned))
+    return replace(found, follow_up=planned, verdict=replace(found.verdict, sentences=told))

@@ -1,0 +1,125 @@
+"""Which names have a rival that more data could exclude, and the models of both as the finished model has them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identify.follow_up_separation import Way, prior_of
+from identify.identifiability import vector_of
+from identify.output_error import Estimate, evaluate, refine
+from identify.regression import Structure
+from identify.results import Identification, Unparted
+from identify.traces import Trace
+from rig import effects
+from rig.platform import Platform
+
+MOST_PAIRS = 6
+EXCLUDED = 25.0  # chi square by which the data have excluded a rival already
+REFIT = 10  # iterations in which a rival is fitted into the finished model
+
+
+@dataclass(frozen=True)
+class Pair:
+    """An effect and its rival, each in the finished model, and the directions in which data have to decide."""
+
+    effect: str
+    rival: str
+    models: tuple[Platform, Platform]
+    ways: tuple[Way, ...]
+
+
+def never_reason(effect: str, rival: str) -> str:
+    """Why no torque-to-rate data can tell two effects apart; empty where some can."""
+    for one, other in ((effect, rival), (rival, effect)):
+        why = (effects.get(one).never_separable or {}).get(other)
+        if why:
+            return why
+    return ""
+
+
+def pairs_of(found: Identification, traces: Sequence[Trace], noise: float) -> tuple[list[Pair], list[Unparted]]:
+    """The pairs to part, and those for which nothing can be planned."""
+    pairs: list[Pair] = []
+    without: list[Unparted] = []
+    final = found.final.platform
+    for effect, rivals in found.verdict.confusable_with.items():
+        for rival in rivals:
+            why = never_reason(effect, rival)
+            model = found.verdict.rival_models.get(effect, {}).get(rival)
+            if why:
+                without.append(Unparted(effect, rival, why))
+            elif final is None or model is None or effect not in final.effects:
+                without.append(Unparted(effect, rival, "there is no fitted model of it to plan with"))
+            elif len(pairs) == MOST_PAIRS:
+                without.append(Unparted(effect, rival, f"the {MOST_PAIRS} pairs before it come first"))
+            else:
+                placed = _in_place(final, effect, rival, model, traces, noise)
+                if placed is None:
+                    why = "fitted in the finished model it leaves far more than what is named: these data exclude it"
+                    without.append(Unparted(effect, rival, why))
+                else:
+                    pairs.append(
+                        Pair(effect, rival, (final, placed), _ways(final, placed, effect, rival, traces, noise))
+                    )
+    return pairs, without
+
+
+def _ways(
+    named: Platform, other: Platform, effect: str, rival: str, traces: Sequence[Trace], noise: float
+) -> tuple[Way, ...]:
+    """Where both have as many parameters either may be the truth, and the other has to fail.
+
+    One with more parameters may pass for the simpler without being true: that is for their penalty to decide. So
+    the data have to show only that the simpler cannot pass for the richer.
+    """
+    sizes = len(effects.get(effect).parameters), len(effects.get(rival).parameters)
+    out = []
+    if sizes[0] <= sizes[1]:
+        out.append(Way(other, named, prior_of(named, traces, noise)))
+    if sizes[1] <= sizes[0]:
+        out.append(Way(named, other, prior_of(other, traces, noise)))
+    return tuple(out)
+
+
+def _in_place(
+    final: Platform, effect: str, rival: str, model: Platform, traces: Sequence[Trace], noise: float
+) -> Platform | None:
+    """The rival in the place of the effect in the finished model; None where the data exclude it there."""
+    wanted = tuple(rival if e == effect else e for e in final.effects)
+    if set(model.effects) == set(wanted) and model.terms == final.terms:
+        return model
+    held = {e: model.effects[rival] if e == rival else final.effects[e] for e in wanted}
+    swapped = replace(final, effects=held)
+    structure, names, values = vector_of(swapped, 1 + max(t.number for t in traces))
+    start = dict(zip(names, values.tolist(), strict=True))
+    fitted = refine(traces, structure, start, None, REFIT, coarse=True, tolerance=1e-3)
+    if not np.isfinite(fitted.sigma):
+        return None
+    worse = (fitted.sigma**2 - _sigma(final, traces) ** 2) * fitted.count / noise**2
+    return None if worse > EXCLUDED else fitted.platform()
+
+
+def _sigma(platform: Platform, traces: Sequence[Trace]) -> float:
+    """Root mean square that a platform leaves of recorded runs in free run."""
+    return free_run(platform, traces).sigma
+
+
+def free_run(platform: Platform, traces: Sequence[Trace]) -> Estimate:
+    """A platform in free run over recorded runs: start states and bias fitted, and what belongs to single runs."""
+    structure, names, values = vector_of(platform, 1 + max(t.number for t in traces))
+    return _of_runs(structure, names, values, traces)
+
+
+def _of_runs(
+    structure: Structure, names: tuple[tuple[str, ...], ...], values: object, traces: Sequence[Trace]
+) -> Estimate:
+    x = np.asarray(values, dtype=float)
+    held = Estimate(structure, names, x, np.inf, 0, np.zeros((0, 0)), (), True)
+    if any(len(n) == 3 for n in names):
+        start = dict(zip(names, x.tolist(), strict=True))
+        shared = [n for n in names if len(n) < 3]
+        held = refine(traces, structure, start, None, REFIT, fixed=shared, coarse=True)
+    return evaluate(held, traces)

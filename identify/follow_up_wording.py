@@ -1,0 +1,82 @@
+"""The follow-up in words: what to play and why, what was played, what came of it; and follow_up.yaml itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import yaml
+
+from identify.follow_up_shapes import Candidate
+from identify.results import FollowUp, FollowUpPlan, Parting, Unparted
+from identify.wording import capital, joined, number, plain
+from rig import effects
+
+FILE = "follow_up.yaml"
+
+
+def file_name(rounds: int) -> str:
+    """What the plan behind so many played follow-ups is called in the results folder."""
+    return FILE if rounds == 0 else f"follow_up_{rounds + 1}.yaml"
+
+
+def why_of(partings: Sequence[Parting], sets: Sequence[Candidate]) -> str:
+    """One sentence: what the sets are, and what they part."""
+    words = joined(list(dict.fromkeys(c.words for c in sets)))
+    parts = "parts" if len({c.words for c in sets}) == 1 else "part"
+    told = joined([f"{plain(p.effect)} from {plain(p.rival)} (expected chi square {size(p)})" for p in partings])
+    return f"{capital(words)} {parts} {told}."
+
+
+def size(parting: Parting) -> str:
+    """An expected separation, to two digits: it is no more exact than the models."""
+    return number(float(f"{parting.separation:.2g}"), 2) if parting.separation < 1e4 else f"{parting.separation:.0e}"
+
+
+def unparted_sentence(one: Unparted) -> str:
+    """Why a pair has no plan."""
+    return capital(f"{plain(one.effect)} and {plain(one.rival)}: {one.reason}.")
+
+
+def verdict_sentences(follow_up: FollowUp) -> list[str]:
+    """What the verdict adds: the plan, and the pairs that no plan parts for want of limits."""
+    out = []
+    if follow_up.plan is not None:
+        out.append(f"To part what these data cannot: {_lower(follow_up.plan.why)}")
+    out += [
+        f"{capital(plain(one.effect))} and {plain(one.rival)} stay open: {one.reason}."
+        for one in follow_up.unparted
+        if one.rival not in (effects.get(one.effect).never_separable or {})  # said by the verdict already
+    ]
+    return out
+
+
+def _lower(sentence: str) -> str:
+    return sentence[:1].lower() + sentence[1:]
+
+
+def lines(follow_up: FollowUp) -> list[str]:
+    """Everything about the follow-up, one sentence each."""
+    out = []
+    for n, one in enumerate(follow_up.rounds, 1):
+        head = "Played" if len(follow_up.rounds) == 1 else f"Played, {n}"
+        out.append(f"{head}: {_lower(one.plan.why)}")
+        out += [f"{capital(plain(a))} and {plain(b)} are told apart now." for a, b in one.separated]
+        out += [f"{capital(plain(a))} and {plain(b)} are still open." for a, b in one.open]
+    if follow_up.plan is not None:
+        out.append(
+            f"{file_name(len(follow_up.rounds))} ({follow_up.plan.duration_s:.0f} s): {_lower(follow_up.plan.why)}"
+        )
+    if follow_up.note:
+        out.append(capital(follow_up.note))
+    return out + [unparted_sentence(one) for one in follow_up.unparted]
+
+
+def follow_up_yaml(plan: FollowUpPlan) -> str:
+    """The text of follow_up.yaml: an `excitation:` section that a rig.yaml may hold or name."""
+    head = [
+        plan.why,
+        f"{plan.duration_s:.0f} s of torque, rests apart. Play it on the same rig: `excitation:` of its rig.yaml takes",
+        "the path of this file (or --set excitation=PATH), then give all recordings to identify-run together.",
+    ]
+    text = yaml.safe_dump({"excitation": dict(plan.excitation)}, sort_keys=False, default_flow_style=None, width=110)
+    return "".join(f"# {line}\n" for line in head) + text
