@@ -148,18 +148,19 @@ def _followed_up(
         except UsageError as refused:
             return played, _noted(found, str(refused))
         if more.cause is not None:
-            return more, _noted(
-                found, f"the follow-up was cut short, so these are the results without it: {more.cause}"
-            )
+            note = f"the follow-up was cut short, so these are the results without it: {more.cause}"
+            return more, dataclasses.replace(_noted(found, note), aborted=True)
         played = more
         try:
             newer = _identified(desk, loaded, played.recording)
         except (Aborted, KeyboardInterrupt) as stopped:
-            return dataclasses.replace(played, cause=stopped), _noted(found, STOPPED_AGAIN)
+            found = dataclasses.replace(_noted(found, STOPPED_AGAIN), aborted=True)
+            return dataclasses.replace(played, cause=stopped), found
         except UsageError as error:
             return played, _noted(found, f"the follow-up was played, but is of no use: {error}")
         if newer.aborted:
-            return dataclasses.replace(played, cause=Aborted(STOPPED_AGAIN)), _noted(found, STOPPED_AGAIN)
+            found = dataclasses.replace(_noted(found, STOPPED_AGAIN), aborted=True)
+            return dataclasses.replace(played, cause=Aborted(STOPPED_AGAIN)), found
         found = after_playing(found, newer, earlier_model, played.recording)
         found = _planned(desk, loaded, played.recording, found, allowed, rate_hz)
     return played, found

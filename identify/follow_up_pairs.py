@@ -10,7 +10,6 @@ import numpy as np
 from identify.follow_up_separation import Way, prior_of
 from identify.identifiability import vector_of
 from identify.output_error import Estimate, evaluate, refine
-from identify.regression import Structure
 from identify.results import Identification, Unparted
 from identify.traces import Trace
 from rig import effects
@@ -110,16 +109,9 @@ def _sigma(platform: Platform, traces: Sequence[Trace]) -> float:
 def free_run(platform: Platform, traces: Sequence[Trace]) -> Estimate:
     """A platform in free run over recorded runs: start states and bias fitted, and what belongs to single runs."""
     structure, names, values = vector_of(platform, 1 + max(t.number for t in traces))
-    return _of_runs(structure, names, values, traces)
-
-
-def _of_runs(
-    structure: Structure, names: tuple[tuple[str, ...], ...], values: object, traces: Sequence[Trace]
-) -> Estimate:
-    x = np.asarray(values, dtype=float)
-    held = Estimate(structure, names, x, np.inf, 0, np.zeros((0, 0)), (), True)
+    held = Estimate(structure, names, values, np.inf, 0, np.zeros((0, 0)), (), True)
     if any(len(n) == 3 for n in names):
-        start = dict(zip(names, x.tolist(), strict=True))
+        start = dict(zip(names, values.tolist(), strict=True))
         shared = [n for n in names if len(n) < 3]
         held = refine(traces, structure, start, None, REFIT, fixed=shared, coarse=True)
     return evaluate(held, traces)

@@ -13,8 +13,8 @@ from identify.hindsight import usable_traces
 from identify.holdout import split
 from identify.identifiability import vector_of
 from identify.measures import measure
-from identify.results import Errors, FollowUp, FollowUpRound, Identification
 from identify.next_steps import USUAL_CUTOFF_HZ
+from identify.results import Errors, FollowUp, FollowUpRound, Identification
 from rig.config.limits import LimitsConfig
 from rig.platform import Platform
 from rig.preflight import Peaks

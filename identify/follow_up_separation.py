@@ -77,7 +77,7 @@ class Share:
 
 
 def prior_of(platform: Platform, traces: Sequence[Trace], noise: float) -> Array:
-    """What recorded runs tell about a platform's parameters, (p, p), with this noise; zero where nothing can be said."""
+    """What recorded runs tell about a platform's parameters, (p, p), with this noise; zero where nothing is known."""
     runs = 1 + max(t.number for t in traces)
     with np.errstate(all="ignore"):
         each = [information_of(t, platform, runs) for t in traces]

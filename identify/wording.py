@@ -120,9 +120,9 @@ def percent(value: float | None) -> str:
 
 
 def errors_in_turn(identification: Identification) -> dict[str, Errors]:
-    """What each model in turn leaves, by what a table calls it: declared, before a follow-up where one was played, final.
+    """What each model in turn leaves, all on the same samples, by what a table calls it.
 
-    All on the same samples.
+    The declared one, the one from before a follow-up where one was played, the final one.
     """
     follow_up = identification.follow_up
     out = {"declared model": identification.before.error}

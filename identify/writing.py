@@ -217,8 +217,8 @@ def write_results(
 
     ``declared`` is the platform of the configuration, ``name`` the campaign's. A recording.h5 that stands
     there already is left alone. Each file appears whole or not at all, and result.json last: where it
-    stands, the others do. Returns the paths written; model.yaml is left out where no valid model came out, follow_up.yaml
-    where nothing is planned.
+    stands, the others do. Returns the paths written; model.yaml is left out where no valid model came out,
+    follow_up.yaml where nothing is planned.
 
     Raises
     ------

@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -28,12 +28,12 @@ from rig.config.load import LoadedConfig
 from rig.errors import PreflightRefusal, RigError, UsageError
 from rig.excitation import PlannedSet
 from rig.guard import Guard
-from rig.interface import Rig, Torque
+from rig.interface import Rig, Statement, Torque
 from rig.preflight import plan
 from rig.recorder import SetStatistics
 from rig.recording.hdf5 import write_recording_h5
-from rig.recording.journal import Journal
-from rig.recording.journal_reader import read_journal, recording_from_journal
+from rig.recording.journal import Journal, JournalError
+from rig.recording.journal_reader import JournalContents, read_journal, recording_from_journal
 from rig.recording.run import Recording
 from rig.sequencer import Sequencer
 
@@ -50,17 +50,39 @@ class Played:
         The names of the runs that came to their end.
     cause
         What ended the campaign early, or None.
+    journals
+        The raw journals of its parts in the results folder, in the order they were played.
+    rate_full_scale_rad_s
+        The largest rate that the gyro reports, or None.
     """
 
     recording: Recording
     whole: frozenset[str]
     cause: BaseException | None
+    journals: tuple[str, ...] = (JOURNAL_FILE,)
+    rate_full_scale_rad_s: float | None = None
 
     @property
     def fit_to_identify(self) -> Recording:
         """The whole runs: a run that was cut short may end in the fault that cut it."""
         runs = tuple(run for run in self.recording.runs if run.name in self.whole)
         return dataclasses.replace(self.recording, runs=runs)
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part of a campaign: what its files are called, what stands in the folder already, who is asked.
+
+    ``earlier`` is what was played before into the same folder; its recording is kept and added to.
+    """
+
+    journal: str = JOURNAL_FILE
+    raw: str = RAW_FOLDER
+    earlier: Played | None = None
+    consent: Callable[[Statement, bool, bool, Callable[[str], str]], None] = ask_consent
+
+
+ALL_OF_IT = Part()
 
 
 class Tally(SetBars):
@@ -81,7 +103,7 @@ class Tally(SetBars):
         return frozenset(s.name for s in self.statistics if s.complete)
 
 
-def play(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> Played:
+def play(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, part: Part = ALL_OF_IT) -> Played:
     """Play the campaign of ``loaded`` on the backend that was asked for and save its recording.
 
     Raises UsageError, with nothing moved or written, where it may not be played.
@@ -94,10 +116,10 @@ def play(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> Played:
         )
     if backend == EMULATED:
         desk.terminal.tell("Starting the emulated devices ...")
-    with BACKENDS[backend](loaded, folder.path / RAW_FOLDER) as stage:
+    with BACKENDS[backend](loaded, folder.path / part.raw) as stage:
         sets = planned_sets(stage.rig, loaded)
-        _open(desk, stage, loaded, sets, folder.path)
-        return _record(desk, stage, loaded, sets, folder)
+        _open(desk, stage, loaded, sets, folder.path, part)
+        return _record(desk, stage, loaded, sets, folder, part)
 
 
 def planned_sets(rig: Rig, loaded: LoadedConfig) -> tuple[PlannedSet, ...]:
@@ -110,12 +132,12 @@ def planned_sets(rig: Rig, loaded: LoadedConfig) -> tuple[PlannedSet, ...]:
         raise with_places(error, loaded) from None
 
 
-def _open(desk: Desk, stage: Stage, loaded: LoadedConfig, sets: Sequence[PlannedSet], path: Path) -> None:
+def _open(desk: Desk, stage: Stage, loaded: LoadedConfig, sets: Sequence[PlannedSet], path: Path, part: Part) -> None:
     statement = stage.rig.statement()
     loudly = desk.terminal.insist if statement.torque is Torque.REAL else desk.terminal.tell
     loudly(opening(statement, loaded.config, sets, path))
     desk.terminal.settle()
-    ask_consent(statement, desk.options.yes, sys.stdin is not None and sys.stdin.isatty(), _ask)
+    part.consent(statement, desk.options.yes, sys.stdin is not None and sys.stdin.isatty(), _ask)
 
 
 def _ask(question: str) -> str:
@@ -166,42 +188,93 @@ class _Recorder:
 
 
 def _record(
-    desk: Desk, stage: Stage, loaded: LoadedConfig, sets: Sequence[PlannedSet], folder: ResultsFolder
+    desk: Desk, stage: Stage, loaded: LoadedConfig, sets: Sequence[PlannedSet], folder: ResultsFolder, part: Part
 ) -> Played:
     """Play, then export what the journal and the sequencer have."""
     path = folder.made()
     info = provenance(loaded) | {"backend": str(stage.rig.statement())}
     recorder = _Recorder(desk, stage, loaded, sets)
-    recorder.run(Journal.create(path / JOURNAL_FILE, {"axis": "rotary", "noise": stage.rig.noise_rad_s} | info))
+    recorder.run(Journal.create(path / part.journal, {"axis": "rotary", "noise": stage.rig.noise_rad_s} | info))
     cause, tally = recorder.cause, recorder.tally
     if isinstance(cause, UsageError) and not tally.statistics:
-        folder.unmade()
+        _take_back(folder, part)
         raise cause
     if cause is not None:
         desk.say_error(cause)
     info |= {"ended_utc": datetime.now(UTC).isoformat(), "aborted": str(cause) if cause else None}
     info |= {"sets": [_figures(s) for s in tally.statistics]} | stage.account()
+    played = Played(Recording(()), tally.whole, cause, (part.journal,), stage.rig.rate_full_scale_rad_s)
     with desk.stops.saving():
-        recording = _save(desk, path, recorder.recording, info)
-    return Played(recording, tally.whole, cause)
+        return _save(desk, path, recorder.recording, info, played, part.earlier)
 
 
-def _save(desk: Desk, path: Path, recording: Recording | None, info: Mapping[str, Any]) -> Recording:
-    """Write recording.h5; a disk that takes no more is said, and the journal has the samples."""
-    contents = None
-    try:
-        contents = read_journal(path / JOURNAL_FILE)
-    except RigError as problem:
-        desk.say_error(problem)
+def _take_back(folder: ResultsFolder, part: Part) -> None:
+    """Take back what was made for a part in which nothing was played."""
+    if part.earlier is None:
+        folder.unmade()
+    else:
+        (folder.path / part.journal).unlink(missing_ok=True)
+
+
+def _save(
+    desk: Desk, path: Path, recording: Recording | None, info: Mapping[str, Any], played: Played, earlier: Played | None
+) -> Played:
+    """Write recording.h5; a disk that takes no more is said, and the journals have the samples."""
+    contents = _read_back(desk, path / played.journals[0])
     if recording is None:
         recording = recording_from_journal(contents) if contents is not None else Recording(())
     recording = dataclasses.replace(recording, info=dict(info))
+    if earlier is not None:
+        before = [_read_back(desk, path / name) for name in earlier.journals]
+        contents = _joined([c for c in (*before, contents) if c is not None])
+        recording = _added(earlier.recording, recording)
+        played = dataclasses.replace(
+            played, whole=played.whole | earlier.whole, journals=(*earlier.journals, *played.journals)
+        )
     if recording.runs:
         try:
-            write_recording_h5(path / RECORDING_FILE, recording, contents)
+            _write(path, recording, contents, anew=earlier is not None)
         except RigError as problem:
             desk.say_error(problem)
-    return recording
+    return dataclasses.replace(played, recording=recording)
+
+
+def _write(path: Path, recording: Recording, contents: JournalContents | None, anew: bool) -> None:
+    """Write recording.h5; with ``anew`` the one that stands there gives way only to a whole one that has it all."""
+    if not anew:
+        write_recording_h5(path / RECORDING_FILE, recording, contents)
+        return
+    new = path / f"{RECORDING_FILE}.new"
+    write_recording_h5(new, recording, contents)
+    try:
+        new.replace(path / RECORDING_FILE)
+    except OSError as error:
+        raise JournalError(f"cannot write {path / RECORDING_FILE}: {error.strerror}; {new} has everything") from error
+
+
+def _read_back(desk: Desk, path: Path) -> JournalContents | None:
+    try:
+        return read_journal(path)
+    except RigError as problem:
+        desk.say_error(problem)
+        return None
+
+
+def _joined(parts: Sequence[JournalContents]) -> JournalContents | None:
+    """Journals of one campaign as one, in the order they were played."""
+    if not parts:
+        return None
+    return JournalContents(
+        parts[0].header, tuple(r for c in parts for r in c.runs), tuple(e for c in parts for e in c.events),
+        all(c.closed for c in parts), sum(c.unread_bytes for c in parts),
+    )  # fmt: skip
+
+
+def _added(earlier: Recording, new: Recording) -> Recording:
+    """All runs of a campaign; what is said of the new part stands behind what was said of the first."""
+    info = dict(earlier.info)
+    info["follow_ups"] = [*info.get("follow_ups", ()), dict(new.info)]
+    return dataclasses.replace(earlier, runs=(*earlier.runs, *new.runs), info=info)
 
 
 def _figures(s: SetStatistics) -> dict[str, Any]:

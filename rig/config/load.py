@@ -17,17 +17,22 @@ from rig.config.yaml_text import Document, Fault, KeyPath, parse, read_text
 from rig.errors import ConfigError
 
 MAX_FAULTS_SHOWN = 25
-# Places where the path of a model.yaml may stand for the mapping that it holds.
-INCLUDES: tuple[KeyPath, ...] = (("model",), ("simulated", "platform"))
-MODELS = INCLUDES  # and where effects of the user's own may be named
+# Places where the path of a model.yaml may stand for the mapping that it holds, and where effects may be named.
+MODELS: tuple[KeyPath, ...] = (("model",), ("simulated", "platform"))
+# And of a follow_up.yaml.
+INCLUDES: tuple[KeyPath, ...] = (*MODELS, ("excitation",))
+_A_FILE: Mapping[str | int, str] = {
+    "model": "a model file", "platform": "a model file", "excitation": "an excitation file"
+}  # fmt: skip
+_FIRST: Mapping[str | int, str] = {"model": "inertia_kg_m2", "platform": "inertia_kg_m2", "excitation": "sets"}
 
 
 @dataclass(frozen=True)
 class LoadedConfig:
     """A checked configuration and what it was read from.
 
-    ``text`` is the file as read, ``included`` the text of each model.yaml and effect file it names, ``overrides`` the
-    ``--set`` texts in order: together they say exactly what was asked.
+    ``text`` is the file as read, ``included`` the text of each model, excitation and effect file it names,
+    ``overrides`` the ``--set`` texts in order: together they say exactly what was asked.
     """
 
     config: Config
@@ -55,16 +60,16 @@ def load_config(path: str | Path, overrides: Sequence[str] = ()) -> LoadedConfig
         raise ConfigError(
             f"{path}:1: has to be a mapping of keys (backend: ..., recorded: ...), not {shown(document.data)}"
         )
-    _include_models(document, path.parent, included)
+    _include_files(document, path.parent, included)
     for override in overrides:
         apply_override(document, override)
-    _include_models(document, path.parent, included)
+    _include_files(document, path.parent, included)
     _read_effects(document, path.parent, included)
     config = _validate(document, name_from_stem(path.stem))
     return LoadedConfig(config, text, path, tuple(overrides), included)
 
 
-def _include_models(document: Document, folder: Path, included: dict[str, str]) -> None:
+def _include_files(document: Document, folder: Path, included: dict[str, str]) -> None:
     for key in INCLUDES:
         parent: Any = document.data
         for part in key[:-1]:
@@ -74,19 +79,20 @@ def _include_models(document: Document, folder: Path, included: dict[str, str]) 
 
 
 def _included(document: Document, key: KeyPath, path: Path, included: dict[str, str]) -> Any:
-    """The mapping in a model.yaml, with its places and faults added to ``document``."""
+    """The mapping in a file that stands for a section, with its places and faults added to ``document``."""
     try:
         included[str(path)] = read_text(path)
         model = parse(included[str(path)], str(path))
     except ConfigError as error:
-        document.faults.append(Fault(place_of(document, key), key, f"names a model file: {error}"))
+        document.faults.append(Fault(place_of(document, key), key, f"names {_A_FILE[key[-1]]}: {error}"))
         return {}
     inside: KeyPath = ()
-    if isinstance(model.data, dict) and list(model.data) == ["model"]:  # pasted together with its key
-        inside, model.data = ("model",), model.data["model"]
+    name = "excitation" if key[-1] == "excitation" else "model"
+    if isinstance(model.data, dict) and list(model.data) == [name]:  # together with its key
+        inside, model.data = (name,), model.data[name]
     if not isinstance(model.data, dict):
         where = place_of(model, ())
-        text = f"has to hold a mapping (inertia_kg_m2: ...), not {shown(model.data)}"
+        text = f"has to hold a mapping ({_FIRST[key[-1]]}: ...), not {shown(model.data)}"
         document.faults.append(Fault(where, key, text))
         return {}
     _count_from(model.data, path.parent)
