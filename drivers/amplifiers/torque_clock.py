@@ -1,8 +1,9 @@
 """When a torque that a drive reports was on the shaft: the drive's own time stamps on the host's clock.
 
-What comes back is heard late, so the fastest answers alone put every stamp late by the shortest way back.
-What was asked left early. Half of the shortest way there and back is the error that is left when the two
-ways are taken as equally long (the two-way transfer that NTP uses too).
+What comes back is heard late, so the fastest answers alone put every stamp late by the shortest way back. The
+shortest way there and back is known, how it divides is not: all of it is taken off, so that a torque is never
+stamped later than it acted. A gyro's samples are never stamped early. What is left between the two is a delay
+and not its opposite, which no model of a drive could describe.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ class TorqueClock:
             self._note_way(stamped_s - self._asked_s, heard_s)
         self._unanswered = 0
         # Set points that the drive took up together carry one stamp; the last of them is the one that holds.
-        self._last_s = max(stamped_s - 0.5 * self.way_s, self._last_s + self._unit_s)
+        self._last_s = max(stamped_s - self.way_s, self._last_s + self._unit_s)
         return self._last_s
 
     def _note_way(self, way_s: float, now_s: float) -> None:

@@ -22,9 +22,10 @@ def exchange(clock, there_s, back_s, ticks=12_000, together=()):
     return np.array(errors)
 
 
-def test_equal_roads_leave_no_error():
-    errors = exchange(TorqueClock(1e-6, 1 << 32), lambda k: 80e-6, lambda k: 80e-6)
-    assert np.max(np.abs(errors[3000:])) < 3e-6
+def test_what_is_left_is_the_way_there_whatever_the_way_back():
+    for back_s in (20e-6, 80e-6, 400e-6):
+        errors = exchange(TorqueClock(1e-6, 1 << 32), lambda k: 80e-6, lambda k, b=back_s: b)
+        assert np.max(np.abs(errors[3000:] + 80e-6)) < 3e-6
 
 
 def test_jitter_of_both_roads_is_seen_through():
@@ -32,7 +33,7 @@ def test_jitter_of_both_roads_is_seen_through():
     there, back = (60e-6 + rng.exponential(40e-6, 12_000) for _ in range(2))
     errors = exchange(TorqueClock(1e-6, 1 << 32), lambda k: there[k], lambda k: back[k])
     assert np.std(errors[3000:]) < 3e-6
-    assert abs(np.mean(errors[3000:])) < 8e-6
+    assert np.mean(errors[3000:]) == pytest.approx(-60e-6, abs=10e-6)
 
 
 def test_two_questions_with_one_answer_do_not_count_as_a_short_road():
