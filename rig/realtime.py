@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 _PR_SET_TIMERSLACK = 29
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
-HAND_OVER_S = 10e-6  # how long the loop waits at most for another thread of ours to leave the interpreter to it
+HAND_OVER_S = 50e-6  # how long the loop waits at most for another thread of ours to leave the interpreter to it
 _usual_hand_over_s = sys.getswitchinterval()
 
 

@@ -8,12 +8,15 @@ and not its opposite, which no model of a drive could describe.
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 
 from drivers.source_clock import SourceClock
 
 BLOCK_S = 0.25
 BLOCKS_KEPT = 240
+MOST_UNANSWERED = 16
 
 
 class TorqueClock:
@@ -31,8 +34,7 @@ class TorqueClock:
         self._back = SourceClock(unit_s)
         self._unit_s, self._modulus = unit_s, modulus
         self._stamp: int | None = None
-        self._asked_s = 0.0
-        self._unanswered = 0
+        self._asked_s: deque[float] = deque(maxlen=MOST_UNANSWERED)
         self._there_and_back_s: list[float] = []
         self._best_s = np.inf
         self._block_end_s = 0.0
@@ -41,8 +43,7 @@ class TorqueClock:
 
     def asked(self, at_s: float) -> None:
         """A request to apply and stamp was handed over."""
-        self._asked_s = at_s
-        self._unanswered += 1
+        self._asked_s.append(at_s)
 
     def heard(self, stamp: int, heard_s: float) -> float:
         """Host time of a stamp that was heard at ``heard_s``; later than every one before."""
@@ -50,9 +51,12 @@ class TorqueClock:
         self._stamp = before + (stamp - before) % self._modulus
         self._back.observe(self._stamp, heard_s)
         stamped_s = self._back.host_time_s(self._stamp)
-        if self._unanswered == 1:  # two at once cannot be told apart
-            self._note_way(stamped_s - self._asked_s, heard_s)
-        self._unanswered = 0
+        # An answer may be looked at after the next request has gone out; what it answers went before it came.
+        before_it = []
+        while self._asked_s and self._asked_s[0] <= heard_s:
+            before_it.append(self._asked_s.popleft())
+        if len(before_it) == 1:  # two at once cannot be told apart
+            self._note_way(stamped_s - before_it[0], heard_s)
         # Set points that the drive took up together carry one stamp; the last of them is the one that holds.
         self._last_s = max(stamped_s - self.way_s, self._last_s + self._unit_s)
         return self._last_s

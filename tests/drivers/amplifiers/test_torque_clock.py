@@ -42,6 +42,17 @@ def test_two_questions_with_one_answer_do_not_count_as_a_short_road():
     assert clock.way_s == pytest.approx(160e-6, abs=4e-6)
 
 
+def test_an_answer_that_is_looked_at_after_the_next_request_still_finds_its_own():
+    clock, waiting = TorqueClock(1e-6, 1 << 32), []
+    for k in range(4000):
+        asked_s = 10.0 + k * 1e-3
+        clock.asked(asked_s)
+        for answer in waiting:
+            clock.heard(*answer)
+        waiting = [(int((asked_s + 80e-6) * 1e6), asked_s + 160e-6)]
+    assert clock.way_s == pytest.approx(160e-6, abs=4e-6)
+
+
 def test_times_never_stand_still():
     clock = TorqueClock(1e-6, 1 << 32)
     times = [clock.heard(1000, 5.0) for _ in range(3)]
