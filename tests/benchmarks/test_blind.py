@@ -78,8 +78,10 @@ def test_the_bench_imports_nothing_of_the_product(path: Path) -> None:
 
 
 def test_every_effect_of_the_product_can_be_hidden() -> None:
-    assert set(library.LIBRARY) == set(effects.names()) == set(VALUES)
-    for name in effects.names():
+    # What only shows where a known inertia was added is hidden as a kind of case, not as an effect.
+    nameable = [n for n in effects.names() if not effects.get(n).needs_added_inertia]
+    assert set(library.LIBRARY) == set(nameable) == set(VALUES)
+    for name in nameable:
         if name != "periodic_disturbance":  # the bench draws a phase where the product fits sine and cosine
             assert ORDER[name] == tuple(p.name for p in effects.get(name).parameters)
     assert not set(library.OUTSIDE) & set(effects.names())
