@@ -8,15 +8,16 @@ and not its opposite, which no model of a drive could describe.
 
 from __future__ import annotations
 
+import math
+import statistics
 from collections import deque
-
-import numpy as np
 
 from drivers.source_clock import SourceClock
 
 BLOCK_S = 0.25
 BLOCKS_KEPT = 240
 MOST_UNANSWERED = 16
+FAST_SHARE = 0.1
 
 
 class TorqueClock:
@@ -35,10 +36,10 @@ class TorqueClock:
         self._unit_s, self._modulus = unit_s, modulus
         self._stamp: int | None = None
         self._asked_s: deque[float] = deque(maxlen=MOST_UNANSWERED)
-        self._there_and_back_s: list[float] = []
-        self._best_s = np.inf
+        self._ways_s: list[float] = []
+        self._blocks_s: deque[float] = deque(maxlen=BLOCKS_KEPT)
         self._block_end_s = 0.0
-        self._last_s = -np.inf
+        self._last_s = -math.inf
         self.way_s = 0.0
 
     def asked(self, at_s: float) -> None:
@@ -62,14 +63,13 @@ class TorqueClock:
         return self._last_s
 
     def _note_way(self, way_s: float, now_s: float) -> None:
-        """Per block the shortest way there and back; of the blocks the faster half, as the clocks are fitted."""
-        self._best_s = min(self._best_s, way_s)
+        """Of each block a fast way, not the fastest; of the blocks the median: neither a stall nor a slip moves it."""
+        self._ways_s.append(way_s)
         if now_s < self._block_end_s:
             return
         if self._block_end_s:
-            blocks = self._there_and_back_s
-            blocks.append(self._best_s)
-            del blocks[:-BLOCKS_KEPT]
-            faster = sorted(blocks)[: (len(blocks) + 1) // 2]
-            self.way_s = max(0.0, sum(faster) / len(faster))
-        self._block_end_s, self._best_s = now_s + BLOCK_S, np.inf
+            self._ways_s.sort()
+            self._blocks_s.append(self._ways_s[int(FAST_SHARE * (len(self._ways_s) - 1))])
+            self.way_s = max(0.0, statistics.median(self._blocks_s))
+        self._block_end_s = now_s + BLOCK_S
+        self._ways_s.clear()
