@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from identify.follow_up_pairs import Pair, pairs_of
-from identify.follow_up_separation import Sensor, Share, Way, coarser, measured, raw, settled, share_of
-from identify.follow_up_shapes import Candidate, candidates, passes, shapes
+from identify.follow_up_separation import Sensor, Share, Way, coarser, measured, settled, share_of
+from identify.follow_up_shapes import Candidate, candidates, fitting, shapes
 from identify.follow_up_wording import verdict_sentences, why_of
 from identify.hindsight import usable_traces
 from identify.results import FollowUp, FollowUpPlan, Identification, Parting, Unparted
@@ -72,6 +72,8 @@ def plan_follow_up(
         why = "no torque was recorded, so none can be planned: record a decay from another amplitude"
         return FollowUp(None, tuple(Unparted(e, r, why) for e, rivals in _all(found) for r in rivals))
     traces = usable_traces(recording)
+    if not traces:
+        return None
     noise = max(found.noise_floor.holdout_rate_rms, found.final.error.holdout_rate_rms or 0.0)
     with np.errstate(all="ignore"):
         pairs, without = pairs_of(found, traces, noise)
@@ -86,44 +88,29 @@ def _all(found: Identification) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table) -> FollowUp:
-    platforms = list(dict.fromkeys(_Key(m) for p in pairs for m in p.models))
-    models = [k.platform for k in platforms]
+    models: list[Platform] = []
+    models += [m for p in pairs for m in p.models if m not in models]
     look, weight = coarser(table.sensor, LOOK_HZ)
     several = shapes(natural_hz(models[0]), table.sensor.sample_rate_hz)
-    choice = candidates(several, models, table.allowed, look.sample_rate_hz)
-    choice = [c for c in choice if passes(c.planned, models, table.allowed)] if choice else []
+    choice = candidates(several, models, table.allowed, look)
     if not choice:
         why = "no set of any kind stays within the limits"
         return FollowUp(None, (*without, *(Unparted(p.effect, p.rival, why) for p in pairs)))
-    looks = _Looks(pairs, choice, look, weight)
-    chosen = _choose(looks)
+    looks = _Looks(pairs, choice, models, look, weight)
+    sets = [s for i in _choose(looks) if (s := fitting(choice[i], models, table.allowed)) is not None]
     partings, failed = [], list(without)
     for k, pair in enumerate(pairs):
-        best = min(settled(w, [choice[i].planned for i in chosen], look) * weight for w in pair.ways) if chosen else 0.0
+        best = min(settled(w, [s.planned for s in sets], look, weight) for w in pair.ways) if sets else 0.0
         if best >= LEAST:
             partings.append(Parting(pair.effect, pair.rival, best))
             continue
         failed.append(Unparted(pair.effect, pair.rival, _too_little(pair, max(best, looks.best_of(k)), best)))
     if not partings:
         return FollowUp(None, tuple(failed))
-    sets = [choice[i] for i in chosen]
     plan = FollowUpPlan(
         _section(sets, table), tuple(partings), sum(c.planned.duration_s for c in sets), why_of(partings, sets)
     )
     return FollowUp(plan, tuple(failed))
-
-
-class _Key:
-    """A platform that can be told from others: its effects make it no key by itself."""
-
-    def __init__(self, platform: Platform) -> None:
-        self.platform = platform
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and self.platform == other.platform
-
-    def __hash__(self) -> int:
-        return hash((self.platform.inertia_kg_m2, tuple(self.platform.effects)))
 
 
 def _too_little(pair: Pair, promised: float, reached: float) -> str:
@@ -145,14 +132,20 @@ def natural_hz(platform: Platform) -> float:
 class _Looks:
     """Chi square between the models of each pair under each candidate, computed where it is asked for."""
 
-    def __init__(self, pairs: Sequence[Pair], choice: Sequence[Candidate], sensor: Sensor, weight: float) -> None:
+    def __init__(
+        self, pairs: Sequence[Pair], choice: Sequence[Candidate], models: Sequence[Platform], sensor: Sensor,
+        weight: float,
+    ) -> None:  # fmt: skip
         self.pairs, self.choice, self._sensor, self._weight = pairs, choice, sensor, weight
+        self._models = models
         self._shares: dict[tuple[int, int, int], Share] = {}
         self.shortlist = sorted({i for p in pairs for i in self._promising(p)})
 
     def _promising(self, pair: Pair) -> list[int]:
         """The candidates with the largest difference of each amplitude: a small one may tell more in the end."""
-        size = [self._weight * raw(pair.ways[0], c.planned, self._sensor) for c in self.choice]
+        one, other = (self._models.index(m) for m in pair.models)
+        scale = self._weight / self._sensor.noise**2
+        size = [scale * float(np.sum((c.seen[one] - c.seen[other]) ** 2)) for c in self.choice]
         shares = sorted({c.share for c in self.choice}, reverse=True)
         per = max(1, LOOKED_AT // len(shares))
         out = []

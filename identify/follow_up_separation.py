@@ -103,12 +103,6 @@ def measured(truth: Platform, planned: PlannedSet, sensor: Sensor) -> Trace:
     return planned_trace(truth, planned, sensor.sample_rate_hz, sensor.noise, 0, sensor.channel)
 
 
-def raw(way: Way, planned: PlannedSet, sensor: Sensor) -> float:
-    """Chi square between both models before anything is taken up."""
-    seen, passed = (measured(p, planned, sensor).measured for p in (way.truth, way.model))
-    return float(np.sum(((seen - passed) / sensor.noise) ** 2))
-
-
 @RUNAWAY
 def share_of(model: Platform, trace: Trace) -> Share:
     """How a model differs from what a set showed, start state and bias projected out."""
@@ -131,11 +125,13 @@ def share_of(model: Platform, trace: Trace) -> Share:
     return Share(float(gram[-1, -1]), gram[:-1, -1], gram[:-1, :-1])
 
 
-def settled(way: Way, several: Sequence[PlannedSet], sensor: Sensor) -> float:
+def settled(way: Way, several: Sequence[PlannedSet], sensor: Sensor, weight: float = 1.0) -> float:
     """Chi square that several sets leave when the model is fitted to what the truth would have shown.
 
-    Sensitivities are taken anew after each move: a large difference may be taken up along a bend.
+    Each sample counts ``weight`` times. Sensitivities are taken anew after each move: a large difference may be taken
+    up along a bend.
     """
+    sensor = replace(sensor, noise=sensor.noise / np.sqrt(weight))
     traces = [measured(way.truth, s, sensor) for s in several]
     structure, names, origin = vector_of(way.model, 1)
     kept = [i for i, n in enumerate(names) if len(n) < 3]

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.dynamics import TorqueSignal, simulate
+from identify.follow_up_separation import Sensor
+from rig.dynamics import Equations, Grid, TorqueSignal
 from rig.excitation import Chirp, ExcitationSet, FreeDecay, Multisine, PlannedSet, RampHoldRelease, Sine
 from rig.platform import Platform
 from rig.preflight import Peaks, predict
+from rig.recording.run import Array
 
 AMPLITUDES = (1.0, 0.3, 0.1, 0.03)  # of what the limits allow
 SHORTEST_S, LONGEST_S = 5.0, 15.0
@@ -41,6 +43,15 @@ class Shape:
 
 
 @dataclass(frozen=True)
+class Rehearsal:
+    """What a set would do: its strain is the largest of travel, rate and torque over what is allowed."""
+
+    strain: float
+    travel_deg: float
+    seen: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
 class Candidate:
     """A shape at one amplitude, within the limits on every model it was held against."""
 
@@ -48,6 +59,7 @@ class Candidate:
     shape: Shape
     share: float  # of the largest amplitude that the limits allow
     travel_deg: float  # predicted, the larger of the models'
+    seen: tuple[Array, ...]  # by the sensor, without noise, one array a model
 
     @property
     def words(self) -> str:
@@ -119,53 +131,77 @@ def _decay(length_s: float) -> Shape:
     )
 
 
-def strain(platform: Platform, planned: PlannedSet, allowed: Peaks, sample_rate_hz: float) -> tuple[float, float]:
-    """The largest of travel, rate and torque over what is allowed, and the travel in degrees; from rest."""
-    time = np.arange(round(planned.duration_s * sample_rate_hz) + 1) / sample_rate_hz
-    torque = np.asarray(planned.torque(time), dtype=float)
-    with np.errstate(all="ignore"):
-        motion = simulate(platform, time, TorqueSignal(time, torque))
-    travel, rate = (math.degrees(float(np.max(np.abs(x)))) for x in (motion.angle_rad, motion.rate_rad_s))
-    if not (math.isfinite(travel) and math.isfinite(rate)):
-        return math.inf, math.inf
-    found = Peaks(travel, rate, float(np.max(np.abs(torque))))
-    return max(value / limit for value, limit in zip(found, allowed, strict=True)), travel
+class _Bench:
+    """One shape on several platforms, ready to be simulated at any torque."""
 
+    def __init__(self, shape: Shape, platforms: Sequence[Platform], allowed: Peaks, sensor: Sensor) -> None:
+        self._allowed, self._angle = allowed, sensor.channel == "angle"
+        unit = shape.make(1.0)
+        time = np.arange(round(unit.duration_s * sensor.sample_rate_hz) + 1) / sensor.sample_rate_hz
+        torque = np.asarray(unit.torque(time), dtype=float)
+        self._peak = float(np.max(np.abs(torque)))
+        self._equations = [Equations(p) for p in platforms]
+        signal = TorqueSignal(time, torque)
+        substeps = [e.substeps(1.0 / sensor.sample_rate_hz) for e in self._equations]
+        grids = {n: Grid(time, signal, n) for n in set(substeps)}
+        self._grids = [grids[n] for n in substeps]
 
-def largest(shape: Shape, platforms: Sequence[Platform], allowed: Peaks, sample_rate_hz: float) -> float | None:
-    """The peak torque with which a shape stays within the limits on every platform; None where none is found."""
-    torque, best = allowed.torque_nm, None
-    for _ in range(ATTEMPTS):
-        planned = PlannedSet("", shape.make(torque))
-        worst = max(strain(p, planned, allowed, sample_rate_hz)[0] for p in platforms)
-        if worst <= 1.0:
-            best = torque
-            if worst >= FILL / WIDE or torque >= allowed.torque_nm:
-                break
-        # Not in proportion where there are effects: try again with what it should have been.
-        factor = FILL / worst if math.isfinite(worst) and worst > 0.0 else 0.1
-        torque = min(allowed.torque_nm, torque * float(np.clip(factor, 0.02, 5.0)))
-    return best
+    def play(self, torque_nm: float) -> Rehearsal:
+        """From rest, at this peak torque."""
+        worst, farthest, seen = torque_nm * self._peak / self._allowed.torque_nm, 0.0, []
+        for grid, equations in zip(self._grids, self._equations, strict=True):
+            with np.errstate(all="ignore"):
+                motion = grid.scaled(torque_nm).simulate(equations, (0.0, 0.0))
+            travel, rate = (math.degrees(float(np.max(np.abs(x)))) for x in (motion.angle_rad, motion.rate_rad_s))
+            if not (math.isfinite(travel) and math.isfinite(rate)):
+                return Rehearsal(math.inf, math.inf, ())
+            worst = max(worst, travel / self._allowed.travel_deg, rate / self._allowed.rate_deg_s)
+            farthest = max(farthest, travel)
+            seen.append(motion.angle_rad if self._angle else motion.sensed_rate_rad_s)
+            if worst > 1.0:
+                break  # too much on one is too much
+        return Rehearsal(worst, farthest, tuple(seen))
+
+    def largest(self) -> float | None:
+        """The peak torque that stays within the limits on every platform; None where none is found."""
+        torque, best = self._allowed.torque_nm / max(self._peak, 1e-300), None
+        most = torque
+        for _ in range(ATTEMPTS):
+            strain = self.play(torque).strain
+            if strain <= 1.0:
+                best = torque
+                if strain >= FILL / WIDE or torque >= most:
+                    break
+            # Not in proportion where there are effects: try again with what it should have been.
+            factor = FILL / strain if math.isfinite(strain) and strain > 0.0 else 0.1
+            torque = min(most, torque * float(np.clip(factor, 0.02, 5.0)))
+        return best
 
 
 def candidates(
-    several: Sequence[Shape], platforms: Sequence[Platform], allowed: Peaks, sample_rate_hz: float
+    several: Sequence[Shape], platforms: Sequence[Platform], allowed: Peaks, sensor: Sensor
 ) -> list[Candidate]:
-    """Every shape at every amplitude, named by what it is."""
+    """Every shape at every amplitude that stays within the limits on all platforms."""
     out = []
     for shape in several:
-        most = largest(shape, platforms, allowed, sample_rate_hz)
+        bench = _Bench(shape, platforms, allowed, sensor)
+        most = bench.largest()
         if most is None:
             continue
         for share in shape.amplitudes:
-            made = shape.make(float(f"{share * most:.3g}"))
-            planned = PlannedSet(made.title, made)
-            reached = [strain(p, planned, allowed, sample_rate_hz) for p in platforms]
-            if max(s for s, _ in reached) <= 1.0:
-                out.append(Candidate(planned, shape, share, max(travel for _, travel in reached)))
+            torque = float(f"{share * most:.3g}")
+            rehearsal = bench.play(torque)
+            if rehearsal.strain <= 1.0:
+                made = shape.make(torque)
+                out.append(Candidate(PlannedSet(made.title, made), shape, share, rehearsal.travel_deg, rehearsal.seen))
     return out
 
 
-def passes(planned: PlannedSet, platforms: Sequence[Platform], allowed: Peaks) -> bool:
-    """Whether the pre-flight itself would let a set pass on every platform."""
-    return all(predict(p, planned, allowed).passes for p in platforms)
+def fitting(candidate: Candidate, platforms: Sequence[Platform], allowed: Peaks) -> Candidate | None:
+    """The candidate as the pre-flight itself lets it pass on every platform, with a little less torque if need be."""
+    scale = min(predict(p, candidate.planned, allowed).scale for p in platforms)
+    if scale >= 1.0:
+        return candidate
+    made = candidate.planned.excitation
+    torque = float(f"{0.99 * scale * made.model_dump()['torque_nm']:.3g}")
+    return replace(candidate, planned=PlannedSet(made.title, candidate.shape.make(torque))) if torque > 0.0 else None

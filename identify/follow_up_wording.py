@@ -12,6 +12,7 @@ from identify.wording import capital, joined, number, plain
 from rig import effects
 
 FILE = "follow_up.yaml"
+PLENTY = 10_000.0  # chi square beyond which nobody asks how much
 
 
 def file_name(rounds: int) -> str:
@@ -29,7 +30,7 @@ def why_of(partings: Sequence[Parting], sets: Sequence[Candidate]) -> str:
 
 def size(parting: Parting) -> str:
     """An expected separation, to two digits: it is no more exact than the models."""
-    return number(float(f"{parting.separation:.2g}"), 2) if parting.separation < 1e4 else f"{parting.separation:.0e}"
+    return number(parting.separation, 2) if parting.separation < PLENTY else f"over {PLENTY:,.0f}"
 
 
 def unparted_sentence(one: Unparted) -> str:

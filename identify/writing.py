@@ -92,7 +92,13 @@ def _listed(several: Sequence[NotReported]) -> list[dict[str, str]]:
 
 
 def _verdict(verdict: Verdict) -> dict[str, Any]:
-    return dict(vars(verdict)) | {"candidates": [dict(vars(candidate)) for candidate in verdict.candidates]}
+    return dict(vars(verdict)) | {
+        "candidates": [dict(vars(candidate)) for candidate in verdict.candidates],
+        "rival_models": {
+            effect: {rival: dict(vars(platform)) for rival, platform in models.items()}
+            for effect, models in verdict.rival_models.items()
+        },
+    }
 
 
 def _follow_up(identification: Identification) -> dict[str, Any] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -193,6 +194,12 @@ class Grid:
         self._lead = 2 * int(lead_s / self.step_s)
         begin = float(time_s[0]) - 0.5 * self.step_s * self._lead
         self._half = torque.on_half_steps(begin, 0.5 * self.step_s, 2 * self.n + 1 + self._lead)
+
+    def scaled(self, factor: float) -> Grid:
+        """The same grid with its torque multiplied: reading a smooth torque off its samples costs more than that."""
+        other = copy(self)
+        other._half, other._plain = factor * self._half, None
+        return other
 
     def shaft_torque(self, equations: Equations) -> Array:
         """Torque behind the drive effects at start, middle and end of each fine step, shape (n, 3)."""
