@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rig.recording.hdf5 import read_recording_h5
-from sim_backend.emulators.faults import FAULTS
+from sim_backend.emulators.fault_kinds import FAULTS
 
 SET_S = 4.0
 QUIET = (

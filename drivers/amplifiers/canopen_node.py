@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,9 @@ from canopen.sdo import SdoAbortedError, SdoClient, SdoCommunicationError
 from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
 from rig.errors import ConfigError, DeviceFault
+
+# What the library logs is said by our own faults; without a handler it would go to the operator's terminal.
+logging.getLogger("canopen").addHandler(logging.NullHandler())
 
 
 class PolledSdoClient(SdoClient):

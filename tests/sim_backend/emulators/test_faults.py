@@ -10,7 +10,8 @@ import pytest
 from drivers.codecs import stim300
 from rig.config.bench import InjectedFault
 from rig.errors import ConfigError
-from sim_backend.emulators.faults import FAULTS, Faults
+from sim_backend.emulators.fault_kinds import FAULTS
+from sim_backend.emulators.faults import Faults
 from sim_backend.emulators.requests import FaultRequests
 
 DATAGRAM = stim300.encode_datagram(stim300.Datagram(0x90, (0, 0, 1234), 0, 7, 506))
