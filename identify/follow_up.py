@@ -7,14 +7,14 @@ Every shape at every amplitude is simulated on both models; what the loser could
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from identify.follow_up_pairs import Pair, pairs_of
-from identify.follow_up_separation import Sensor, Share, Way, coarser, measured, settled, share_of
+from identify.follow_up_separation import Sensor, Share, Way, coarser, measured, settled, share_of, shots_of
 from identify.follow_up_shapes import Candidate, candidates, fitting, shapes
 from identify.follow_up_wording import verdict_sentences, why_of
 from identify.hindsight import usable_traces
@@ -31,6 +31,8 @@ GOOD = 400.0  # from which more sets are not worth their time
 BEST = 1e4  # from which more of it proves nothing more
 ALIKE = 0.5  # of the best score: the shorter of two such sets is played
 MOST_SETS = 4
+FAINT = 0.005  # of the largest torque played so far: drives take torque in steps of about a thousandth
+PROOFS = 5  # sets that are put to the proof in a round
 LOOKED_AT = 14  # candidates of a pair whose sensitivities are taken
 LOOK_HZ = 2000.0  # sample rate that is fine enough for a first look
 USUAL_HZ = 5.0  # where nothing swings
@@ -46,6 +48,7 @@ class Table:
     rest_s: float
     prefix: str = "follow-up"
     linear: bool = False
+    least_torque_nm: float = 0.0  # what a drive still makes well
 
 
 def plan_follow_up(
@@ -80,7 +83,9 @@ def plan_follow_up(
         if not pairs:
             return FollowUp(None, tuple(without))
         sensor = Sensor(sample_rate_hz, noise, traces[0].channel)
-        return _planned(pairs, without, Table(allowed, sensor, rest_s, prefix, found.axis == "linear"))
+        played = max(float(np.max(np.abs(r.torque_nm))) for r in recording.runs if r.torque_nm is not None)
+        table = Table(allowed, sensor, rest_s, prefix, found.axis == "linear", FAINT * played)
+        return _planned(pairs, without, table)
 
 
 def _all(found: Identification) -> list[tuple[str, tuple[str, ...]]]:
@@ -92,19 +97,19 @@ def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table) -> Fo
     models += [m for p in pairs for m in p.models if m not in models]
     look, weight = coarser(table.sensor, LOOK_HZ)
     several = shapes(natural_hz(models[0]), table.sensor.sample_rate_hz)
-    choice = candidates(several, models, table.allowed, look)
+    choice = candidates(several, models, table.allowed, look, table.least_torque_nm)
     if not choice:
-        why = "no set of any kind stays within the limits"
+        why = f"no set of any kind stays within the limits with {number(table.least_torque_nm, 2)} N m or more"
         return FollowUp(None, (*without, *(Unparted(p.effect, p.rival, why) for p in pairs)))
     looks = _Looks(pairs, choice, models, look, weight)
     sets = [s for i in _choose(looks) if (s := fitting(choice[i], models, table.allowed)) is not None]
     partings, failed = [], list(without)
-    for k, pair in enumerate(pairs):
-        best = min(settled(w, [s.planned for s in sets], look, weight) for w in pair.ways) if sets else 0.0
+    for pair in pairs:
+        best = looks.checked(sets, pair) if sets else 0.0
         if best >= LEAST:
             partings.append(Parting(pair.effect, pair.rival, best))
-            continue
-        failed.append(Unparted(pair.effect, pair.rival, _too_little(pair, max(best, looks.best_of(k)), best)))
+        else:
+            failed.append(Unparted(pair.effect, pair.rival, _too_little(pair, best)))
     if not partings:
         return FollowUp(None, tuple(failed))
     plan = FollowUpPlan(
@@ -113,12 +118,12 @@ def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table) -> Fo
     return FollowUp(plan, tuple(failed))
 
 
-def _too_little(pair: Pair, promised: float, reached: float) -> str:
+def _too_little(pair: Pair, reached: float) -> str:
     """Why a pair has no part in the plan."""
     cure = effects.get(pair.effect).separated_by
     told = f" (what would tell it {cure})" if cure.startswith("from ") else ""
     return (
-        f"no excitation within the limits parts them: the best leaves chi square {number(min(promised, reached), 2)}, "
+        f"no excitation within the limits parts them: the best leaves chi square {number(reached, 2)}, "
         f"{LEAST:g} are needed{told}"
     )
 
@@ -138,6 +143,7 @@ class _Looks:
     ) -> None:  # fmt: skip
         self.pairs, self.choice, self._sensor, self._weight = pairs, choice, sensor, weight
         self._models = models
+        self._checked: dict[tuple[int, ...], float] = {}  # by the identity of what is kept here anyway
         self._shares: dict[tuple[int, int, int], Share] = {}
         self.shortlist = sorted({i for p in pairs for i in self._promising(p)})
 
@@ -157,7 +163,8 @@ class _Looks:
     def _share(self, i: int, k: int, w: int, way: Way) -> Share:
         key = (i, k, w)
         if key not in self._shares:
-            found = share_of(way.model, measured(way.truth, self.choice[i].planned, self._sensor))
+            trace = measured(way.truth, self.choice[i].planned, self._sensor)
+            found = share_of(way.model, shots_of(way.model, trace))
             g = self._weight
             self._shares[key] = Share(g * found.squares, g * found.gradient, g * found.information)
         return self._shares[key]
@@ -173,34 +180,68 @@ class _Looks:
             left.append(total.left(way.prior))
         return min(left)
 
-    def best_of(self, k: int) -> float:
-        """The most that a single candidate does for a pair."""
-        return max((self.separation([i], k) for i in self.shortlist), default=0.0)
-
     def score(self, chosen: Sequence[int]) -> float:
-        """How well all pairs are parted: more of what is enough counts nothing."""
-        return float(sum(np.log1p(np.clip(self.separation(chosen, k), 0.0, BEST)) for k in range(len(self.pairs))))
+        """How well all pairs are parted to first order: more of what is enough counts nothing."""
+        return _worth(self.separation(chosen, k) for k in range(len(self.pairs)))
+
+    def checked(self, sets: Sequence[Candidate], pair: Pair) -> float:
+        """Chi square between the models of a pair after all sets, the loser fitted along the bend."""
+        plans = [s.planned for s in sets]
+        key = (*(id(p) for p in plans), id(pair))
+        if key not in self._checked:
+            self._checked[key] = min(settled(way, plans, self._sensor, self._weight) for way in pair.ways)
+        return self._checked[key]
+
+    def proved(self, chosen: Sequence[int]) -> list[float]:
+        """The same for every pair."""
+        return [self.checked([self.choice[i] for i in chosen], pair) for pair in self.pairs]
 
     def duration(self, i: int) -> float:
         """Length of a candidate in seconds."""
         return self.choice[i].planned.duration_s
 
 
+def _worth(separations: Iterable[float]) -> float:
+    return float(sum(np.log1p(np.clip(x, 0.0, BEST)) for x in separations))
+
+
 def _choose(looks: _Looks) -> list[int]:
-    """Set by set, each the one that parts most; the shortest of those that do nearly as well."""
+    """Set by set, each the one that parts most; the shortest of those that do nearly as well.
+
+    What looks best to first order is put to the proof, one after the other, until one stands.
+    """
     chosen: list[int] = []
+    reached = 0.0
     while looks.shortlist and len(chosen) < MOST_SETS:
-        reached = [looks.separation(chosen, k) for k in range(len(looks.pairs))] if chosen else [0.0]
-        if chosen and min(reached) >= GOOD:
-            break
-        now = looks.score(chosen) if chosen else 0.0
-        gains = {i: looks.score([*chosen, i]) - now for i in looks.shortlist}
+        gains = {i: looks.score([*chosen, i]) for i in looks.shortlist}
         best = max(gains.values())
-        if best < 0.1:  # of the logarithm: nothing that would be seen
+        alike = sorted(
+            (i for i, g in gains.items() if g > best - ALIKE), key=lambda i: (looks.duration(i), -looks.choice[i].share)
+        )
+        others = sorted((i for i in gains if i not in alike), key=lambda i: -gains[i])
+        order = _varied(looks, [*alike, *others])
+        proofs: dict[int, list[float]] = {}
+        for i in order[:PROOFS]:
+            proofs[i] = looks.proved([*chosen, i])
+            if min(proofs[i]) >= GOOD:
+                break
+        winner = max(proofs, key=lambda i: _worth(proofs[i]))
+        if chosen and _worth(proofs[winner]) < reached + 0.1:  # of the logarithm: nothing that would be seen
             break
-        alike = [i for i, g in gains.items() if g > best - ALIKE]
-        chosen.append(min(alike, key=lambda i: (looks.duration(i), -gains[i])))
+        chosen.append(winner)
+        reached = _worth(proofs[winner])
+        if min(proofs[winner]) >= GOOD:
+            break
     return chosen
+
+
+def _varied(looks: _Looks, order: Sequence[int]) -> list[int]:
+    """The same order, but the best of every amplitude first: where one amplitude misleads, the next is another."""
+    first: list[int] = []
+    for i in order:
+        if looks.choice[i].share not in {looks.choice[k].share for k in first}:
+            first.append(i)
+    return [*first, *(i for i in order if i not in first)]
 
 
 def _section(sets: Sequence[Candidate], table: Table) -> dict[str, Any]:
@@ -209,7 +250,7 @@ def _section(sets: Sequence[Candidate], table: Table) -> dict[str, Any]:
     for candidate in sets:
         entry = candidate.planned.excitation.model_dump(mode="json", exclude_defaults=True)
         entry = {"kind": candidate.planned.excitation.model_dump()["kind"]} | entry
-        entry["name"] = f"{table.prefix}: {_described(candidate)}"
+        entry["name"] = f"{table.prefix}: {candidate.planned.excitation.describe()}"
         if not table.linear:
             entry["travel_cap_deg"] = float(f"{min(CAP * candidate.travel_deg, table.allowed.travel_deg):.3g}")
         entries.append(entry)
@@ -218,13 +259,6 @@ def _section(sets: Sequence[Candidate], table: Table) -> dict[str, Any]:
     }  # fmt: skip
     ExcitationConfig.model_validate_json(json.dumps(section), strict=True)
     return section
-
-
-def _described(candidate: Candidate) -> str:
-    excitation = candidate.planned.excitation
-    torque = excitation.model_dump()["torque_nm"]
-    words = excitation.describe()
-    return words if "N m" in words else f"{words}, {torque:g} N m"
 
 
 def with_follow_up(found: Identification, planned: FollowUp | None) -> Identification:

@@ -13,7 +13,7 @@ from identify.output_error import Estimate, evaluate, refine
 from identify.results import Identification, Unparted
 from identify.traces import Trace
 from rig import effects
-from rig.platform import Platform
+from rig.platform import TERMS, Platform
 
 MOST_PAIRS = 6
 EXCLUDED = 25.0  # chi square by which the data have excluded a rival already
@@ -57,7 +57,7 @@ def pairs_of(found: Identification, traces: Sequence[Trace], noise: float) -> tu
             else:
                 placed = _in_place(final, effect, rival, model, traces, noise)
                 if placed is None:
-                    why = "fitted in the finished model it leaves far more than what is named: these data exclude it"
+                    why = "in the finished model the data so far exclude the rival already"
                     without.append(Unparted(effect, rival, why))
                 else:
                     pairs.append(
@@ -88,10 +88,11 @@ def _in_place(
 ) -> Platform | None:
     """The rival in the place of the effect in the finished model; None where the data exclude it there."""
     wanted = tuple(rival if e == effect else e for e in final.effects)
-    if set(model.effects) == set(wanted) and model.terms == final.terms:
+    if set(model.effects) == set(wanted):
         return model
+    terms = tuple(t for t in TERMS if t in (*final.terms, *model.terms))
     held = {e: model.effects[rival] if e == rival else final.effects[e] for e in wanted}
-    swapped = replace(final, effects=held)
+    swapped = replace(final, effects=held, terms=terms)
     structure, names, values = vector_of(swapped, 1 + max(t.number for t in traces))
     start = dict(zip(names, values.tolist(), strict=True))
     fitted = refine(traces, structure, start, None, REFIT, coarse=True, tolerance=1e-3)

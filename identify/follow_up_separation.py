@@ -16,16 +16,19 @@ import numpy as np
 from identify.identifiability import Information, information_of, planned_trace, vector_of
 from identify.parameters import bounds_of, ordered, platform_of
 from identify.sensitivities import nuisance_basis, sensitivities
-from identify.shots import RUNAWAY, make_shots
+from identify.shots import RUNAWAY, Shots, make_shots
 from identify.traces import Trace
+from rig import effects
 from rig.dynamics import Equations
 from rig.dynamics.simulate import MAX_SUBSTEPS
 from rig.excitation import PlannedSet
 from rig.platform import Platform
 from rig.recording.run import Array
 
-SETTLE = 6  # rounds in which a model is fitted to what the other would have shown
+SETTLE = 8  # rounds in which a model is fitted to what the other would have shown
+TRIES = 5  # of a step, each shorter than the one before
 ENOUGH = 1e-2  # of chi square by which a round has to gain
+STARTS = (1.0, 0.1, 0.0)  # of the gains of the model's own effects
 
 
 @dataclass(frozen=True)
@@ -66,14 +69,15 @@ class Share:
         """Chi square left when the parameters have taken up what pays, to first order."""
         return self.squares - float(self.gradient @ self.step(prior))
 
-    def step(self, prior: Array, moved: Array | None = None) -> Array:
+    def step(self, prior: Array, moved: Array | None = None, damping: float = 0.0) -> Array:
         """The move of the parameters that leaves the least, from where they have ``moved`` already."""
         total = self.information + prior
         gradient = self.gradient if moved is None else self.gradient - prior @ moved
         size = np.sqrt(np.maximum(np.diag(total), 1e-300))
         if not np.all(np.isfinite(total)):
             return np.zeros(len(size))
-        return np.asarray(np.linalg.lstsq(total / np.outer(size, size), gradient / size, rcond=1e-13)[0] / size)
+        scaled = total / np.outer(size, size) + damping * np.eye(len(size))
+        return np.asarray(np.linalg.lstsq(scaled, gradient / size, rcond=1e-13)[0] / size)
 
 
 def prior_of(platform: Platform, traces: Sequence[Trace], noise: float) -> Array:
@@ -103,18 +107,23 @@ def measured(truth: Platform, planned: PlannedSet, sensor: Sensor) -> Trace:
     return planned_trace(truth, planned, sensor.sample_rate_hz, sensor.noise, 0, sensor.channel)
 
 
-@RUNAWAY
-def share_of(model: Platform, trace: Trace) -> Share:
-    """How a model differs from what a set showed, start state and bias projected out."""
-    structure, names, values = vector_of(model, 1)
+def shots_of(model: Platform, trace: Trace) -> Shots:
+    """A set as the simulator sees it, from rest, on steps fine enough for a model."""
     shots = make_shots(trace, min(MAX_SUBSTEPS, Equations(model).substeps(trace.step_s)), None)
     shots.starts = np.zeros((len(shots.first), 2))
+    return shots
+
+
+@RUNAWAY
+def share_of(model: Platform, shots: Shots) -> Share:
+    """How a model differs from what a set showed, start state and bias projected out."""
+    structure, names, values = vector_of(model, 1)
     scale = np.where(values != 0.0, np.abs(values), 1.0)
     columns, state, residual = sensitivities(shots, structure, names, values, scale, np.zeros(len(names), dtype=bool))
     used: Any = shots.weight
     kept = [i for i, n in enumerate(names) if len(n) < 3]
     loose = [i for i, n in enumerate(names) if len(n) == 3]
-    both = np.column_stack([columns[used][:, kept], residual[used]]) / trace.noise
+    both = np.column_stack([columns[used][:, kept], residual[used]]) / shots.trace.noise
     if not (np.all(np.isfinite(both)) and np.all(np.isfinite(state[used]))):
         return Share(0.0, np.zeros(len(kept)), np.zeros((len(kept), len(kept))))  # it runs away: no ground to stand on
     basis = nuisance_basis(shots, state)
@@ -128,36 +137,54 @@ def share_of(model: Platform, trace: Trace) -> Share:
 def settled(way: Way, several: Sequence[PlannedSet], sensor: Sensor, weight: float = 1.0) -> float:
     """Chi square that several sets leave when the model is fitted to what the truth would have shown.
 
-    Each sample counts ``weight`` times. Sensitivities are taken anew after each move: a large difference may be taken
-    up along a bend.
+    Each sample counts ``weight`` times. The fit follows the bend (Levenberg-Marquardt, sensitivities anew after each
+    move), and begins once more with little of the model's own effects: a gain that the data so far hardly know may
+    be far off, and the way back from there leads over hills.
     """
     sensor = replace(sensor, noise=sensor.noise / np.sqrt(weight))
-    traces = [measured(way.truth, s, sensor) for s in several]
+    shots = [shots_of(way.model, measured(way.truth, s, sensor)) for s in several]
+    _, names, origin = vector_of(way.model, 1)
+    own = np.array([len(n) > 1 and n[0] not in way.truth.effects and _is_gain(n) for n in names])
+    found = [_descend(way, shots, np.where(own, share * origin, origin)) for share in STARTS[: 1 + 2 * bool(own.any())]]
+    return min(found)
+
+
+def _is_gain(name: tuple[str, ...]) -> bool:
+    return next(p.linear for p in effects.get(name[0]).parameters if p.name == name[1])
+
+
+def _descend(way: Way, several: Sequence[Shots], start: Array) -> float:
+    """The least chi square, price of moving included, that is found from a start."""
     structure, names, origin = vector_of(way.model, 1)
     kept = [i for i, n in enumerate(names) if len(n) < 3]
     low, high = np.array([bounds_of(n) for n in names]).T
-    values, total = origin, _total(way.model, traces)
-    cost = total.squares
+
+    def at(values: Array) -> tuple[Share, float]:
+        share = _total(platform_of(structure, names, values), several)
+        moved = (values - origin)[kept]
+        return share, share.squares + float(moved @ way.prior @ moved)
+
+    values = start
+    total, cost = at(values)
+    damping = 0.0
     for _ in range(SETTLE):
-        step = total.step(way.prior, (values - origin)[kept])
         before = cost
-        for damping in (1.0, 0.3, 0.1):
+        for _try in range(TRIES):
             trial = values.copy()
-            trial[kept] += damping * step
+            trial[kept] += total.step(way.prior, (values - origin)[kept], damping)
             trial = ordered(names, np.clip(trial, low, high))
-            moved = (trial - origin)[kept]
-            found = _total(platform_of(structure, names, trial), traces)
-            new = found.squares + float(moved @ way.prior @ moved)
+            share, new = at(trial)
             if 0.0 < new < cost:
-                values, total, cost = trial, found, new
+                values, total, cost, damping = trial, share, new, 0.1 * damping
                 break
+            damping = max(10.0 * damping, 1e-3)
         if before - cost < ENOUGH * cost:
             break
-    return cost
+    return cost if cost > 0.0 else np.inf
 
 
-def _total(model: Platform, traces: Sequence[Trace]) -> Share:
-    shares = [share_of(model, t) for t in traces]
+def _total(model: Platform, several: Sequence[Shots]) -> Share:
+    shares = [share_of(model, s) for s in several]
     total = shares[0]
     for one in shares[1:]:
         total = total + one

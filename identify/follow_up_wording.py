@@ -8,7 +8,7 @@ import yaml
 
 from identify.follow_up_shapes import Candidate
 from identify.results import FollowUp, FollowUpPlan, Parting, Unparted
-from identify.wording import capital, joined, number, plain
+from identify.wording import capital, joined, plain
 from rig import effects
 
 FILE = "follow_up.yaml"
@@ -30,7 +30,7 @@ def why_of(partings: Sequence[Parting], sets: Sequence[Candidate]) -> str:
 
 def size(parting: Parting) -> str:
     """An expected separation, to two digits: it is no more exact than the models."""
-    return number(parting.separation, 2) if parting.separation < PLENTY else f"over {PLENTY:,.0f}"
+    return f"{float(f'{parting.separation:.2g}'):,.0f}" if parting.separation < PLENTY else f"over {PLENTY:,.0f}"
 
 
 def unparted_sentence(one: Unparted) -> str:
@@ -44,7 +44,7 @@ def verdict_sentences(follow_up: FollowUp) -> list[str]:
     if follow_up.plan is not None:
         out.append(f"To part what these data cannot: {_lower(follow_up.plan.why)}")
     out += [
-        f"{capital(plain(one.effect))} and {plain(one.rival)} stay open: {one.reason}."
+        f"No follow-up for {plain(one.effect)} and {plain(one.rival)}: {one.reason}."
         for one in follow_up.unparted
         if one.rival not in (effects.get(one.effect).never_separable or {})  # said by the verdict already
     ]
