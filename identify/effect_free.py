@@ -34,8 +34,11 @@ def effect_free(trace: Trace, shots: Shots, estimate: Estimate) -> Trace:
     torque = grid.shaft_torque(equations)
     mean = np.empty(len(torque) + 1)
     h = grid.step_s
-    for (first, last), start in zip(spans, shots.starts, strict=True):
-        fine = equations.integrate_shots(torque, h, [(first, last)], start[None, :], trace.offset_s)[first : last + 1]
+    motion = equations.integrate_shots(torque, h, spans, shots.starts, trace.offset_s)  # what remembers goes on
+    for first, last in spans:
+        fine = motion[first : last + 1].copy()
+        if last < len(motion) - 1 and last - first > 2:  # the next span's start stands there
+            fine[-1] = 2.0 * fine[-2] - fine[-3]
         # Its mean over each fine step, exact also where dry friction makes the acceleration jump.
         turned, gained = np.diff(fine[:, 0]), np.diff(fine[:, 1])
         angle = 0.5 * (fine[1:, 0] + fine[:-1, 0]) - h * gained / 12.0

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import signal
 
-from identify.compare import Judged
+from identify.compare import Judged, rough
 from identify.holdout import Split
 from identify.output_error import Estimate, evaluate, refine
 from identify.parameters import Name
@@ -100,6 +100,7 @@ class FineSearch:
         self.fixed: list[Name] = [("inertia",)] if self.torque_free else []
         self.allowed = [n for n in allowed if self._possible(n)]
         self.tried_at = np.inf
+        self.horizon = 1.0
 
     def _possible(self, name: str) -> bool:
         """A bias is a nuisance; a constant torque only shifts the unseen rest angle behind a gyro."""
@@ -153,7 +154,7 @@ class FineSearch:
         begin = self.whole(found.best.structure, found.best.values())
         if begin is None or not self._near(begin):
             return False
-        self.tried_at = begin.level
+        self.tried_at, self.horizon = begin.level, found.horizon
         trial = replace(
             found, candidates=list(found.candidates), rivals=dict(found.rivals), dropped=list(found.dropped),
             rival_models=dict(found.rival_models),
@@ -245,11 +246,29 @@ class FineSearch:
             best = min(tried.values(), key=lambda w: w.squares, default=now)
             if best.level < AT_FLOOR and look.gain < FAR_BEHIND * short[0].gain:
                 continue
-            start = {**now.values(), **look.start}
-            fitted = self.whole(now.structure.plus(look.effect), start, HOPELESS * best.estimate.sigma)
+            fitted = self._from(now, look, HOPELESS * best.estimate.sigma)
             if fitted is not None:
                 tried[look.effect] = fitted
         return tried, looks
+
+    def _from(self, now: Whole, look: Scored, hopeless: float) -> Whole | None:
+        """A candidate fitted from where its score points; with dry friction also by way of a short horizon.
+
+        Over whole runs friction has false minima: a standstill that comes too soon puts the rest of the run off.
+        """
+        structure = now.structure.plus(look.effect)
+        start = {**now.values(), **look.start}
+        straight = self.whole(structure, start, hopeless)
+        own_in_each = any(p.per_run for p in effects.get(look.effect).parameters)
+        if own_in_each or not rough(structure) or (straight is not None and straight.level < AT_FLOOR):
+            return straight
+        traces, use = [self.traces[i] for i in self.fit], [self.split.fit[i] for i in self.fit]
+        near = refine(traces, structure, start, self.horizon, 8, use, fixed=self.fixed, coarse=True, tolerance=1e-3)
+        if not np.isfinite(near.sigma):
+            return straight
+        around = self.whole(structure, dict(zip(near.names, near.values.tolist(), strict=True)), hopeless)
+        both = [w for w in (straight, around) if w is not None]
+        return min(both, key=lambda w: w.squares) if both else None
 
     def _scale(self, now: Whole) -> Scale:
         values = now.values()

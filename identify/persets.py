@@ -26,6 +26,7 @@ from identify.traces import UPSAMPLING, Trace
 from rig import effects
 from rig.config.identify import IdentifyConfig
 from rig.dynamics import TorqueSignal
+from rig.dynamics.low_pass import low_pass_kernel, smoothed
 from rig.effects.base import Place
 from rig.platform import TERMS
 from rig.recording.run import Array
@@ -38,10 +39,25 @@ KEYS = {"inertia": "inertia_kg_m2", "damping": "damping_nm_s_rad", "stiffness": 
 def linear_traces(traces: Sequence[Trace], fitted: Fitted) -> list[Trace]:
     """The runs with the torque that is left for J a + C w + K th once the model's effects are taken off."""
     if not fitted.structure.effects:
-        return list(traces)
-    if fitted.free_run is None or not fitted.sensor_limited:
-        return [_along_measured(t, fitted) for t in traces]
-    return [effect_free(t, s, fitted.free_run) for t, s in zip(traces, fitted.free_run.shots, strict=True)]
+        left = list(traces)
+    elif fitted.free_run is None or not fitted.sensor_limited:
+        left = [_along_measured(t, fitted) for t in traces]
+    else:
+        left = [effect_free(t, s, fitted.free_run) for t, s in zip(traces, fitted.free_run.shots, strict=True)]
+    return [_as_the_gyro_sees(t) for t in left]
+
+
+def _as_the_gyro_sees(trace: Trace) -> Trace:
+    """The torque behind the same low-pass as the rate: for a linear platform that changes nothing else."""
+    run = trace.run
+    if trace.channel != "rate" or trace.torque is None or not run.rate_corner_hz or not run.rate_delay_s:
+        return trace
+    fine = trace.step_s / UPSAMPLING
+    n = (len(trace.measured) - 1) * UPSAMPLING + 1
+    mean = trace.torque.on_half_steps(trace.start_s, fine, n)
+    kernel = low_pass_kernel(run.rate_corner_hz, run.rate_delay_s, fine)
+    time = trace.start_s + fine * np.arange(n)
+    return replace(trace, torque=TorqueSignal(time, smoothed(mean, kernel), "zero_order"), _series={})
 
 
 def _along_measured(trace: Trace, fitted: Fitted) -> Trace:
@@ -183,6 +199,8 @@ def _least_errors(trace: Trace, values: Mapping[str, float], labels: Sequence[Na
         structure, tuple(labels), np.array([values[term] for (term,) in labels]), np.inf, 0, np.zeros((0, 0)), (), True
     )
     settled = evaluate(held, [replace(trace, number=0)])
+    if not np.isfinite(settled.sigma):
+        return np.full(len(labels), np.inf)
     return least_std_errors(settled.shots[0], settled, labels, trace.noise)
 
 

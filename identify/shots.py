@@ -13,8 +13,10 @@ from identify.parameters import Name, equations_of
 from identify.regression import Structure
 from identify.traces import LEAD_S, Trace
 from rig.dynamics import Equations, Grid
+from rig.dynamics.low_pass import low_pass_kernel, smoothed
 from rig.recording.run import Array
 
+SOON_S = 0.02  # a first stretch that begins by then
 SENSOR_LEAD_S = 0.02  # longer than a gyro's filter remembers
 RUNAWAY = np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a simulation may; its error is then infinite
 
@@ -72,6 +74,11 @@ def make_shots(trace: Trace, substeps: int, length: int | None, use: Any = None)
     ratio = (len(angle) - 1) // (n - 1)
     starts = np.stack([angle[first * ratio], rate[first * ratio]], axis=1)
     weight = trace.keep if use is None else trace.keep & use
+    if trace.channel == "rate" and trace.run.rate_corner_hz and trace.run.rate_delay_s:
+        weight = weight.copy()  # across the seam of two shots the sensor's average mixes both
+        reach = int(np.ceil(trace.run.rate_delay_s / trace.step_s))
+        for seam in (*first.tolist(), n):
+            weight[max(0, seam - reach) : seam + reach] = False
     return Shots(trace, Grid(time, trace.torque, substeps, min(LEAD_S, trace.offset_s)), first, starts, 0.0, weight)
 
 
@@ -82,13 +89,19 @@ def predict(shots: Shots, equations: Equations, starts: Array, bias: float) -> A
     ratio = round(shots.trace.step_s / grid.step_s)
     n = len(shots.trace.measured)
     rate = shots.trace.channel == "rate"
-    active = [(a * ratio, min(b, n - 1) * ratio) for (a, b), on in zip(shots.edges, shots.active, strict=True) if on]
-    fine = equations.integrate_shots(torque, grid.step_s, active, starts[shots.active], shots.trace.offset_s)
-    if rate and equations.sensor.names:
-        sensed = _sensed(equations, fine[:, 1], active[0][0] if active else 0, grid.step_s)
-        return np.asarray(sensed[: n * ratio : ratio] + bias)
-    out = fine[: n * ratio : ratio, 1 if rate else 0]
-    return out + bias if rate else out
+    on = shots.active
+    if equations.states and len(on) > 1 and not on[0] and shots.first[1] * shots.trace.step_s <= SOON_S:
+        on = np.concatenate([[True], on[1:]])  # what remembers begins where the run does, not where samples count
+    active = [(a * ratio, min(b, n - 1) * ratio) for (a, b), used in zip(shots.edges, on, strict=True) if used]
+    fine = equations.integrate_shots(torque, grid.step_s, active, starts[on], shots.trace.offset_s)
+    if not rate:
+        return np.asarray(fine[: n * ratio : ratio, 0])
+    run, turned = shots.trace.run, fine[:, 1]
+    if equations.sensor.names:
+        turned = _sensed(equations, turned, active[0][0] if active else 0, grid.step_s)
+    if run.rate_corner_hz and run.rate_delay_s:
+        turned = smoothed(turned, low_pass_kernel(run.rate_corner_hz, run.rate_delay_s, grid.step_s))
+    return np.asarray(turned[: n * ratio : ratio] + bias)
 
 
 def _sensed(equations: Equations, rate: Array, first: int, step_s: float) -> Array:

@@ -45,6 +45,8 @@ def least_std_errors(shots: Shots, estimate: Estimate, names: Sequence[Name], si
     here = columns(np.zeros(2))
     parts = [here, *(columns(d) - here for d in along.T)]  # the motion is linear in its start state, nearly
     gram = np.array([[a.T @ b for b in parts] for a in parts])
+    if not np.all(np.isfinite(gram)):  # a model that runs away tells nothing about itself
+        return np.full(len(keep), np.inf)
     reach = np.linspace(-DOUBT, DOUBT, GRID)
     points = np.array([(1.0, u, v) for u in reach for v in reach if np.hypot(u, v) <= DOUBT])
     size = np.sqrt(np.maximum(np.diag(gram[0, 0]), 1e-300))
@@ -61,4 +63,8 @@ def _directions(shots: Shots, estimate: Estimate, which: int) -> Array:
     )
     begin, end = shots.edges[which]
     z = state[begin:end][shots.weight[begin:end]]
-    return np.asarray(np.linalg.cholesky(np.linalg.pinv(z.T @ z, hermitian=True) + 1e-300 * np.eye(2)))
+    square = z.T @ z
+    if not np.all(np.isfinite(square)):
+        return np.zeros((2, 2))
+    spread, axes = np.linalg.eigh(np.linalg.pinv(square, hermitian=True))
+    return np.asarray(axes * np.sqrt(np.maximum(spread, 0.0)))
