@@ -133,11 +133,18 @@ def test_for_what_no_torque_and_rate_can_part_nothing_is_planned(rival: str) -> 
 
 
 def test_where_the_limits_leave_too_little_nothing_is_planned_and_the_verdict_says_so() -> None:
-    found, recording = case("actuator_lag")
-    follow_up = plan_follow_up(found, recording, Peaks(0.01, 0.9, 0.5), RATE_HZ, 12.0)
+    found, recording = case("coulomb_friction")
+    follow_up = plan_follow_up(found, recording, Peaks(0.04, 0.3, 5.0), RATE_HZ, 12.0)
     assert follow_up is not None and follow_up.plan is None
     assert f"{LEAST:g} are needed" in follow_up.unparted[0].reason
     assert "No follow-up for" in with_follow_up(found, follow_up).verdict.sentences[-1]
+
+
+def test_torque_that_no_drive_makes_well_is_no_way_out() -> None:
+    found, recording = case("actuator_lag")
+    follow_up = plan_follow_up(found, recording, Peaks(0.01, 0.9, 0.5), RATE_HZ, 12.0)
+    assert follow_up is not None and follow_up.plan is None
+    assert "with 0.30 N m or more" in follow_up.unparted[0].reason
 
 
 def test_without_a_rival_nothing_is_planned() -> None:

@@ -161,6 +161,22 @@ def test_a_missing_model_file_is_said_with_the_line_that_names_it(tmp_path: Path
         load(tmp_path, SMALLEST + "model: gone.yaml\n")
 
 
+@pytest.mark.parametrize("head", ["", "excitation:\n"])
+def test_an_excitation_file_may_stand_for_the_section(tmp_path: Path, head: str) -> None:
+    body = "sample_rate_hz: 500.0\nsets:\n- {torque_nm: 3.0, frequency_hz: 2.0}\n"
+    indented = body if not head else "".join(f"  {line}\n" for line in body.splitlines())
+    (tmp_path / "follow_up.yaml").write_text(f"# why\n{head}{indented}")
+    loaded = load(tmp_path, SMALLEST, "excitation=follow_up.yaml")
+    assert loaded.config.excitation.sample_rate_hz == 500.0
+    assert [s.title for s in loaded.config.excitation.sets] == ["2 Hz"]
+    assert list(loaded.included) == [str(tmp_path / "follow_up.yaml")]
+
+
+def test_a_missing_excitation_file_is_said_to_be_one(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"excitation: names an excitation file: .*gone\.yaml: no such file"):
+        load(tmp_path, SMALLEST + "excitation: gone.yaml\n")
+
+
 def test_a_term_left_out_is_zero_in_the_platform(tmp_path: Path) -> None:
     platform = load(tmp_path, SMALLEST + "model: {terms: [inertia, damping]}\n").config.model.platform()
     assert platform.stiffness_nm_rad == 0.0

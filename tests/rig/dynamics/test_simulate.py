@@ -31,6 +31,19 @@ def test_step_by_step_a_delay_and_a_sensor_lag_act_as_in_the_whole_set() -> None
     assert np.max(np.abs(np.array(sensed) - whole[1:])) < 3e-3 * np.max(np.abs(whole))
 
 
+@pytest.mark.parametrize("effects", [COULOMB, {"torque_delay": {"delay": 1.5e-3}}], ids=str)
+def test_a_grid_with_its_torque_multiplied_is_the_grid_of_the_larger_torque(
+    effects: dict[str, dict[str, float]],
+) -> None:
+    equations = Equations(Platform(effects=effects))
+    small = Grid(TIME, SINE, 4)
+    before = small.simulate(equations, (0.0, 0.0))
+    large = small.scaled(1.5).simulate(equations, (0.0, 0.0))
+    whole = Grid(TIME, TorqueSignal(TIME, 1.5 * SINE.torque_nm), 4).simulate(equations, (0.0, 0.0))
+    np.testing.assert_allclose(large.rate_rad_s, whole.rate_rad_s, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(small.simulate(equations, (0.0, 0.0)).rate_rad_s, before.rate_rad_s)
+
+
 def test_a_stepper_that_is_reset_forgets_everything() -> None:
     stepper = Stepper(Platform(effects={"torque_delay": {"delay": 5e-3}}), 1e-3)
     first = [stepper.advance(20.0, 20.0) for _ in range(50)]
