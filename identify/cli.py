@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rig.cli.campaign import Played
     from rig.cli.results_folder import ResultsFolder
     from rig.config.load import LoadedConfig
+    from rig.platform import Platform
     from rig.preflight import Peaks
     from rig.recording.run import Recording
 
@@ -127,9 +128,7 @@ def _followed_up(
 
     Whatever a follow-up ends in, what stood before it stands: results are written before it is played.
     """
-    from identify.follow_up_rounds import after_playing, promises_more
-    from rig.cli.follow_up import play_follow_up
-    from rig.errors import Aborted, UsageError
+    from identify.follow_up_rounds import promises_more
     from rig.preflight import allowed_peaks
 
     config = loaded.config
@@ -137,41 +136,68 @@ def _followed_up(
     rate_hz, earlier_model = config.excitation.sample_rate_hz, found.final.platform
     found = _planned(desk, loaded, played.recording, found, allowed, rate_hz)
     for number in (1, 2):
-        plan = found.follow_up.plan if found.follow_up else None
-        if plan is None or found.aborted or not promises_more(found):
+        if found.aborted or not promises_more(found):
             break
         _write(desk, loaded, folder, played.recording, found)
-        try:
-            more = play_follow_up(
-                desk, loaded, folder, played, plan.excitation, found.final.platform, number, plan.why
-            )  # fmt: skip
-        except UsageError as refused:
-            return played, _noted(found, str(refused))
-        if more.cause is not None:
-            note = f"the follow-up was cut short, so these are the results without it: {more.cause}"
-            return more, dataclasses.replace(_noted(found, note), aborted=True)
-        played = more
-        try:
-            newer = _identified(desk, loaded, played.recording)
-        except (Aborted, KeyboardInterrupt) as stopped:
-            found = dataclasses.replace(_noted(found, STOPPED_AGAIN), aborted=True)
-            return dataclasses.replace(played, cause=stopped), found
-        except UsageError as error:
-            return played, _noted(found, f"the follow-up was played, but is of no use: {error}")
-        if newer.aborted:
-            found = dataclasses.replace(_noted(found, STOPPED_AGAIN), aborted=True)
-            return dataclasses.replace(played, cause=Aborted(STOPPED_AGAIN)), found
-        found = after_playing(found, newer, earlier_model, played.recording)
+        played, found, is_new = _played_on(desk, loaded, folder, played, found, number)
+        if not is_new:
+            break
+        played, found, is_new = _identified_again(desk, loaded, played, found, earlier_model)
+        if not is_new:
+            break
         found = _planned(desk, loaded, played.recording, found, allowed, rate_hz)
     return played, found
 
 
-def _noted(found: Identification, note: str) -> Identification:
+def _played_on(
+    desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, played: Played, found: Identification, number: int
+) -> tuple[Played, Identification, bool]:
+    """Play what is planned; the last of the three says whether all of it is there to identify from."""
+    from rig.cli.follow_up import play_follow_up
+    from rig.errors import RigError, UsageError
+
+    plan = found.follow_up.plan if found.follow_up else None
+    if plan is None:
+        return played, found, False
+    try:
+        more = play_follow_up(desk, loaded, folder, played, plan.excitation, found.final.platform, number, plan.why)
+    except UsageError as refused:
+        return played, _noted(found, str(refused)), False
+    except (RigError, KeyboardInterrupt) as error:  # before the first tick, at the question perhaps
+        desk.say_error(error)
+        note = f"the follow-up was not played: {str(error) or 'stopped by Ctrl-C'}"
+        return dataclasses.replace(played, cause=error), _noted(found, note, aborted=True), False
+    if more.cause is None:
+        return more, found, True
+    note = f"the follow-up was cut short, so these are the results without it: {more.cause}"
+    return more, _noted(found, note, aborted=True), False
+
+
+def _identified_again(
+    desk: Desk, loaded: LoadedConfig, played: Played, found: Identification, earlier_model: Platform | None
+) -> tuple[Played, Identification, bool]:
+    """Identify from all the data; where that fails or is stopped, what was found before stands."""
+    from identify.follow_up_rounds import after_playing
+    from rig.errors import Aborted, UsageError
+
+    stopped: BaseException = Aborted(STOPPED_AGAIN)
+    try:
+        newer = _identified(desk, loaded, played.recording)
+        if not newer.aborted:
+            return played, after_playing(found, newer, earlier_model, played.recording), True
+    except (Aborted, KeyboardInterrupt) as error:
+        stopped = error
+    except UsageError as error:
+        return played, _noted(found, f"the follow-up was played, but is of no use: {error}"), False
+    return dataclasses.replace(played, cause=stopped), _noted(found, STOPPED_AGAIN, aborted=True), False
+
+
+def _noted(found: Identification, note: str, aborted: bool = False) -> Identification:
     """With a word on why the plan was not played, or what came of it."""
     follow_up = found.follow_up
-    return found if follow_up is None else dataclasses.replace(
-        found, follow_up=dataclasses.replace(follow_up, note=note)
-    )  # fmt: skip
+    if follow_up is not None:
+        found = dataclasses.replace(found, follow_up=dataclasses.replace(follow_up, note=note))
+    return dataclasses.replace(found, aborted=found.aborted or aborted)
 
 
 def _planned(

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from identify.follow_up_pairs import Pair, pairs_of
 from identify.follow_up_separation import Sensor, Share, Way, coarser, measured, settled, share_of, shots_of
@@ -78,7 +79,7 @@ def plan_follow_up(
     if not traces:
         return None
     noise = max(found.noise_floor.holdout_rate_rms, found.final.error.holdout_rate_rms or 0.0)
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"), threadpool_limits(1):  # small matrices: a second BLAS thread only waits
         pairs, without = pairs_of(found, traces, noise)
         if not pairs:
             return FollowUp(None, tuple(without))

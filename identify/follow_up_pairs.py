@@ -15,7 +15,7 @@ from identify.traces import Trace
 from rig import effects
 from rig.platform import TERMS, Platform
 
-MOST_PAIRS = 6
+MOST_PAIRS = 4
 EXCLUDED = 25.0  # chi square by which the data have excluded a rival already
 REFIT = 10  # iterations in which a rival is fitted into the finished model
 

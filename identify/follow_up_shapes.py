@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -182,21 +183,20 @@ def candidates(
     several: Sequence[Shape], platforms: Sequence[Platform], allowed: Peaks, sensor: Sensor, least_nm: float = 0.0
 ) -> list[Candidate]:
     """Every shape at every amplitude that stays within the limits on all platforms, from ``least_nm`` on."""
-    out = []
-    for shape in several:
+
+    def of_shape(shape: Shape) -> list[Candidate]:
         bench = _Bench(shape, platforms, allowed, sensor)
         most = bench.largest()
-        if most is None:
-            continue
-        for share in shape.amplitudes:
-            torque = float(f"{share * most:.3g}")
-            if torque < least_nm:
-                break
-            rehearsal = bench.play(torque)
-            if rehearsal.strain <= 1.0:
+        out = []
+        for torque, share in ((float(f"{share * (most or 0.0):.3g}"), share) for share in shape.amplitudes):
+            rehearsal = bench.play(torque) if torque > least_nm else None
+            if rehearsal is not None and rehearsal.strain <= 1.0:
                 made = shape.make(torque)
                 out.append(Candidate(PlannedSet(made.title, made), shape, share, rehearsal.travel_deg, rehearsal.seen))
-    return out
+        return out
+
+    with ThreadPoolExecutor(2) as workers:
+        return [candidate for found in workers.map(of_shape, several) for candidate in found]
 
 
 def fitting(candidate: Candidate, platforms: Sequence[Platform], allowed: Peaks) -> Candidate | None:

@@ -14,7 +14,9 @@ Out = Annotated[
 ]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="The same campaign on the simulated backend.")]
 Emulate = Annotated[bool, typer.Option("--emulate", help="The bench against devices emulated at wire level.")]
-Yes = Annotated[bool, typer.Option("--yes", help="Apply REAL torque without asking.")]
+Yes = Annotated[
+    bool, typer.Option("--yes", help="Apply REAL torque without asking; a follow-up only if the file says auto.")
+]
 Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="A.B.C=VALUE", help="Override one key of CONFIG; may be repeated."),

@@ -261,6 +261,23 @@ def test_one_that_the_preflight_refuses_is_not_played_and_nothing_is_lost(tmp_pa
     assert names(out) == ["5 Hz", "7 Hz"] and not (out / "follow_up.journal").exists()
 
 
+@pytest.mark.parametrize(("error", "code"), [(KeyboardInterrupt(), 130), (DeviceFault("no emulators"), 3)])
+def test_what_ends_a_follow_up_before_it_begins_leaves_the_first_results(
+    tmp_path: Path, stub: Stub, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int
+) -> None:
+    stub(doubtful())
+
+    def fail(*_: Any) -> None:
+        raise error
+
+    monkeypatch.setattr("rig.cli.follow_up.play", fail)
+    out = tmp_path / "out"
+    done = command(app, write_config(tmp_path), *AUTO, "--out", out)
+    assert done.exit_code == code, done.output
+    assert result(out)["aborted"] is True and "was not played" in result(out)["follow_up"]["note"]
+    assert names(out) == ["5 Hz", "7 Hz"]
+
+
 def test_ctrl_c_while_all_the_data_are_identified_leaves_the_first_results(tmp_path: Path, stub: Stub) -> None:
     stub(doubtful(), KeyboardInterrupt())
     out = tmp_path / "out"
