@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import signal
 
-from identify.compare import Judged, rough
+from identify.compare import Judged
 from identify.holdout import Split
 from identify.output_error import Estimate, evaluate, refine
 from identify.parameters import Name
@@ -30,7 +30,7 @@ from rig.platform import TERMS
 from rig.recording.run import Array
 
 NEAR_SIGNAL = 0.3  # of the signal that a free run may leave for this search to begin
-TRIED = 5  # candidates of a round that are fitted
+TRIED = 4  # candidates of a round that are fitted
 WORTH_A_FIT = 15.0  # expected fall of chi square
 CHANCE = 20.0  # fall of chi square, beyond the penalty, that no chance among all candidates and shapes makes
 HELD = 4.0  # the same on the held-out samples
@@ -41,7 +41,14 @@ SHARE = 0.2  # of the excess over the noise that an effect has to take away
 FARTHEST = 3000.0  # times the noise: beyond, the sensor's noise is not what limits this record
 CLOSER = 0.01  # of the mean square at the last attempt
 ENDS_NEAR = 2.0  # mean square over the noise's variance at the end for what was found to be believed
+ATTEMPTS = 2
 PATIENCE = 3  # effects after which the end must be near
+LONG = 14_000  # samples; of a longer recording a first part is scored first
+SHOWN = 6.0  # fall of chi square on that part at which the whole is looked at
+MOST_SHOWN = 10
+PLAIN = 300.0  # fall of chi square on that part at which it tells enough
+FEW_STEPS = 8  # of a fit that is only compared
+NEAR_THEN = 4.0  # times the best squares of its round: asked again in the finished model
 AT_FLOOR = 1.1  # mean square over the noise's variance: who is there has found what there is
 FAR_BEHIND = 0.7  # of the best score: not fitted any more once another candidate is at the floor
 HOPELESS = 3.0  # times the best error of the round after three steps
@@ -101,6 +108,8 @@ class FineSearch:
         self.allowed = [n for n in allowed if self._possible(n)]
         self.tried_at = np.inf
         self.horizon = 1.0
+        self.attempts = 0
+        self.came_near: dict[str, dict[str, Whole]] = {}
 
     def _possible(self, name: str) -> bool:
         """A bias is a nuisance; a constant torque only shifts the unseen rest angle behind a gyro."""
@@ -110,12 +119,14 @@ class FineSearch:
             return False
         return not (name == "torque_offset" and all(t.biased for t in self.traces))
 
-    def whole(self, structure: Structure, start: Mapping[Name, float], hopeless: float = np.inf) -> Whole | None:
+    def whole(
+        self, structure: Structure, start: Mapping[Name, float], hopeless: float = np.inf, steps: int = 15
+    ) -> Whole | None:
         """A structure fitted over whole runs; None where it runs away."""
         traces = [self.traces[i] for i in self.fit]
         use = [self.split.fit[i] for i in self.fit]
         estimate = refine(
-            traces, structure, start, None, 15, use, fixed=self.fixed, coarse=True, tolerance=TOLERANCE,
+            traces, structure, start, None, steps, use, fixed=self.fixed, coarse=True, tolerance=TOLERANCE,
             hopeless=hopeless,
         )  # fmt: skip
         return self._measured(estimate) if np.isfinite(estimate.sigma) else None
@@ -154,7 +165,7 @@ class FineSearch:
         begin = self.whole(found.best.structure, found.best.values())
         if begin is None or not self._near(begin):
             return False
-        self.tried_at, self.horizon = begin.level, found.horizon
+        self.tried_at, self.horizon, self.attempts = begin.level, found.horizon, self.attempts + 1
         trial = replace(
             found, candidates=list(found.candidates), rivals=dict(found.rivals), dropped=list(found.dropped),
             rival_models=dict(found.rival_models),
@@ -169,6 +180,8 @@ class FineSearch:
     def _near(self, model: Whole) -> bool:
         """Whether the free run stays close enough, and closer than where this was tried before."""
         moving = np.concatenate([self.traces[i].measured[self.split.fit[i]] for i in self.fit])
+        if self.attempts >= ATTEMPTS:
+            return False
         close = model.estimate.sigma < NEAR_SIGNAL * float(np.std(moving)) and model.level < FARTHEST**2
         return close and model.level < CLOSER * self.tried_at
 
@@ -183,6 +196,8 @@ class FineSearch:
             if chosen is None:
                 break
             now = self._pruned(found, chosen, chosen.structure.effects[:-1])
+            if now.level > AT_FLOOR:  # a lag in the sensor looks like one in the drive until the rest is there
+                now = self._asked_again(found, now)
         if now.level > ENDS_NEAR or len(now.structure.effects) > len(declared.effects) + MOST_NAMED:
             return False
         now = self._restored(found, now, declared.terms)
@@ -192,18 +207,20 @@ class FineSearch:
         return True
 
     def _asked_again(self, found: Search, now: Whole) -> Whole:
-        """Effects that were added while others were still missing, each against all others in the finished model."""
+        """Effects that were added while others were still missing, each against those that came near it then."""
         added = now.structure.effects[len(found.base.structure.effects) :]
         for name in added[:-1]:
-            start = {n: v for n, v in now.values().items() if n[0] != name}
-            without = self.whole(now.structure.minus(name), start)
-            if without is None:
-                continue
-            tried, _ = self._tried(without)
-            tried[name] = now
-            chosen = self._chosen(tried, without)
-            if chosen is None:
-                continue
+            tried = {name: now}
+            for other, before in self.came_near.get(name, {}).items():
+                if other in now.structure.effects or name in effects.get(other).nests:
+                    continue  # what contains the named one was asked in the last round, on top of it
+                start = {n: v for n, v in now.values().items() if n[0] != name}
+                start |= {n: v for n, v in before.values().items() if n[0] == other}
+                names = tuple(other if e == name else e for e in now.structure.effects)
+                swapped = self.whole(replace(now.structure, effects=names), start)
+                if swapped is not None:
+                    tried[other] = swapped
+            chosen = self._simplest(tried)
             if chosen != name:
                 self.say(f"{chosen} in the place of {name}, now that the others are there")
             now = tried[chosen]
@@ -232,14 +249,17 @@ class FineSearch:
         if name is None:
             return None
         best = tried[name]
+        self.came_near[name] = {
+            n: w for n, w in tried.items() if n != name and w.squares < NEAR_THEN * best.squares
+        }  # fmt: skip
+        if not best.estimate.converged:
+            best = self.whole(best.structure, best.values()) or best
         self.say(f"added {name}: free-run error {now.estimate.sigma:.3g} -> {best.estimate.sigma:.3g}")
         return best
 
     def _tried(self, now: Whole) -> tuple[dict[str, Whole], list[Scored]]:
         """The most promising candidates, fitted on top of a model, and all that were looked at."""
-        names = [n for n in self.allowed if n not in now.structure.effects]
-        scores = Scores(now.estimate, self.fixed, self.noise * float(np.sqrt(now.level)), self._scale(now))
-        looks = scores.all(names)
+        looks = self._looks(now, [n for n in self.allowed if n not in now.structure.effects])
         tried: dict[str, Whole] = {}
         short = self._shortlist(looks, now)
         for look in short:
@@ -251,6 +271,18 @@ class FineSearch:
                 tried[look.effect] = fitted
         return tried, looks
 
+    def _looks(self, now: Whole, names: Sequence[str]) -> list[Scored]:
+        """Scores of all candidates: of a long recording first on part of it, then on all for those that show there."""
+        sigma, scale = self.noise * float(np.sqrt(now.level)), self._scale(now)
+        if now.count < LONG:
+            return Scores(now.estimate, self.fixed, sigma, scale).all(names)
+        part = Scores(now.estimate, self.fixed, sigma, scale, LONG / now.count).all(names)
+        if part and part[0].gain > PLAIN:
+            return part
+        shown = [s.effect for s in part if s.gain > SHOWN][:MOST_SHOWN]
+        whole = Scores(now.estimate, self.fixed, sigma, scale).all(shown) if shown else []
+        return whole + [s for s in part if s.effect not in shown]
+
     def _from(self, now: Whole, look: Scored, hopeless: float) -> Whole | None:
         """A candidate fitted from where its score points; with dry friction also by way of a short horizon.
 
@@ -258,15 +290,15 @@ class FineSearch:
         """
         structure = now.structure.plus(look.effect)
         start = {**now.values(), **look.start}
-        straight = self.whole(structure, start, hopeless)
-        own_in_each = any(p.per_run for p in effects.get(look.effect).parameters)
-        if own_in_each or not rough(structure) or (straight is not None and straight.level < AT_FLOOR):
+        straight = self.whole(structure, start, hopeless, FEW_STEPS)
+        dry = effects.get(look.effect).place is Place.FRICTION
+        if not dry or (straight is not None and straight.level < AT_FLOOR):
             return straight
         traces, use = [self.traces[i] for i in self.fit], [self.split.fit[i] for i in self.fit]
         near = refine(traces, structure, start, self.horizon, 8, use, fixed=self.fixed, coarse=True, tolerance=1e-3)
         if not np.isfinite(near.sigma):
             return straight
-        around = self.whole(structure, dict(zip(near.names, near.values.tolist(), strict=True)), hopeless)
+        around = self.whole(structure, dict(zip(near.names, near.values.tolist(), strict=True)), hopeless, FEW_STEPS)
         both = [w for w in (straight, around) if w is not None]
         return min(both, key=lambda w: w.squares) if both else None
 
@@ -302,15 +334,18 @@ class FineSearch:
         good = {n: w for n, w in tried.items() if self._worth(n, w, now)}
         if not good:
             return None
-        best = min(good, key=lambda n: good[n].penalised)
-        level = good[best].level
-        behind = {n: (good[n].penalised - good[best].penalised) / level for n in good}
-        alike = [n for n in good if behind[n] < RIVAL]
-        best = min(alike, key=lambda n: (*_simplicity(n), behind[n] > EQUAL, effects.names().index(n)))
+        best = self._simplest(good)
         for first in effects.get(best).lower_order:
             if first in good:
                 return first
         return best
+
+    def _simplest(self, good: Mapping[str, Whole]) -> str:
+        """The likeliest, or the simplest of those that are as likely."""
+        best = min(good, key=lambda n: good[n].penalised)
+        behind = {n: (good[n].penalised - good[best].penalised) / good[best].level for n in good}
+        alike = [n for n in good if behind[n] < RIVAL]
+        return min(alike, key=lambda n: (*_simplicity(n), behind[n] > EQUAL, effects.names().index(n)))
 
     def _worth(self, name: str, new: Whole, now: Whole) -> bool:
         """Whether chi square falls beyond chance, also where nothing was fitted, with parameters that stand out."""

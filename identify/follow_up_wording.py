@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import yaml
 
-from identify.follow_up_shapes import Candidate
 from identify.results import FollowUp, FollowUpPlan, Parting, Unparted
 from identify.wording import capital, joined, plain
 from rig import effects
+
+if TYPE_CHECKING:
+    from identify.follow_up_shapes import Candidate
 
 FILE = "follow_up.yaml"
 PLENTY = 10_000.0  # chi square beyond which nobody asks how much

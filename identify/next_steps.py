@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from identify.follow_up_wording import file_name
 from identify.residual import dependence
 from identify.results import GeneticRun, Identification, NotReported
 from identify.sign_check import SENTENCE, signs
@@ -46,6 +47,9 @@ def next_steps(found: Identification) -> tuple[str, ...]:
         failed.append(found.joint)
     if failed and not found.verdict.unexplained:
         steps.append(_to_reach(failed))
+    follow_up = found.follow_up
+    if follow_up is not None and follow_up.plan is not None:
+        steps.append(f"Play {file_name(len(follow_up.rounds))}: {follow_up.plan.why}")
     if found.aborted:
         steps.append("The campaign was aborted: run it again to its end.")
     return tuple(steps) or ("Run the campaign once more and compare: `rig check` says what each set can determine.",)

@@ -77,14 +77,18 @@ class Scores:
         One standard deviation of the measured channel's noise.
     scale
         How large the motion is.
+    share
+        How much of each run is looked at, from its start.
     """
 
-    def __init__(self, estimate: Estimate, fixed: Sequence[Name], sigma: float, scale: Scale) -> None:
+    def __init__(
+        self, estimate: Estimate, fixed: Sequence[Name], sigma: float, scale: Scale, share: float = 1.0
+    ) -> None:
         self.estimate, self.sigma, self.scale = estimate, sigma, scale
         self.keep = np.array([n not in fixed for n in estimate.names])
         self._finer_ones: dict[tuple[int, int], tuple[Shots, Array]] = {}
         with ThreadPoolExecutor(2) as workers:
-            self.runs = list(workers.map(self._around, estimate.shots))
+            self.runs = list(workers.map(self._around, [_cut(s, share) for s in estimate.shots]))
         self.largest_first = sorted(self.runs, key=lambda r: -float(np.std(r.base)))
         information = np.sum([r.columns.T @ r.columns for r in self.runs], axis=0)
         self.size = np.sqrt(np.maximum(np.diag(information), 1e-300))
@@ -221,6 +225,23 @@ class Scores:
             if p.linear and not p.per_run:
                 out.setdefault((effect.name, p.name), max(p.low, 0.0))
         return out
+
+
+def _cut(shots: Shots, share: float) -> Shots:
+    """The first part of a run, begun as the whole was."""
+    if share >= 1.0:
+        return shots
+    last = int(share * (len(shots.trace.measured) - 1))
+    trace = shots.trace.piece(0, last)
+    inside = shots.first < last
+    time = trace.start_s + trace.step_s * np.arange(len(trace.measured))
+    substeps = round(trace.step_s / shots.grid.step_s)
+    weight = shots.weight[: last + 1]
+    if not trace.stretches or not np.any(weight):
+        return shots
+    return Shots(
+        trace, Grid(time, trace.torque, substeps), shots.first[inside], shots.starts[inside], shots.bias, weight
+    )
 
 
 def _bounded(square: Array, along: Array, lowest: Array) -> tuple[Array, float]:
