@@ -10,6 +10,7 @@ import pytest
 from identify.follow_up_rounds import after_playing, errors_on, limits_of, promises_more, told_apart
 from identify.follow_up_separation import Sensor, Share, Way, prior_of, settled
 from identify.follow_up_wording import lines, verdict_sentences
+from identify.next_steps import next_steps
 from identify.results import FollowUp, FollowUpPlan, FollowUpRound, Identification, Parting, Unparted
 from identify.summary import summary
 from identify.writing import result_json
@@ -77,6 +78,11 @@ def test_what_was_played_stands_in_result_and_summary() -> None:
     said = " ".join(summary(found).split())
     assert "declared model without follow-up after follow-up noise floor" in said
     assert "Coulomb friction and Stribeck friction are told apart now." in said
+
+
+def test_where_the_campaign_was_not_accepted_the_plan_is_what_to_run_next() -> None:
+    found = replace(sample(2.0)[0], accepted=False, follow_up=FollowUp(plan(400.0)))
+    assert "Play follow_up.yaml: A slow sine parts them." in next_steps(found)
 
 
 def test_a_plan_and_what_has_none_are_said_in_words() -> None:
