@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 from rig.cli.terminal import plain
@@ -9,14 +10,15 @@ from rig.config.load import LoadedConfig
 from rig.config.messages import place_of
 from rig.config.overrides import apply_override
 from rig.config.yaml_text import parse
-from rig.errors import PreflightRefusal
+from rig.errors import ConfigError, PreflightRefusal
 
 
 def with_places(error: PreflightRefusal, loaded: LoadedConfig) -> PreflightRefusal:
     """The same refusal, saying file, line, key and value of every limit that it speaks of."""
     document = parse(loaded.text, str(loaded.path))
     for override in loaded.overrides:
-        apply_override(document, override)
+        with contextlib.suppress(ConfigError):  # it reaches into a file that an earlier one names: no place of its own
+            apply_override(document, override)
     lines = []
     for key in error.keys:
         path = tuple(key.split("."))

@@ -63,7 +63,7 @@ def load_config(path: str | Path, overrides: Sequence[str] = ()) -> LoadedConfig
     _include_files(document, path.parent, included)
     for override in overrides:
         apply_override(document, override)
-    _include_files(document, path.parent, included)
+        _include_files(document, path.parent, included)  # the next one may reach into it
     _read_effects(document, path.parent, included)
     config = _validate(document, name_from_stem(path.stem))
     return LoadedConfig(config, text, path, tuple(overrides), included)

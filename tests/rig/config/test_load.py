@@ -166,8 +166,8 @@ def test_an_excitation_file_may_stand_for_the_section(tmp_path: Path, head: str)
     body = "sample_rate_hz: 500.0\nsets:\n- {torque_nm: 3.0, frequency_hz: 2.0}\n"
     indented = body if not head else "".join(f"  {line}\n" for line in body.splitlines())
     (tmp_path / "follow_up.yaml").write_text(f"# why\n{head}{indented}")
-    loaded = load(tmp_path, SMALLEST, "excitation=follow_up.yaml")
-    assert loaded.config.excitation.sample_rate_hz == 500.0
+    loaded = load(tmp_path, SMALLEST, "excitation=follow_up.yaml", "excitation.rest_s=3")
+    assert (loaded.config.excitation.sample_rate_hz, loaded.config.excitation.rest_s) == (500.0, 3.0)
     assert [s.title for s in loaded.config.excitation.sets] == ["2 Hz"]
     assert list(loaded.included) == [str(tmp_path / "follow_up.yaml")]
 
