@@ -20,6 +20,7 @@ CLOSED = {
     "creep": ({"stiffness": 30.0, "time": 0.05}, 1.0, 30.0 * 0.05 * S / (1.0 + 0.05 * S)),
     "flexible_mode": ({"inertia": 3e-3, "frequency": 12.0, "ratio": 0.02}, 1.0, 3e-3 * MODE * S**2 / (S**2 + MODE)),
     "torque_offset": ({"level": 1.0}, 1.0, 0.0),
+    "torque_scale": ({"scale": 1.3}, 1.3, 0.0),
     "rate_bias": ({"bias": 0.1}, 1.0, 0.0),
 }
 
