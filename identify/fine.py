@@ -9,14 +9,13 @@ penalty for its parameters explain, on the samples fitted and on the held-out on
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from scipy import signal
 
-from identify.compare import Judged
 from identify.holdout import Split
-from identify.output_error import Estimate, evaluate, refine
+from identify.lines import foreign_lines_hz
+from identify.output_error import refine
 from identify.parameters import Name
 from identify.regression import Structure
 from identify.results import Candidate
@@ -24,10 +23,10 @@ from identify.scores import Scored, Scores
 from identify.screen import scale_of
 from identify.search import MOST_EFFECTS, MOST_NAMED, Search
 from identify.traces import Trace
+from identify.whole_runs import STEPS, Whole, fit_whole
 from rig import effects
 from rig.effects.base import Place, Scale
 from rig.platform import TERMS
-from rig.recording.run import Array
 
 NEAR_SIGNAL = 0.3  # of the signal that a free run may leave for this search to begin
 TRIED = 4  # candidates of a round that are fitted
@@ -43,53 +42,15 @@ CLOSER = 0.01  # of the mean square at the last attempt
 ENDS_NEAR = 2.0  # mean square over the noise's variance at the end for what was found to be believed
 ATTEMPTS = 2
 PATIENCE = 3  # effects after which the end must be near
-LONG = 14_000  # samples; of a longer recording a first part is scored first
 SHOWN = 6.0  # fall of chi square on that part at which the whole is looked at
 MOST_SHOWN = 10
 PLAIN = 300.0  # fall of chi square on that part at which it tells enough
+LONG = 14_000  # samples; of a longer recording a first part is scored first
 FEW_STEPS = 8  # of a fit that is only compared
 NEAR_THEN = 4.0  # times the best squares of its round: asked again in the finished model
 AT_FLOOR = 1.1  # mean square over the noise's variance: who is there has found what there is
 FAR_BEHIND = 0.7  # of the best score: not fitted any more once another candidate is at the floor
 HOPELESS = 3.0  # times the best error of the round after three steps
-LINE = 4.0  # times the noise at which a spectral line is one: e^-16 is the chance of a bin
-TOLERANCE = 3e-4
-
-
-@dataclass(frozen=True)
-class Whole:
-    """One structure fitted over whole runs; squares in units of the noise's variance."""
-
-    estimate: Estimate
-    squares: float  # on the samples fitted
-    count: int
-    held: float  # on the held-out samples
-    held_count: int
-    losses: Array  # held-out squares of every run, (runs,), in units of the channel squared
-    counts: Array
-
-    @property
-    def structure(self) -> Structure:
-        """Its terms and effects."""
-        return self.estimate.structure
-
-    @property
-    def level(self) -> float:
-        """Mean square over the noise's variance, one at least."""
-        return max(1.0, self.squares / max(self.count, 1))
-
-    @property
-    def penalised(self) -> float:
-        """Chi square and the penalty for parameters (Schwarz 1978)."""
-        return self.squares + len(self.estimate.names) * float(np.log(max(self.count, 2)))
-
-    def judged(self) -> Judged:
-        """As the rest of the search sees a model."""
-        return Judged(self.structure, self.estimate, self.losses, self.counts)
-
-    def values(self) -> dict[Name, float]:
-        """Parameter values by name."""
-        return dict(zip(self.estimate.names, self.estimate.values.tolist(), strict=True))
 
 
 class FineSearch:
@@ -100,7 +61,6 @@ class FineSearch:
     ) -> None:
         self.traces, self.say = traces, say
         self.fit = [i for i, m in enumerate(split.fit) if np.any(m)]
-        self.apart = [i for i, m in enumerate(split.judge) if np.any(m) and i not in self.fit]
         self.split = split
         self.noise = float(np.sqrt(np.mean([t.noise**2 for t in traces])))
         self.torque_free = all(t.torque is None for t in traces)
@@ -120,41 +80,10 @@ class FineSearch:
         return not (name == "torque_offset" and all(t.biased for t in self.traces))
 
     def whole(
-        self, structure: Structure, start: Mapping[Name, float], hopeless: float = np.inf, steps: int = 15
+        self, structure: Structure, start: Mapping[Name, float], hopeless: float = np.inf, steps: int = STEPS
     ) -> Whole | None:
         """A structure fitted over whole runs; None where it runs away."""
-        traces = [self.traces[i] for i in self.fit]
-        use = [self.split.fit[i] for i in self.fit]
-        estimate = refine(
-            traces, structure, start, None, steps, use, fixed=self.fixed, coarse=True, tolerance=TOLERANCE,
-            hopeless=hopeless,
-        )  # fmt: skip
-        return self._measured(estimate) if np.isfinite(estimate.sigma) else None
-
-    def _measured(self, estimate: Estimate) -> Whole | None:
-        squares, count, losses, counts = 0.0, 0, [], []
-        for i, r in zip(self.fit, estimate.residuals(), strict=True):
-            fitted, judged = self.split.fit[i], self.split.judge[i]
-            squares += float(r[fitted] @ r[fitted])
-            count += int(np.sum(fitted))
-            if np.any(judged):
-                losses.append(float(r[judged] @ r[judged]))
-                counts.append(float(np.sum(judged)))
-        if self.apart:
-            held = evaluate(
-                estimate, [self.traces[i] for i in self.apart], [self.split.judge[i] for i in self.apart], coarse=True
-            )
-            for i, r in zip(self.apart, held.residuals(), strict=True):
-                m = self.split.judge[i]
-                losses.append(float(r[m] @ r[m]))
-                counts.append(float(np.sum(m)))
-        if not (np.isfinite(squares) and np.all(np.isfinite(losses))):
-            return None
-        variance = self.noise**2
-        return Whole(
-            estimate, squares / variance, count, float(np.sum(losses)) / variance, int(np.sum(counts)),
-            np.array(losses), np.array(counts),
-        )  # fmt: skip
+        return fit_whole(self.traces, self.split, structure, start, self.noise, self.fixed, hopeless, steps)
 
     def take_over(self, found: Search) -> bool:
         """Go on from the model at hand, if it runs free near the data; ``found`` is brought up to date.
@@ -303,23 +232,11 @@ class FineSearch:
         return min(both, key=lambda w: w.squares) if both else None
 
     def _scale(self, now: Whole) -> Scale:
-        values = now.values()
-        platform = tuple(values.get((t,), 0.0) for t in TERMS)
-        return scale_of([self.traces[i] for i in self.fit], platform, self._lines(now))  # type: ignore[arg-type]
-
-    def _lines(self, now: Whole) -> tuple[float, ...]:
-        """Frequencies of the strongest lines in what the free runs leave."""
-        found: list[tuple[float, float]] = []
-        for i, r in zip(self.fit, now.estimate.residuals(), strict=True):
-            trace = self.traces[i]
-            x = np.where(trace.keep, r, 0.0) * signal.windows.hann(len(r))
-            size = np.abs(np.fft.rfft(x, 8 * len(x))) / (self.noise * np.sqrt(0.375 * len(x)))
-            f = np.fft.rfftfreq(8 * len(x), trace.step_s)
-            size[f < 2.0 / (trace.step_s * len(x))] = 0.0
-            peaks = signal.find_peaks(size, height=LINE)[0]
-            found += [(float(size[k]), float(f[k])) for k in peaks[np.argsort(size[peaks])[-3:]]]
-        found.sort(reverse=True)
-        return tuple(f for _, f in found[:8])
+        values, traces = now.values(), [self.traces[i] for i in self.fit]
+        inertia, damping, stiffness = (values.get((t,), 0.0) for t in TERMS)
+        natural_hz = float(np.sqrt(max(stiffness, 0.0) / max(inertia, 1e-300)) / (2.0 * np.pi))
+        lines = foreign_lines_hz(traces, now.estimate.residuals(), self.noise, natural_hz)
+        return scale_of(traces, (inertia, damping, stiffness), lines)
 
     def _shortlist(self, looks: Sequence[Scored], now: Whole) -> list[Scored]:
         """The largest gains beyond their penalty, and what comes first by order or simplicity."""

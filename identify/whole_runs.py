@@ -1,0 +1,103 @@
+"""A structure fitted over whole runs, its squares in units of the noise's variance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.compare import Judged
+from identify.holdout import Split
+from identify.output_error import Estimate, evaluate, refine
+from identify.parameters import Name
+from identify.regression import Structure
+from identify.traces import Trace
+from rig.recording.run import Array
+
+TOLERANCE = 3e-4
+STEPS = 15
+
+
+@dataclass(frozen=True)
+class Whole:
+    """One structure fitted over whole runs; squares in units of the noise's variance."""
+
+    estimate: Estimate
+    squares: float  # on the samples fitted
+    count: int
+    held: float  # on the held-out samples
+    held_count: int
+    losses: Array  # held-out squares of every run, (runs,), in units of the channel squared
+    counts: Array
+
+    @property
+    def structure(self) -> Structure:
+        """Its terms and effects."""
+        return self.estimate.structure
+
+    @property
+    def level(self) -> float:
+        """Mean square over the noise's variance, one at least."""
+        return max(1.0, self.squares / max(self.count, 1))
+
+    @property
+    def penalised(self) -> float:
+        """Chi square and the penalty for parameters (Schwarz 1978)."""
+        return self.squares + len(self.estimate.names) * float(np.log(max(self.count, 2)))
+
+    def judged(self) -> Judged:
+        """As the rest of the search sees a model."""
+        return Judged(self.structure, self.estimate, self.losses, self.counts)
+
+    def values(self) -> dict[Name, float]:
+        """Parameter values by name."""
+        return dict(zip(self.estimate.names, self.estimate.values.tolist(), strict=True))
+
+
+def fit_whole(
+    traces: Sequence[Trace], split: Split, structure: Structure, start: Mapping[Name, float], noise: float,
+    fixed: Sequence[Name], hopeless: float = np.inf, steps: int = STEPS,
+) -> Whole | None:  # fmt: skip
+    """A structure fitted to the samples that fit, measured on those that judge; None where it runs away.
+
+    Parameters
+    ----------
+    noise
+        One standard deviation of the measured channel.
+    hopeless
+        Root mean square above which the fit is given up after three steps.
+    """
+    fit = [i for i, m in enumerate(split.fit) if np.any(m)]
+    estimate = refine(
+        [traces[i] for i in fit], structure, start, None, steps, [split.fit[i] for i in fit], fixed=fixed,
+        coarse=True, tolerance=TOLERANCE, hopeless=hopeless,
+    )  # fmt: skip
+    return _measured(traces, split, fit, estimate, noise) if np.isfinite(estimate.sigma) else None
+
+
+def _measured(
+    traces: Sequence[Trace], split: Split, fit: Sequence[int], estimate: Estimate, noise: float
+) -> Whole | None:
+    squares, count, losses, counts = 0.0, 0, [], []
+    for i, r in zip(fit, estimate.residuals(), strict=True):
+        fitted, judged = split.fit[i], split.judge[i]
+        squares += float(r[fitted] @ r[fitted])
+        count += int(np.sum(fitted))
+        if np.any(judged):
+            losses.append(float(r[judged] @ r[judged]))
+            counts.append(float(np.sum(judged)))
+    apart = [i for i, m in enumerate(split.judge) if np.any(m) and i not in fit]
+    if apart:
+        held = evaluate(estimate, [traces[i] for i in apart], [split.judge[i] for i in apart], coarse=True)
+        for i, r in zip(apart, held.residuals(), strict=True):
+            m = split.judge[i]
+            losses.append(float(r[m] @ r[m]))
+            counts.append(float(np.sum(m)))
+    if not (np.isfinite(squares) and np.all(np.isfinite(losses))):
+        return None
+    variance = noise**2
+    return Whole(
+        estimate, squares / variance, count, float(np.sum(losses)) / variance, int(np.sum(counts)),
+        np.array(losses), np.array(counts),
+    )  # fmt: skip
