@@ -181,7 +181,7 @@ def bound(delay: bool) -> tuple[Array, Array]:
     """True values, and the relative Cramer-Rao bound of the joint fit."""
     platform = Platform(*TRUTH.values(), {"torque_delay": {"delay": DELAY_S}} if delay else {})
     rates = clean_rates(DELAY_S if delay else 0.0)
-    traces = traces_from(rates, [np.zeros_like(r) for r in rates])
+    traces = traces_from(rates, [np.zeros_like(r) for r in rates], lead_in_s=0.0)  # the start state holds at 0 s
     total = together([information_of(t, platform, len(SETS), (0.0, 0.0)) for t in traces])
     return total.values, np.array([total.relative(n) for n in total.names])
 

@@ -41,6 +41,8 @@ FARTHEST = 3000.0  # times the noise: beyond, the sensor's noise is not what lim
 CLOSER = 0.01  # of the mean square at the last attempt
 ENDS_NEAR = 2.0  # mean square over the noise's variance at the end for what was found to be believed
 ATTEMPTS = 2
+STILL_FAR = 100.0  # mean square over the noise's variance
+LEAST = 0.4  # of the squares that the best candidate takes while the noise is still far
 PATIENCE = 3  # effects after which the end must be near
 SHOWN = 6.0  # fall of chi square on that part at which the whole is looked at
 MOST_SHOWN = 10
@@ -124,6 +126,8 @@ class FineSearch:
             chosen = self._round(found, now, round_)
             if chosen is None:
                 break
+            if chosen.level > STILL_FAR and chosen.squares > (1.0 - LEAST) * now.squares:
+                return False
             now = self._pruned(found, chosen, chosen.structure.effects[:-1])
             if now.level > AT_FLOOR:  # a lag in the sensor looks like one in the drive until the rest is there
                 now = self._asked_again(found, now)

@@ -28,13 +28,10 @@ def amplitude(x: np.ndarray) -> float:
     return float(np.hypot(*np.linalg.lstsq(basis, x[inside], rcond=None)[0][:2]))
 
 
-SECOND_DERIVATIVE = pytest.mark.xfail(
-    strict=True, reason="the second derivative of a cubic spline through an encoder's angle is low by (w h)^2 / 12"
-)
 EDGES = pytest.mark.xfail(strict=True, reason="the low-pass swings at both ends of a run, and these samples count")
 
 
-@pytest.mark.parametrize("channel", ["rate", pytest.param("angle", marks=SECOND_DERIVATIVE)])
+@pytest.mark.parametrize("channel", ["rate", "angle"])
 def test_at_the_ring_the_differentiators_are_off_by_less_than_a_twentieth_of_a_percent(channel: str) -> None:
     ok = np.ones(len(TIME), bool)
     gyro = Run("ring", TIME, ok, rate_rad_s=RING * np.cos(RING * TIME))
