@@ -143,7 +143,23 @@ class _Identifier:
             per_set, joint = persets.each_set(
                 self.traces, after, self.start, centre, self.settings, self.recording.axis
             )  # fmt: skip
-        return self._conclude(search, before, after, measured_before, measured_after, floor, per_set, joint, changed)
+        found = self._conclude(search, before, after, measured_before, measured_after, floor, per_set, joint, changed)
+        return replace(found, torque_scale=self._torque_scale(after)) if in_full else found
+
+    def _torque_scale(self, fitted: Fitted) -> ParameterEstimate | None:
+        """The shaft's torque over the recorded one, where a known inertia was added for some of the runs."""
+        name = ("torque_scale", "scale")
+        if not fitted.sensor_limited or len({t.run.added_inertia_kg_m2 for t in self.traces}) < 2:
+            return None
+        if name not in fitted.names:
+            fitted = by_output_error(
+                self.traces, fitted.structure.plus("torque_scale"), {**fitted.values, name: 1.0}, 1.0,
+                self.split.final, self.split.everything,
+            )  # fmt: skip
+        value, error = fitted.values[name], fitted.std_error(name)
+        if not np.isfinite(error) or not fitted.determined[fitted.names.index(name)]:
+            return None
+        return ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), "1")
 
     def _before(self, search: Search) -> Fitted:
         if search.base.sigma < 2.0 * search.floor or self.structure.effects:

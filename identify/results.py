@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -212,6 +213,14 @@ class Identification:
     max_error_percent: Mapping[str, float] | None = None  # Eq. 15 over the sets
     aborted: bool = False
     follow_up: FollowUp | None = None  # where a name has a rival
+    torque_scale: ParameterEstimate | None = None  # shaft's over recorded; where runs carry a known added inertia
+
+    @property
+    def set_scatter(self) -> dict[str, float]:
+        """Standard deviation of every parameter from set to set, of those that at least two sets determine."""
+        names = {n for one in self.per_set for n in one.parameters}
+        values = {n: [s.parameters[n].value for s in self.per_set if n in s.parameters] for n in sorted(names)}
+        return {n: statistics.stdev(v) for n, v in values.items() if len(v) > 1}
 
     @property
     def final(self) -> ModelResult:

@@ -165,6 +165,9 @@ def _sets(identification: Identification) -> Table:
     for one in sets:
         values = [value_of(one.parameters[n]) if n in one.parameters else "undetermined" for n in names]
         table.add_row(printable(one.name), *values, "yes" if one.accepted else "NO", str(one.restarts))
+    scatter = identification.set_scatter
+    if scatter:
+        table.add_row("set to set", *[number(scatter[n], 2) if n in scatter else "-" for n in names], "", "")
     totals = identification.max_error_percent
     if totals:
         table.add_row("Max_Error", *[f"{number(totals[n], 2)} %" if n in totals else "-" for n in names], "", "")

@@ -23,6 +23,14 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
                else "the declared model reaches the noise floor.")
         )  # fmt: skip
     out += _bent(found)
+    if found.torque_scale is not None and "torque_scale" not in found.verdict.effects:
+        scale = found.torque_scale
+        off = abs(scale.value - 1.0) > 1.96 * scale.std_error
+        out.append(
+            f"From the known added inertia the torque on the shaft is {number(scale.value, 5)} +- "
+            f"{number(1.96 * scale.std_error, 2)} of the recorded one"
+            + ("; J, C and K are that much larger or smaller." if off else ": the torque scale is right.")
+        )
     if found.verdict.unexplained:
         out.append(
             f"{number(100.0 * found.verdict.unexplained_fraction, 2)} % of the residual above the noise floor stays "

@@ -49,6 +49,8 @@ def result_json(identification: Identification) -> dict[str, Any]:
         "after": _model(identification.after) if identification.after else None,
         "noise_floor": dict(vars(identification.noise_floor)),
         "per_set": [_set(one) for one in identification.per_set],
+        "set_scatter": identification.set_scatter,
+        "torque_scale": _parameter(identification.torque_scale) if identification.torque_scale else None,
         "max_error_percent": identification.max_error_percent,
         "dropped": _listed(final.dropped),
         "not_determined": _listed(final.not_determined),

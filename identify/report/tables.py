@@ -173,6 +173,10 @@ def set_table(identification: Identification) -> Markup:
         passed = "yes" if one.accepted else "NO"
         rows.append([one.name, frequency(one.frequency_hz), *values, number(one.objective), str(one.restarts), passed])
         rows[-1].append(one.advice)
+    scatter = identification.set_scatter
+    if scatter:
+        spread: list[Piece] = [number(scatter[n], 2) if n in scatter else "-" for n in names]
+        rows.append(["from set to set", "", *spread, "", "", "", "one standard deviation"])
     totals = identification.max_error_percent
     if totals:
         shown: list[Piece] = [f"{number(totals[n], 2)} %" if n in totals else "-" for n in names]

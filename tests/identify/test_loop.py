@@ -196,3 +196,23 @@ def test_who_stops_before_anything_is_fitted_gets_nothing() -> None:
 
     with pytest.raises(Aborted):
         identify(campaign(duration_s=4), LOW, SETTINGS, interrupt)
+
+
+@pytest.mark.parametrize(("scale", "named"), [(1.0, ()), (1.05, ("torque_scale",))])
+def test_a_known_added_inertia_tells_the_torque_scale(scale: float, named: tuple[str, ...]) -> None:
+    time = np.arange(4001) * 1e-3
+    runs = []
+    for i, (amplitude, hz, added) in enumerate(((104.0, 3.0, 0.0), (42.0, 9.0, 0.0), (104.0, 3.0, 0.01))):
+        torque = TorqueSignal(time, amplitude * np.sin(2 * np.pi * hz * time))
+        moved = simulate(Platform(TRUTH[0] + added, *TRUTH[1:]), time, torque, substeps=16).rate_rad_s
+        noisy = moved + white(len(time), NOISE_RAD_S, seed=i)
+        run = Run(f"run {i}", time, np.ones(len(time), bool), rate_rad_s=noisy, torque_time_s=time,
+                  torque_nm=torque.torque_nm / scale, frequency_hz=hz, added_inertia_kg_m2=added)  # fmt: skip
+        runs.append(run)
+    settings = IdentifyConfig.model_validate({"candidates": (*FEW, "torque_scale")})
+    found = identify(Recording(tuple(runs)), LOW, settings)
+    assert found.verdict.effects == named
+    assert found.torque_scale is not None
+    assert abs(found.torque_scale.value - scale) < 4.5 * found.torque_scale.std_error
+    assert found.torque_scale.std_error < 1e-3
+    assert found.set_scatter["stiffness"] < 1.0
