@@ -38,10 +38,12 @@ RIVAL = 10.0  # what parts two candidates for good
 STRONG = 4.0  # standard errors by which every parameter of a new effect must differ from zero
 SHARE = 0.2  # of the excess over the noise that an effect has to take away
 FARTHEST = 3000.0  # times the noise: beyond, the sensor's noise is not what limits this record
-CLOSER = 0.01  # of the mean square at the last attempt
+CLOSER = 0.5  # of the mean square at the last attempt
 ENDS_NEAR = 2.0  # mean square over the noise's variance at the end for what was found to be believed
 ATTEMPTS = 2
 STILL_FAR = 100.0  # mean square over the noise's variance
+VERY_FAR = 1e4
+LEAP = 0.03  # of the squares that the right effect leaves where it is the only one that is large
 LEAST = 0.4  # of the squares that the best candidate takes while the noise is still far
 PATIENCE = 3  # effects after which the end must be near
 SHOWN = 6.0  # fall of chi square on that part at which the whole is looked at
@@ -126,7 +128,7 @@ class FineSearch:
             chosen = self._round(found, now, round_)
             if chosen is None:
                 break
-            if chosen.level > STILL_FAR and chosen.squares > (1.0 - LEAST) * now.squares:
+            if self._astray(chosen, now):
                 return False
             now = self._pruned(found, chosen, chosen.structure.effects[:-1])
             if now.level > AT_FLOOR:  # a lag in the sensor looks like one in the drive until the rest is there
@@ -139,16 +141,21 @@ class FineSearch:
         found.best, found.floor = now.judged(), self.noise
         return True
 
+    @staticmethod
+    def _astray(new: Whole, now: Whole) -> bool:
+        """Whether a round brought too little for whole runs to be the right place to look: a short horizon is."""
+        left = new.squares / max(now.squares, 1e-300)
+        return (new.level > STILL_FAR and left > 1.0 - LEAST) or (new.level > VERY_FAR and left > LEAP)
+
     def _asked_again(self, found: Search, now: Whole) -> Whole:
         """Effects that were added while others were still missing, each against those that came near it then."""
         added = now.structure.effects[len(found.base.structure.effects) :]
         for name in added[:-1]:
             tried = {name: now}
-            for other, before in self.came_near.get(name, {}).items():
+            for other, own in self._others(name, now).items():
                 if other in now.structure.effects or name in effects.get(other).nests:
                     continue  # what contains the named one was asked in the last round, on top of it
-                start = {n: v for n, v in now.values().items() if n[0] != name}
-                start |= {n: v for n, v in before.values().items() if n[0] == other}
+                start = {n: v for n, v in now.values().items() if n[0] != name} | own
                 names = tuple(other if e == name else e for e in now.structure.effects)
                 swapped = self.whole(replace(now.structure, effects=names), start)
                 if swapped is not None:
@@ -161,6 +168,18 @@ class FineSearch:
             found.rival_models.pop(name, None)
             self._note_rivals(found, chosen, tried)
         return now
+
+    def _others(self, name: str, now: Whole) -> dict[str, dict[Name, float]]:
+        """Who came near an effect in its round, and its twin beyond the platform, with values to begin from."""
+        out = {
+            other: {n: v for n, v in before.values().items() if n[0] == other}
+            for other, before in self.came_near.get(name, {}).items()
+        }  # fmt: skip
+        mine = {n[1:]: v for n, v in now.values().items() if n[0] == name}
+        for twin in effects.get(name).never_separable or {}:
+            if twin in self.allowed and {p.name for p in effects.get(twin).parameters} == {k[0] for k in mine}:
+                out.setdefault(twin, {(twin, *k): v for k, v in mine.items()})
+        return out
 
     def _restored(self, found: Search, now: Whole, terms: Sequence[str]) -> Whole:
         """With a declared term that was set aside, where it is missed now that the effects are there."""

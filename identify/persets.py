@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from identify.effect_free import effect_free
 from identify.finish import Fitted, _regression_covariance
 from identify.genetic import QuadraticObjective, search
 from identify.output_error import Estimate, evaluate
-from identify.parameters import Name
+from identify.parameters import Name, platform_of
 from identify.prefilter import Denominator
 from identify.regression import Regression, Structure, fit, normal
 from identify.results import UNITS, GeneticRun, ParameterEstimate, SetResult
@@ -25,7 +26,7 @@ from identify.start_doubt import least_std_errors
 from identify.traces import UPSAMPLING, Trace
 from rig import effects
 from rig.config.identify import IdentifyConfig
-from rig.dynamics import TorqueSignal
+from rig.dynamics import Equations, TorqueSignal
 from rig.dynamics.low_pass import low_pass_kernel, smoothed
 from rig.effects.base import Place
 from rig.platform import TERMS
@@ -44,20 +45,24 @@ def linear_traces(traces: Sequence[Trace], fitted: Fitted) -> list[Trace]:
         left = [_along_measured(t, fitted) for t in traces]
     else:
         left = [effect_free(t, s, fitted.free_run) for t, s in zip(traces, fitted.free_run.shots, strict=True)]
-    return [_as_the_gyro_sees(t) for t in left]
+    values = np.array(list(fitted.values.values()))
+    sensor = Equations(platform_of(fitted.structure, tuple(fitted.values), values)).sensor
+    return [_as_the_gyro_sees(t, sensor) for t in left]
 
 
-def _as_the_gyro_sees(trace: Trace) -> Trace:
-    """The torque behind the same low-pass as the rate: for a linear platform that changes nothing else."""
+def _as_the_gyro_sees(trace: Trace, sensor: Any) -> Trace:
+    """The torque behind the same filters as the rate: for a linear platform that changes nothing else."""
     run = trace.run
-    if trace.channel != "rate" or trace.torque is None or not run.rate_corner_hz or not run.rate_delay_s:
+    smooth = bool(run.rate_corner_hz and run.rate_delay_s)
+    if trace.channel != "rate" or trace.torque is None or not (smooth or sensor.names):
         return trace
     fine = trace.step_s / UPSAMPLING
     n = (len(trace.measured) - 1) * UPSAMPLING + 1
-    mean = trace.torque.on_half_steps(trace.start_s, fine, n)
-    kernel = low_pass_kernel(run.rate_corner_hz, run.rate_delay_s, fine)
+    mean = np.asarray(sensor.apply(trace.torque.on_half_steps(trace.start_s, fine, n), fine))
+    if smooth:
+        mean = smoothed(mean, low_pass_kernel(float(run.rate_corner_hz or 0.0), float(run.rate_delay_s or 0.0), fine))
     time = trace.start_s + fine * np.arange(n)
-    return replace(trace, torque=TorqueSignal(time, smoothed(mean, kernel), "zero_order"), _series={})
+    return replace(trace, torque=TorqueSignal(time, mean, "zero_order"), _series={})
 
 
 def _along_measured(trace: Trace, fitted: Fitted) -> Trace:
