@@ -236,23 +236,18 @@ class FineSearch:
         return whole + [s for s in part if s.effect not in shown]
 
     def _from(self, now: Whole, look: Scored, hopeless: float) -> Whole | None:
-        """A candidate fitted from where its score points; with dry friction also by way of a short horizon.
+        """A candidate fitted from where its score points; with dry friction by way of a short horizon.
 
         Over whole runs friction has false minima: a standstill that comes too soon puts the rest of the run off.
         """
         structure = now.structure.plus(look.effect)
         start = {**now.values(), **look.start}
-        straight = self.whole(structure, start, hopeless, FEW_STEPS)
-        dry = effects.get(look.effect).place is Place.FRICTION
-        if not dry or (straight is not None and straight.level < AT_FLOOR):
-            return straight
-        traces, use = [self.traces[i] for i in self.fit], [self.split.fit[i] for i in self.fit]
-        near = refine(traces, structure, start, self.horizon, 8, use, fixed=self.fixed, coarse=True, tolerance=1e-3)
-        if not np.isfinite(near.sigma):
-            return straight
-        around = self.whole(structure, dict(zip(near.names, near.values.tolist(), strict=True)), hopeless, FEW_STEPS)
-        both = [w for w in (straight, around) if w is not None]
-        return min(both, key=lambda w: w.squares) if both else None
+        if effects.get(look.effect).place is Place.FRICTION:
+            traces, use = [self.traces[i] for i in self.fit], [self.split.fit[i] for i in self.fit]
+            near = refine(traces, structure, start, self.horizon, 8, use, fixed=self.fixed, coarse=True, tolerance=1e-3)
+            if np.isfinite(near.sigma):
+                start = dict(zip(near.names, near.values.tolist(), strict=True))
+        return self.whole(structure, start, hopeless, FEW_STEPS)
 
     def _scale(self, now: Whole) -> Scale:
         values, traces = now.values(), [self.traces[i] for i in self.fit]
