@@ -35,6 +35,8 @@ CHANCE = 20.0  # fall of chi square, beyond the penalty, that no chance among al
 HELD = 4.0  # the same on the held-out samples
 EQUAL = 4.0  # fall of chi square that says nothing: the library's order, simple before special, decides
 RIVAL = 10.0  # what parts two candidates for good
+TWICE = 2.0  # times the squares of the best: a special case of it does as well while much is missing
+CERTAIN = 30.0  # standard errors beyond which nobody asks whether a term is needed
 STRONG = 4.0  # standard errors by which every parameter of a new effect must differ from zero
 SHARE = 0.2  # of the excess over the noise that an effect has to take away
 FARTHEST = 3000.0  # times the noise: beyond, the sensor's noise is not what limits this record
@@ -149,8 +151,10 @@ class FineSearch:
 
     def _asked_again(self, found: Search, now: Whole) -> Whole:
         """Effects that were added while others were still missing, each against those that came near it then."""
-        added = now.structure.effects[len(found.base.structure.effects) :]
-        for name in added[:-1]:
+        added = list(now.structure.effects[len(found.base.structure.effects) :])
+        waiting = added[:-1]
+        while waiting:
+            name = waiting.pop(0)
             tried = {name: now}
             for other, own in self._others(name, now).items():
                 if other in now.structure.effects or name in effects.get(other).nests:
@@ -161,6 +165,9 @@ class FineSearch:
                 if swapped is not None:
                     tried[other] = swapped
             chosen = self._simplest(tried)
+            if chosen != name and added[-1:] and added[-1] in now.structure.effects:
+                waiting += [n for n in added[-1:] if n != name and n not in waiting]  # chosen beside the one that goes
+                added.pop()
             if chosen != name:
                 self.say(f"{chosen} in the place of {name}, now that the others are there")
             now = tried[chosen]
@@ -278,6 +285,11 @@ class FineSearch:
     def _simplest(self, good: Mapping[str, Whole]) -> str:
         """The likeliest, or the simplest of those that are as likely."""
         best = min(good, key=lambda n: good[n].penalised)
+        if good[best].level > AT_FLOOR:  # the richer one may only soak up what is still missing
+            nested = [n for n in effects.get(best).nests if n in good and good[n].squares < TWICE * good[best].squares]
+            best = min(nested, key=lambda n: good[n].squares, default=best)
+            if nested:
+                return best
         behind = {n: (good[n].penalised - good[best].penalised) / good[best].level for n in good}
         alike = [n for n in good if behind[n] < RIVAL]
         return min(alike, key=lambda n: (*_simplicity(n), behind[n] > EQUAL, effects.names().index(n)))
@@ -295,9 +307,14 @@ class FineSearch:
         for name in names:
             kept_by = [e for e in now.structure.effects if name in effects.get(e).lower_order]
             last = len(now.structure.terms) - len(self.fixed) + len(now.structure.effects) <= 1
-            if name == "inertia" or kept_by or last or now.judged().strength(name) > 30.0:
+            if name == "inertia" or kept_by or last:
                 continue
             start = {n: v for n, v in now.values().items() if n[0] != name}
+            wider = [e for e in now.structure.effects if name in effects.get(e).nests]
+            if wider:
+                start = _taken_in(start, now.values(), name, wider[0])
+            elif now.judged().strength(name) > CERTAIN and not _own_in_each_run(name):
+                continue
             without = self.whole(now.structure.minus(name), start)
             if without is None or without.penalised - now.penalised > RIVAL * now.level:
                 continue
@@ -337,6 +354,18 @@ class FineSearch:
             if s.effect not in tried:
                 penalty = s.count * float(np.log(max(now.count, 2)))
                 found.candidates.append(Candidate(s.effect, round_, penalty - s.gain, None, "screened out"))
+
+
+def _taken_in(start: Mapping[Name, float], values: Mapping[Name, float], name: str, wider: str) -> dict[Name, float]:
+    """Start values where an effect that contains another takes its gain over."""
+    gain = next((values[(name, p.name)] for p in effects.get(name).parameters if p.linear), 0.0)
+    linear = {p.name for p in effects.get(wider).parameters if p.linear}
+    return {n: v + gain if n[0] == wider and n[1] in linear else v for n, v in start.items()}
+
+
+def _own_in_each_run(name: str) -> bool:
+    """Whether an effect has gains of its own in every run, with which it soaks up much."""
+    return name not in TERMS and any(p.per_run for p in effects.get(name).parameters)
 
 
 def _loads_differ(traces: Sequence[Trace]) -> bool:

@@ -42,6 +42,7 @@ from rig.recording.run import Recording
 
 MOVES = 3.0  # times the sensor's noise that a motion has to reach
 STOPPED = "stopped before the search was through: what is missing may still be unnamed"
+TIED = 0.95  # correlation beyond which two parameters are one
 SHOWS = 5.0  # standard errors from zero at which whole runs show damping
 STRAYED = 3.0  # times the sensor's noise: a free run with friction may have gone astray
 UNEXPLAINED = 1.1  # times the noise floor in free run: above it, something is left that no effect here explains
@@ -276,6 +277,10 @@ class _Identifier:
                     unit = unit.replace("kg*m^2", "kg").replace("N*m", "N").replace("rad", "m")
             elif self.torque_free:
                 label, unit = TORQUE_FREE[name[0]]
+            tied = len(name) == 1 and _tied_to_nothing(fitted, i, len(self.traces) == 1)
+            if tied:
+                missing.append(NotReported(label, f"it is tied to {tied}, which the data do not determine"))
+                continue
             if not fitted.determined[i] or not np.isfinite(error) or (error > 0.5 * abs(value) and len(name) == 1):
                 if len(name) > 1 and fitted.determined[i]:
                     pass
@@ -329,6 +334,23 @@ class _Identifier:
                 )
             )  # fmt: skip
         return tuple(out)
+
+
+def _tied_to_nothing(fitted: Fitted, i: int, alone: bool) -> str:
+    """A term that the data do not determine and that drags this one along; empty where there is none.
+
+    In a single run (``alone``) inertia and stiffness are one number at each frequency.
+    """
+    size = np.sqrt(np.maximum(np.diag(fitted.covariance), 1e-300))
+    for k, name in enumerate(fitted.names):
+        if k == i or len(name) > 1:
+            continue
+        lost = not fitted.determined[k] or not size[k] <= 0.5 * abs(fitted.values[name])
+        pair = alone and {name[0], fitted.names[i][0]} == {"inertia", "stiffness"}
+        one = abs(fitted.covariance[i, k]) > TIED * size[i] * size[k]
+        if lost and fitted.determined[i] and (pair or one):
+            return name[0]
+    return ""
 
 
 def _refuse_the_idle(traces: list[Trace], free: bool) -> None:

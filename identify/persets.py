@@ -16,6 +16,7 @@ import numpy as np
 from identify.effect_free import effect_free
 from identify.finish import Fitted, _regression_covariance
 from identify.genetic import QuadraticObjective, search
+from identify.identifiability import information_of
 from identify.output_error import Estimate, evaluate
 from identify.parameters import Name, platform_of
 from identify.prefilter import Denominator
@@ -188,11 +189,12 @@ def each_set(
     terms = fitted.structure.terms
     begin = replace(start, platform=_platform(fitted))
     whole = [replace(t, number=i) for i, t in enumerate(linear)]
+    bounds = _bounds(traces, fitted) if fitted.sensor_limited and fitted.structure.effects else [{} for _ in traces]
     rho = 0.0 if fitted.sensor_limited else start.rho
     results = []
     for i, trace in enumerate(whole):
         run = genetic(trace.run.name, [trace], terms, begin, centre, settings, settings.seed + i, rho, False)
-        results.append(_result(trace, run, terms, begin, rho, axis))
+        results.append(_result(trace, run, terms, begin, rho, axis, bounds[i]))
     joint = genetic("all sets", whole, terms, begin, centre, settings, settings.seed, rho, True)
     return tuple(results), joint
 
@@ -200,6 +202,8 @@ def each_set(
 def _least_errors(trace: Trace, values: Mapping[str, float], labels: Sequence[Name]) -> Array:
     """What the motion itself allows, (p,): the sensor's noise in the regression's columns passes for motion."""
     structure = Structure(tuple(term for (term,) in labels))
+    if values.get("inertia", 1.0) <= 0.0:
+        return np.full(len(labels), np.inf)
     held = Estimate(
         structure, tuple(labels), np.array([values[term] for (term,) in labels]), np.inf, 0, np.zeros((0, 0)), (), True
     )
@@ -209,13 +213,28 @@ def _least_errors(trace: Trace, values: Mapping[str, float], labels: Sequence[Na
     return least_std_errors(settled.shots[0], settled, labels, trace.noise)
 
 
-def _result(trace: Trace, run: GeneticRun, terms: tuple[str, ...], start: Start, rho: float, axis: str) -> SetResult:
+def _bounds(traces: Sequence[Trace], fitted: Fitted) -> list[dict[str, float]]:
+    """Standard errors of J, C, K that each set allows where its effects are not known better than it tells."""
+    values = np.array(list(fitted.values.values()))
+    out = []
+    for trace in traces:
+        platform = platform_of(fitted.structure, tuple(fitted.values), values, trace.number)
+        bound = information_of(replace(trace, number=0), platform)
+        out.append({n[0]: bound.std_error(n) for n in bound.names if len(n) == 1})
+    return out
+
+
+def _result(
+    trace: Trace, run: GeneticRun, terms: tuple[str, ...], start: Start, rho: float, axis: str,
+    bound: Mapping[str, float],
+) -> SetResult:  # fmt: skip
     regression = Regression([trace], Structure(terms))
     solution = fit(regression, {}, start.platform, rho, 8)
     mask = [trace.keep]
     covariance, determined = _regression_covariance([trace], solution, mask)
     least = _least_errors(trace, run.parameters, solution.labels)
     errors = np.maximum(np.sqrt(np.maximum(np.diag(covariance), 0.0)), least)
+    errors = np.maximum(errors, [bound.get(term, 0.0) for (term,) in solution.labels])
     parameters, identifiable = {}, []
     for i, (term,) in enumerate(solution.labels):
         value, error = run.parameters[term], float(errors[i])

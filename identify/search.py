@@ -122,7 +122,7 @@ class Loop:
         length = horizon / self.fitting[0].step_s
         floor = self.noise * float(np.sqrt(max(1.0 - 2.0 / length, 0.25)))
         base = judge(self.fitting, self.judging, declared, start_values(solution, shapes, self.runs), horizon)
-        if nominal is not None and base.sigma > BEGIN_AGAIN * floor:
+        if nominal is not None and not self.torque_free and base.sigma > BEGIN_AGAIN * floor:
             start = start_values(replace(solution, platform=nominal), shapes, self.runs)
             other = judge(self.fitting, self.judging, declared, start, horizon)
             base = min((base, other), key=lambda j: j.estimate.sigma)

@@ -19,8 +19,8 @@ from identify.sensitivities import jacobian, sensitivities
 from identify.shots import Shots
 from rig.recording.run import Array
 
-DOUBT = 2.0  # standard errors by which a start state may be off
-GRID = 17  # points across the ellipse, either way
+DOUBT = 4.0  # standard errors by which a start state may be off
+GRID = 25  # points across the ellipse, either way
 
 
 def least_std_errors(shots: Shots, estimate: Estimate, names: Sequence[Name], sigma: float) -> Array:

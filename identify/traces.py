@@ -17,12 +17,14 @@ from rig.dynamics import TorqueSignal
 from rig.dynamics.integrator import _call, _pointer, addresses, run_filter
 from rig.dynamics.simulate import MAX_SUBSTEPS
 from rig.effects.base import Effect, Place
+from rig.errors import RecordingError
 from rig.recording.run import Array, Run
 
 UPSAMPLING = 4  # nonlinear torques have corners between samples
 SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than it tells
 LEAD_S = 0.1
 LEAD_IN_S = 0.01  # at the start of a run that carry no weight
+MOST_HOLES = 20  # times as many missing samples as there are
 LONGEST_FILL = 25  # missing samples that a spline may bridge
 STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
 
@@ -299,6 +301,12 @@ def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: fl
     if np.max(np.abs(time / step - index)) < 0.02 * min(1.0, step / 1e-9):
         step = float(time[-1] / index[-1])
     n = int(index[-1]) + 1
+    if n > MOST_HOLES * len(time):
+        widest = int(np.argmax(spacing))
+        raise RecordingError(
+            f"{run.name}: {len(time)} samples {step:.3g} s apart span {time[-1]:.6g} s, with a hole of "
+            f"{spacing[widest]:.6g} s after {run.time_s[widest]:.6g} s: make two runs of it with from_s and to_s"
+        )
     grid = step * np.arange(n)
     filled = np.asarray(CubicSpline(time[good], values[good])(grid), dtype=float)
     keep = np.zeros(n, dtype=bool)

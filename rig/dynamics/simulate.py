@@ -108,6 +108,7 @@ class Equations:
     def fastest_rad_s(self) -> float:
         """The fastest motion that a fine step has to follow."""
         j, c, k = self.jck
+        j = max(abs(j), 1e-12)  # a set alone may give nonsense; the step must still be a number
         rates = [np.sqrt(abs(k) / j), 0.3 * abs(c) / j]
         for name, values in self._values.items():
             fastest = effects.get(name).fastest_rad_s
