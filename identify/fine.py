@@ -267,6 +267,8 @@ class FineSearch:
         """The largest gains beyond their penalty, and what comes first by order or simplicity."""
         penalty = float(np.log(max(now.count, 2)))
         worth = sorted((s for s in looks if s.gain > WORTH_A_FIT), key=lambda s: s.count * penalty - s.gain)
+        gains = {s.effect: s.gain for s in worth}  # what contains another and promises less is not it
+        worth = [s for s in worth if all(gains.get(n, 0.0) <= s.gain for n in effects.get(s.effect).nests)]
         short = worth[:TRIED]
         wanted = {n for s in short for n in (*effects.get(s.effect).nests, *effects.get(s.effect).lower_order)}
         return short + [s for s in worth[TRIED:] if s.effect in wanted]
