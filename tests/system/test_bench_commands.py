@@ -57,6 +57,7 @@ def timeless(value: Any) -> Any:
     return [timeless(v) for v in value] if isinstance(value, list) else value
 
 
+@pytest.mark.slow
 def test_a_raw_capture_replays_to_the_same_samples_and_the_same_result(tmp_path: Path) -> None:
     code, live, said = played(tmp_path, lambda process, _: process.wait(120))
     assert code in (0, 1), said
@@ -74,6 +75,7 @@ def test_a_raw_capture_replays_to_the_same_samples_and_the_same_result(tmp_path:
     assert results[0]["before"]["parameters"]
 
 
+@pytest.mark.slow
 def test_a_capture_of_another_campaign_is_refused(tmp_path: Path) -> None:
     code, live, said = played(tmp_path, lambda process, _: process.wait(120))
     assert code in (0, 1), said

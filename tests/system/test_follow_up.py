@@ -16,6 +16,8 @@ from rig.config.load import load_config
 from rig.recording.hdf5 import read_recording_h5
 
 ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.slow
+
 # Two slow sines that set in softly: no ring and no high frequency, so a lag of the drive is as good as a delay, and
 # either is as good as damping.
 CONFIG = """

@@ -18,7 +18,8 @@ PROMISED = {
     "coulomb_friction", "stribeck_friction", "presliding_friction", "load_dependent_friction", "quadratic_damping",
     "directional_damping", "cubic_stiffness", "quadratic_stiffness", "bilinear_stiffness", "backlash", "hysteresis",
     "creep", "stiffness_drift", "unbalance", "cogging", "torque_delay", "actuator_lag", "torque_saturation",
-    "torque_deadzone", "torque_offset", "torque_scale", "flexible_mode", "sensor_lag", "rate_bias", "periodic_disturbance",
+    "torque_deadzone", "torque_offset", "torque_scale", "flexible_mode", "sensor_lag", "rate_bias",
+    "periodic_disturbance",
 }  # fmt: skip
 SUFFIX = {
     "N*m": "nm", "rad": "rad", "s": "s", "rad/s": "rad_s", "N*m/rad": "nm_rad", "N*m/rad^2": "nm_rad2",
