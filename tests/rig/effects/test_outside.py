@@ -98,7 +98,7 @@ def test_a_model_file_counts_its_effect_files_from_where_it_stands(tmp_path: Pat
         (('name="eddy_brake"', 'name="Eddy brake"'), "lower-case"),
         (("@kernel", "@(lambda f: f)"), "decorated with @kernel"),
         (("place=Place.LOAD", "place=Place.DRIVE"), "decorated with @filter_kernel"),
-        (("start=lambda scale: (0.1 * scale.rate_rad_s, 0.4 * scale.rate_rad_s)", "start=None"), "`start=`"),
+        (("start=speeds", "start=None"), "`start=`"),
         (("family=", "family"), r"my_effect.py:\d+: SyntaxError"),
         (("from rig.effects import", "raise ValueError('no')  #"), "my_effect.py:1: ValueError: no"),
     ],
