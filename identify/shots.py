@@ -11,7 +11,7 @@ import numpy as np
 
 from identify.parameters import Name, equations_of
 from identify.regression import Structure
-from identify.traces import LEAD_S, Trace
+from identify.traces import LEAD_S, Trace, clear_of_seam
 from rig.dynamics import Equations, Grid
 from rig.dynamics.low_pass import low_pass_kernel, smoothed
 from rig.recording.run import Array
@@ -73,12 +73,9 @@ def make_shots(trace: Trace, substeps: int, length: int | None, use: Any = None)
     angle, rate, _, _, _ = trace.fine
     ratio = (len(angle) - 1) // (n - 1)
     starts = np.stack([angle[first * ratio], rate[first * ratio]], axis=1)
-    weight = trace.keep if use is None else trace.keep & use
-    if trace.channel == "rate" and trace.run.rate_corner_hz and trace.run.rate_delay_s:
-        weight = weight.copy()  # across the seam of two shots the sensor's average mixes both
-        reach = int(np.ceil(trace.run.rate_delay_s / trace.step_s))
-        for seam in (*first.tolist(), n):
-            weight[max(0, seam - reach) : seam + reach] = False
+    weight = trace.keep.copy() if use is None else trace.keep & use
+    for seam in (*first.tolist(), n):
+        clear_of_seam(trace, seam, weight)
     return Shots(trace, Grid(time, trace.torque, substeps, min(LEAD_S, trace.offset_s)), first, starts, 0.0, weight)
 
 

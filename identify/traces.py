@@ -342,7 +342,17 @@ def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: fl
     for a, b in trace.stretches:
         inside[a : b + 1] = True
     trace.keep &= inside
+    for seam in (0, *(a for a, _ in trace.stretches), n):
+        clear_of_seam(trace, seam, trace.keep)
     return trace
+
+
+def clear_of_seam(trace: Trace, seam: int, keep: Any) -> None:
+    """Take the samples in which the gyro's own average mixes both sides of a seam out of ``keep``, in place."""
+    run = trace.run
+    if trace.channel == "rate" and run.rate_corner_hz and run.rate_delay_s:
+        reach = int(np.ceil(run.rate_delay_s / trace.step_s))
+        keep[max(0, seam - reach) : seam + reach] = False
 
 
 def _gaps(flags: Any) -> list[tuple[int, int]]:

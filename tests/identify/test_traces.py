@@ -75,6 +75,18 @@ def test_a_long_gap_cuts_the_run_in_two_stretches() -> None:
     assert not trace.keep[3000:3500].any()
 
 
+def test_samples_whose_filter_reaches_across_a_seam_do_not_count() -> None:
+    torque = {"torque_time_s": TIME, "torque_nm": np.sin(20.0 * TIME)}
+    filtered = gyro(np.sin(20.0 * TIME), rate_corner_hz=262.0, rate_delay_s=2.2e-3, **torque)
+    plain = prepare(gyro(np.sin(20.0 * TIME), **torque))
+    trace = prepare(filtered)
+    begin, end = trace.stretches[0]
+    assert (begin, end) == plain.stretches[0]
+    assert not np.any(trace.keep[: begin + 3])
+    assert not np.any(trace.keep[end - 2 :])
+    np.testing.assert_array_equal(trace.keep[begin + 3 : end - 2], plain.keep[begin + 3 : end - 2])
+
+
 def test_samples_slower_than_asked_for_are_left_out() -> None:
     trace = prepare(gyro(np.sin(2 * np.pi * 0.5 * TIME), min_rate_rad_s=0.5))
     fast = np.abs(np.sin(2 * np.pi * 0.5 * TIME)) > 0.5
