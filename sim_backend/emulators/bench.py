@@ -1,7 +1,8 @@
 """The emulated bench: platform, gyroscope on one pseudo terminal, CAN adapter with a drive on another.
 
 One thread, woken by bytes from the host and by the gyro's own clock. Torque changes take effect at the
-instant their frame was read; the platform is then integrated up to each gyro sample.
+instant their frame was read, or was sent where the machine kept this process from reading it (``overslept``);
+the platform is then integrated up to each gyro sample.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from sim_backend.emulators.drive import Cia402Drive
 from sim_backend.emulators.faults import Faults
 from sim_backend.emulators.gyro import GYROS, AnyGyro, GyroSettings, flat_low_pass
 from sim_backend.emulators.odrive import OdriveAxis
+from sim_backend.emulators.overslept import TOLD_S, Arrivals
 from sim_backend.emulators.pty_port import PtyPort
 from sim_backend.emulators.world import World
 
@@ -116,6 +118,7 @@ class EmulatedBench:
         self._window = np.zeros(2 * len(self._kernel))
         self._slot = 0
         self._adapter = LawicelAdapter(self._from_host, clock)
+        self._arrivals = Arrivals()
         self.gyro_port, self.can_port = PtyPort(), PtyPort()
         self._now_s = self._start_s = clock() + 0.05
         self._world = World(config.simulated.platform.platform(), self._start_s, step_s)
@@ -151,21 +154,35 @@ class EmulatedBench:
     def run(self, stop: Callable[[], bool]) -> None:
         """Emulate until ``stop()``, asked at least every 2 ms."""
         lag_s = self._gyro.latency_s + self._gyro.transmission_s
+        self._now_s = self._clock()
         while not stop():
             due_s = self._start_s + (self._samples + 1) * self._period_s + lag_s
             wait_s = min(max(due_s - self._clock(), 0.0), LONGEST_SLEEP_S)
             ports = [port for port in (self.can_port, self.gyro_port) if port.plugged_in]
             readable = select.select(ports, [], [], wait_s)[0]
-            self._now_s = self._clock()
+            before_s, self._now_s = self._now_s, self._clock()
+            if self._now_s - before_s > TOLD_S:
+                self._tell_of_pause(self._now_s - before_s)
             self._faults.pass_time(self, self._now_s)
             if self.can_port in readable and self.can_port.plugged_in:
-                data = self._faults.to_adapter(self.can_port.read())
-                self._serve_drive(self._adapter.feed(data) if data else b"")
-            else:
-                self._serve_drive(b"")
+                self._hear_host(before_s)
+            self._serve_drive(b"")
             if self.gyro_port in readable and self.gyro_port.plugged_in:
                 self._gyro.command(self.gyro_port.read())
             self._send_samples(lag_s)
+
+    def _tell_of_pause(self, paused_s: float) -> None:
+        nm = self.drive.torque_nm
+        what = f"this machine kept the emulators from running for {paused_s * 1e3:.1f} ms"
+        self._on_event(Event("paused", self._now_s, nm, nm, what))
+
+    def _hear_host(self, before_s: float) -> None:
+        found_s = self._now_s
+        for at_s, sent in self._arrivals.pieces(self.can_port.read(), before_s, found_s):
+            self._now_s = at_s
+            data = self._faults.to_adapter(sent) if sent else sent
+            self._serve_drive(self._adapter.feed(data) if data else b"")
+        self._now_s = found_s
 
     def _serve_drive(self, answer: bytes) -> None:
         now_s = self._now_s

@@ -7,10 +7,12 @@ import os
 import select
 import subprocess
 import sys
+import threading
 import time
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rig.config.root import Config
 from rig.errors import DeviceFault
@@ -19,27 +21,35 @@ START_TIMEOUT_S = 60.0
 STOP_TIMEOUT_S = 3.0
 
 
-@dataclass(frozen=True)
+@dataclass
 class Emulators:
-    """Running emulators: their ports and what their drive has done so far."""
+    """Running emulators: their ports and what their drive has done so far.
+
+    A thread takes their events in as they come: a pipe that nobody reads would fill and stop them.
+    """
 
     gyro: str
     can: str
     process: subprocess.Popen[bytes]
+    _lines: deque[bytes] = field(default_factory=deque)
+
+    def __post_init__(self) -> None:
+        threading.Thread(target=self._listen, name="events of the emulators", daemon=True).start()
+
+    def _listen(self) -> None:
+        assert self.process.stdout is not None
+        rest = b""
+        try:
+            while part := os.read(self.process.stdout.fileno(), 65_536):
+                *lines, rest = (rest + part).split(b"\n")
+                self._lines.extend(lines)
+        except (OSError, ValueError):  # closed while it was read
+            return
 
     def events(self) -> list[dict[str, object]]:
         """Events since the last call, oldest first; never waits."""
-        lines = b""
-        assert self.process.stdout is not None
-        descriptor = self.process.stdout.fileno()
-        while select.select([descriptor], [], [], 0)[0]:
-            part = os.read(descriptor, 65_536)
-            if not part:
-                break
-            lines += part
-            while not lines.endswith(b"\n"):
-                lines += os.read(descriptor, 65_536)
-        return [json.loads(line) for line in lines.splitlines()]
+        lines = self._lines
+        return [json.loads(lines.popleft()) for _ in range(len(lines))]
 
 
 def on_emulated_ports(config: Config, emulators: Emulators) -> Config:

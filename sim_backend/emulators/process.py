@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import select
 import signal
 import sys
+import time
+from collections.abc import Callable
 from types import FrameType
 
 from rig import realtime
@@ -15,6 +18,7 @@ from sim_backend.emulators.device import Event
 from sim_backend.emulators.requests import FaultRequests
 
 PRIORITY_ABOVE_THE_LOOP = 5
+LOOK_FOR_LISTENER_S = 0.2
 
 
 def _say(line: dict[str, object]) -> None:
@@ -24,6 +28,29 @@ def _say(line: dict[str, object]) -> None:
 
 def _refused(why: str) -> None:
     _say({"event": "refused", "detail": why})
+
+
+def listener_is_gone() -> Callable[[], bool]:
+    """A function that says, a few times a second, whether the reader of standard output has gone away.
+
+    A program that was killed stops nothing; its emulated devices must not outlive it because they had nothing to say.
+    """
+    poll = select.poll()
+    try:
+        poll.register(sys.stdout.fileno(), 0)
+    except (OSError, ValueError):
+        return lambda: False
+    due_s = 0.0
+
+    def gone() -> bool:
+        nonlocal due_s
+        now_s = time.monotonic()
+        if now_s < due_s:
+            return False
+        due_s = now_s + LOOK_FOR_LISTENER_S
+        return any(happened & (select.POLLERR | select.POLLHUP | select.POLLNVAL) for _, happened in poll.poll(0))
+
+    return gone
 
 
 def run_emulators(config: Config, requests: int | None = None) -> None:
@@ -62,10 +89,12 @@ def run_emulators(config: Config, requests: int | None = None) -> None:
         _say({"event": "listening", "gyro": bench.gyro_port.path, "can": bench.can_port.path})
         faults = FaultRequests(requests, bench.inject, _refused) if requests is not None else None
 
+        gone = listener_is_gone()
+
         def stop_asked() -> bool:
             if faults is not None:
                 faults.poll()
-            return stopping
+            return stopping or gone()
 
         bench.run(stop_asked)
     finally:
