@@ -77,6 +77,8 @@ def decode_registers(data: bytes) -> dict[int, float]:
         if not 0x20 <= head < 0x30:
             raise ValueError(f"moteus reply {data.hex()}: subframe 0x{head:02X} at {at - 1} is not known")
         kind, count = head >> 2 & 3, head & 3
+        if at + 1 + (not count) > len(data):
+            raise ValueError(f"moteus reply {data.hex()} is cut off")
         if not count:
             count, at = data[at], at + 1
         first, at = data[at], at + 1
@@ -177,7 +179,7 @@ class Moteus(Amplifier):
             return
         try:
             self._registers = decode_registers(heard.frame.data)
-        except (ValueError, IndexError):
+        except ValueError:
             return  # a damaged reply counts as silence
         self._heard_s = heard.time_s
 

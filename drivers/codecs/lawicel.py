@@ -36,6 +36,7 @@ _LONGEST_LINE = 40
 _ID_DIGITS = {0x74: 3, 0x72: 3, 0x54: 8, 0x52: 8}  # t r T R
 _REMOTE = frozenset((0x72, 0x52))
 _EXTENDED = frozenset((0x54, 0x52))
+_HEX = frozenset(b"0123456789abcdefABCDEF")
 _FD_HEADS = frozenset(b"dDbB")
 _FD_LENGTHS = {9: 12, 10: 16, 11: 20, 12: 24, 13: 32, 14: 48, 15: 64}
 
@@ -111,14 +112,18 @@ def _decode_answer(line: bytes, head: int) -> Answer | str:
         return Answer("error", line[:-1].decode("ascii", errors="replace"))
     if line in (b"z", b"Z"):
         return Answer("sent")
+    text = line[1:]
+    if head == 0x46 and not _HEX.issuperset(text):
+        return "flags that are no hexadecimal number"
     if head in b"FVNvWQa" and line.isalnum():
-        return Answer(chr(head), line[1:].decode("ascii"))
+        return Answer(chr(head), text.decode("ascii"))
     return "neither frame nor answer"
 
 
 def _decode_frame(line: bytes, head: int, digits: int) -> CanFrame | str:
     try:
-        identifier = int(line[1 : 1 + digits], 16)
+        # Not int(..., 16), which also takes blanks, signs and underscores.
+        identifier = int.from_bytes(unhexlify(line[1 : 1 + digits].rjust(8, b"0")))
         length = line[1 + digits] - 48
         if not 0 <= length <= 8:
             return "length above 8"
@@ -127,7 +132,7 @@ def _decode_frame(line: bytes, head: int, digits: int) -> CanFrame | str:
         stop = start if remote else start + 2 * length
         data = unhexlify(line[start:stop])
         stamp = line[stop:]
-        timestamp = int(stamp, 16) if len(stamp) == 4 else -1
+        timestamp = int.from_bytes(unhexlify(stamp)) if len(stamp) == 4 else -1
     except (ValueError, IndexError):
         return "not a frame"
     if (stamp and len(stamp) != 4) or (not remote and len(data) != length):
@@ -140,14 +145,16 @@ def _decode_frame(line: bytes, head: int, digits: int) -> CanFrame | str:
 def _decode_fd(line: bytes, head: int) -> CanFrame | str:
     digits = 8 if head in b"DB" else 3
     try:
-        code = int(line[1 + digits : 2 + digits], 16)
+        code = int.from_bytes(unhexlify(line[1 + digits : 2 + digits].rjust(2, b"0")))
         length = _FD_LENGTHS.get(code, code)
         data = unhexlify(line[2 + digits :])
-        identifier = int(line[1 : 1 + digits], 16)
+        identifier = int.from_bytes(unhexlify(line[1 : 1 + digits].rjust(8, b"0")))
     except ValueError:
         return "not a frame"
-    if len(data) != length:
+    if len(line) < 2 + digits or len(data) != length:
         return "frame cut or run together"
+    if identifier > (0x1FFFFFFF if digits == 8 else 0x7FF):
+        return "identifier out of range"
     return CanFrame(identifier, data, digits == 8, False, length, -1, True)
 
 
@@ -165,5 +172,5 @@ def encode_frame(frame: CanFrame) -> bytes:
 
 def flags_in_words(text: str) -> str:
     """The answer to F as words; "" when all is well."""
-    flags = int(text, 16)
+    flags = int(text or "0", 16)
     return ", ".join(words for bit, words in FLAG_BITS.items() if flags >> bit & 1)

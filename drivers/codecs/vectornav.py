@@ -134,9 +134,12 @@ class VectorNavMessage:
         """The error that a $VNERR line reports, in words; "" for other messages."""
         if self.name != "ERR":
             return ""
-        code = int(self.fields[0], 16) if self.fields else 0
-        # The maker prints the code in decimal (12 = insufficient baud rate); firmware differs, so try both.
-        return ERRORS.get(int(self.fields[0]) if self.fields[0].isdigit() else code, f"error {self.fields[0]}")
+        # The maker prints the code in decimal (12 = insufficient baud rate); some firmware in hexadecimal.
+        text = self.fields[0] if self.fields else "without a code"
+        try:
+            return ERRORS.get(int(text, 10 if text.isdecimal() else 16), f"error {text}")
+        except ValueError:
+            return f"error {text}"
 
 
 def decode_vectornav(packet: bytes) -> VectorNavMessage:
@@ -156,10 +159,17 @@ def _decode_line(line: bytes) -> VectorNavMessage:
     column = _RATE_COLUMNS.get(name)
     rate = ypr = None
     if column is not None and len(fields) >= column + 3:
-        rate = (float(fields[column]), float(fields[column + 1]), float(fields[column + 2]))
+        rate = (_number(fields[column]), _number(fields[column + 1]), _number(fields[column + 2]))
     if name == "YMR" and len(fields) >= 3:
-        ypr = (float(fields[0]), float(fields[1]), float(fields[2]))
+        ypr = (_number(fields[0]), _number(fields[1]), _number(fields[2]))
     return VectorNavMessage(name, rate, None, ypr, tuple(fields))
+
+
+def _number(text: str) -> float:
+    """As the device prints one. Raises ValueError for what only Python takes for a number ("1_0")."""
+    if "_" in text:
+        raise ValueError(f"no number: {text!r}")
+    return float(text)
 
 
 def _decode_binary(packet: bytes) -> VectorNavMessage:

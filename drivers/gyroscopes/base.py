@@ -135,7 +135,11 @@ class Gyroscope(ABC):
         packets = self.framer.feed(data)
         behind = self.framer.pending_bytes
         for _, packet in reversed(packets):
-            reading = self.decode(packet)
+            try:
+                reading = self.decode(packet)
+            except ValueError as nonsense:  # whole on the wire, but it says what no data sheet knows
+                self.tally.last_reason = str(nonsense)
+                reading = None
             # What still arrived behind a packet in this read came after it, at the speed of the line.
             on_wire_s = (len(packet) + behind) * BITS_PER_BYTE / self.baud
             behind += len(packet)
@@ -176,8 +180,8 @@ class Gyroscope(ABC):
         if self._count is None:
             return
         step = self.counts_per_sample
-        missing = min((count - self._count) // step - 1, MOST_LOST_MARKED)
-        if missing <= 0:
+        missing = (count - self._count) // step - 1
+        if not 0 < missing <= MOST_LOST_MARKED:
             return
         excused = min(missing, self._replaced)
         self._replaced -= excused

@@ -1,0 +1,1 @@
+"""Hostile input for everything that reads: wire bytes, configurations, recordings, object dictionaries."""
