@@ -11,9 +11,10 @@ from rig.excitation import PlannedSet
 from rig.guard import Tick
 from rig.interface import LowPass
 from rig.recording.journal import Journal
+from rig.recording.rows import increasing, on_samples
 from rig.recording.run import Array, Run, TorqueHold
 
-JOURNAL_TICKS = 25  # ticks between hand-overs to the journal, which buffers again: far below 100 ms at 1 kHz
+HAND_OVER_S = 0.02  # between hand-overs to the journal, which buffers again: together far below 100 ms
 EDGE_S = 1e-6  # rounding of time stamps at the ends of a set
 
 
@@ -66,6 +67,7 @@ class SetRecorder:
         self._ticks: list[tuple[float, ...]] = []
         self._channel_names: tuple[str, ...] = ()
         self._written = [0, 0, 0]
+        self._handed_s = start_s
         self.late_max_s = 0.0
         self.missed_ticks = 0
         self.drops = 0
@@ -94,7 +96,8 @@ class SetRecorder:
             self.late_max_s = max(self.late_max_s, late)
             if late >= tick.period_s:
                 self.missed_ticks += int(late / tick.period_s + 1e-9)
-        if self._journal is not None and len(self._ticks) - self._written[2] >= JOURNAL_TICKS:
+        if self._journal is not None and tick.now_s - self._handed_s >= HAND_OVER_S:
+            self._handed_s = tick.now_s
             self.write()
 
     def write(self) -> None:
@@ -121,11 +124,11 @@ class SetRecorder:
                 self._journal.append(kind, np.array(rows[self._written[i] :], dtype=float))
                 self._written[i] = len(rows)
 
-    def close(self) -> None:
-        """Write the rest and end the run in the journal."""
+    def close(self, complete: bool = True) -> None:
+        """Write the rest and end the run in the journal, which notes whether the set was played whole."""
         self.write()
         if self._journal is not None and self._open:
-            self._journal.end_run()
+            self._journal.end_run(complete)
 
     def statistics(self, complete: bool) -> SetStatistics:
         """How the set went."""
@@ -137,13 +140,13 @@ class SetRecorder:
 
         Time stamps that run backwards are dropped: a device that repeats itself must not spoil the record.
         """
-        samples = _increasing(np.array(self._samples, dtype=float).reshape(-1, 3))
-        commands = _increasing(np.array(self._commands, dtype=float).reshape(-1, 3))
+        samples = increasing(np.array(self._samples, dtype=float).reshape(-1, 3))
+        commands = increasing(np.array(self._commands, dtype=float).reshape(-1, 3))
         if len(samples) < 2 or len(commands) < 1:
             return None
         time_s = samples[:, 0].copy()
         ticks = np.array(self._ticks, dtype=float)
-        channels = {name: np.interp(time_s, ticks[:, 0], ticks[:, 2 + i]) for i, name in enumerate(self._channel_names)}
+        channels = on_samples(ticks, self._channel_names, 2, time_s)
         return Run(
             name=self._planned.name,
             time_s=time_s,
@@ -158,11 +161,3 @@ class SetRecorder:
             rate_corner_hz=self._low_pass.get("rate_corner_hz"),
             rate_delay_s=self._low_pass.get("rate_delay_s"),
         )
-
-
-def _increasing(rows: Array) -> Array:
-    """Rows whose first column is later than that of every row before."""
-    if len(rows) < 2:
-        return rows
-    newest = np.maximum.accumulate(rows[:, 0])
-    return rows[np.concatenate([[True], rows[1:, 0] > newest[:-1]])]

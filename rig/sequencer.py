@@ -239,7 +239,7 @@ class Sequencer:
         self._statistics.append(statistics)
         self._observer.set_ends(statistics)
         with contextlib.nullcontext() if complete else contextlib.suppress(RigError):
-            recorder.close()
+            recorder.close(complete)
 
 
 def _with_context(error: RigError) -> RigError:

@@ -1,15 +1,17 @@
 """The raw journal: an append-only file written while a campaign plays.
 
-A kill costs at most what was buffered since the last flush (50 ms by default); whatever was flushed stays
-readable, because every frame carries its own length and CRC and the reader stops at the first cut one.
+A kill costs at most what was buffered since the last write (25 ms by default), a power cut what was written since
+the last sync (40 ms more, and as long as the disk takes). Whatever was written stays readable, because every frame
+carries its own length and CRC; docs/recordings.md has the format and what is lost when.
 
     frame  = marker "ISPJ", type, 3 zero bytes, payload length, CRC-32 of all the rest    (little-endian)
     HEADER = JSON   RUN = JSON {name, meta, columns}   BLOCK = kind (16 bytes ASCII), columns, float64 rows
-    EVENT  = JSON {time_s, text, values}   RUN_END = empty   CLOSE = empty
+    EVENT  = JSON {time_s, text, values}   RUN_END = JSON {complete}   CLOSE = empty
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import struct
@@ -26,6 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.errors import Aborted
+from rig.recording.flushing import SYNC_EVERY_S, WRITE_EVERY_S, Repeating, sync, sync_folder
 
 MARKER = b"ISPJ"
 FRAME_HEAD = struct.Struct("<4sB3xII")
@@ -71,6 +74,7 @@ class Journal:
         self._in_run = False
         self._closed = False
         self._good_bytes = 0
+        self._synced_bytes = 0
         self._failure: JournalError | None = None
         self._background = False
         self._buffer_lock = threading.Lock()
@@ -82,7 +86,7 @@ class Journal:
         path: str | Path,
         header: Mapping[str, Any],
         *,
-        flush_interval_s: float = 0.05,
+        flush_interval_s: float = WRITE_EVERY_S,
         clock: Callable[[], float] = time.monotonic,
     ) -> Journal:
         """Start a new journal; an existing file is never overwritten.
@@ -98,7 +102,8 @@ class Journal:
             raise JournalError(f"cannot start journal {path}: {error.strerror}; choose another --out") from error
         journal = cls(path, descriptor, flush_interval_s, clock)
         journal._pending.append(frame(HEADER, _json({"format": "isp-rig journal", "version": 1} | dict(header))))
-        journal.flush()
+        journal.flush(to_disk=True)
+        sync_folder(path.parent)
         return journal
 
     def begin_run(
@@ -134,12 +139,15 @@ class Journal:
         self._queue(frame(EVENT, _json({"time_s": float(time_s), "text": text, "values": dict(values or {})})))
         self._flush_if_due()
 
-    def end_run(self) -> None:
-        """Close the open run and write it out (a flush later, where that is done in the background)."""
+    def end_run(self, complete: bool = True) -> None:
+        """Close the open run and write it out (a flush later, where that is done in the background).
+
+        ``complete`` is False for a run that was cut short: a campaign that is resumed plays it again.
+        """
         if not self._in_run:
             raise ValueError("end_run() without begin_run()")
         self._in_run = False
-        self._queue(frame(RUN_END, b""))
+        self._queue(frame(RUN_END, _json({"complete": complete})))
         self._flush_unless_in_background()
 
     def _flush_unless_in_background(self) -> None:
@@ -162,18 +170,21 @@ class Journal:
             try:
                 self._write(data)
                 if to_disk:
-                    os.fsync(self._descriptor)
+                    sync(self._descriptor)
             except OSError as error:
-                self._failure = JournalError(
-                    f"cannot write {self.path}: {error.strerror}. What was recorded until now "
-                    f"({self._good_bytes} bytes) is kept there; free space or choose another --out, "
-                    "then play again"
-                )
+                self._failure = self._failed(error)
                 raise self._failure from error
             with self._buffer_lock:
                 del self._pending[:taken]
             self._failure = None
         self._flushed_at_s = self._clock()
+
+    def _failed(self, error: OSError) -> JournalError:
+        return JournalError(
+            f"cannot write {self.path}: {error.strerror}. What was recorded until now "
+            f"({self._good_bytes} bytes) is kept there; free space or choose another --out, "
+            "then play again"
+        )
 
     def close(self) -> None:
         """Write the rest and close. Raises JournalError unless the same failure was raised before."""
@@ -195,29 +206,41 @@ class Journal:
     def end_run_quietly(self) -> None:
         """Mark the open run as ended without writing yet: the last step of an aborted campaign."""
         self._in_run = False
-        self._queue_raw(frame(RUN_END, b""))
+        self._queue_raw(frame(RUN_END, _json({"complete": False})))
 
     @contextmanager
     def flushing_in_background(self) -> Iterator[None]:
-        """Let a thread write and sync at the flush interval; its failure is raised by the next call here."""
-        stop = threading.Event()
+        """Let threads write and sync; a failure of theirs is raised by the next call here.
 
-        def work() -> None:
-            while not stop.wait(self._interval_s):
-                try:
-                    self.flush(to_disk=True)
-                except JournalError:
-                    continue  # kept in self._failure: the control loop meets it at its next append
-
-        thread = threading.Thread(target=work, name="journal", daemon=True)
+        Two of them: a disk that takes its time to sync must not hold up what a mere kill would cost.
+        """
+        threads = (
+            Repeating("journal", self._flush_quietly, self._interval_s),
+            Repeating("journal sync", self._sync_quietly, SYNC_EVERY_S),
+        )
         self._background = True
-        thread.start()
+        for thread in threads:
+            thread.start()
         try:
             yield
         finally:
-            stop.set()
-            thread.join()
+            for thread in threads:
+                thread.stop()
             self._background = False
+
+    def _flush_quietly(self) -> None:
+        with contextlib.suppress(JournalError):  # kept in self._failure: the loop meets it at its next append
+            self.flush()
+
+    def _sync_quietly(self) -> None:
+        written = self._good_bytes
+        if written == self._synced_bytes:
+            return
+        try:
+            sync(self._descriptor)
+        except OSError as error:
+            self._failure = self._failed(error)
+        self._synced_bytes = written
 
     def __enter__(self) -> Journal:
         return self
