@@ -5,11 +5,13 @@
     kinds  = G gyro bytes read · g gyro bytes sent · R frame received · S frame sent ·
              T tick (payload: torque asked for) · C clock reading · M mark (JSON)
 
-What was flushed survives a kill; a record that was cut off ends the reading, nothing before it is lost.
+What was written (every 25 ms) survives a kill, what was synced (every 40 ms) a power cut; a record that was cut off
+or is none ends the reading, nothing before it is lost.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import struct
@@ -21,12 +23,13 @@ from typing import Any, NamedTuple
 
 from drivers.codecs.lawicel import CanFrame
 from rig.errors import Aborted, RecordingError
+from rig.recording.flushing import SYNC_EVERY_S, WRITE_EVERY_S, Repeating, sync, sync_folder
 
 MAGIC = b"ISPRAW1\n"
 FILE_NAME = "wire.cap"
 GYRO_READ, GYRO_SENT, CAN_READ, CAN_SENT = b"G"[0], b"g"[0], b"R"[0], b"S"[0]
 TICK, CLOCK, MARK = b"T"[0], b"C"[0], b"M"[0]
-FLUSH_INTERVAL_S = 0.05
+KINDS = frozenset(b"GgRSTCM")
 LONGEST_PAYLOAD = 1 << 24
 
 _HEAD = struct.Struct("<BdI")
@@ -63,9 +66,9 @@ def unpack_torque(payload: bytes) -> float:
 
 
 class Capture:
-    """Writer. Records are gathered in memory and written at most 50 ms later.
+    """Writer. Records are gathered in memory and written at most 25 ms later.
 
-    After ``start`` a thread does the writing: a busy disk may hold a write up for longer than a tick, and
+    After ``start`` threads do the writing: a busy disk may hold a write up for longer than a tick, and
     the control loop must not wait for it. What fails there is raised by the next ``flush_if_due``.
 
     Raises
@@ -87,22 +90,32 @@ class Capture:
         self._flushed_at_s = 0.0
         self._open = True
         self._writing = threading.Lock()
-        self._enough = threading.Event()
-        self._writer: threading.Thread | None = None
+        self._threads: tuple[Repeating, ...] = ()
+        self._is_synced = False
         self._failure: Aborted | None = None
 
     def start(self) -> None:
-        """Let a thread write from here on."""
-        self._writer = threading.Thread(target=self._write_on, name="capture", daemon=True)
-        self._writer.start()
+        """Let threads write and sync from here on."""
+        sync_folder(self.path.parent)
+        self._threads = (
+            Repeating("capture", self._flush_quietly, WRITE_EVERY_S),
+            Repeating("capture sync", self._sync_quietly, SYNC_EVERY_S),
+        )
+        for thread in self._threads:
+            thread.start()
 
-    def _write_on(self) -> None:
-        while not self._enough.wait(FLUSH_INTERVAL_S):
-            try:
-                self.flush()
-            except Aborted as failure:
-                self._failure = failure
-                return
+    def _flush_quietly(self) -> None:
+        try:
+            self.flush()
+        except Aborted as failure:
+            self._failure = failure
+
+    def _sync_quietly(self) -> None:
+        """A disk that cannot sync cannot be written either, which the next write says."""
+        if self._open and not self._is_synced:
+            self._is_synced = True
+            with contextlib.suppress(OSError):
+                sync(self._descriptor)
 
     def _add(self, kind: int, time_s: float, payload: bytes) -> None:
         self._pending.append(_HEAD.pack(kind, time_s, len(payload)) + payload)
@@ -136,9 +149,9 @@ class Capture:
         if self._failure is not None:
             failure, self._failure = self._failure, None
             raise failure
-        if self._writer is not None:
+        if self._threads:
             return
-        if now_s - self._flushed_at_s >= FLUSH_INTERVAL_S:
+        if now_s - self._flushed_at_s >= WRITE_EVERY_S:
             self._flushed_at_s = now_s
             self.flush()
 
@@ -152,6 +165,7 @@ class Capture:
             try:
                 while data:
                     data = data[os.write(self._descriptor, data) :]
+                    self._is_synced = False
             except OSError as problem:
                 self._open = False  # once is enough: the way out must not stumble over it again
                 os.close(self._descriptor)
@@ -159,12 +173,12 @@ class Capture:
 
     def close(self) -> None:
         """Write the rest and close; safe twice."""
-        self._enough.set()
-        if self._writer is not None:
-            self._writer.join()
-            self._writer = None
+        for thread in self._threads:
+            thread.stop()
+        self._threads = ()
         if self._open:
             self.flush()
+            self._sync_quietly()
             self._open = False
             os.close(self._descriptor)
 
@@ -187,7 +201,7 @@ def read_capture(path: Path) -> Iterator[Entry]:
     while at + _HEAD.size <= len(data):
         kind, time_s, length = _HEAD.unpack_from(data, at)
         start = at + _HEAD.size
-        if length > LONGEST_PAYLOAD or start + length > len(data):
+        if kind not in KINDS or length > LONGEST_PAYLOAD or start + length > len(data):
             return
         yield Entry(kind, time_s, data[start : start + length])
         at = start + length
