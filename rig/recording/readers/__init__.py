@@ -35,6 +35,10 @@ def read_file(path: Path) -> Sequence[Table | Run]:
 
     Raises RecordingError with cause and cure.
     """
+    if _is_folder(path):
+        from rig.recording.readers import folder  # noqa: PLC0415  only where one is named
+
+        return folder.read(path)
     _check_is_file(path)
     suffix = next((s for s in _BY_SUFFIX if path.name.lower().endswith(s)), None)
     if suffix is None:
@@ -44,6 +48,13 @@ def read_file(path: Path) -> Sequence[Table | Run]:
     reader = import_module(f"rig.recording.readers.{_BY_SUFFIX[suffix]}")
     contents: Sequence[Table | Run] = reader.read(path)
     return contents
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
 
 
 def _check_is_file(path: Path) -> None:
@@ -57,8 +68,6 @@ def _check_is_file(path: Path) -> None:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise RecordingError(f"{path}: cannot be opened: {reason}; check path and permissions") from error
-    if stat.S_ISDIR(status.st_mode):
-        raise RecordingError(f"{path}: is a folder: name one file of it for each run")
     if not stat.S_ISREG(status.st_mode):
         # A pipe may never end and a device may never answer.
         raise RecordingError(f"{path}: is no regular file (a pipe or device): save the data to a file first")

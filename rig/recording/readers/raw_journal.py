@@ -6,16 +6,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rig.errors import RecordingError
-from rig.recording.journal_reader import read_journal, recording_from_journal
+from rig.recording.checks import MIN_SAMPLES
+from rig.recording.journal_reader import JournalRun, read_journal, run_from_journal
 from rig.recording.run import Run
 
 
 def read(path: Path) -> Sequence[Run]:
-    """Every run that has samples. Raises RecordingError where there is none."""
+    """Every run that tells anything. Raises RecordingError where there is none."""
     contents = read_journal(path)
     try:
-        runs = recording_from_journal(contents).runs
-    except (KeyError, TypeError, ValueError) as error:
+        runs = [run_from_journal(run) for run in contents.runs if tells_something(run)]
+    except (KeyError, TypeError, ValueError, IndexError) as error:
         raise RecordingError(
             f"{path}: its frames are sound but not what this version writes ({error!r}): "
             "read it with the version that wrote it"
@@ -23,3 +24,14 @@ def read(path: Path) -> Sequence[Run]:
     if not runs:
         raise RecordingError(f"{path}: no run in it has a sample: the campaign stopped before it moved; play it again")
     return runs
+
+
+def tells_something(run: JournalRun) -> bool:
+    """Whether a run is worth reading: one that was cut in its first milliseconds must not spoil those before it.
+
+    A whole run is always read, so that what is wrong with it is said.
+    """
+    samples = len(run.tables.get("samples", ()))
+    if run.complete or run.ended:
+        return samples > 0
+    return samples >= MIN_SAMPLES and len(run.tables.get("commands", ())) > 0

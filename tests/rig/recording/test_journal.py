@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -105,9 +106,36 @@ def test_a_cut_or_damaged_journal_yields_all_before_the_damage(tmp_path: Path, c
     except RecordingError as error:
         assert "not a journal" in str(error)
         return
-    for run, original in zip(contents.runs, read_journal(whole).runs, strict=False):
+    originals = {run.name: run.tables["samples"] for run in read_journal(whole).runs}
+    for run in contents.runs:
         rows = run.tables["samples"]
-        np.testing.assert_array_equal(rows, original.tables["samples"][: len(rows)])
+        np.testing.assert_array_equal(rows, originals[run.name][: len(rows)])
+
+
+def test_damage_in_one_run_costs_its_rest_and_none_of_the_next(tmp_path: Path) -> None:
+    path = tmp_path / "a.journal"
+    write_two_runs(path)
+    data = bytearray(path.read_bytes())
+    at = data.index(b"samples\0") + 200  # within the rows of the first run
+    data[at : at + 8] = b"\xff" * 8
+    path.write_bytes(data)
+    contents = read_journal(path)
+    first, second = contents.runs
+    assert len(first.tables["samples"]) == 0 and not first.ended
+    assert len(second.tables["samples"]) == 100 and second.ended and contents.closed
+    assert contents.gaps == 1 and contents.stray_rows == 100  # the commands behind it: whose they are is not known
+    assert contents.unread_bytes > 2400
+
+
+def test_heads_that_lie_do_not_take_for_ever(tmp_path: Path) -> None:
+    path = tmp_path / "a.journal"
+    write_two_runs(path)
+    lying = struct.pack("<4sB3xII", b"ISPJ", 3, 1_000_000, 0)
+    path.write_bytes(path.read_bytes() + lying * 100_000)
+    begun_s = time.monotonic()
+    contents = read_journal(path)
+    assert time.monotonic() - begun_s < 2.0
+    assert [run.name for run in contents.runs] == ["0.5 Hz", "1.0 Hz"]
 
 
 WRITER = """
