@@ -34,7 +34,8 @@ def effect_free(trace: Trace, shots: Shots, estimate: Estimate) -> Trace:
     torque = grid.shaft_torque(equations)
     mean = np.empty(len(torque) + 1)
     h = grid.step_s
-    motion = equations.integrate_shots(torque, h, spans, shots.starts, trace.offset_s)  # what remembers goes on
+    # What remembers goes on from span to span.
+    motion = equations.integrate_shots(torque, h, spans, shots.starts, trace.offset_s, trace)
     for first, last in spans:
         fine = motion[first : last + 1].copy()
         if last < len(motion) - 1 and last - first > 2:  # the next span's start stands there

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identify.channels import simplicity
 from identify.holdout import Split
 from identify.lines import foreign_lines_hz
 from identify.output_error import refine
@@ -30,6 +31,7 @@ from rig.platform import TERMS
 
 NEAR_SIGNAL = 0.3  # of the signal that a free run may leave for this search to begin
 TRIED = 4  # candidates of a round that are fitted
+CHANNELS_TRIED = 2  # effects of measured channels, beside them
 WORTH_A_FIT = 15.0  # expected fall of chi square
 CHANCE = 20.0  # fall of chi square, beyond the penalty, that no chance among all candidates and shapes makes
 HELD = 4.0  # the same on the held-out samples
@@ -269,9 +271,10 @@ class FineSearch:
         worth = sorted((s for s in looks if s.gain > WORTH_A_FIT), key=lambda s: s.count * penalty - s.gain)
         gains = {s.effect: s.gain for s in worth}  # what contains another and promises less is not it
         worth = [s for s in worth if all(gains.get(n, 0.0) <= s.gain for n in effects.get(s.effect).nests)]
-        short = worth[:TRIED]
+        short = [s for s in worth if not simplicity(s.effect)][:TRIED]  # channels come beside, they displace nothing
+        short = sorted(short + [s for s in worth if simplicity(s.effect)][:CHANNELS_TRIED], key=worth.index)
         wanted = {n for s in short for n in (*effects.get(s.effect).nests, *effects.get(s.effect).lower_order)}
-        return short + [s for s in worth[TRIED:] if s.effect in wanted]
+        return short + [s for s in worth if s.effect in wanted and s not in short]
 
     def _chosen(self, tried: Mapping[str, Whole], now: Whole) -> str | None:
         """The candidate to add: the likeliest, or the simplest of those that are as likely."""
@@ -375,7 +378,7 @@ def _loads_differ(traces: Sequence[Trace]) -> bool:
     return len({t.run.added_inertia_kg_m2 for t in traces}) > 1
 
 
-def _simplicity(name: str) -> tuple[int, bool]:
-    """What goes first among candidates that do as well: fewer parameters, and the drive before the sensor."""
+def _simplicity(name: str) -> tuple[int, int, bool]:
+    """What goes first among candidates that do as well: no channel, fewer parameters, the drive before the sensor."""
     effect = effects.get(name)
-    return len(effect.parameters), effect.place is Place.SENSOR
+    return simplicity(name), len(effect.parameters), effect.place is Place.SENSOR

@@ -31,7 +31,10 @@ class Pair:
 
 
 def never_reason(effect: str, rival: str) -> str:
-    """Why no torque-to-rate data can tell two effects apart; empty where some can."""
+    """Why no excitation can tell two effects apart; empty where some can."""
+    read = [c.name for c in (effects.get(effect).reads, effects.get(rival).reads) if c is not None]
+    if read:
+        return f"no torque makes {' and '.join(read)} change: play a run in which that changes by itself"
     for one, other in ((effect, rival), (rival, effect)):
         why = (effects.get(one).never_separable or {}).get(other)
         if why:

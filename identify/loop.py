@@ -9,6 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from identify import persets
+from identify.channels import offer_of, with_causes
 from identify.compare import Judged, horizon_s
 from identify.fine import FineSearch
 from identify.finish import Fitted, by_output_error, by_regression
@@ -84,7 +85,8 @@ class _Identifier:
     ) -> None:
         self.recording, self.declared, self.settings, self.say = recording, declared, settings, say
         free = all(r.torque_nm is None or not np.any(r.torque_nm) for r in recording.runs)
-        runs = [replace(r, torque_nm=None, torque_time_s=None) if free else r for r in recording.runs]
+        runs = with_causes(recording.runs, declared, settings.channels)
+        runs = [replace(r, torque_nm=None, torque_time_s=None) if free else r for r in runs]
         traces = [prepare(r, i, recording.noise) for i, r in enumerate(runs)]
         self.traces = _one_noise([t for t in traces if t.stretches and t.count > 40])
         if not self.traces:
@@ -94,7 +96,9 @@ class _Identifier:
         self.torque_free = free
         _refuse_the_idle(self.traces, free)
         self.split: Split = split(self.traces)
-        names = tuple(declared.effects)
+        self.offer = offer_of(self.traces, declared)
+        still = {name for name, _ in self.offer.idle}
+        names = tuple(n for n in declared.effects if n not in still)
         self.structure = Structure(declared.terms, names)
         self.start: Start = first_guess(self.traces, Structure(declared.terms))
         if settings.lowpass_hz is not None:
@@ -106,7 +110,10 @@ class _Identifier:
         horizon = horizon_s(self.start.platform, self.traces)
         fitting = pieces(self.traces, self.split.fit, 3.0 * horizon)
         judging = pieces(self.traces, self.split.judge, 3.0 * horizon, 5_000)
-        allowed = self.settings.candidates or effects.names()
+        allowed = [
+            n for n in self.settings.candidates or effects.names()
+            if effects.get(n).reads is None or n in self.offer.candidates
+        ]  # fmt: skip
         loop = Loop(fitting, judging, self.start, allowed, self.say, self.traces)
         d = self.declared
         try:
@@ -213,8 +220,9 @@ class _Identifier:
         self, search: Search, before: Fitted, after: Fitted, measured_before: Measured, measured_after: Measured,
         floor: NoiseFloor, per_set: tuple[SetResult, ...], joint: persets.GeneticRun | None, changed: bool,
     ) -> Identification:  # fmt: skip
-        dropped = tuple(NotReported(n, why) for n, why in search.dropped)
-        result_before = self._model(before, measured_before, ())
+        idle = tuple(NotReported(n, why) for n, why in self.offer.idle)
+        dropped = (*idle, *(NotReported(n, why) for n, why in search.dropped))
+        result_before = self._model(before, measured_before, idle)
         result_after = self._model(after, measured_after, dropped) if changed else None
         final = result_after or result_before
         ratio = self._ratio(after, search)
@@ -225,7 +233,7 @@ class _Identifier:
             never_separable=_never(search.best.structure),
             unexplained_fraction=_fraction(measured_before, measured_after, floor) if unexplained else 0.0,
             unexplained=unexplained,
-            candidates=tuple(search.candidates),
+            candidates=(*search.candidates, *self.offer.refused),
             sentences=(),
             rival_models=search.rival_models,
         )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from identify.channels import simplicity
 from identify.compare import CLEARLY, Judged, advantage, delta_bic, horizon_s, judge, share_explained, start_values
 from identify.effect_free import effect_free
 from identify.regression import Shapes, Solution, Structure
@@ -288,7 +289,7 @@ class Loop:
             order = sorted((n for n in far if n in short), key=lambda n: far[n].sigma)
             if order:
                 alike = [n for n in order if n == order[0] or self._status(far[order[0]], far[n]) == "rival"]
-                chosen = min(alike, key=lambda n: (len(effects.get(n).parameters), far[n].sigma))
+                chosen = min(alike, key=lambda n: (simplicity(n), len(effects.get(n).parameters), far[n].sigma))
                 return chosen, short[chosen]
         name, best = tried[0]
         as_good = [t for t in tried if t[1] is best or self._status(best, t[1]) == "rival"]
@@ -299,7 +300,7 @@ class Loop:
                 t for t in tried
                 if t[0] in nested and t not in as_good and t[1].sigma**2 - found.floor**2 < TWICE * excess
             ]  # fmt: skip
-        name, best = min(as_good, key=lambda t: (len(effects.get(t[0]).parameters), t[1].sigma))
+        name, best = min(as_good, key=lambda t: (simplicity(t[0]), len(effects.get(t[0]).parameters), t[1].sigma))
         for other, judged in tried:
             if other in effects.get(name).lower_order and self._worth_adding(now, other, judged, found.floor):
                 return other, judged

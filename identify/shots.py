@@ -91,7 +91,7 @@ def predict(shots: Shots, equations: Equations, starts: Array, bias: float) -> A
     if remembers and len(on) > 1 and not on[0] and shots.first[1] * shots.trace.step_s <= SOON_S:
         on = np.concatenate([[True], on[1:]])  # what remembers begins where the run does, not where samples count
     active = [(a * ratio, min(b, n - 1) * ratio) for (a, b), used in zip(shots.edges, on, strict=True) if used]
-    fine = equations.integrate_shots(torque, grid.step_s, active, starts[on], shots.trace.offset_s)
+    fine = equations.integrate_shots(torque, grid.step_s, active, starts[on], shots.trace.offset_s, shots.trace)
     if not rate:
         return np.asarray(fine[: n * ratio : ratio, 0])
     run, turned = shots.trace.run, fine[:, 1]

@@ -11,11 +11,13 @@ import numpy as np
 from scipy import signal
 from scipy.interpolate import CubicSpline
 
+from identify.channel_readings import lost, table_of
 from identify.prefilter import held_pieces, linear_pieces, smooth_pieces
 from rig import effects
+from rig.channels import Channel
 from rig.dynamics import TorqueSignal
 from rig.dynamics.integrator import _call, _pointer, addresses, run_filter
-from rig.dynamics.simulate import MAX_SUBSTEPS
+from rig.dynamics.simulate import MAX_SUBSTEPS, slots
 from rig.effects.base import Effect, Place
 from rig.errors import RecordingError
 from rig.recording.run import Array, Run
@@ -130,6 +132,7 @@ class Trace:
     offset_s: float = 0.0  # of the first sample from the start of the run
     motion: tuple[Array, Array, Array, Array, float] | None = None  # of a piece: cut out of the whole run's
     _series: dict[Any, Any] = field(default_factory=dict)
+    _tables: dict[Channel, tuple[Array, float]] = field(default_factory=dict)  # shared by the pieces of a run
 
     @property
     def start_s(self) -> float:
@@ -151,6 +154,12 @@ class Trace:
             motion=(angle[fine], rate[fine], time[fine], torque[fine], left),
             _series={},
         )
+
+    def table(self, channel: Channel) -> tuple[Array, float]:
+        """What a channel does from the start of the run, finer than the samples, and the entries a second."""
+        if channel not in self._tables:
+            self._tables[channel] = table_of(self.run, channel, self.step_s)
+        return self._tables[channel]
 
     @property
     def biased(self) -> bool:
@@ -246,13 +255,15 @@ class Trace:
             p[3 + i] = (1.0 if i == unit else 0.0) if parameter.linear else next(shapes)
         if unit < 0:
             p[3 + unit] = 1.0
+        if effect.reads is not None:
+            p = np.append(p, slots(effect.reads, self)[1])
         z = np.array(
             effect.rest_state(angle[0], rate[0]) if effect.rest_state else np.zeros(effect.states), dtype=float
         )
         fine = self.step_s / UPSAMPLING
         substeps = 1
         if effect.states and effect.fastest_rad_s:
-            full = (1.0, 0.0, 0.0, *(v if v else 1e-12 for v in p[3:]))
+            full = (1.0, 0.0, 0.0, *(v if v else 1e-12 for v in p[3 : 3 + len(effect.parameters)]))
             substeps = int(np.clip(np.ceil(fine * effect.fastest_rad_s(full) / STEP_PHASE_RAD), 1, 8))
         out = np.empty_like(angle)
         _along(
@@ -293,7 +304,7 @@ def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: fl
     channel = _channel(run)
     values = run.rate_rad_s if channel == "rate" else run.angle_rad
     assert values is not None
-    good = run.valid & np.isfinite(values)
+    good = run.valid & np.isfinite(values) & ~lost(run)
     time = run.time_s - run.time_s[0]
     spacing = np.diff(time)
     step = float(np.median(spacing))

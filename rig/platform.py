@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from rig.channels import Channel
+
 TERMS = ("inertia", "damping", "stiffness")
 
 
@@ -20,6 +22,8 @@ class Platform:
         Effect name -> parameter name -> value, in the order in which they were added.
     terms
         Which of inertia, damping and stiffness the model has.
+    channels
+        Measured channels that its effects read, as it was declared with them.
     """
 
     inertia_kg_m2: float = 0.02
@@ -27,3 +31,4 @@ class Platform:
     stiffness_nm_rad: float = 677.3
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     terms: tuple[str, ...] = TERMS
+    channels: Mapping[str, Channel] = field(default_factory=dict)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field, field_validator
 
 from rig.config.base import Positive, Probability, Section
+from rig.config.channels import ChannelConfig, check_channels
 from rig.config.effects import check_effect_names
 
 
@@ -38,6 +40,8 @@ class IdentifyConfig(Section):
     genetic: GeneticConfig = GeneticConfig()
     j_dec: Positive | None = None  # None: from the noise floor
     reference: ReferenceConfig | None = None
+    # Further readings of a bench, or of a recording.h5, that may serve as causes.
+    channels: Annotated[Mapping[str, ChannelConfig], AfterValidator(check_channels)] = Field(default_factory=dict)
     candidates: tuple[str, ...] | None = None  # None: every effect of the registry
     follow_up: Literal["auto", "ask", "never"] = "ask"
     holdout: Literal["auto"] | Annotated[float, Field(ge=0.05, le=0.5)] = "auto"

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 import yaml
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field, field_validator
 
+from rig.channels import Channel
 from rig.config.base import Positive, Section
+from rig.config.channels import ModelChannel, check_channels
 from rig.config.effects import EffectsConfig
 from rig.platform import TERMS, Platform
 
@@ -22,6 +25,8 @@ class ModelConfig(Section):
     stiffness_nm_rad: float = 677.3
     terms: tuple[Term, ...] = TERMS  # type: ignore[assignment]
     effects_from: tuple[Annotated[str, Field(min_length=1, max_length=4096)], ...] = ()  # files with effects of yours
+    # What its effects read besides angle, rate and torque; stands before them, who are checked against it.
+    channels: Annotated[Mapping[str, ModelChannel], AfterValidator(check_channels)] = Field(default_factory=dict)
     effects: EffectsConfig = Field(default_factory=dict)
 
     @field_validator("terms")
@@ -41,6 +46,7 @@ class ModelConfig(Section):
             stiffness_nm_rad=self.stiffness_nm_rad if "stiffness" in self.terms else 0.0,
             effects=self.effects,
             terms=tuple(t for t in TERMS if t in self.terms),
+            channels={name: config.channel(name) for name, config in self.channels.items()},
         )
 
     @classmethod
@@ -52,7 +58,18 @@ class ModelConfig(Section):
             stiffness_nm_rad=platform.stiffness_nm_rad,
             terms=platform.terms,  # type: ignore[arg-type]
             effects=platform.effects,
+            channels={c.name: ModelChannel.of(c) for c in channels_of(platform)},
         )
+
+
+def channels_of(platform: Platform) -> tuple[Channel, ...]:
+    """The measured channels that a platform's effects read."""
+    if not platform.effects:
+        return ()
+    from rig import effects  # noqa: PLC0415  compiled kernels: only where there is an effect
+
+    read = [effects.get(name).reads for name in platform.effects]
+    return tuple(dict.fromkeys(channel for channel in read if channel is not None))
 
 
 def model_yaml(platform: Platform, comment: str = "") -> str:
@@ -69,6 +86,8 @@ def model_yaml(platform: Platform, comment: str = "") -> str:
         files = {str(path): None for name in section.effects if (path := effects.file_of(name))}
         if files:
             content["effects_from"] = list(files)
+        if section.channels:
+            content["channels"] = {n: c.model_dump(exclude_defaults=True) for n, c in section.channels.items()}
         content["effects"] = {
             name: {p.key: float(section.effects[name][p.name]) for p in effects.get(name).parameters}
             for name in section.effects

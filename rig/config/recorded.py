@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from rig.config.base import NonNegative, Positive, Section
+from rig.config.channels import ChannelConfig, check_channels
 
 MOST_RUNS = 1000
 ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
@@ -42,18 +44,37 @@ class RecordedRun(Section):
         return self
 
 
+class ChannelColumn(ChannelConfig):
+    """A further column that may serve as a cause; ``column`` is the channel's own name where left out."""
+
+    column: ColumnName | None = None
+    scale: float = 1.0
+
+    @field_validator("scale")
+    @classmethod
+    def _not_zero(cls, factor: float) -> float:
+        if factor == 0:
+            raise ValueError("a factor of 0 erases the column: give the factor to the channel's unit")
+        return factor
+
+
+ChannelColumns = Annotated[Mapping[str, ChannelColumn], AfterValidator(check_channels)]
+
+
 class Columns(Section):
-    """Names of the columns where they are not the default ones."""
+    """Names of the columns where they are not the default ones, and further columns that may serve as causes."""
 
     time: ColumnName | None = None
     torque: ColumnName | None = None
     rate: ColumnName | None = None
     angle: ColumnName | None = None
     valid: ColumnName | None = None
+    channels: ChannelColumns = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _each_column_once(self) -> Self:
         given = [name for name in (self.time, self.torque, self.rate, self.angle, self.valid) if name]
+        given += [channel.column or name for name, channel in self.channels.items()]
         twice = sorted({name for name in given if given.count(name) > 1})
         if twice:
             raise ValueError(f"column {twice[0]!r} is used for two quantities: each needs its own")

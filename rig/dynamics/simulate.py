@@ -6,20 +6,38 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from rig import effects
+from rig.channels import Channel
 from rig.dynamics import integrator
 from rig.dynamics.torque import NO_TORQUE, TorqueSignal
+from rig.effects._channels import AT_REST, SLOTS
 from rig.effects.base import Effect, Place
 from rig.platform import Platform
 from rig.recording.run import Array
 
 STEP_PHASE_RAD = 0.06  # of the fastest motion in one fine step: 4th order leaves 1e-7 of a frequency
 MAX_SUBSTEPS = 64
+
+
+class Readings(Protocol):
+    """Whoever knows what the channels of a run read."""
+
+    def table(self, channel: Channel) -> tuple[Array, float]:
+        """What acts (see ``Channel``), evenly spaced from the start of the run, and the entries a second."""
+
+
+def slots(channel: Channel, readings: Readings | None) -> tuple[Array, tuple[float, float, float]]:
+    """The table of a channel and the numbers by which a kernel finds it; the table must outlive their use.
+
+    Without ``readings`` the channel stands at its reference.
+    """
+    table, per_s = readings.table(channel) if readings is not None else (AT_REST, 0.0)
+    return table, (float(table.ctypes.data), per_s, float(len(table)))
 
 
 @lru_cache(maxsize=512)
@@ -82,8 +100,10 @@ class Equations:
         values = {name: effects.get(name).values(given) for name, given in platform.effects.items()}
         self.kernels, self.loads = kernels, loads
         self.z_at = _offsets([effects.get(name).states for name in body])
-        self.p_at = _offsets([3 + len(values[name]) for name in body])
-        self.p = np.array([x for name in body for x in (*self.jck, *values[name])], dtype=float)
+        rest = {name: slots(read, None)[1] if (read := effects.get(name).reads) else () for name in body}
+        self.p_at = _offsets([3 + len(values[name]) + len(rest[name]) for name in body])
+        self.p = np.array([x for name in body for x in (*self.jck, *values[name], *rest[name])], dtype=float)
+        self._reading = [(name, int(self.p_at[i + 1]) - SLOTS) for i, name in enumerate(body) if rest[name]]
         self.drive = _Filters(drive, drives, tuple(values[n] for n in drives))
         self.sensor = _Filters(sensor, sensors, tuple(values[n] for n in sensors))
         self._values = values
@@ -120,8 +140,23 @@ class Equations:
         """Fine steps in one sample period: enough for the fastest motion, at least two."""
         return int(np.clip(np.ceil(sample_s * self.fastest_rad_s() / STEP_PHASE_RAD), 2, MAX_SUBSTEPS))
 
-    def integrate(self, torque: Array, step_s: float, start: tuple[float, float]) -> Array:
+    def _p(self, readings: Readings | None) -> tuple[Array, list[Array]]:
+        """Parameters with the channels of a run, and the tables that must stay as long as they are used."""
+        if readings is None or not self._reading:
+            return self.p, []
+        p, kept = self.p.copy(), []  # runs that share these equations are integrated side by side
+        for name, at in self._reading:
+            read = effects.get(name).reads
+            assert read is not None
+            table, p[at : at + SLOTS] = slots(read, readings)
+            kept.append(table)
+        return p, kept
+
+    def integrate(
+        self, torque: Array, step_s: float, start: tuple[float, float], readings: Readings | None = None
+    ) -> Array:
         """Angle, rate and acceleration, shape (n + 1, 3), under a shaft torque of shape (n, 3)."""
+        p, _kept = self._p(readings)
         state = np.array([start[0], start[1], np.sign(start[1]), 0.0])
         out = np.empty((len(torque) + 1, 3))
         integrator.run_steps(
@@ -133,25 +168,27 @@ class Equations:
             self.kernels,
             self.loads,
             self.z_at,
-            self.p,
+            p,
             self.p_at,
             out,
         )
         return out
 
     def integrate_shots(
-        self, torque: Array, step_s: float, spans: Sequence[tuple[int, int]], starts: Array, offset_s: float = 0.0
-    ) -> Array:
+        self, torque: Array, step_s: float, spans: Sequence[tuple[int, int]], starts: Array, offset_s: float = 0.0,
+        readings: Readings | None = None,
+    ) -> Array:  # fmt: skip
         """As ``integrate``, over spans of fine steps (first, last), each begun from its row of ``starts``.
 
         Internal states go on from span to span. What lies between spans is zero.
         """
+        p, _kept = self._p(readings)
         out = np.zeros((len(torque) + 1, 3))
         if not spans:
             return out
         integrator.run_spans(
             starts, np.array(spans, dtype=np.int64), offset_s, self.rest_states(*starts[0]), step_s, torque,
-            self.jck, self.kernels, self.loads, self.z_at, self.p, self.p_at, out,
+            self.jck, self.kernels, self.loads, self.z_at, p, self.p_at, out,
         )  # fmt: skip
         return out
 

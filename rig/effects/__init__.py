@@ -5,11 +5,13 @@ Effects from outside the package (installed ones, and files that a rig.yaml name
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-from rig.effects import _outside
+from rig.channels import Channel
+from rig.effects import _channels, _outside
 from rig.effects.base import Effect, Parameter, Place, Scale, filter_kernel, kernel
 
 _MODULES = {
@@ -42,8 +44,8 @@ _MODULES = {
 
 
 def names() -> tuple[str, ...]:
-    """Names of all effects, in the order of the docs, those from outside the package last."""
-    return (*_MODULES, *_outside.names(_MODULES))
+    """Names of all effects, in the order of the docs, then those from outside the package and of channels."""
+    return (*_MODULES, *_outside.names(_MODULES), *_channels.names())
 
 
 def get(name: str) -> Effect:
@@ -56,7 +58,9 @@ def get(name: str) -> Effect:
     ConfigError
         Where it comes from an installed package and cannot be loaded.
     """
-    return _own(name) if name in _MODULES else _outside.get(name)
+    if name in _MODULES:
+        return _own(name)
+    return _channels.get(name) if name in _channels.names() else _outside.get(name)
 
 
 @cache
@@ -76,11 +80,30 @@ def read_file(path: Path) -> str:
     return _outside.read_file(path, _MODULES)
 
 
+def declare_channels(channels: Iterable[Channel]) -> None:
+    """Make the effects of measured channels known, each named <channel>_<way>.
+
+    They replace those of channels of the same name that were declared before.
+
+    Raises
+    ------
+    ConfigError
+        Where such a name is taken.
+    """
+    _channels.declare(channels, lambda name: name in _MODULES or name in _outside.names(_MODULES))
+
+
+def of_channel(name: str) -> tuple[str, ...]:
+    """The effects that a declared channel makes."""
+    return tuple(n for n in _channels.names() if (read := _channels.get(n).reads) is not None and read.name == name)
+
+
 def file_of(name: str) -> Path | None:
     """The file that an effect was read from; None for those of the package and of installed ones."""
     return _outside.file_of(name)
 
 
 __all__ = [
-    "Effect", "Parameter", "Place", "Scale", "file_of", "filter_kernel", "get", "kernel", "names", "read_file",
+    "Effect", "Parameter", "Place", "Scale", "declare_channels", "file_of", "filter_kernel", "get", "kernel", "names",
+    "of_channel", "read_file",
 ]  # fmt: skip

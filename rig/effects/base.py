@@ -19,6 +19,8 @@ from typing import Any
 import numba
 from numba import types
 
+from rig.channels import Channel
+
 KERNEL_SIGNATURE = types.float64(
     types.float64,  # angle_rad
     types.float64,  # rate_rad_s (FRICTION kernels receive its magnitude)
@@ -114,6 +116,7 @@ class Effect:
     never_separable: Mapping[str, str] | None = None  # rival -> why no torque-to-rate data can tell
     needs_added_inertia: bool = False  # shows only where runs carry a known inertia besides the platform's own
     separated_by: str = ""
+    reads: Channel | None = None  # the measured channel that it is an effect of
 
     def values(self, given: Mapping[str, float]) -> tuple[float, ...]:
         """Parameter values in declared order from a mapping of name (or key) to value.

@@ -57,6 +57,27 @@ def check_samples(table: Table, columns: Mapping[str, Array]) -> NDArray[np.bool
     return valid
 
 
+def check_channel(table: Table, name: str, values: Array, count: int) -> None:
+    """Raise RecordingError for a further channel of another length, or that never reads a usable number."""
+    key = f"recorded.columns.channels.{name}"
+    if len(values) != count:
+        raise RecordingError(
+            f"{table.path}: channel {name!r} has {len(values)} readings, time has {count}: export one value a sample "
+            f"(empty where there is none), or take {key} out"
+        )
+    known = np.isfinite(values)
+    if known.sum() < 2:
+        raise RecordingError(
+            f"{table.path}: channel {name!r} has {known.sum()} readings that are numbers, at least 2 are needed: "
+            f"record it, or take {key} out"
+        )
+    if np.max(np.abs(values[known])) > LARGEST_VALUE:
+        i = int(np.argmax(np.where(known, np.abs(values), 0.0)))
+        raise RecordingError(
+            f"{table.path}: {table.label(i)}: channel {name!r} is {values[i]:g}: correct it, or leave it empty"
+        )
+
+
 def check_run(run: Run, path: Path, scales_given: Collection[str] = ()) -> Run:
     """``run`` itself, once it is known to be fit for identification.
 

@@ -1,7 +1,8 @@
 """recording.h5: all of a campaign in one file, and back again without a bit changed.
 
 /             attributes: format, version, axis, noise; info: JSON (versions, config as read)
-/runs/000/    attributes: name, use, torque_hold, ...; datasets: time_s, rate_rad_s, valid, torque_nm, ...
+/runs/000/    attributes: name, use, torque_hold, ...; datasets: time_s, rate_rad_s, valid, torque_nm, ...;
+              channels/<name>, with kind, unit, reference and factor where it was declared as a cause
 /journal/000/ attributes: name, meta (JSON); a dataset a kind (samples, commands, clocks) with its columns
 /events       one JSON text each
 """
@@ -15,6 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from rig.channels import KINDS, Channel
 from rig.errors import RecordingError
 from rig.recording.journal import JournalError
 from rig.recording.journal_reader import JournalContents
@@ -90,7 +92,10 @@ def _write_run(group: h5py.Group, run: Run) -> None:
         if array is not None:
             group.create_dataset(name, data=array, **_packed(array))
     for name, array in run.channels.items():
-        group.create_dataset(f"channels/{name}", data=array, **_packed(array))
+        dataset = group.create_dataset(f"channels/{name}", data=array, **_packed(array))
+        if name in run.causes:
+            given = {key: value for key, value in vars(run.causes[name]).items() if key != "name" and value is not None}
+            dataset.attrs.update(given)
 
 
 def read_recording_h5(path: str | Path) -> Recording:
@@ -119,5 +124,12 @@ def _read_run(group: h5py.Group) -> Run:
             values[name] = float(values[name])
     arrays = {name: group[name][()] for name in _ARRAYS if name in group}
     arrays["valid"] = np.asarray(arrays["valid"], dtype=bool)
-    channels = {name: data[()] for name, data in group.get("channels", {}).items()}
-    return Run(**values, **arrays, channels=channels)
+    datasets = dict(group.get("channels", {}).items())
+    channels = {name: data[()] for name, data in datasets.items()}
+    causes = {name: _cause(name, data.attrs) for name, data in datasets.items() if data.attrs.get("kind") in KINDS}
+    return Run(**values, **arrays, channels=channels, causes=causes)
+
+
+def _cause(name: str, attrs: Any) -> Channel:
+    numbers = {key: float(attrs[key]) for key in ("reference", "factor") if key in attrs}
+    return Channel(name, attrs["kind"], str(attrs.get("unit", "")), **numbers)

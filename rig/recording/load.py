@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.recording.checks import check_run, check_samples, missing_column
+from rig.recording.checks import check_channel, check_run, check_samples, missing_column
 from rig.recording.readers import read_file
 from rig.recording.readers.base import Table
 from rig.recording.run import Array, Recording, Run
@@ -89,7 +89,7 @@ def _own_run(path: Path, run: Run, entry: RecordedRun, section: RecordedConfig) 
     if section.columns.model_fields_set or section.scale.model_fields_set:
         raise RecordingError(
             f"{path}: was written by this program, in SI units under its own names: "
-            "leave recorded.columns and recorded.scale out"
+            "leave recorded.columns and recorded.scale out (a further channel of it is declared in identify.channels)"
         )
     return dataclasses.replace(
         run,
@@ -102,6 +102,7 @@ def _own_run(path: Path, run: Run, entry: RecordedRun, section: RecordedConfig) 
 def _run_of_table(table: Table, entry: RecordedRun, section: RecordedConfig) -> Run:
     columns = _columns(table, section)
     valid = check_samples(table, {k: values for k, (_, values) in columns.items()})
+    channels = _channels(table, section, len(valid))
     time_s, rate, angle, torque = (_scaled(columns, section, q) for q in ("time", "rate", "angle", "torque"))
     assert time_s is not None  # _columns refuses a table without time
     keep = np.isfinite(time_s)  # a lost sample may have lost its time too
@@ -118,7 +119,23 @@ def _run_of_table(table: Table, entry: RecordedRun, section: RecordedConfig) -> 
         use=entry.use,
         min_rate_rad_s=section.min_rate_of(entry),
         added_inertia_kg_m2=entry.added_inertia_kg_m2,
+        channels={name: values[keep] for name, values in channels.items()},
+        causes={name: config.channel(name) for name, config in section.columns.channels.items()},
     )
+
+
+def _channels(table: Table, section: RecordedConfig, count: int) -> dict[str, Array]:
+    """The further columns, in their channel's unit; a reading may be missing. Raises RecordingError."""
+    wanted = section.columns.channels
+    named = {name: config.column or name for name, config in wanted.items()}
+    for name, column in named.items():
+        if column not in table.names:
+            raise missing_column(table, f"channels.{name}", [column], mapped=True)
+    values = table.read(list(named.values())) if named else {}
+    out = {name: wanted[name].scale * values[column] for name, column in named.items()}
+    for name, x in out.items():
+        check_channel(table, name, x, count)
+    return out
 
 
 def _columns(table: Table, section: RecordedConfig) -> dict[Quantity, tuple[str, Array]]:

@@ -9,6 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.channels import Channel
+
 Array = NDArray[np.floating[Any]]  # float64 in fact; numpy's annotations lose that in arithmetic
 TorqueHold = Literal["band_limited", "zero_order"]
 Use = Literal["auto", "fit", "holdout"]
@@ -46,6 +48,9 @@ class Run:
         The excitation frequency of a sine set, for the per-set table; None otherwise.
     channels
         Further measured channels by name, each of shape (n,).
+    causes
+        Those of them that were declared as something that may act on the platform, with what they are; only
+        their readings may be missing (NaN) where a sample is valid.
     rate_corner_hz, rate_delay_s
         The gyro's own low-pass where its data sheet gives it: -3 dB corner and group delay. The delay is
         already taken off ``time_s``; the rounding is in ``rate_rad_s`` (see ``rig.dynamics.low_pass``).
@@ -64,6 +69,7 @@ class Run:
     added_inertia_kg_m2: float = 0.0
     frequency_hz: float | None = None
     channels: Mapping[str, Array] = field(default_factory=dict)
+    causes: Mapping[str, Channel] = field(default_factory=dict)
     rate_corner_hz: float | None = None
     rate_delay_s: float | None = None
 

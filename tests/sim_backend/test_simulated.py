@@ -194,7 +194,7 @@ def test_a_recording_is_made_of_samples_and_plain_text_and_names_nothing_of_the_
 def test_a_run_has_no_place_where_truth_could_hide() -> None:
     assert {f.name for f in dataclasses.fields(Run)} == {
         "name", "time_s", "valid", "rate_rad_s", "angle_rad", "torque_time_s", "torque_nm", "torque_hold",
-        "use", "min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "channels",
+        "use", "min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "channels", "causes",
             "rate_corner_hz", "rate_delay_s",  # of the gyro's data sheet
     }  # fmt: skip
     assert not played(config()).recording.runs[0].channels
