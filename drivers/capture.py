@@ -33,6 +33,8 @@ KINDS = frozenset(b"GgRSTCM")
 LONGEST_PAYLOAD = 1 << 24
 
 _HEAD = struct.Struct("<BdI")
+RECORD_HEAD_BYTES = _HEAD.size
+RECORD_HEAD_BYTES = _HEAD.size
 _CAN_HEAD = struct.Struct("<IBB")
 _TORQUE = struct.Struct("<d")
 _EXTENDED, _REMOTE, _FD = 1, 2, 4
@@ -207,9 +209,9 @@ def read_capture(path: Path) -> Iterator[Entry]:
         at = start + length
 
 
-def export(path: Path) -> tuple[Path, Path]:
+def export(path: Path, prefix: str = "") -> tuple[Path, Path]:
     """Beside the capture: ``gyro.bin``, the gyro's bytes as they came, and ``can.log`` in candump's format."""
-    gyro, log = path.with_name("gyro.bin"), path.with_name("can.log")
+    gyro, log = path.with_name(f"{prefix}gyro.bin"), path.with_name(f"{prefix}can.log")
     with gyro.open("wb") as stream, log.open("w", encoding="ascii") as lines:
         for entry in read_capture(path):
             if entry.kind == GYRO_READ:

@@ -11,7 +11,7 @@ import typer
 
 from rig.cli.desk import Desk, Options, at_desk
 from rig.cli.exits import leave_warnings_to_developers
-from rig.cli.options import ConfigFile, DryRun, Emulate, Out, Overrides, Quiet, Seed, Version, Yes, new_app
+from rig.cli.options import ConfigFile, DryRun, Emulate, Out, Overrides, Quiet, Resume, Seed, Version, Yes, new_app
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -38,6 +38,7 @@ def identify_run(
     overrides: Overrides = None,
     seed: Seed = None,
     quiet: Quiet = False,
+    resume: Resume = None,
     version: Version = False,
 ) -> None:
     """Play the campaign of CONFIG (or read its recordings), identify J, C and K, name what the model misses.
@@ -45,7 +46,7 @@ def identify_run(
     Exit codes: 0 identified and accepted, 1 not accepted (the results say why), 2 wrong usage, file or forecast,
     3 device fault, 4 safety trip, 70 internal error, 130 Ctrl-C.
     """
-    options = Options(config, out, dry_run, emulate, yes, tuple(overrides or ()), seed, quiet)
+    options = Options(config, out, dry_run, emulate, yes, tuple(overrides or ()), seed, quiet, resume)
     raise typer.Exit(at_desk(options, run))
 
 
@@ -62,7 +63,7 @@ def run(desk: Desk) -> int:
     options = desk.options
     loaded = options.load()
     folder = desk.choose_folder(loaded.config.name)
-    if backend_name(loaded.config, options.dry_run, options.emulate) == RECORDED:
+    if backend_name(loaded.config, options.dry_run, options.emulate) == RECORDED and options.resume is None:
         return _run_recorded(desk, loaded, folder)
     return _run_played(desk, loaded, folder)
 
@@ -95,11 +96,11 @@ def _sample_rate_hz(recording: Recording) -> float:
 
 
 def _run_played(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> int:
-    from rig.cli.campaign import play
     from rig.cli.exits import NOT_ACCEPTED, code_of
+    from rig.cli.resume import play_campaign
     from rig.errors import Aborted, UsageError
 
-    played = play(desk, loaded, folder)
+    played = play_campaign(desk, loaded, folder)
     cause = played.cause
     if cause is None:
         try:

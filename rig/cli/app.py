@@ -1,14 +1,16 @@
-"""The command `rig`: check, devices, play, emulate."""
+"""The command `rig`: check, devices, play, emulate, recover, export."""
 
 from __future__ import annotations
 
 import sys
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
 from rig.cli.desk import Desk, Options, at_desk
 from rig.cli.exits import conclude
-from rig.cli.options import ConfigFile, DryRun, Emulate, Out, Overrides, Quiet, Seed, Version, Yes, new_app
+from rig.cli.options import ConfigFile, DryRun, Emulate, Out, Overrides, Quiet, Resume, Seed, Version, Yes, new_app
 
 app = new_app("Prepare, check and play a campaign on the rig. To identify from it: identify-run.")
 
@@ -54,6 +56,7 @@ def play(
     overrides: Overrides = None,
     seed: Seed = None,
     quiet: Quiet = False,
+    resume: Resume = None,
 ) -> None:
     """Play and record only."""
 
@@ -63,8 +66,24 @@ def play(
 
         return play_only(desk, loaded)
 
-    options = Options(config, out, dry_run, emulate, yes, tuple(overrides or ()), seed, quiet)
+    options = Options(config, out, dry_run, emulate, yes, tuple(overrides or ()), seed, quiet, resume)
     raise typer.Exit(at_desk(options, command))
+
+
+@app.command()
+def recover(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="The results folder of a campaign.", show_default=False)
+    ],
+) -> None:
+    """Mend what a kill or a power cut left of a results folder; nothing that stands there is changed."""
+
+    def command() -> int:
+        from rig.cli.recover import recover_folder
+
+        return recover_folder(folder)
+
+    raise typer.Exit(conclude(command))
 
 
 @app.command()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import shutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -34,6 +35,7 @@ from rig.recorder import SetStatistics
 from rig.recording.hdf5 import write_recording_h5
 from rig.recording.journal import Journal, JournalError
 from rig.recording.journal_reader import JournalContents, read_journal, recording_from_journal
+from rig.recording.results import joined
 from rig.recording.run import Recording
 from rig.sequencer import Sequencer
 
@@ -73,13 +75,26 @@ class Played:
 class Part:
     """One part of a campaign: what its files are called, what stands in the folder already, who is asked.
 
-    ``earlier`` is what was played before into the same folder; its recording is kept and added to.
+    ``earlier`` is what was played before: into the same folder, where its recording is kept and added to, or into
+    the one that this part ``resumes``; then its journals are ``brought``, each under its new name.
     """
 
     journal: str = JOURNAL_FILE
     raw: str = RAW_FOLDER
     earlier: Played | None = None
     consent: Callable[[Statement, bool, bool, Callable[[str], str]], None] = ask_consent
+    brought: tuple[tuple[Path, str], ...] = ()
+    resumes: Path | None = None
+
+    @property
+    def done(self) -> frozenset[str]:
+        """Names of the sets that are not played again."""
+        return self.earlier.whole if self.earlier is not None and self.resumes is not None else frozenset()
+
+    def bring(self, path: Path) -> None:
+        """Copy what was played before into the folder of this part. Raises OSError."""
+        for source, name in self.brought:
+            shutil.copyfile(source, path / name)
 
 
 ALL_OF_IT = Part()
@@ -117,9 +132,25 @@ def play(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, part: Part = A
     if backend == EMULATED:
         desk.terminal.tell("Starting the emulated devices ...")
     with BACKENDS[backend](loaded, folder.path / part.raw) as stage:
-        sets = planned_sets(stage.rig, loaded)
+        every = planned_sets(stage.rig, loaded)
+        sets = tuple(planned for planned in every if planned.name not in part.done)
         _open(desk, stage, loaded, sets, folder.path, part)
-        return _record(desk, stage, loaded, sets, folder, part)
+        return _record(desk, stage, loaded, sets, folder, part, [planned.name for planned in every])
+
+
+def export_earlier(
+    desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, part: Part, header: Mapping[str, Any]
+) -> Played:
+    """Make a folder of what was played before, where nothing is left to play."""
+    path = folder.made()
+    part.bring(path)
+    assert part.earlier is not None
+    info = dict(header) | provenance(loaded) | {"resumed_from": str(part.resumes), "aborted": None}
+    contents = joined([c for _, name in part.brought if (c := _read_back(desk, path / name)) is not None])
+    recording = dataclasses.replace(part.earlier.recording, info=info, noise=header.get("noise"))
+    with desk.stops.saving():
+        write_recording_h5(path / RECORDING_FILE, recording, contents)
+    return dataclasses.replace(part.earlier, recording=recording)
 
 
 def planned_sets(rig: Rig, loaded: LoadedConfig) -> tuple[PlannedSet, ...]:
@@ -188,13 +219,20 @@ class _Recorder:
 
 
 def _record(
-    desk: Desk, stage: Stage, loaded: LoadedConfig, sets: Sequence[PlannedSet], folder: ResultsFolder, part: Part
-) -> Played:
-    """Play, then export what the journal and the sequencer have."""
+    desk: Desk, stage: Stage, loaded: LoadedConfig, sets: Sequence[PlannedSet], folder: ResultsFolder, part: Part,
+    every: Sequence[str],
+) -> Played:  # fmt: skip
+    """Play, then export what the journal and the sequencer have; ``every`` names all sets of the campaign."""
     path = folder.made()
-    info = provenance(loaded) | {"backend": str(stage.rig.statement())}
+    part.bring(path)
+    played_on = backend_name(loaded.config, desk.options.dry_run, desk.options.emulate)
+    info = provenance(loaded) | {"backend": str(stage.rig.statement()), "played_on": played_on}
     recorder = _Recorder(desk, stage, loaded, sets)
-    recorder.run(Journal.create(path / part.journal, {"axis": "rotary", "noise": stage.rig.noise_rad_s} | info))
+    if part.resumes is not None:
+        info["resumed_from"] = str(part.resumes)
+    head = {"axis": "rotary", "noise": stage.rig.noise_rad_s, "planned": [s.name for s in sets]} | info
+    head["planned_in_all"] = list(every)
+    recorder.run(Journal.create(path / part.journal, head))
     cause, tally = recorder.cause, recorder.tally
     if isinstance(cause, UsageError) and not tally.statistics:
         _take_back(folder, part)
@@ -205,35 +243,36 @@ def _record(
     info |= {"sets": [_figures(s) for s in tally.statistics]} | stage.account()
     played = Played(Recording(()), tally.whole, cause, (part.journal,), stage.rig.rate_full_scale_rad_s)
     with desk.stops.saving():
-        return _save(desk, path, recorder.recording, info, played, part.earlier)
+        return _save(desk, path, recorder.recording, info, played, part)
 
 
 def _take_back(folder: ResultsFolder, part: Part) -> None:
     """Take back what was made for a part in which nothing was played."""
-    if part.earlier is None:
+    if part.earlier is None or part.resumes is not None:
         folder.unmade()
     else:
         (folder.path / part.journal).unlink(missing_ok=True)
 
 
 def _save(
-    desk: Desk, path: Path, recording: Recording | None, info: Mapping[str, Any], played: Played, earlier: Played | None
+    desk: Desk, path: Path, recording: Recording | None, info: Mapping[str, Any], played: Played, part: Part
 ) -> Played:
     """Write recording.h5; a disk that takes no more is said, and the journals have the samples."""
+    earlier = part.earlier
     contents = _read_back(desk, path / played.journals[0])
     if recording is None:
         recording = recording_from_journal(contents) if contents is not None else Recording(())
     recording = dataclasses.replace(recording, info=dict(info))
     if earlier is not None:
         before = [_read_back(desk, path / name) for name in earlier.journals]
-        contents = _joined([c for c in (*before, contents) if c is not None])
-        recording = _added(earlier.recording, recording)
+        contents = joined([c for c in (*before, contents) if c is not None])
+        recording = (_added if part.resumes is None else _resumed)(earlier.recording, recording)
         played = dataclasses.replace(
             played, whole=played.whole | earlier.whole, journals=(*earlier.journals, *played.journals)
         )
     if recording.runs:
         try:
-            _write(path, recording, contents, anew=earlier is not None)
+            _write(path, recording, contents, anew=(path / RECORDING_FILE).exists())
         except RigError as problem:
             desk.say_error(problem)
     return dataclasses.replace(played, recording=recording)
@@ -260,21 +299,16 @@ def _read_back(desk: Desk, path: Path) -> JournalContents | None:
         return None
 
 
-def _joined(parts: Sequence[JournalContents]) -> JournalContents | None:
-    """Journals of one campaign as one, in the order they were played."""
-    if not parts:
-        return None
-    return JournalContents(
-        parts[0].header, tuple(r for c in parts for r in c.runs), tuple(e for c in parts for e in c.events),
-        all(c.closed for c in parts), sum(c.unread_bytes for c in parts),
-    )  # fmt: skip
-
-
 def _added(earlier: Recording, new: Recording) -> Recording:
     """All runs of a campaign; what is said of the new part stands behind what was said of the first."""
     info = dict(earlier.info)
     info["follow_ups"] = [*info.get("follow_ups", ()), dict(new.info)]
     return dataclasses.replace(earlier, runs=(*earlier.runs, *new.runs), info=info)
+
+
+def _resumed(earlier: Recording, new: Recording) -> Recording:
+    """The finished runs of before and those of now; what is said is of now, and names the folder of before."""
+    return dataclasses.replace(new, runs=(*earlier.runs, *new.runs))
 
 
 def _figures(s: SetStatistics) -> dict[str, Any]:

@@ -30,6 +30,7 @@ class Options:
     overrides: tuple[str, ...] = ()
     seed: int | None = None
     quiet: bool = False
+    resume: Path | None = None
 
     def load(self) -> LoadedConfig:
         """The checked configuration, --set and --seed applied. Raises ConfigError."""

@@ -12,6 +12,10 @@ Out = Annotated[
     Path | None,
     typer.Option(metavar="DIR", help="Results folder; never overwritten. Default: runs/<UTC time>-<config name>/"),
 ]
+Resume = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Play only the sets that the campaign in DIR did not finish; DIR stays as it is."),
+]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="The same campaign on the simulated backend.")]
 Emulate = Annotated[bool, typer.Option("--emulate", help="The bench against devices emulated at wire level.")]
 Yes = Annotated[

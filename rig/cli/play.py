@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sys
 
-from rig.cli.campaign import play
 from rig.cli.desk import Desk
 from rig.cli.exits import code_of
+from rig.cli.resume import play_campaign
 from rig.cli.terminal import plain
 from rig.config.load import LoadedConfig
 
@@ -14,7 +14,7 @@ from rig.config.load import LoadedConfig
 def play_only(desk: Desk, loaded: LoadedConfig) -> int:
     """Play the campaign and say where its recording is; returns the exit code."""
     folder = desk.choose_folder(loaded.config.name)
-    played = play(desk, loaded, folder)
+    played = play_campaign(desk, loaded, folder)
     desk.terminal.settle()
     if not desk.options.quiet:
         sys.stdout.write(f"{len(played.whole)} complete set(s); the recording is in {plain(str(folder.path))}\n")

@@ -25,10 +25,11 @@ def _version_of(package: str) -> str:
 
 
 def provenance(loaded: LoadedConfig) -> dict[str, Any]:
-    """When, by which versions, from which configuration (as read, with its overrides)."""
+    """When, by which versions, from which configuration: as understood, and as read with its overrides."""
     return {
         "started_utc": datetime.now(UTC).isoformat(),
         "config_file": str(loaded.path),
+        "config": loaded.config.model_dump(mode="json"),
         "config_text": loaded.text,
         "config_included": dict(loaded.included),
         "config_overrides": list(loaded.overrides),

@@ -13,7 +13,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Literal
 
 import numpy as np
 
@@ -227,7 +227,7 @@ def recording_from_journal(contents: JournalContents) -> Recording:
     runs = tuple(run_from_journal(r) for r in contents.runs if len(r.tables["samples"]))
     header = dict(contents.header)
     complete = contents.closed and all(r.ended for r in contents.runs)
-    axis = "linear" if header.get("axis") == "linear" else "rotary"
+    axis: Literal["rotary", "linear"] = "linear" if header.get("axis") == "linear" else "rotary"
     noise = header.get("noise")
     known = isinstance(noise, (int, float)) and math.isfinite(noise) and noise > 0
     return Recording(runs, axis=axis, noise=noise if known else None, info=header | {"complete": complete})

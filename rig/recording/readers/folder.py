@@ -33,5 +33,6 @@ def read(path: Path) -> Sequence[Run]:
         return found
     told = "\n".join(wrong) or f"it has neither {RECORDING_FILE} nor a .journal"
     raise RecordingError(
-        f"{path}: is a folder without a recording that can be read: {told}; name one file of it for each run, or a results folder"
+        f"{path}: is a folder without a recording that can be read: {told}; name one file "
+        "of it for each run, or a results folder"
     )
