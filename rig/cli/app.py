@@ -87,6 +87,26 @@ def recover(
 
 
 @app.command()
+def export(
+    source: Annotated[
+        Path, typer.Argument(metavar="FROM", help="A results folder, recording.h5 or journal.", show_default=False)
+    ],
+    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, npz; of the CAN log: blf, asc, mf4.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="A folder that does not exist yet. Default: FROM/export_FORMAT/")
+    ] = None,
+) -> None:
+    """Write a recording for other programs, every digit kept, with a rig.yaml that reads it back."""
+
+    def command() -> int:
+        from rig.cli.export import export_recording
+
+        return export_recording(source, to, out)
+
+    raise typer.Exit(conclude(command))
+
+
+@app.command()
 def emulate(config: ConfigFile, overrides: Overrides = None) -> None:
     """Emulate the devices of CONFIG's `bench` section at wire level until Ctrl-C; JSON lines say what they do.
 

@@ -29,6 +29,7 @@ from rig.config.load import LoadedConfig
 from rig.errors import PreflightRefusal, RigError, UsageError
 from rig.excitation import PlannedSet
 from rig.guard import Guard
+from rig.guard_motion import motion_checks
 from rig.interface import Rig, Statement, Torque
 from rig.preflight import plan
 from rig.recorder import SetStatistics
@@ -203,7 +204,7 @@ class _Recorder:
         sequencer = Sequencer(
             stage.rig,
             stage.clock,
-            Guard(config.limits),
+            Guard(config.limits, motion_checks(config.limits, config.model.platform())),
             sample_rate_hz=config.excitation.sample_rate_hz,
             rest_s=config.excitation.rest_s,
             journal=journal,

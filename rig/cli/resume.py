@@ -31,7 +31,8 @@ SECTIONS: Mapping[str, tuple[str, ...]] = {
 SCALING = ("model", "limits")
 # What may change from one day to the next without making the sets incomparable.
 MAY_DIFFER = (
-    "simulated.seed", "bench.gyroscope.port", "bench.amplifier.can.channel", "bench.amplifier.can.tty_baud",
+    "simulated.seed", "excitation.rest_s",
+    "bench.gyroscope.port", "bench.amplifier.can.channel", "bench.amplifier.can.tty_baud",
     "bench.real_time", "bench.raw_capture", "bench.replay", "bench.settle_s", "bench.emulator.faults",
 )  # fmt: skip
 
