@@ -7,73 +7,16 @@ a line in ``CHECKS``. The first broken limit is the verdict; taking the torque o
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Sequence
 
 from rig.config.limits import LimitsConfig
-from rig.interface import GyroSample, TorqueSample
+from rig.guard_base import Check, Rest, Tick, Trip
+from rig.guard_readings import READINGS
+
+__all__ = ["CHECKS", "Check", "Guard", "Rest", "Tick", "Trip"]
 
 BOUND_SIGMAS = 3.0  # of the drift of an integrated rate that counts as travel
 MEASURED_TORQUE_EXCESS = 1.05  # a drive's own torque reading may overshoot the limit by so much
-
-
-@dataclass(frozen=True)
-class Trip:
-    """A broken limit: which, by how much, when (seconds since the start of the set) and what to do."""
-
-    limit: str
-    value: float
-    allowed: float
-    unit: str
-    time_s: float
-    what_to_do: str
-
-    def __str__(self) -> str:
-        return (
-            f"{self.limit}: {self.value:.4g} {self.unit} at {self.time_s:.3f} s, allowed is {self.allowed:.4g} "
-            f"{self.unit}. {self.what_to_do}"
-        )
-
-
-class Rest(NamedTuple):
-    """What the gyro read at rest before a set: its bias, how sure that is, and the noise of one sample."""
-
-    bias_rad_s: float = 0.0
-    bias_sigma_rad_s: float = 0.0
-    noise_rad_s: float = 0.0
-
-
-class Tick(NamedTuple):
-    """One tick as the guard sees it; times on the sequencer's clock."""
-
-    now_s: float
-    late_s: float
-    period_s: float
-    torque_nm: float
-    gyro: Sequence[GyroSample]
-    torque: Sequence[TorqueSample]
-    channels: Mapping[str, float]
-
-
-class Check(ABC):
-    """One limit. ``start_s`` is the instant that times of trips count from."""
-
-    def __init__(self, limits: LimitsConfig) -> None:
-        self._limits = limits
-        self._start_s = 0.0
-
-    def begin(self, start_s: float, rest: Rest) -> None:
-        """A set begins, from rest."""
-        self._start_s = start_s
-
-    @abstractmethod
-    def look(self, tick: Tick) -> Trip | None:
-        """The verdict on one tick."""
-
-    def _trip(self, limit: str, value: float, allowed: float, unit: str, time_s: float, what_to_do: str) -> Trip:
-        return Trip(limit, value, allowed, unit, time_s - self._start_s, what_to_do)
 
 
 class MissedTicks(Check):
@@ -215,7 +158,7 @@ class MeasuredTorque(Check):
         return None
 
 
-CHECKS: tuple[type[Check], ...] = (MissedTicks, StaleGyro, FrozenGyro, Rate, Travel, MeasuredTorque)
+CHECKS: tuple[type[Check], ...] = (MissedTicks, StaleGyro, FrozenGyro, Rate, Travel, MeasuredTorque, *READINGS)
 
 
 class Guard:

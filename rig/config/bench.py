@@ -80,6 +80,18 @@ class RealTimeConfig(Section):
     spin_us: Annotated[float, Field(ge=0, le=1000)] = 0.0
 
 
+class ProbeConfig(Section):
+    """The small pulses between arming and the first set (docs/safety.md).
+
+    ``play: false`` leaves them out. ``torque_nm`` is the most that a pulse may have; where left out, three tenths
+    of the largest torque of the campaign. ``inertia_factor``: the declared inertia may be wrong by so much either way.
+    """
+
+    play: bool = True
+    torque_nm: Positive | None = None
+    inertia_factor: Annotated[float, Field(gt=1, le=100)] = 2.0
+
+
 class InjectedFault(Section):
     """A fault that takes hold of the emulated devices ``after_s`` the drive was enabled, for ``lasts_s``.
 
@@ -114,7 +126,8 @@ class EmulatorConfig(Section):
 class BenchConfig(Section):
     """Real devices, or their emulators at wire level.
 
-    ``settle_s`` is how long the gyro's clock is compared with the host's before anything moves.
+    ``settle_s`` is how long the gyro's clock is compared with the host's before anything moves. ``probe``: small
+    pulses after arming.
     ``raw_capture`` keeps every byte and frame with its time in `raw/` of the results folder. ``replay``
     names such a folder (relative to this yaml): it is played through the same drivers, no device is touched.
     """
@@ -123,6 +136,7 @@ class BenchConfig(Section):
     amplifier: AmplifierConfig = AmplifierConfig()
     real_time: RealTimeConfig = RealTimeConfig()
     settle_s: Annotated[float, Field(ge=0.2, le=60)] = 3.0
+    probe: ProbeConfig = ProbeConfig()
     raw_capture: bool = True
     replay: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
     emulator: EmulatorConfig = EmulatorConfig()

@@ -154,3 +154,36 @@ def test_times_of_a_trip_count_from_the_start_of_the_set() -> None:
     trip = first_trip(guard, ticks(1.0, lambda t: 0.0 if t < 0.1 - 1e-9 else 500.0))
     assert trip is not None
     assert trip.time_s == pytest.approx(0.05)
+
+
+def with_channels(**channels: float) -> Tick:
+    return Tick(0.5, 0.0, PERIOD_S, 0.0, (GyroSample(0.5, 1e-4, True),), (), channels)
+
+
+def test_a_hot_drive_trips_only_where_a_limit_is_given() -> None:
+    hot = with_channels(drive_temperature_c=91.0, drive_current_a=12.0)
+    easy, strict = Guard(LIMITS), Guard(LimitsConfig(drive_temperature_c=85, drive_current_a=20))
+    for guard in (easy, strict):
+        guard.begin(0.49, Rest())
+    assert easy.look(hot) is None
+    trip = strict.look(hot)
+    assert trip is not None
+    assert (trip.limit, trip.value, trip.allowed) == ("temperature of the drive (limits.drive_temperature_c)", 91.0, 85)
+
+
+def test_the_current_of_the_drive_counts_in_either_direction() -> None:
+    guard = Guard(LimitsConfig(drive_current_a=20))
+    guard.begin(0.49, Rest())
+    trip = guard.look(with_channels(drive_current_a=-21.0))
+    assert trip is not None
+    assert "limits.drive_current_a" in trip.limit
+
+
+def test_an_encoder_counts_travel_from_where_it_stood_at_rest() -> None:
+    guard = Guard(LIMITS)
+    guard.begin(0.49, Rest())
+    assert guard.look(with_channels(angle_rad=1.0)) is None
+    assert guard.look(with_channels(angle_rad=1.0 + math.radians(9.9))) is None
+    trip = guard.look(with_channels(angle_rad=1.0 - math.radians(10.1)))
+    assert trip is not None
+    assert trip.limit == "travel by the encoder (limits.travel_deg)"
