@@ -1,4 +1,4 @@
-"""`rig export`: a recording for other programs with a rig.yaml that reads it back; the CAN log for those of the trade."""
+"""`rig export`: a recording for other programs and a rig.yaml that reads it back; the CAN log as BLF, ASC or MF4."""
 
 from __future__ import annotations
 

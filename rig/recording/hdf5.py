@@ -92,10 +92,16 @@ def _write_run(group: h5py.Group, run: Run) -> None:
         if array is not None:
             group.create_dataset(name, data=array, **_packed(array))
     for name, array in run.channels.items():
-        dataset = group.create_dataset(f"channels/{name}", data=array, **_packed(array))
+        dataset = group.create_dataset(f"channels/{_word(name)}", data=array, **_packed(array))
         if name in run.causes:
             given = {key: value for key, value in vars(run.causes[name]).items() if key != "name" and value is not None}
             dataset.attrs.update(given)
+
+
+def _word(name: str) -> str:
+    """A channel's name as one that HDF5 takes: there a slash leads into a group, and nothing and a dot are no names."""
+    word = name.replace("/", "_").replace("\0", "_")
+    return word if word.strip(".") else f"channel_{word}"
 
 
 def read_recording_h5(path: str | Path) -> Recording:

@@ -38,6 +38,9 @@ RUN_META = (
 )  # fmt: skip
 
 
+LONGEST_NAME = 200
+
+
 @dataclass(frozen=True)
 class JournalRun:
     """One run as written: ``tables`` maps a kind to its rows, shape (n, columns).
@@ -166,10 +169,10 @@ class _Reading:
         self.end = end
 
     def _begin(self, head: dict[str, Any]) -> None:
-        columns = {k: tuple(v) for k, v in head["columns"].items()}
-        if "time_s" not in columns["samples"] or not all(isinstance(n, str) for v in columns.values() for n in v):
+        columns = {str(k): tuple(_printable(str(name)) for name in v) for k, v in head["columns"].items()}
+        if "time_s" not in columns["samples"]:
             raise ValueError("a run without time_s among its samples")
-        self._open = _OpenRun(str(head["name"]), dict(head["meta"]), columns)
+        self._open = _OpenRun(_printable(str(head["name"])), dict(head["meta"]), columns)
         self.runs.append(self._open)
 
     def _end(self, payload: bytes) -> None:
@@ -188,6 +191,11 @@ class _Reading:
         if width != len(self._open.columns[table]):
             raise ValueError(f"{table} has {width} columns, {len(self._open.columns[table])} declared")
         self._open.blocks.setdefault(table, []).append(rows.astype(np.float64))
+
+
+def _printable(name: str) -> str:
+    """Names go to terminals, files and the report; what only steers those is no part of a name."""
+    return "".join(c if c.isprintable() else "?" for c in name[:LONGEST_NAME])
 
 
 def read_journal(path: str | Path) -> JournalContents:
