@@ -6,9 +6,11 @@ The plant's time is what the sequencer hands over, rounded to fine steps; nothin
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from fractions import Fraction
 
+from rig.channels import Channel
 from rig.config.simulated import SimulatedConfig
 from rig.errors import ConfigError, DeviceFault
 from rig.interface import Exchange, GyroSample, Rig, Statement, Torque, TorqueOfTime, TorqueSample
@@ -31,6 +33,8 @@ class SimulatedRig(Rig):
         How often the sequencer ticks.
     seed
         Overrides the seed of the section.
+    channels
+        Measured channels that a model reads: nothing moves them here, they are reported at their reference.
 
     Raises
     ------
@@ -38,8 +42,11 @@ class SimulatedRig(Rig):
         Where the gyro's rate and the sequencer's share no reasonable time grid.
     """
 
-    def __init__(self, config: SimulatedConfig, sample_rate_hz: float, seed: int | None = None) -> None:
+    def __init__(
+        self, config: SimulatedConfig, sample_rate_hz: float, seed: int | None = None, channels: Iterable[Channel] = ()
+    ) -> None:
         self._config = config
+        self._held = {channel.name: channel.reference or 0.0 for channel in channels}
         common_hz = _common_rate_hz(sample_rate_hz, config.gyro.sample_rate_hz)
         self._common_hz = common_hz
         self._seed = config.seed if seed is None else seed
@@ -49,7 +56,9 @@ class SimulatedRig(Rig):
     def statement(self) -> Statement:
         """Torque is SIMULATED."""
         kind = self._config.amplifier.kind
-        return Statement(Torque.SIMULATED, ("simulated platform", f"{kind} amplifier", "simulated gyroscope"))
+        held = [f"{name} held at {reading:g}, where its effects do nothing" for name, reading in self._held.items()]
+        devices = ("simulated platform", f"{kind} amplifier", "simulated gyroscope", *held)
+        return Statement(Torque.SIMULATED, devices)
 
     @property
     def torque_hold(self) -> TorqueHold:
@@ -118,7 +127,7 @@ class SimulatedRig(Rig):
         if epoch:
             gyro = [GyroSample(t + epoch, rate, valid) for t, rate, valid in gyro]
             torque = [TorqueSample(t + epoch, value) for t, value in torque]
-        return Exchange(gyro, torque)
+        return Exchange(gyro, torque, self._held)
 
     def begin_set(self, torque: TorqueOfTime, start_s: float) -> None:
         """An own noise stream for the set, and the excitation for an ideal amplifier."""

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 RECORDED = "recorded"
 EMULATED = "emulated"
 SIMULATED = "simulated"
+REPORTED = ("drive_torque_nm", "sent_torque_nm")  # further channels of a bench whose drive reports its torque
 
 
 def no_account() -> dict[str, Any]:
@@ -50,13 +51,16 @@ def simulated(loaded: LoadedConfig, raw_folder: Path) -> Iterator[Stage]:
     from sim_backend.simulated import SimulatedRig
 
     config = loaded.config
-    yield Stage(SimulatedRig(config.simulated, config.excitation.sample_rate_hz), VirtualClock())
+    channels = {**config.model.platform().channels, **config.simulated.platform.platform().channels}
+    rig = SimulatedRig(config.simulated, config.excitation.sample_rate_hz, channels=channels.values())
+    yield Stage(rig, VirtualClock())
 
 
 @contextmanager
 def bench(loaded: LoadedConfig, raw_folder: Path) -> Iterator[Stage]:
     """Real devices, or the raw capture of a campaign that was played on them."""
     section = _bench_section(loaded.config)
+    _require_channels(loaded.config)
     if section.replay is not None:
         yield _replayed(_capture_of(loaded.folder, section.replay))
         return
@@ -73,6 +77,7 @@ def bench(loaded: LoadedConfig, raw_folder: Path) -> Iterator[Stage]:
 def emulated(loaded: LoadedConfig, raw_folder: Path) -> Iterator[Stage]:
     """The same drivers on devices that are emulated at wire level in a process of their own."""
     config = loaded.config
+    _require_channels(config)
     if _bench_section(config).replay is not None:
         raise UsageError(
             "--emulate and bench.replay exclude each other: the first emulates devices, the second has none."
@@ -102,6 +107,22 @@ def require_emulators() -> None:
     """Raise UsageError where there are no pseudo terminals to emulate devices on."""
     if sys.platform == "win32":
         raise UsageError("emulated devices need pseudo terminals, which Windows has not: use --dry-run there.")
+
+
+def _require_channels(config: Config) -> None:
+    """Raise ConfigError where the declared model reads a channel that no bench reports."""
+    if not config.model.channels:
+        return
+    from rig import effects
+
+    for name in config.model.effects:
+        read = effects.get(name).reads
+        if read is not None and read.name not in REPORTED:
+            raise ConfigError(
+                f"model.effects.{name} reads the channel {read.name!r}, which the bench does not report (it reports "
+                f"{' and '.join(REPORTED)}): take {name} out of the model, or record {read.name} beside the bench and "
+                "identify with backend: recorded"
+            )
 
 
 def _bench_section(config: Config) -> BenchConfig:
