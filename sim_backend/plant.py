@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 
 from rig.dynamics import Equations, integrator
+from rig.errors import ConfigError
 from rig.platform import Platform
 from rig.recording.run import Array
 from sim_backend.motor import MotorState, motor_torque
 
 ANGLE, RATE, SENSED, TORQUE = range(4)  # columns of what Plant.follow and its like return
 RK4_PHASE_RAD = 0.03  # of the fastest motion in one fine step: leaves (0.03)^4 / 120, 7e-9, of a frequency
+MOST_PARTS = 4096  # fine steps in a tick: a minute at 1 kHz takes some minutes then, and beyond that has no end
 FOLLOW, HOLD, MOTOR = range(3)
 _DRIVE, _SENSOR = 12, 18  # where the filter chains begin in the table of addresses
 
@@ -85,6 +87,12 @@ class Plant:
     def __init__(self, platform: Platform, coarsest_step_s: float, phase_rad: float = RK4_PHASE_RAD) -> None:
         e = Equations(platform)
         needed = coarsest_step_s * e.fastest_rad_s() / phase_rad
+        if not needed <= MOST_PARTS:
+            raise ConfigError(
+                f"simulated.platform: its fastest motion, {e.fastest_rad_s() / (2 * np.pi):.3g} Hz, takes "
+                f"{needed:.3g} fine steps a tick, at most {MOST_PARTS} are simulated: raise the inertia, lower the "
+                "stiffness, the damping or the sharpest of its effects, or tick faster"
+            )
         # A power of two, so that grids that halve each other nest and a held torque changes on all of them.
         self.parts = 1 << max(0, int(np.ceil(np.log2(needed) - 1e-9))) if needed > 1.0 else 1
         self.step_s = coarsest_step_s / self.parts

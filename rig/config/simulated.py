@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
@@ -9,6 +10,8 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from rig.config.base import NonNegative, Positive, Section
 from rig.config.model import ModelConfig
+
+FASTEST_HZ = 5000.0  # of a simulated platform: each turn of it takes some two hundred fine steps
 
 
 class SimulatedGyro(Section):
@@ -89,4 +92,13 @@ class SimulatedConfig(Section):
         for key in ("damping_nm_s_rad", "stiffness_nm_rad"):
             if getattr(self.platform, key) < 0:
                 raise ValueError(f"platform.{key} is negative: such a platform runs away by itself")
+        inertia = self.platform.inertia_kg_m2
+        resonance_hz = math.sqrt(self.platform.stiffness_nm_rad / inertia) / (2 * math.pi)
+        decay_hz = self.platform.damping_nm_s_rad / inertia / (2 * math.pi)
+        if max(resonance_hz, decay_hz) > FASTEST_HZ:
+            raise ValueError(
+                f"platform moves at up to {max(resonance_hz, decay_hz):.3g} Hz (stiffness {resonance_hz:.3g} Hz, damping "
+                f"{decay_hz:.3g} Hz), which would be simulated for ever: at most {FASTEST_HZ:g} Hz, so raise "
+                "inertia_kg_m2 or lower stiffness_nm_rad or damping_nm_s_rad"
+            )
         return self

@@ -231,7 +231,8 @@ class _Walk:
         except ValueError:
             self._fault(place, path, f"{text[:40]!r} is not a number")
             return None
-        if not math.isfinite(number) or abs(number) > 1e300:
+        # In this order: a whole number of hundreds of digits is no float that could be asked whether it is finite.
+        if abs(number) > 1e300 or not math.isfinite(number):
             self._fault(place, path, f"{text[:40]} is not allowed: give a finite number")
             return None
         # Python's whole numbers have no end; beyond 64 bits none is meant as one.

@@ -45,6 +45,11 @@ def check_samples(table: Table, columns: Mapping[str, Array]) -> NDArray[np.bool
     if flags is not None and not np.isfinite(flags).all():
         at = table.label(int(np.argmin(np.isfinite(flags))))
         raise RecordingError(f"{table.path}: {at}: valid is empty: write 1 for a good sample, 0 for a lost one")
+    if flags is not None and not np.isin(flags, (0.0, 1.0)).all():
+        i = int(np.argmin(np.isin(flags, (0.0, 1.0))))
+        raise RecordingError(
+            f"{table.path}: {table.label(i)}: valid is {flags[i]:g}: write 1 for a good sample, 0 for a lost one"
+        )
     valid = np.ones(lengths["time"], dtype=bool) if flags is None else flags != 0
     for quantity, values in columns.items():
         bad = valid & ~(np.abs(values) <= LARGEST_VALUE)
