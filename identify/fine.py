@@ -55,6 +55,8 @@ MOST_SHOWN = 10
 PLAIN = 300.0  # fall of chi square on that part at which it tells enough
 LONG = 14_000  # samples; of a longer recording a first part is scored first
 FEW_STEPS = 8  # of a fit that is only compared
+TAKEN_ON = 4  # times so many more, while each time the squares fall
+GOING = 0.95  # to less than this share
 NEAR_THEN = 4.0  # times the best squares of its round: asked again in the finished model
 AT_FLOOR = 1.1  # mean square over the noise's variance: who is there has found what there is
 FAR_BEHIND = 0.7  # of the best score: not fitted any more once another candidate is at the floor
@@ -230,7 +232,20 @@ class FineSearch:
             fitted = self._from(now, look, HOPELESS * best.estimate.sigma)
             if fitted is not None:
                 tried[look.effect] = fitted
-        return tried, looks
+        return {n: self._on(w) if w.squares < now.squares else w for n, w in tried.items()}, looks
+
+    def _on(self, fitted: Whole) -> Whole:
+        """A fit that still goes down, taken on: a sharp resonance is found late, and then at once."""
+        for _ in range(TAKEN_ON):
+            if fitted.estimate.converged or fitted.level < AT_FLOOR:
+                break
+            further = self.whole(fitted.structure, fitted.values(), steps=FEW_STEPS)
+            if further is None or further.squares >= fitted.squares:
+                break
+            slow, fitted = further.squares > GOING * fitted.squares, further
+            if slow:
+                break
+        return fitted
 
     def _looks(self, now: Whole, names: Sequence[str]) -> list[Scored]:
         """Scores of all candidates: of a long recording first on part of it, then on all for those that show there."""

@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from identify.parameters import Name, bounds_of, equations_of, names_of, ordered, platform_of
 from identify.regression import Structure
-from identify.sensitivities import Reduced, linearise
-from identify.shots import RUNAWAY, Shots, losses_at, losses_of, make_shots, moved, predict
+from identify.sensitivities import Reduced, at_residual, linearise
+from identify.shots import RUNAWAY, Shots, losses_of, make_shots, moved, predict, residual_at
 from identify.traces import Trace
 from rig.dynamics import Equations
 from rig.dynamics.simulate import MAX_SUBSTEPS
@@ -28,6 +28,8 @@ from rig.recording.run import Array
 COARSEST = 16  # fine steps a sample while models are compared
 ROBUST_FROM = 12  # shots: fewer show no outlier
 OUTLIER = 4.0  # times the median error of a shot
+KEPT = 3  # steps with the same sensitivities
+FORETOLD = 0.1  # of the fall of the squares that sensitivities may miss to be kept
 SETTLE = 6  # rounds in which start states are fitted at fixed parameters
 
 
@@ -129,7 +131,7 @@ def refine(
     shots = _shots_for(traces, structure, names, x, shot_s, use, carry, coarse)
     workers = ThreadPoolExecutor(2)
     try:
-        return _levenberg(workers, shots, structure, names, x, still, iterations, tolerance, hopeless)
+        return _levenberg(_Descent(workers, shots, structure, names, x, still), iterations, tolerance, hopeless, coarse)
     finally:
         workers.shutdown()
 
@@ -155,67 +157,141 @@ def _shots_for(
     return out
 
 
-def _levenberg(
-    workers: ThreadPoolExecutor, shots: list[Shots], structure: Structure, names: tuple[Name, ...],
-    x: Array, still: Any, iterations: int, tolerance: float, hopeless: float,
-) -> Estimate:  # fmt: skip
-    scale = np.where(np.abs(x) > 0, np.abs(x), 1.0)
-    low = np.array([bounds_of(n)[0] for n in names])
-    high = np.array([bounds_of(n)[1] for n in names])
-    damping, converged = 1e-6, False
+class _Descent:
+    """Gauss-Newton with Levenberg's damping, sensitivities kept as long as they foretell what a step brings.
 
-    def around(x: Array, shots: Sequence[Shots], outlier: float) -> list[Reduced]:
-        return list(workers.map(lambda s: linearise(s, structure, names, x, scale, still, outlier), shots))
+    A step costs a simulation of every run; new sensitivities cost one for every parameter besides.
+    """
 
-    first = list(workers.map(lambda s: losses_at(s, structure, names, x), shots))
-    counts = np.concatenate([s.counts for s in shots])
-    losses = np.concatenate(first)
-    outlier = _outlier(losses, counts)
-    parts = around(x, shots, outlier)
-    a, b, losses, counts = _total(parts)
-    count = int(np.sum(counts))
-    for k in range(iterations if np.all(np.isfinite(losses)) else 0):
-        cost = _cost(losses, counts, outlier)
-        if not (np.all(np.isfinite(a)) and np.all(np.isfinite(b))):
+    def __init__(
+        self, workers: ThreadPoolExecutor, shots: list[Shots], structure: Structure, names: tuple[Name, ...],
+        x: Array, still: Any,
+    ) -> None:  # fmt: skip
+        self.workers, self.shots, self.structure, self.names, self.x = workers, shots, structure, names, x
+        self.still = still
+        self.scale = np.where(np.abs(x) > 0, np.abs(x), 1.0)
+        self.low = np.array([bounds_of(n)[0] for n in names])
+        self.high = np.array([bounds_of(n)[1] for n in names])
+        self.damping = 1e-6
+        self.counts = np.concatenate([s.counts for s in shots])
+        self.count = int(np.sum(self.counts))
+        found = list(workers.map(lambda s: residual_at(s, structure, names, x), shots))
+        self.residuals = [r for r, _ in found]
+        self.outlier = _outlier(np.concatenate([each for _, each in found]), self.counts)
+        self.renew()
+
+    def renew(self) -> None:
+        """Sensitivities where the descent stands."""
+        self.parts = list(
+            self.workers.map(
+                lambda s: linearise(s, self.structure, self.names, self.x, self.scale, self.still, self.outlier),
+                self.shots,
+            )
+        )
+        self.fresh = True
+        self._add_up()
+
+    def keep(self) -> None:
+        """The sensitivities at hand, with the residual where the descent stands."""
+        self.parts = [
+            at_residual(q, s, r, self.outlier) for q, s, r in zip(self.parts, self.shots, self.residuals, strict=True)
+        ]
+        self.fresh = False
+        self._add_up()
+
+    def _add_up(self) -> None:
+        self.a, self.b, self.losses, _ = _total(self.parts)
+
+    @property
+    def cost(self) -> float:
+        """Sum of squares, mistrusted shots counting less."""
+        return _cost(self.losses, self.counts, self.outlier)
+
+    @property
+    def lost(self) -> bool:
+        """Whether the simulation ran away."""
+        return not (np.all(np.isfinite(self.losses)) and np.all(np.isfinite(self.a)) and np.all(np.isfinite(self.b)))
+
+    def step(self) -> _Step | None:
+        """One step down; None where none leads there."""
+        cost = self.cost
+        size = np.sqrt(np.maximum(np.diag(self.a), 1e-300))
+        free = ~self.still
+        scaled, right = (self.a / np.outer(size, size))[np.ix_(free, free)], (self.b / size)[free]
+        if not (np.all(np.isfinite(scaled)) and np.all(np.isfinite(right))):
+            return None
+        for _ in range(8 if self.fresh else 1):
+            dx = np.zeros(len(self.x))
+            dx[free] = np.linalg.lstsq(scaled + self.damping * np.eye(int(free.sum())), right, rcond=1e-14)[0]
+            new = ordered(self.names, np.clip(self.x + dx / size, self.low, self.high))
+            steps = [q.back(new - self.x) for q in self.parts]
+            trial = [moved(s, m) for s, m in zip(self.shots, steps, strict=True)]
+            found = list(self.workers.map(lambda s, new=new: residual_at(s, self.structure, self.names, new), trial))
+            losses = np.concatenate([each for _, each in found])
+            after = _cost(losses, self.counts, self.outlier)
+            if after <= cost * (1.0 + 1e-12):
+                residuals = [r for r, _ in found]
+                missed = self._missed(new - self.x, steps, residuals)
+                length = float(np.max(np.abs(new - self.x) * size / np.sqrt(cost / max(self.count, 1)), initial=0.0))
+                self.x, self.shots, self.residuals = new, trial, residuals
+                self.damping = max(self.damping / 30.0, 1e-9)
+                self.outlier = _outlier(losses, self.counts)
+                return _Step(length, cost - after, cost, missed <= FORETOLD * (cost - after))
+            self.damping = max(self.damping * 30.0, 1e-5)
+        return None
+
+    @RUNAWAY
+    def _missed(self, dx: Array, steps: Sequence[tuple[Array, float]], residuals: Sequence[Array]) -> float:
+        """Squares of what the sensitivities did not foretell of a step."""
+        out = 0.0
+        for q, s, (start, bias), old, new in zip(
+            self.parts, self.shots, steps, self.residuals, residuals, strict=True
+        ):  # fmt: skip
+            own = np.repeat(start, [b - a for a, b in s.edges], axis=0)
+            change = q.columns @ dx + np.sum(q.state * own, axis=1) + bias
+            out += float(np.sum((new - old + change)[s.weight] ** 2))
+        return out if np.isfinite(out) else np.inf
+
+
+class _Step(NamedTuple):
+    """A step taken: its largest part in standard errors, what it brought, of what, and whether as foretold."""
+
+    length: float
+    fall: float
+    cost: float
+    foretold: bool
+
+
+def _levenberg(descent: _Descent, iterations: int, tolerance: float, hopeless: float, coarse: bool) -> Estimate:
+    d, converged = descent, False
+    for k in range(iterations):
+        if d.lost or (k == 3 and d.cost > hopeless**2 * d.count):
             break
-        if k == 3 and cost > hopeless**2 * count:
-            break
-        step = None
-        trial, trial_cost = shots, cost
-        for _try in range(8):
-            size = np.sqrt(np.maximum(np.diag(a), 1e-300))
-            free = ~still
-            scaled = (a / np.outer(size, size))[np.ix_(free, free)]
-            if not (np.all(np.isfinite(scaled)) and np.all(np.isfinite(b / size))):
+        step = d.step()
+        for _ in range(KEPT):
+            if step is None or _arrived(step, tolerance) or not step.foretold:
                 break
-            dx = np.zeros(len(x))
-            dx[free] = np.linalg.lstsq(
-                scaled + damping * np.eye(int(free.sum())), (b / size)[free], rcond=1e-14
-            )[0] / size[free]  # fmt: skip
-            new = ordered(names, np.clip(x + dx, low, high))
-            steps = [q.back(new - x) for q in parts]
-            trial = [moved(s, m) for s, m in zip(shots, steps, strict=True)]
-            found = list(workers.map(lambda s, new=new: losses_at(s, structure, names, new), trial))
-            trial_cost = _cost(np.concatenate(found), counts, outlier)
-            if trial_cost <= cost * (1.0 + 1e-12):
-                step = new
-                break
-            damping = max(damping * 30.0, 1e-5)
-        if step is None:
+            d.keep()
+            step = d.step()
+        kept = not d.fresh
+        if step is None and not kept:
             converged = True
             break
-        sigma = np.sqrt(cost / max(count, 1))
-        small = bool(np.all(np.abs(step - x) * np.sqrt(np.maximum(np.diag(a), 0.0)) <= tolerance * 30.0 * sigma))
-        flat = cost - trial_cost < 1e-2 * tolerance * cost
-        x, shots, damping = step, trial, max(damping / 30.0, 1e-9)
-        outlier = _outlier(np.concatenate(found), counts)
-        parts = around(x, shots, outlier)
-        a, b, losses, counts = _total(parts)
-        if small or flat:
+        arrived = step is not None and _arrived(step, tolerance)
+        if arrived and coarse:
+            d.keep()
+        else:
+            d.renew()
+        # Sensitivities from elsewhere lead beside the minimum, by a part of a standard error: for a comparison near.
+        if arrived and (coarse or not kept):
             converged = True
             break
-    sigma = float(np.sqrt(_cost(losses, counts, outlier) / max(count, 1)))
-    return Estimate(structure, names, x, sigma, count, a, tuple(shots), converged)
+    sigma = float(np.sqrt(d.cost / max(d.count, 1)))
+    return Estimate(d.structure, d.names, d.x, sigma, d.count, d.a, tuple(d.shots), converged)
+
+
+def _arrived(step: _Step, tolerance: float) -> bool:
+    return step.length <= 30.0 * tolerance or step.fall < 1e-2 * tolerance * step.cost
 
 
 def evaluate(

@@ -7,7 +7,7 @@ residual along what is left is the candidate's gain in chi square, without fitti
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -17,7 +17,8 @@ from identify.output_error import Estimate
 from identify.parameters import Name, platform_of
 from identify.screen import grid_of
 from identify.sensitivities import nuisance_basis, sensitivities
-from identify.shots import RUNAWAY, Shots, predict
+from identify.shots import RUNAWAY, Shots, motion, predict
+from identify.traces import torque_along
 from rig import effects
 from rig.dynamics import Equations, Grid
 from rig.dynamics.simulate import MAX_SUBSTEPS
@@ -26,6 +27,7 @@ from rig.platform import Platform
 from rig.recording.run import Array
 
 LITTLE = 1e-4  # of the torque: more of a candidate would shift the ring beyond where sensitivities hold
+PHASE_RAD = 0.2  # of a candidate's own fastest motion in one of its steps
 SCALED = (0.1, 10.0)  # by how much the score may scale a shape that means "none" at zero
 
 
@@ -49,15 +51,16 @@ class Scored:
     count: int
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Run:
-    """One run around the model: projector, projected sensitivities and residual."""
+    """One run around the model: projector, projected sensitivities and residual, and its motion once asked for."""
 
     shots: Shots
     base: Array
     basis: Array
     columns: Array
     residual: Array
+    along: tuple[Array, Array, Array, Array] | None = None
 
     def project(self, values: Array) -> Array:
         used = values[self.shots.weight]
@@ -185,13 +188,38 @@ class Scores:
             e = self.estimate
             bare = platform_of(e.structure, e.names, e.values, run.shots.number, run.shots.added)
             platform = replace(bare, effects={**bare.effects, effect.name: held})
-            equations = Equations(platform)
-            shots, base = self._finer(run, bare, equations)
-            moved = predict(shots, equations, shots.starts, shots.bias) - base
-            if not np.all(np.isfinite(moved[shots.weight])):
+            if effect.place is Place.LOAD and not effect.reads:
+                moved = self._pushed(run, Equations(bare), effect, held) - run.base
+            else:
+                equations = Equations(platform)
+                shots, base = self._finer(run, bare, equations)
+                moved = predict(shots, equations, shots.starts, shots.bias) - base
+            if not np.all(np.isfinite(moved[run.shots.weight])):
                 return None
             out.append(run.project(moved))
         return out
+
+    def _pushed(self, run: _Run, bare: Equations, effect: Effect, held: Mapping[str, float]) -> Array:
+        """The channel with the torque that a little of a candidate makes along the model's own motion.
+
+        To first order that is the candidate, however fast its own states are.
+        """
+        values = effect.values(held)
+        s = run.shots
+        if run.along is None:
+            run.along = _half_steps(s, bare)
+        angle, rate, time, torque = run.along
+        step = 0.5 * s.grid.step_s
+        substeps = 1
+        if effect.states and effect.fastest_rad_s:
+            substeps = int(np.clip(np.ceil(step * effect.fastest_rad_s((*bare.jck, *values)) / PHASE_RAD), 1, 16))
+        z = np.array(effect.rest_state(angle[0], rate[0]) if effect.rest_state else [0.0] * effect.states, dtype=float)
+        out = np.empty_like(angle)
+        torque_along(
+            effect.kernel.address, angle, rate, time, torque, step, z, substeps, np.array([*bare.jck, *values]),
+            False, 1.0, out,
+        )  # fmt: skip
+        return predict(s, bare, s.starts, s.bias, np.stack([out[:-1:2], out[1::2], out[2::2]], axis=1))
 
     def _finer(self, run: _Run, bare: Platform, equations: Equations) -> tuple[Shots, Array]:
         """The same shots on a grid that a fast candidate needs, and the model's own motion there."""
@@ -225,6 +253,21 @@ class Scores:
             if p.linear and not p.per_run:
                 out.setdefault((effect.name, p.name), max(p.low, 0.0))
         return out
+
+
+def _half_steps(s: Shots, equations: Equations) -> tuple[Array, Array, Array, Array]:
+    """Angle, rate, time and torque of the model at start, middle and end of its fine steps, (2 m - 1,) each."""
+    fine, first = motion(s, equations, s.starts)
+    h, steps = s.grid.step_s, s.grid.shaft_torque(equations)
+    out = np.empty((2 * len(fine) - 1, 2))
+    out[::2] = fine
+    slope = np.stack([fine[:, 1], np.gradient(fine[:, 1], h)], axis=1)
+    out[1::2] = 0.5 * (fine[1:] + fine[:-1]) + h / 8.0 * (slope[:-1] - slope[1:])
+    out[: 2 * first] = fine[first]  # at rest where nothing was simulated
+    out[: 2 * first, 1] = 0.0
+    torque = np.empty(len(out))
+    torque[::2], torque[1::2] = np.append(steps[:, 0], steps[-1, 2]), steps[:, 1]
+    return out[:, 0].copy(), out[:, 1].copy(), s.trace.offset_s + 0.5 * h * np.arange(len(out)), torque
 
 
 def _cut(shots: Shots, share: float) -> Shots:

@@ -19,13 +19,18 @@ STEP = 1e-6  # relative step of the differences: simulations repeat to 1e-13
 
 @dataclass
 class Reduced:
-    """One run's share of the normal equations; start states and bias eliminated, with the way back."""
+    """One run's share of the normal equations; start states and bias eliminated, with the way back.
+
+    ``columns`` and ``state`` are the sensitivities behind it.
+    """
 
     a: Array
     b: Array
     losses: Array
     counts: Array
     back: Callable[[Array], tuple[Array, float]]
+    columns: Array
+    state: Array
 
 
 def linearise(
@@ -34,6 +39,11 @@ def linearise(
     """Normal equations of one run around a parameter vector."""
     columns, state, residual = sensitivities(s, structure, names, x, scale, fixed)
     return _eliminate(s, columns, state, residual, s.trace.biased, outlier)
+
+
+def at_residual(part: Reduced, s: Shots, residual: Array, outlier: float) -> Reduced:
+    """The normal equations a little further on: a new residual, the sensitivities as they were."""
+    return _eliminate(s, part.columns, part.state, residual, s.trace.biased, outlier)
 
 
 @RUNAWAY
@@ -155,8 +165,9 @@ def _eliminate(s: Shots, columns: Array, state: Array, residual: Array, rate: bo
     if not (np.all(np.isfinite(columns[used])) and np.all(np.isfinite(state[used])) and np.all(np.isfinite(losses))):
         # The simulation ran away: nothing can be said from here.
         return Reduced(
-            np.zeros((p, p)), np.zeros(p), np.full(len(counts), np.inf), counts, lambda dx: (0.0 * s.starts, 0.0)
-        )
+            np.zeros((p, p)), np.zeros(p), np.full(len(counts), np.inf), counts, lambda dx: (0.0 * s.starts, 0.0),
+            columns, state,
+        )  # fmt: skip
     wide = np.column_stack([columns, np.ones(len(residual))]) if rate else np.ascontiguousarray(columns)
     trust = 1.0 / (1.0 + losses / np.maximum(counts, 1.0) / outlier**2)
     a, b, inverse, zw, zr = _schur(wide, state, residual, used, np.array(s.edges), trust)
@@ -171,4 +182,4 @@ def _eliminate(s: Shots, columns: Array, state: Array, residual: Array, rate: bo
         full = np.append(dx, bias) if rate else dx
         return np.einsum("sij,sj->si", inverse, zr - zw @ full), bias
 
-    return Reduced(a, b, losses, counts, back)
+    return Reduced(a, b, losses, counts, back, columns, state)

@@ -79,27 +79,40 @@ def make_shots(trace: Trace, substeps: int, length: int | None, use: Any = None)
     return Shots(trace, Grid(time, trace.torque, substeps, min(LEAD_S, trace.offset_s)), first, starts, 0.0, weight)
 
 
-def predict(shots: Shots, equations: Equations, starts: Array, bias: float) -> Array:
-    """The measured channel as the model gives it, shape (n,)."""
-    grid = shots.grid
-    torque = grid.shaft_torque(equations)
+def predict(shots: Shots, equations: Equations, starts: Array, bias: float, push: Array | None = None) -> Array:
+    """The measured channel as the model gives it, shape (n,); ``push`` is a further resisting torque (see motion)."""
+    fine, first = motion(shots, equations, starts, push)
+    grid, run = shots.grid, shots.trace.run
     ratio = round(shots.trace.step_s / grid.step_s)
     n = len(shots.trace.measured)
-    rate = shots.trace.channel == "rate"
+    if shots.trace.channel == "angle":
+        return np.asarray(fine[: n * ratio : ratio, 0])
+    turned = fine[:, 1]
+    if equations.sensor.names:
+        turned = _sensed(equations, turned, first, grid.step_s)
+    if run.rate_corner_hz and run.rate_delay_s:
+        turned = smoothed(turned, low_pass_kernel(run.rate_corner_hz, run.rate_delay_s, grid.step_s))
+    return np.asarray(turned[: n * ratio : ratio] + bias)
+
+
+def motion(shots: Shots, equations: Equations, starts: Array, push: Array | None = None) -> tuple[Array, int]:
+    """Angle and rate at every fine instant, (m, 2), and the first one that is simulated.
+
+    ``push``, (m - 1, 3), is a torque at start, middle and end of each fine step that resists besides.
+    """
+    grid = shots.grid
+    torque = grid.shaft_torque(equations)
+    if push is not None:
+        torque = torque - push
+    ratio = round(shots.trace.step_s / grid.step_s)
+    n = len(shots.trace.measured)
     on = shots.active
     remembers = equations.states or equations.sensor.names
     if remembers and len(on) > 1 and not on[0] and shots.first[1] * shots.trace.step_s <= SOON_S:
         on = np.concatenate([[True], on[1:]])  # what remembers begins where the run does, not where samples count
     active = [(a * ratio, min(b, n - 1) * ratio) for (a, b), used in zip(shots.edges, on, strict=True) if used]
     fine = equations.integrate_shots(torque, grid.step_s, active, starts[on], shots.trace.offset_s, shots.trace)
-    if not rate:
-        return np.asarray(fine[: n * ratio : ratio, 0])
-    run, turned = shots.trace.run, fine[:, 1]
-    if equations.sensor.names:
-        turned = _sensed(equations, turned, active[0][0] if active else 0, grid.step_s)
-    if run.rate_corner_hz and run.rate_delay_s:
-        turned = smoothed(turned, low_pass_kernel(run.rate_corner_hz, run.rate_delay_s, grid.step_s))
-    return np.asarray(turned[: n * ratio : ratio] + bias)
+    return fine[:, :2], active[0][0] if active else 0
 
 
 def _sensed(equations: Equations, rate: Array, first: int, step_s: float) -> Array:
@@ -119,10 +132,10 @@ def losses_of(s: Shots, residual: Array) -> Array:
     return np.where(np.isfinite(sums), sums, np.inf)
 
 
-def losses_at(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> Array:
-    """Sum of squares of every shot at a parameter vector, (shots,)."""
-    equations = equations_of(structure, names, x, s.number, s.added)
-    return losses_of(s, s.trace.measured - predict(s, equations, s.starts, s.bias))
+def residual_at(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> tuple[Array, Array]:
+    """Measured minus simulated at a parameter vector, (n,), and its sum of squares in every shot, (shots,)."""
+    residual = s.trace.measured - predict(s, equations_of(structure, names, x, s.number, s.added), s.starts, s.bias)
+    return residual, losses_of(s, residual)
 
 
 def moved(s: Shots, by: tuple[Array, float]) -> Shots:

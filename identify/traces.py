@@ -60,7 +60,7 @@ def bandwidth_of(values: Array, step_s: float) -> float:
 
 
 @nb.njit(cache=True, error_model="numpy", nogil=True)
-def _along(kernel, angle, rate, time, torque, step, z, substeps, p, friction, soft, out):  # type: ignore[no-untyped-def]
+def torque_along(kernel, angle, rate, time, torque, step, z, substeps, p, friction, soft, out):  # type: ignore[no-untyped-def]
     """An effect's torque along a given motion; its states by the midpoint rule, one state linearly implicit."""
     n = len(angle)
     states = len(z)
@@ -266,7 +266,7 @@ class Trace:
             full = (1.0, 0.0, 0.0, *(v if v else 1e-12 for v in p[3 : 3 + len(effect.parameters)]))
             substeps = int(np.clip(np.ceil(fine * effect.fastest_rad_s(full) / STEP_PHASE_RAD), 1, 8))
         out = np.empty_like(angle)
-        _along(
+        torque_along(
             effect.kernel.address, angle, rate, time, torque, fine, z, substeps, p,
             effect.place is Place.FRICTION, max(2.0 * left, 1e-12), out,
         )  # fmt: skip

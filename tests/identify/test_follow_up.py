@@ -40,7 +40,7 @@ NEVER = {
     ),
 }  # fmt: skip
 
-RECORDS = {"cubic_stiffness": (10.0, 40.0, 1.5)}  # torque, frequency, duration: no harmonic of it comes near resonance
+RECORDS = {"cubic_stiffness": (10.0, 40.0, 1.0)}  # torque, frequency, duration: no harmonic of it comes near resonance
 
 
 @cache
