@@ -21,7 +21,7 @@ from drivers.capture import Capture, export
 from drivers.gyro_line import GyroReport
 from drivers.gyroscopes import make_gyroscope
 from rig import realtime
-from rig.config.bench import BenchConfig
+from rig.config.bench import BenchConfig, ProbeConfig
 from rig.errors import DeviceFault
 from rig.interface import Exchange, GyroSample, LowPass, Rig, Statement, Torque, TorqueOfTime, TorqueSample
 from rig.recording.run import TorqueHold
@@ -115,6 +115,11 @@ class BenchRig(Rig):
     def rate_full_scale_key(self) -> str:
         """The device decides, by its data sheet."""
         return "bench.gyroscope.device"
+
+    @property
+    def probe(self) -> ProbeConfig | None:
+        """As the file has it."""
+        return self._config.probe if self._config.probe.play else None
 
     # -- contact ---------------------------------------------------------------------------------
 

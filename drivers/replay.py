@@ -7,8 +7,9 @@ tick, what it did on the bench.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from drivers import capture
 from drivers.amplifiers import make_amplifier
@@ -17,7 +18,7 @@ from drivers.can_link import CanLink, Heard
 from drivers.capture import Entry, read_capture, unpack_frame, unpack_torque
 from drivers.codecs.lawicel import CanFrame
 from drivers.gyroscopes import make_gyroscope
-from rig.config.bench import BenchConfig
+from rig.config.bench import BenchConfig, ProbeConfig
 from rig.errors import RecordingError
 from rig.interface import Exchange, GyroSample, LowPass, Rig, Statement, Torque, TorqueSample
 from rig.recording.run import TorqueHold
@@ -94,7 +95,8 @@ class ReplayRig(Rig):
 
     def __init__(self, path: Path) -> None:
         self._entries = list(read_capture(path))
-        self.config = _config(self._entries, path)
+        section = _section(self._entries, path)
+        self.config, self._probed = BenchConfig.model_validate(section), "probe" in section
         self.gyroscope = make_gyroscope(self.config.gyroscope)
         self.amplifier = make_amplifier(self.config.amplifier)
         self.clock = ReplayClock([e.time_s for e in self._entries if e.kind == capture.CLOCK])
@@ -131,6 +133,11 @@ class ReplayRig(Rig):
     def rate_full_scale_key(self) -> str:
         """As on the bench."""
         return "bench.gyroscope.device"
+
+    @property
+    def probe(self) -> ProbeConfig | None:
+        """As it was played; captures of versions that did not probe hold none."""
+        return self.config.probe if self._probed and self.config.probe.play else None
 
     def _is_mark(self, entry: Entry, what: str) -> bool:
         return entry.kind == capture.MARK and json.loads(entry.payload)["mark"] == what
@@ -209,10 +216,11 @@ class ReplayRig(Rig):
         """There is nothing to close."""
 
 
-def _config(entries: Sequence[Entry], path: Path) -> BenchConfig:
+def _section(entries: Sequence[Entry], path: Path) -> Mapping[str, Any]:
     for entry in entries:
         if entry.kind == capture.MARK:
             values = json.loads(entry.payload)
             if values.get("mark") == "config":
-                return BenchConfig.model_validate(values["bench"])
+                section: Mapping[str, Any] = values["bench"]
+                return section
     raise RecordingError(f"{path} holds no configuration: it was cut before the devices were contacted")

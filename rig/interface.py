@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NamedTuple, Self
 
+from rig.config.bench import ProbeConfig
 from rig.recording.run import TorqueHold
 
 TorqueOfTime = Callable[[Any], Any]  # seconds since the start of the set (float or array) -> N m, same shape
@@ -117,6 +118,11 @@ class Rig(ABC):
     def rate_full_scale_key(self) -> str:
         """The key of the configuration that decides the full scale of the gyro."""
         return "the gyro's full scale"
+
+    @property
+    def probe(self) -> ProbeConfig | None:
+        """How to probe the platform before the first set; None where no torque can hurt."""
+        return None
 
     @abstractmethod
     def open(self) -> None:

@@ -13,7 +13,6 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,49 +21,34 @@ from rig.errors import Aborted, DeviceFault, RigError, SafetyTrip
 from rig.excitation import PlannedSet
 from rig.guard import Guard, Rest, Tick, Trip
 from rig.interface import Rig
+from rig.observer import Observer, Progress
+from rig.probe import Probe
 from rig.recorder import SetRecorder, SetStatistics
 from rig.recording.journal import Journal
 from rig.recording.run import Recording, Run
+
+__all__ = ["Campaign", "Observer", "Progress", "Sequencer"]
 
 SETTLE_S = 0.5  # zero torque before the first set: the gyro's bias is read here
 TAIL_S = 0.05  # zero torque after a set, for samples still on their way
 REST_PERIOD_S = 0.01  # ticks of zero torque may be slower; they still feed the drive's watchdog
 BIAS_WINDOW_S = 1.0  # of a rest, at its end
 PROGRESS_S = 0.1
-
-
-class Progress(NamedTuple):
-    """Where a set stands."""
-
-    name: str
-    time_s: float
-    duration_s: float
-    late_max_s: float
-    missed_ticks: int
-    drops: int
-    peak_torque_nm: float
-
-
-class Observer:
-    """Told how the campaign goes; each method may be overridden and has to be quick."""
-
-    def set_begins(self, planned: PlannedSet, number: int, count: int) -> None:
-        """Set ``number`` of ``count`` (from 1) is about to play."""
-
-    def progress(self, progress: Progress) -> None:
-        """About ten times a second while a set plays."""
-
-    def set_ends(self, statistics: SetStatistics) -> None:
-        """A set is over, complete or not."""
+LOOK_S = 0.25  # after the probe: how often to ask whether the ring has died out
+STILL_SIGMAS, STILL_RAD_S = 6.0, math.radians(0.5)
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """What came of playing: all runs so far, how each set went, and the error that ended it early, if any."""
+    """What came of playing: all runs so far, how each set went, and the error that ended it early, if any.
+
+    ``verdict_s`` is the instant of that error on the sequencer's clock: before anything was done about it.
+    """
 
     recording: Recording
     statistics: tuple[SetStatistics, ...]
     cause: RigError | None = None
+    verdict_s: float | None = None
 
     @property
     def aborted(self) -> bool:
@@ -87,6 +71,8 @@ class Sequencer:
         Where samples go as they come, or None.
     stop
         Asked every tick; a text means: stop now, for this reason. Set by a signal handler, say.
+    probe
+        Small pulses before the first set, or None for none.
     """
 
     def __init__(
@@ -100,6 +86,7 @@ class Sequencer:
         journal: Journal | None = None,
         observer: Observer | None = None,
         stop: Callable[[], str | None] = lambda: None,
+        probe: Probe | None = None,
     ) -> None:
         self._rig = rig
         self._clock = clock
@@ -109,6 +96,8 @@ class Sequencer:
         self._journal = journal
         self._observer = observer or Observer()
         self._stop = stop
+        self._probe = probe
+        self._verdict_s: float | None = None
         self._runs: list[Run] = []
         self._statistics: list[SetStatistics] = []
         self._still: deque[tuple[float, float]] = deque()
@@ -124,6 +113,7 @@ class Sequencer:
             with _without_collector(), self._rig.opened(), self._rig.armed():
                 self._guard.begin(self._clock.now_s(), Rest())
                 self._zero(SETTLE_S, REST_PERIOD_S)
+                self._probing()
                 for number, planned in enumerate(sets, 1):
                     if number > 1:
                         self._zero(self._rest_s, REST_PERIOD_S)
@@ -135,10 +125,62 @@ class Sequencer:
             cause = _with_context(error)
         if cause is not None and self._journal is not None:
             with contextlib.suppress(RigError):
-                self._journal.event(self._clock.now_s(), str(cause), {"aborted": True})
+                self._journal.event(self._now_s(), str(cause), {"aborted": True, "verdict_s": self._verdict_s})
         info = {"backend": str(self._rig.statement()), "aborted": str(cause) if cause else None}
         recording = Recording(tuple(self._runs), noise=self._rig.noise_rad_s, info=info)
-        return Campaign(recording, tuple(self._statistics), cause)
+        return Campaign(recording, tuple(self._statistics), cause, self._verdict_s)
+
+    def _now_s(self) -> float:
+        """For what is said on the way out: a replay has no more time to give."""
+        try:
+            return self._clock.now_s()
+        except RigError:
+            return self._verdict_s or 0.0
+
+    def _probing(self) -> None:
+        """Small pulses and what they tell, then rest until the platform is still. Raises SafetyTrip."""
+        probe = self._probe
+        if probe is None:
+            return
+        rest = self._resting()
+        probe.begin(rest)
+        start_s = self._clock.now_s() + self._period_s
+        self._guard.begin(start_s, rest)
+        tick = 0
+        while not probe.over:
+            deadline_s = start_s + tick * self._period_s
+            now_s = self._clock.wait_until(deadline_s)
+            at_s, late_s = now_s - start_s, now_s - deadline_s
+            seen = self._exchange(now_s, late_s, self._period_s, probe.torque(at_s), None)
+            probe.take(at_s, start_s, seen)
+            tick += 1 + int(late_s / self._period_s + 1e-9)
+        try:
+            finding = probe.finding()
+        except SafetyTrip:
+            self._note_verdict()
+            raise
+        now_s = self._clock.now_s()
+        self._observer.probed(finding)
+        if self._journal is not None:
+            self._journal.event(now_s, finding, {"probe": True})
+        self._until_still(rest)
+
+    def _until_still(self, rest: Rest) -> None:
+        """Zero torque until nothing moves any more, at most as long as a rest."""
+        still_rad_s = max(STILL_SIGMAS * rest.noise_rad_s, STILL_RAD_S)
+        left_s = max(self._rest_s, SETTLE_S)
+        while left_s > 0.0:
+            self._zero(min(LOOK_S, left_s), REST_PERIOD_S)
+            left_s -= LOOK_S
+            if all(abs(rate - rest.bias_rad_s) < still_rad_s for _, rate in self._still):
+                break
+        self._zero(SETTLE_S, REST_PERIOD_S)
+
+    def _note_verdict(self) -> None:
+        """The instant at which the first error was known; it ends up in the journal and in ``Campaign``."""
+        if self._verdict_s is None:
+            with contextlib.suppress(RigError):
+                self._verdict_s = self._clock.now_s()
 
     def _play_set(self, planned: PlannedSet) -> None:
         start_s = self._clock.now_s() + self._period_s
@@ -182,11 +224,16 @@ class Sequencer:
         """One tick: permission, exchange, record, verdict."""
         reason = self._stop()
         if reason is not None:
+            self._note_verdict()
             raise Aborted(f"{reason}: torque is off; what was recorded until then is kept.")
         trip = self._guard.permit(torque_nm, now_s, late_s)
         if trip is not None:
             raise self._tripped(trip)
-        reply = self._rig.exchange(now_s, torque_nm)
+        try:
+            reply = self._rig.exchange(now_s, torque_nm)
+        except BaseException:
+            self._note_verdict()
+            raise
         tick = Tick(now_s, late_s, period_s, torque_nm, reply.gyro, reply.torque, reply.channels)
         if recorder is not None:
             recorder.take(tick)
@@ -196,6 +243,7 @@ class Sequencer:
         return tick
 
     def _tripped(self, trip: Trip) -> SafetyTrip:
+        self._note_verdict()
         with contextlib.suppress(RigError):
             self._rig.torque_off()  # the shortest road: before anything is formatted or written
         return SafetyTrip(f"Torque is off. Tripped on {trip}")

@@ -32,6 +32,7 @@ from rig.guard import Guard
 from rig.guard_motion import motion_checks
 from rig.interface import Rig, Statement, Torque
 from rig.preflight import plan
+from rig.probe import Probe
 from rig.recorder import SetStatistics
 from rig.recording.hdf5 import write_recording_h5
 from rig.recording.journal import Journal, JournalError
@@ -188,6 +189,7 @@ class _Recorder:
         self.tally = Tally(desk.terminal)
         self.recording: Recording | None = None
         self.cause: BaseException | None = None
+        self.verdict_s: float | None = None
         self._desk, self._stage, self._config, self._sets = desk, stage, loaded.config, sets
 
     def run(self, journal: Journal) -> None:
@@ -201,20 +203,23 @@ class _Recorder:
 
     def _play(self, journal: Journal) -> None:
         stage, config = self._stage, self._config
+        platform, asked = config.model.platform(), stage.rig.probe
         sequencer = Sequencer(
             stage.rig,
             stage.clock,
-            Guard(config.limits, motion_checks(config.limits, config.model.platform())),
+            Guard(config.limits, motion_checks(config.limits, platform)),
             sample_rate_hz=config.excitation.sample_rate_hz,
             rest_s=config.excitation.rest_s,
             journal=journal,
             observer=self.tally,
             stop=self._desk.stops.poll,
+            probe=None if asked is None else Probe(asked, config.limits, platform, self._sets),
         )
         try:
             with self._desk.stops.playing(stage.rig.torque_off):
                 campaign = sequencer.play(self._sets)
             self.recording, self.cause = campaign.recording, campaign.cause
+            self.verdict_s = campaign.verdict_s
         except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (torque is off by now; what is there is saved)
             self.cause = as_known(error)
 
@@ -241,6 +246,7 @@ def _record(
     if cause is not None:
         desk.say_error(cause)
     info |= {"ended_utc": datetime.now(UTC).isoformat(), "aborted": str(cause) if cause else None}
+    info |= {"verdict_time_s": recorder.verdict_s}
     info |= {"sets": [_figures(s) for s in tally.statistics]} | stage.account()
     played = Played(Recording(()), tally.whole, cause, (part.journal,), stage.rig.rate_full_scale_rad_s)
     with desk.stops.saving():

@@ -121,6 +121,10 @@ class SetBars(Observer):
         self._terminal = terminal
         self._head = ""
 
+    def probed(self, finding: str) -> None:
+        """What the probe found."""
+        self._terminal.tell(plain(finding))
+
     def set_begins(self, planned: PlannedSet, number: int, count: int) -> None:
         """Which set it is."""
         self._head = f"set {number}/{count}  {plain(planned.name)}"

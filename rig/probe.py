@@ -1,0 +1,239 @@
+"""The probe: small pulses after arming, before any full torque, and what their answer says.
+
+Half a sine each, doubled until the platform answers clearly. From rest, and while it lasts,
+
+    J (w - w0) + K int(th - th0) + F int sgn(w) + c t = int M dt
+
+whatever J, K and the friction F are; c takes up where the spring stood. So the inertia follows from one pulse by
+least squares and nothing declared is needed for it, resonance and stiffness included. It has to lie within a factor
+of the declared one and to be positive: torque and rate then have one sign and the right scale. Where even the largest
+pulse moves nothing, that is said.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+
+from rig.config.bench import ProbeConfig
+from rig.config.limits import LimitsConfig
+from rig.errors import SafetyTrip
+from rig.excitation import PlannedSet
+from rig.guard_base import Rest, Tick
+from rig.platform import Platform
+from rig.recording.run import Array
+
+SHORTEST_S, LONGEST_S = 0.01, 0.1
+PERIOD_SHARE = 0.5  # of the declared period of the ring: the length of a pulse
+LISTEN_PERIODS = 0.6
+LATE_S = 0.05  # samples and torque may be so late
+FIRST_RATE, LARGEST_RATE, LARGEST_TRAVEL = 0.05, 0.6, 0.3  # of the limits, by the declared model
+LEAST_STEP = 1.02
+LARGEST_TORQUE = 0.3  # of the campaign's
+CLEAR_SIGMAS, CLEAR_LEAST_RAD_S = 40.0, math.radians(5.0)
+MOST_LEVELS = 16
+DELAY_SHARE, DELAY_STEP_S = 0.6, 0.001  # of the pulse: how late the torque may act
+POOR_FIT = 0.3  # of the scatter of the impulse: beyond it a pulse does not count
+FEWEST_SAMPLES = 8
+STEPS = 400
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one pulse told. ``inertia_kg_m2`` is None where it moved too little, or followed no law like that above."""
+
+    torque_nm: float
+    peak_rad_s: float
+    inertia_kg_m2: float | None
+
+
+class Probe:
+    """Pulses to play and the verdict on them. No clock, no device: it is asked for torque and given the ticks.
+
+    Parameters
+    ----------
+    config, limits
+        What the file allows.
+    platform
+        The declared one.
+    sets
+        The campaign that the probe precedes.
+    """
+
+    def __init__(
+        self, config: ProbeConfig, limits: LimitsConfig, platform: Platform, sets: Sequence[PlannedSet]
+    ) -> None:
+        self._config, self._platform = config, platform
+        j, k = platform.inertia_kg_m2, platform.stiffness_nm_rad
+        period_s = 2.0 * math.pi * math.sqrt(j / k) if k > 0.0 else math.inf
+        self.pulse_s = min(max(PERIOD_SHARE * period_s, SHORTEST_S), LONGEST_S)
+        self._listen_s = min(LISTEN_PERIODS * period_s, LONGEST_S)
+        peak_rate, peak_angle = _answer_of(platform, self.pulse_s)
+        rate = math.radians(limits.rate_deg_s)
+        # What a harder pulse adds, were the inertia half of what is declared, has to stay below these.
+        self._rate_per_nm, self._most_rad_s = 2.0 * peak_rate, LARGEST_RATE * rate
+        self._step_nm = LARGEST_TRAVEL * math.radians(limits.travel_deg) / (2.0 * peak_angle)
+        campaign_nm = max(_largest(s) for s in sets) if sets else limits.torque_nm
+        given = config.torque_nm
+        self._largest_nm = min(LARGEST_TORQUE * campaign_nm if given is None else given, limits.torque_nm)
+        self._torque_nm = min(FIRST_RATE * rate / peak_rate, self._largest_nm)
+        self._clear_share = 0.25 * peak_rate
+        self._answers: list[Answer] = []
+        self._pulse_at_s = 0.0
+        self._samples: list[tuple[float, float]] = []
+        self._rest = Rest()
+        self.over = False
+
+    def begin(self, rest: Rest) -> None:
+        """Nothing was played yet; what the gyro reads at rest."""
+        self._rest = rest
+
+    def torque(self, at_s: float) -> float:
+        """Torque in N m at seconds since the probe began."""
+        x = (at_s - self._pulse_at_s) / self.pulse_s
+        return self._torque_nm * math.sin(math.pi * x) if 0.0 <= x <= 1.0 and not self.over else 0.0
+
+    def take(self, at_s: float, start_s: float, tick: Tick) -> None:
+        """What a tick brought; ``start_s`` is when the probe began on the clock of the ticks."""
+        self._samples += [(t - start_s, w - self._rest.bias_rad_s) for t, w, valid in tick.gyro if valid]
+        if at_s - self._pulse_at_s >= self.pulse_s + self._listen_s + LATE_S:
+            self._judge(at_s)
+
+    def _judge(self, at_s: float) -> None:
+        answer = self._heard()
+        self._answers.append(answer)
+        room_nm = min((self._most_rad_s - answer.peak_rad_s) / self._rate_per_nm, self._step_nm, self._torque_nm)
+        next_nm = min(self._torque_nm + room_nm, self._largest_nm)
+        is_last = next_nm < LEAST_STEP * self._torque_nm or len(self._answers) >= MOST_LEVELS
+        if answer.inertia_kg_m2 is not None or is_last:
+            self.over = True
+            return
+        self._torque_nm = next_nm
+        self._pulse_at_s = at_s
+        self._samples.clear()
+
+    def _heard(self) -> Answer:
+        data = np.array(self._samples, dtype=float).reshape(-1, 2)
+        data = data[(data[:, 0] >= self._pulse_at_s) & (data[:, 0] <= self._pulse_at_s + self.pulse_s + self._listen_s)]
+        peak = float(np.max(np.abs(data[:, 1]))) if len(data) else 0.0
+        clear = max(CLEAR_SIGMAS * self._rest.noise_rad_s, CLEAR_LEAST_RAD_S, self._clear_share * self._torque_nm)
+        # An answer that is larger than foreseen is clear too: the inertia may be the one that is wrong.
+        if peak < clear or len(data) < FEWEST_SAMPLES:
+            return Answer(self._torque_nm, peak, None)
+        inertia = inertia_of(data[:, 0] - self._pulse_at_s, data[:, 1], self._torque_nm, self.pulse_s)
+        return Answer(self._torque_nm, peak, inertia)
+
+    def finding(self) -> str:
+        """What came of it, in a sentence. Raises SafetyTrip where the campaign must not go on."""
+        last = self._answers[-1]
+        declared, factor = self._platform.inertia_kg_m2, self._config.inertia_factor
+        asked = f"{last.torque_nm:.3g} N m for {self.pulse_s * 1e3:.0f} ms"
+        peak_deg_s = math.degrees(last.peak_rad_s)
+        found = last.inertia_kg_m2
+        if found is None:
+            raise SafetyTrip(
+                f"Torque is off. The probe found no clear answer: {asked} made {peak_deg_s:.2g} deg/s at most. "
+                "Is a brake on, the platform stuck, the motor not connected, the gyro off its shaft? Where friction "
+                "holds it, raise bench.probe.torque_nm. Nothing was played."
+            )
+        if found < 0.0:
+            raise SafetyTrip(
+                f"Torque is off. The probe found torque and rate with opposite signs: {asked} answered like an "
+                f"inertia of {found:.3g} kg m2. Turn one of bench.amplifier.invert and bench.gyroscope.invert. "
+                "Nothing was played."
+            )
+        if not 1.0 / factor <= found / declared <= factor:
+            raise SafetyTrip(
+                f"Torque is off. The probe found an inertia of {found:.3g} kg m2 ({asked}, {peak_deg_s:.3g} deg/s); "
+                f"declared are {declared:.3g}, allowed is {declared / factor:.3g} to {declared * factor:.3g}. Check "
+                "the drive's torque scale and gear ratio, the gyro's axis, and model.inertia_kg_m2 (or "
+                "bench.probe.inertia_factor). Nothing was played."
+            )
+        return (
+            f"probe: {asked} answered with {peak_deg_s:.3g} deg/s, like an inertia of {found:.3g} kg m2 "
+            f"(declared {declared:.3g}): sign and scale are right"
+        )
+
+
+def inertia_of(time_s: Array, rate_rad_s: Array, torque_nm: float, pulse_s: float) -> float | None:
+    """Inertia in kg m2 from the answer to half a sine of this height that began at time zero; None if none fits.
+
+    Parameters
+    ----------
+    time_s, rate_rad_s
+        Shape (n,), increasing; the rate less its bias.
+    """
+    moving = _while_it_moves(rate_rad_s)
+    t, w = time_s[moving], rate_rad_s[moving]
+    if len(t) < FEWEST_SAMPLES:
+        return None
+    step = np.diff(t)
+    angle = _integral(w, step)
+    slow = 0.02 * float(np.max(np.abs(w)))
+    columns = np.column_stack([
+        w - w[0], _integral(angle, step), _integral(np.tanh(w / slow), step), t - t[0], t[0] - t,
+    ])  # fmt: skip
+    scale = np.maximum(np.max(np.abs(columns), axis=0), 1e-300)
+    x = columns / scale
+    sign = _first_way(rate_rad_s) * math.copysign(1.0, torque_nm)
+    best = (POOR_FIT, math.nan)
+    for delay_s in np.arange(0.0, DELAY_SHARE * pulse_s, DELAY_STEP_S):
+        y = _impulse(t - delay_s, torque_nm, pulse_s)
+        y = y - y[0]
+        size = max(float(np.std(y)), 1e-300) * math.sqrt(len(y))
+        # Inertia, stiffness and friction of one sign: else half a period of delay would pass for the other sign.
+        solved, left = nnls(sign * x, y)
+        if left / size < best[0]:
+            best = (left / size, sign * float(solved[0] / scale[0]))
+    return None if math.isnan(best[1]) else best[1]
+
+
+def _first_way(rate: Array) -> float:
+    """The direction in which it first moves: from rest that is the torque's, whatever holds or delays it."""
+    begun = np.abs(rate) > 0.3 * float(np.max(np.abs(rate))) + 1.5 * abs(float(rate[0]))
+    return float(np.sign(rate[int(np.argmax(begun))]))
+
+
+def _while_it_moves(rate: Array) -> slice:
+    """From the first motion to where it sticks again, if it does."""
+    peak = float(np.max(np.abs(rate)))
+    fast = np.abs(rate) > 0.03 * peak
+    first = max(int(np.argmax(fast)) - 2, 0)
+    still = 0
+    for i in range(int(np.argmax(np.abs(rate))), len(rate)):
+        still = 0 if fast[i] else still + 1
+        if still >= 5:
+            return slice(first, i - 4)
+    return slice(first, len(rate))
+
+
+def _integral(y: Array, step: Array) -> Array:
+    return np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * step)])
+
+
+def _impulse(time_s: Array, torque_nm: float, pulse_s: float) -> Array:
+    """Integral of half a sine from its beginning."""
+    x = np.clip(time_s / pulse_s, 0.0, 1.0)
+    return torque_nm * pulse_s / math.pi * (1.0 - np.cos(math.pi * x))
+
+
+def _answer_of(platform: Platform, pulse_s: float) -> tuple[float, float]:
+    """Largest rate and angle per N m of a pulse on the declared linear platform."""
+    j, c, k = platform.inertia_kg_m2, platform.damping_nm_s_rad, platform.stiffness_nm_rad
+    step_s = pulse_s / STEPS
+    angle = rate = peak_rate = peak_angle = 0.0
+    for i in range(2 * STEPS):
+        torque = math.sin(math.pi * i / STEPS) if i < STEPS else 0.0
+        rate += (torque - c * rate - k * angle) / j * step_s
+        angle += rate * step_s
+        peak_rate, peak_angle = max(peak_rate, abs(rate)), max(peak_angle, abs(angle))
+    return peak_rate, peak_angle
+
+
+def _largest(planned: PlannedSet) -> float:
+    times = np.linspace(0.0, planned.duration_s, 2001)
+    return float(np.max(np.abs(planned.torque(times))))
