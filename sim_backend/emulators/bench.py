@@ -143,6 +143,20 @@ class EmulatedBench:
         """Its port vanishes."""
         self.can_port.close()
 
+    def replug_gyro(self) -> None:
+        """Its port is there again, under another name, which is told."""
+        self.gyro_port = PtyPort()
+        self._tell_of_fault(self._now_s, f"the gyro is plugged in again: {self.gyro_port.path}")
+
+    def replug_adapter(self) -> None:
+        """As ``replug_gyro``."""
+        self.can_port = PtyPort()
+        self._tell_of_fault(self._now_s, f"the CAN adapter is plugged in again: {self.can_port.path}")
+
+    def flag_gyro(self, status: int) -> None:
+        """Set bits of its status byte."""
+        self._gyro.flags = status
+
     def command_gyro(self, data: bytes) -> None:
         """As if the host had sent this to the gyro."""
         self._gyro.command(data)

@@ -84,6 +84,7 @@ class Stim300Emulator:
         self._rng = np.random.default_rng([config.seed, 402])
         self._noise: list[float] = []
         self.frozen = False
+        self.flags = 0
         self._waiting: list[bytes] = []
         length = self._layout.length + 2 * self._line_ending
         self.latency_s = 506e-6
@@ -101,6 +102,7 @@ class Stim300Emulator:
         value, status = self._word(rate)
         if starting:
             value, status = round(stim300.SATURATION_DEG_S / stim300.RATE_LSB_DEG_S), 0b0100_0000
+        status |= self.flags
         gyro = [0, 0, 0]
         gyro[self._axis] = value
         return stim300.encode_datagram(
@@ -169,6 +171,7 @@ class VectorNavEmulator:
         self._sent = 0
         self._rng = np.random.default_rng([config.seed, 100])
         self.frozen = False
+        self.flags = 0  # it has no status byte to show them in
         self.latency_s = 300e-6
         self.transmission_s = 30 * BITS_PER_BYTE / config.baud
 
