@@ -11,43 +11,29 @@ from threadpoolctl import threadpool_limits
 from identify import persets
 from identify.channels import offer_of, with_causes
 from identify.compare import Judged, horizon_s
+from identify.conclude import Case, conclude
 from identify.fine import FineSearch
 from identify.finish import Fitted, by_output_error, by_regression
 from identify.holdout import Split, pieces, split
-from identify.measures import Measured, floor_of, measure
-from identify.next_steps import opposite_signs, unexplained_reason
-from identify.parameters import platform_of
+from identify.measures import floor_of, measure
 from identify.regression import Structure, shape_values
 from identify.results import (
-    UNITS,
     Identification,
-    ModelResult,
-    NoiseFloor,
-    NotReported,
     ParameterEstimate,
-    RunTraces,
     SetResult,
-    Verdict,
 )
 from identify.screen import Start, first_guess
 from identify.search import Loop, Search
-from identify.sign_check import SENTENCE
-from identify.traces import UPSAMPLING, Trace, prepare
-from identify.verdict import sentences_of
+from identify.traces import Trace, prepare
 from rig import effects
 from rig.config.identify import IdentifyConfig
-from rig.effects.base import Place
 from rig.errors import Aborted, RecordingError
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
 MOVES = 3.0  # times the sensor's noise that a motion has to reach
 STOPPED = "stopped before the search was through: what is missing may still be unnamed"
-TIED = 0.95  # correlation beyond which two parameters are one
 SHOWS = 5.0  # standard errors from zero at which whole runs show damping
-STRAYED = 3.0  # times the sensor's noise: a free run with friction may have gone astray
-UNEXPLAINED = 1.1  # times the noise floor in free run: above it, something is left that no effect here explains
-TORQUE_FREE = {"damping": ("damping_over_inertia", "1/s"), "stiffness": ("stiffness_over_inertia", "1/s^2")}
 
 
 def identify(
@@ -151,7 +137,10 @@ class _Identifier:
             per_set, joint = persets.each_set(
                 self.traces, after, self.start, centre, self.settings, self.recording.axis
             )  # fmt: skip
-        found = self._conclude(search, before, after, measured_before, measured_after, floor, per_set, joint, changed)
+        case = Case(
+            self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free
+        )
+        found = conclude(case, search, before, after, measured_before, measured_after, floor, per_set, joint)
         return replace(found, torque_scale=self._torque_scale(after)) if in_full else found
 
     def _torque_scale(self, fitted: Fitted) -> ParameterEstimate | None:
@@ -216,150 +205,6 @@ class _Identifier:
         self.say(f"took damping back: {damping:.4g} +- {error:.2g} over whole runs")
         return fuller
 
-    def _conclude(
-        self, search: Search, before: Fitted, after: Fitted, measured_before: Measured, measured_after: Measured,
-        floor: NoiseFloor, per_set: tuple[SetResult, ...], joint: persets.GeneticRun | None, changed: bool,
-    ) -> Identification:  # fmt: skip
-        idle = tuple(NotReported(n, why) for n, why in self.offer.idle)
-        dropped = (*idle, *(NotReported(n, why) for n, why in search.dropped))
-        result_before = self._model(before, measured_before, idle)
-        result_after = self._model(after, measured_after, dropped) if changed else None
-        final = result_after or result_before
-        ratio = self._ratio(after, search)
-        unexplained = ratio > UNEXPLAINED
-        verdict = Verdict(
-            effects=tuple(e for e in search.best.structure.effects if e not in self.structure.effects),
-            confusable_with=search.rivals,
-            never_separable=_never(search.best.structure),
-            unexplained_fraction=_fraction(measured_before, measured_after, floor) if unexplained else 0.0,
-            unexplained=unexplained,
-            candidates=(*search.candidates, *self.offer.refused),
-            sentences=(),
-            rival_models=search.rival_models,
-        )
-        reasons = []
-        searched = [g for g in (*(s.genetic for s in per_set), joint) if g is not None]
-        reasons += [
-            f"{g.name}: the objective {g.objective:.4g} stays above J_dec {g.j_dec:.4g} after {g.restarts} repeats"
-            for g in searched if after.sensor_limited and not g.accepted
-        ]  # fmt: skip
-        reasons += [f"{x.name} is not determined: {x.reason}" for x in final.not_determined]
-        reference, per_set = self._against_reference(per_set)
-        found = Identification(
-            accepted=not reasons and not unexplained, reasons=(), axis=self.recording.axis, before=result_before,
-            verdict=verdict, after=result_after, noise_floor=floor, per_set=per_set, joint=joint,
-            traces=self._series(measured_before, measured_after), holdout_note=self.split.note,
-            max_error_percent=reference,
-        )  # fmt: skip
-        if unexplained:
-            reasons.insert(0, unexplained_reason(ratio, found))
-        if opposite_signs(found):
-            reasons.insert(0, SENTENCE)
-        found = replace(found, accepted=not reasons, reasons=tuple(reasons))
-        return replace(found, verdict=replace(verdict, sentences=sentences_of(found)))
-
-    def _ratio(self, after: Fitted, search: Search) -> float:
-        """Residual over sensor noise: in free run where the model can run free, else over the horizon."""
-        noise = floor_noise(self.traces)
-        if after.free_run is not None and after.sensor_limited:
-            return after.sigma / noise
-        free = after.free_run.sigma / noise if after.free_run is not None else np.inf
-        short = search.best.sigma / search.floor
-        frictions = [e for e in after.structure.effects if effects.get(e).place is Place.FRICTION]
-        # One wrong standstill throws a free run off for good; else what a free run leaves is what is missing.
-        return float(free) if np.isfinite(free) and (free < STRAYED or not frictions) else float(min(free, short))
-
-    def _model(self, fitted: Fitted, measured: Measured, dropped: tuple[NotReported, ...]) -> ModelResult:
-        units = UNITS[self.recording.axis]
-        parameters: dict[str, ParameterEstimate] = {}
-        of_effects: dict[str, dict[str, ParameterEstimate]] = {e: {} for e in fitted.structure.effects}
-        missing: list[NotReported] = []
-        per = "/(kg*m^2)" if self.torque_free else ""
-        for i, name in enumerate(fitted.names):
-            value, error = fitted.values[name], fitted.std_error(name)
-            label, unit = name[0], units.get(name[0], "")
-            if len(name) > 1:
-                parameter = next(p for p in effects.get(name[0]).parameters if p.name == name[1])
-                label, unit = ".".join(name), parameter.unit + (per if parameter.linear else "")
-                if self.recording.axis == "linear":
-                    unit = unit.replace("kg*m^2", "kg").replace("N*m", "N").replace("rad", "m")
-            elif self.torque_free:
-                label, unit = TORQUE_FREE[name[0]]
-            tied = len(name) == 1 and _tied_to_nothing(fitted, i, len(self.traces) == 1)
-            if tied:
-                missing.append(NotReported(label, f"it is tied to {tied}, which the data do not determine"))
-                continue
-            if not fitted.determined[i] or not np.isfinite(error) or (error > 0.5 * abs(value) and len(name) == 1):
-                if len(name) > 1 and fitted.determined[i]:
-                    pass
-                else:
-                    missing.append(NotReported(label, _undetermined(value, error, fitted.determined[i])))
-                    continue
-            estimate = ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), unit)
-            if len(name) == 1:
-                parameters[label] = estimate
-            else:
-                key = name[1] if len(name) == 2 else f"{name[1]}_run_{int(name[2]) + 1}"
-                of_effects[name[0]][key] = estimate
-        names = tuple(fitted.values)
-        platform = platform_of(fitted.structure, names, np.array(list(fitted.values.values())))
-        return ModelResult(
-            parameters, of_effects, measured.errors, dropped, tuple(missing), _correlation(fitted), platform
-        )
-
-    def _against_reference(
-        self, per_set: tuple[SetResult, ...]
-    ) -> tuple[dict[str, float] | None, tuple[SetResult, ...]]:
-        """Max_Error of Eq. 15 over the sets, and each set's own."""
-        known = self.settings.reference
-        if known is None:
-            return None, per_set
-        out: dict[str, float] = {}
-        sets = []
-        for one in per_set:
-            parameters = dict(one.parameters)
-            for term, key in persets.KEYS.items():
-                reference = getattr(known, key)
-                if reference and term in parameters:
-                    error = 100.0 * abs(parameters[term].value - reference) / reference
-                    parameters[term] = replace(parameters[term], max_error_percent=error)
-                    out[term] = max(out.get(term, 0.0), error)
-            sets.append(replace(one, parameters=parameters))
-        return out, tuple(sets)
-
-    def _series(self, before: Measured, after: Measured) -> tuple[RunTraces, ...]:
-        out = []
-        for i, trace in enumerate(self.traces):
-            angle, rate, _, torque, _ = trace.fine
-            first, last = before.torque[i], after.torque[i]
-            out.append(
-                RunTraces(
-                    trace.run.name, trace.start_s + trace.step_s * np.arange(len(trace.measured)), trace.measured,
-                    trace.channel, trace.keep.astype(float), before.simulated[i], after.simulated[i],
-                    None if first is None else first.residual, None if last is None else last.residual,
-                    angle[::UPSAMPLING], rate[::UPSAMPLING], None if trace.torque is None else torque[::UPSAMPLING],
-                    self.split.judge[i].astype(float),
-                )
-            )  # fmt: skip
-        return tuple(out)
-
-
-def _tied_to_nothing(fitted: Fitted, i: int, alone: bool) -> str:
-    """A term that the data do not determine and that drags this one along; empty where there is none.
-
-    In a single run (``alone``) inertia and stiffness are one number at each frequency.
-    """
-    size = np.sqrt(np.maximum(np.diag(fitted.covariance), 1e-300))
-    for k, name in enumerate(fitted.names):
-        if k == i or len(name) > 1:
-            continue
-        lost = not fitted.determined[k] or not size[k] <= 0.5 * abs(fitted.values[name])
-        pair = alone and {name[0], fitted.names[i][0]} == {"inertia", "stiffness"}
-        one = abs(fitted.covariance[i, k]) > TIED * size[i] * size[k]
-        if lost and fitted.determined[i] and (pair or one):
-            return name[0]
-    return ""
-
 
 def _refuse_the_idle(traces: list[Trace], free: bool) -> None:
     """Refuse a recording in which nothing happens.
@@ -389,46 +234,6 @@ def _one_noise(traces: list[Trace]) -> list[Trace]:
     return [replace(t, noise=quietest[t.channel]) for t in traces]
 
 
-def floor_noise(traces: list[Trace]) -> float:
-    """The sensor's noise, pooled."""
-    return float(np.sqrt(np.mean([t.noise**2 for t in traces])))
-
-
 def _plain(declared: Platform, name: str) -> dict[str, float]:
     effect = effects.get(name)
     return dict(zip((p.name for p in effect.parameters), effect.values(declared.effects[name]), strict=True))
-
-
-def _undetermined(value: float, error: float, determined: bool) -> str:
-    if not determined:
-        return "these runs hold no information on it; add a set at another frequency or keep the start transient"
-    return f"its standard error {error:.3g} is more than half of its value {value:.3g}; excite it more or for longer"
-
-
-def _correlation(fitted: Fitted) -> dict[str, float]:
-    size = np.sqrt(np.maximum(np.diag(fitted.covariance), 1e-300))
-    out = {}
-    for i in range(len(fitted.names)):
-        for k in range(i):
-            value = float(fitted.covariance[i, k] / (size[i] * size[k]))
-            if abs(value) > 0.9:
-                out[f"{'.'.join(fitted.names[k])}, {'.'.join(fitted.names[i])}"] = value
-    return out
-
-
-def _never(structure: Structure) -> dict[str, str]:
-    out = {}
-    for name in structure.effects:
-        for rival, why in (effects.get(name).never_separable or {}).items():
-            out[f"{name} / {rival}"] = why
-    return out
-
-
-def _fraction(before: Measured, after: Measured, floor: NoiseFloor) -> float:
-    """Share of the torque residual above the noise floor that is left."""
-    a, b = after.errors.residual_rms_torque, before.errors.residual_rms_torque
-    f = floor.residual_rms_torque
-    if a is None or b is None or f is None:
-        return 0.0
-    excess = b * b - f * f
-    return float(np.clip((a * a - f * f) / excess, 0.0, 1.0)) if excess > 0.01 * f * f else 0.0
