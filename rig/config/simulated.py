@@ -97,8 +97,8 @@ class SimulatedConfig(Section):
         decay_hz = self.platform.damping_nm_s_rad / inertia / (2 * math.pi)
         if max(resonance_hz, decay_hz) > FASTEST_HZ:
             raise ValueError(
-                f"platform moves at up to {max(resonance_hz, decay_hz):.3g} Hz (stiffness {resonance_hz:.3g} Hz, damping "
-                f"{decay_hz:.3g} Hz), which would be simulated for ever: at most {FASTEST_HZ:g} Hz, so raise "
+                f"platform moves at up to {max(resonance_hz, decay_hz):.3g} Hz (stiffness {resonance_hz:.3g} Hz, "
+                f"damping {decay_hz:.3g} Hz), which would be simulated for ever: at most {FASTEST_HZ:g} Hz, so raise "
                 "inertia_kg_m2 or lower stiffness_nm_rad or damping_nm_s_rad"
             )
         return self

@@ -22,6 +22,8 @@ MAX_FILE_BYTES = 256 * 1024
 MAX_NODES = 20_000
 MAX_CHARACTERS = 2_000_000
 MAX_DEPTH = 40
+MOST_BRACKETS = 200  # open at once, those in quotes and comments counted too
+_BRACKETS = re.compile(r"[\[\]{}]")
 
 KeyPath = tuple[str | int, ...]
 
@@ -121,6 +123,7 @@ def parse(text: str, source: str, *, lines: bool = True) -> Document:
     Raises ConfigError where the text is no YAML or breaks a bound; milder faults are in ``faults``.
     """
     loader = None
+    _refuse_deep_brackets(text, source)
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
@@ -138,6 +141,15 @@ def parse(text: str, source: str, *, lines: bool = True) -> Document:
             loader.dispose()
     walk = _Walk(source, lines)
     return Document(None if node is None else walk.value(node, (), 0), walk.places, walk.faults)
+
+
+def _refuse_deep_brackets(text: str, source: str) -> None:
+    """Raise ConfigError where brackets are nested so deeply that the scanner alone would take seconds."""
+    depth = 0
+    for bracket in _BRACKETS.finditer(text):
+        depth = depth + 1 if bracket.group() in "[{" else max(0, depth - 1)
+        if depth > MOST_BRACKETS:
+            raise ConfigError(f"{source}: nested too deeply: a configuration has at most {MAX_DEPTH} levels")
 
 
 def _syntax_cure(problem: str) -> str:

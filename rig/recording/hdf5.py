@@ -20,7 +20,7 @@ from rig.channels import KINDS, Channel
 from rig.errors import RecordingError
 from rig.recording.journal import JournalError
 from rig.recording.journal_reader import JournalContents
-from rig.recording.run import Recording, Run
+from rig.recording.run import Array, Recording, Run
 
 FORMAT = "isp-rig recording"
 VERSION = 1
@@ -28,7 +28,8 @@ _ARRAYS = ("time_s", "valid", "rate_rad_s", "angle_rad", "torque_time_s", "torqu
 _NUMBERS = ("min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "rate_corner_hz", "rate_delay_s")
 _VALUES = ("name", "torque_hold", "use", *_NUMBERS)
 # What h5py raises over a damaged file; a link that leads nowhere reads as None.
-_DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError)
+_DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, MemoryError, RecursionError)
+MOST_VALUES = 60_000_000  # half a gigabyte of numbers: an hour of six channels at 2 kHz is a third of it
 
 
 def write_recording_h5(path: str | Path, recording: Recording, journal: JournalContents | None = None) -> None:
@@ -113,27 +114,48 @@ def read_recording_h5(path: str | Path) -> Recording:
             if int(file.attrs["version"]) > VERSION:
                 raise RecordingError(f"{path}: written by a later version: read it with that one")
             noise = file.attrs.get("noise")
+            info = json.loads(file["info"][()])
+            reader = _Reader(path)
             return Recording(
-                runs=tuple(_read_run(group) for _, group in sorted(file["runs"].items())),
-                axis=str(file.attrs["axis"]),  # type: ignore[arg-type]
+                runs=tuple(reader.run(group) for _, group in sorted(file["runs"].items())),
+                axis="linear" if file.attrs["axis"] == "linear" else "rotary",
                 noise=None if noise is None else float(noise),
-                info=json.loads(file["info"][()]),
+                info=info if isinstance(info, dict) else {},
             )
     except _DAMAGE as error:
         raise RecordingError(f"{path}: is damaged ({error}): export it again from the raw journal") from error
 
 
-def _read_run(group: h5py.Group) -> Run:
-    values: dict[str, Any] = {name: group.attrs[name] for name in _VALUES if name in group.attrs}
-    for name in _NUMBERS:
-        if name in values:
-            values[name] = float(values[name])
-    arrays = {name: group[name][()] for name in _ARRAYS if name in group}
-    arrays["valid"] = np.asarray(arrays["valid"], dtype=bool)
-    datasets = dict(group.get("channels", {}).items())
-    channels = {name: data[()] for name, data in datasets.items()}
-    causes = {name: _cause(name, data.attrs) for name, data in datasets.items() if data.attrs.get("kind") in KINDS}
-    return Run(**values, **arrays, channels=channels, causes=causes)
+class _Reader:
+    """Takes runs out of a file that may have been made to exhaust the memory or to reach into other files."""
+
+    def __init__(self, path: str | Path) -> None:
+        self._path = path
+        self._values_left = MOST_VALUES
+
+    def run(self, group: h5py.Group) -> Run:
+        """One run. Raises RecordingError, or what _DAMAGE lists."""
+        values: dict[str, Any] = {name: group.attrs[name] for name in _VALUES if name in group.attrs}
+        values = {name: float(value) if name in _NUMBERS else str(value) for name, value in values.items()}
+        arrays: dict[str, Any] = {name: self._numbers(group, name) for name in _ARRAYS if name in group}
+        arrays["valid"] = np.asarray(arrays["valid"], dtype=bool)
+        inner = group.get("channels", {})
+        channels = {name: self._numbers(inner, name) for name in inner}
+        causes = {name: _cause(name, inner[name].attrs) for name in inner if inner[name].attrs.get("kind") in KINDS}
+        return Run(**values, **arrays, channels=channels, causes=causes)
+
+    def _numbers(self, group: Any, name: str) -> Array:
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            raise RecordingError(f"{self._path}: {name!r} is a link to another place: copy the values in (h5repack)")
+        data = group[name]
+        if not isinstance(data, h5py.Dataset) or data.external or data.is_virtual or data.ndim != 1:
+            raise RecordingError(f"{self._path}: {name!r} is no plain column in this file: copy it in (h5repack)")
+        if data.dtype.kind not in "fiub":
+            raise RecordingError(f"{self._path}: {name!r} holds {data.dtype} values, not numbers")
+        self._values_left -= data.size
+        if self._values_left < 0:
+            raise RecordingError(f"{self._path}: holds more than {MOST_VALUES} values: cut it into several recordings")
+        return np.asarray(data[()], dtype=np.float64)
 
 
 def _cause(name: str, attrs: Any) -> Channel:

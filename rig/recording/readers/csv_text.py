@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import gzip
 import zlib
+from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,6 +19,8 @@ from rig.recording.readers.base import MAX_SAMPLES, Table, too_long
 from rig.recording.run import Array
 
 MAX_LINE_CHARACTERS = 65_536
+MAX_LINES = 2 * MAX_SAMPLES
+MAX_CHARACTERS = 2 * 1024**3  # a packed file of a few megabytes may unpack to terabytes
 _EMPTY = ("", "na", "n/a", "null", "none", "-")
 _DAMAGE = (OSError, EOFError, zlib.error, UnicodeError)
 
@@ -88,9 +91,14 @@ def _all_lines(path: Path, encoding: str) -> Iterator[tuple[int, str]]:
     with _opened(path) as file:
         # Units in a header may be in any encoding; numbers are ASCII in all of them.
         text_file = io.TextIOWrapper(cast(IO[bytes], file), encoding=encoding, errors="replace")
-        number = 0
+        number = characters = 0
         while line := text_file.readline(MAX_LINE_CHARACTERS):
             number += 1
+            if number > MAX_LINES:
+                raise RecordingError(f"{path}: more than {MAX_LINES} lines, empty ones counted: is it a recording?")
+            characters += len(line)
+            if characters > MAX_CHARACTERS:
+                raise RecordingError(f"{path}: unpacks to more than {MAX_CHARACTERS >> 30} GiB: cut it into runs")
             if len(line) == MAX_LINE_CHARACTERS:
                 raise RecordingError(
                     f"{path}: line {number} is longer than {MAX_LINE_CHARACTERS} characters: one sample a line"
@@ -210,7 +218,8 @@ def _fast(layout: Layout, positions: Sequence[int]) -> Array | None:
 def _careful(layout: Layout, positions: Sequence[int]) -> Array:
     """All rows one by one: slower, but it can say which line is wrong."""
     width = len(layout.names)
-    rows: list[list[float]] = []
+    values = array("d")
+    count = 0
     for number, text in _data_lines(layout):
         fields = layout.fields(text)
         while len(fields) > width and not fields[-1]:
@@ -218,10 +227,11 @@ def _careful(layout: Layout, positions: Sequence[int]) -> Array:
         if len(fields) != width:
             raise RecordingError(_ragged(layout, number, len(fields)))
         try:
-            rows.append([layout.number(fields[i]) for i in positions])
+            values.extend([layout.number(fields[i]) for i in positions])
         except ValueError:
-            raise RecordingError(_not_a_number(layout, number, fields, positions, len(rows))) from None
-    return np.array(rows, dtype=np.float64).reshape(len(rows), len(positions))
+            raise RecordingError(_not_a_number(layout, number, fields, positions, count)) from None
+        count += 1
+    return np.array(values, dtype=np.float64).reshape(count, len(positions))
 
 
 def _ragged(layout: Layout, number: int, count: int) -> str:
