@@ -86,8 +86,8 @@ def hostile_folder(folder: Path) -> None:
     os.mkfifo(folder / "fifo")
     (folder / "loop").symlink_to(folder / "loop")
     (folder / "link.csv").symlink_to("/etc/passwd")
-
-       (folder / "run.csv").write_text("T,U,rate_rad_s\n" + "".join(f"{k / 1000},{k % 7},{k % 5}\n" for k in range(3000)))
+    rows = "".join(f"{k / 1000},{k % 7},{k % 5}\n" for k in range(3000))
+    (folder / "run.csv").write_text(f"T,U,rate_rad_s\n{rows}")
     (folder / "run.mat").write_bytes(b"MATLAB 5.0" + bytes(200))
     (folder / "x.npz").write_bytes(b"PK\x03\x04" + bytes(30))
 

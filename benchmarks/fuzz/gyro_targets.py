@@ -14,7 +14,6 @@ STIM300_IDENTIFIERS = tuple(stim300.LAYOUTS)
 XBUS_LONGEST = 2048 + 7
 
 
-
 def stim300_stream(data: bytes) -> int:
     """Normal Mode datagrams of any layout, special ones among them, through framer, decoders and driver."""
     if len(data) < 2:

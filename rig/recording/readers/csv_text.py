@@ -19,7 +19,7 @@ from rig.recording.readers.base import MAX_SAMPLES, Table, too_long
 from rig.recording.run import Array
 
 MAX_LINE_CHARACTERS = 65_536
-MAX_LINES = 2 * MAX_SAMPLES
+MAX_LINES = MAX_SAMPLES + 1_000_000
 MAX_CHARACTERS = 2 * 1024**3  # a packed file of a few megabytes may unpack to terabytes
 _EMPTY = ("", "na", "n/a", "null", "none", "-")
 _DAMAGE = (OSError, EOFError, zlib.error, UnicodeError)

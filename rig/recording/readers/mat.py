@@ -20,7 +20,7 @@ from rig.errors import RecordingError
 from rig.recording.readers import mat4
 from rig.recording.readers.base import MAX_SAMPLES, Table, read_each
 
-MAX_UNPACKED_BYTES = 16 * 8 * MAX_SAMPLES
+MAX_UNPACKED_BYTES = 8 * 8 * MAX_SAMPLES  # eight columns as long as may be
 MAX_STRUCT_DEPTH = 5
 
 _MATRIX, _COMPRESSED = 14, 15
