@@ -1,80 +1,180 @@
-"""What happens when something fails: each fault of the emulators, at random moments, as the emulated drive saw it.
+"""What happens when something fails: each fault at random moments, as the emulated drive saw it.
 
-    python benchmarks/faults.py [--times 3] [FAULT ...]
+    python benchmarks/faults.py [--times 3] [--jobs 2] [--out TABLE.md] [FAULT ...]
 
-A campaign is played on the emulated bench by `rig play` in a process of its own; some way into the set the fault
-takes hold. From the drive's own events comes the time from there to zero torque.
+`rig play` plays on devices that `rig emulate` emulates, each a process of its own; some way into the set something is
+done to either. From the drive's own events comes when the torque was zero, from the host's files when it knew and what
+was recorded. A try passes where
+
+- the host's verdict came within the time stated for this fault, and the torque was zero within 20 ms of it; or, where
+  the command path or the host is dead, within the heartbeat time of 100 ms and 20 ms of the fault;
+- the exit code is the one that SPEC states, nothing was left running, no traceback was shown;
+- no more than the last 100 ms were lost of what was recorded.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
+import concurrent.futures
+import math
 import random
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from rig.recording.hdf5 import read_recording_h5
-from sim_backend.emulators.fault_kinds import FAULTS
+from benchmarks.emulated import OFF, SET_S, SHORT, TO_THE_SET_S, Devices, Host, Recovered, recovered
+from benchmarks.fault_cases import CASES, Case, Path_
 
-SET_S = 4.0
-QUIET = (
-    f"excitation.sets=[{{torque_nm: 40, frequency_hz: 3, duration_s: {SET_S:g}}}]", "excitation.rest_s=0",
-    "bench.settle_s=1.5", "bench.emulator.start_up_s=0.1",
-)  # fmt: skip
-OFF = ("torque_zero", "watchdog", "fault", "disabled")
+REACTION_S, WATCHDOG_S, LOST_S = 0.020, 0.120, 0.100
+HANGS_S = 30.0
+BUSY = ("stall or clock jump", "missed ticks in a row", "no longer hears this computer")
 
 
 class Outcome(NamedTuple):
-    """Of one try; times in s, None where the fault never took hold or the torque never went off before the end."""
+    """Of one try; times in seconds, NaN where there is none. ``wrong`` says what did not pass."""
 
-    code: int
-    zero_after_s: float | None
+    code: int | None
+    zero_s: float
+    verdict_s: float
+    reaction_s: float
+    lost_s: float
     said: str
+    wrong: tuple[str, ...]
 
 
-def one_try(fault: str, after_s: float, folder: Path) -> Outcome:
-    """Play with a fault that takes hold so long after the drive was enabled."""
-    injected = json.dumps([{"fault": fault, "after_s": after_s}])
-    line = [sys.executable, "-c", "from rig.cli import main; main()", "play", "examples/bench.yaml", "--emulate"]
-    line += ["--quiet", "--out", str(folder)]
-    for override in (*QUIET, f"bench.emulator.faults={injected}"):
-        line += ["--set", override]
-    done = subprocess.run(line, capture_output=True, text=True, timeout=60, check=False)
-    events: Sequence[dict[str, Any]] = ()
-    if (folder / "recording.h5").exists():
-        events = read_recording_h5(folder / "recording.h5").info.get("emulated_drive", ())
-    begun = next((e["time_s"] for e in events if e["event"] == "injected"), None)
-    zero = None
-    if begun is not None:
-        zero = next((e["time_s"] for e in events if e["event"] in OFF and e["time_s"] >= begun), None)
-    said = " ".join(done.stderr.split())
-    return Outcome(done.returncode, None if begun is None or zero is None else zero - begun, said)
+def one_try(case: Case, after_s: float, folder: Path) -> Outcome:
+    """Play, let it fail so long into the set, and look at what came of it."""
+    with Devices((*SHORT, *case.devices)) as devices:
+        if case.before:
+            fault_s = case.strike(devices, None)
+            host = Host(devices, folder, (*SHORT, *case.overrides))
+        else:
+            host = Host(devices, folder, (*SHORT, *case.overrides), terminal=case.terminal())
+            if devices.wait_for(("enabled",), 30.0) is None:
+                host.ended(1.0)
+                return _nothing(f"the drive was never enabled: {host.said}")
+            devices.wait_for(("nothing",), TO_THE_SET_S + after_s)
+            fault_s = case.strike(devices, host)
+        code = host.ended(HANGS_S)
+        devices.wait_for(("nothing",), 0.4)  # until the drive's own watchdog has had its time
+        return _judged(case, devices, host, code, fault_s, recovered(folder))
 
 
-def main(given: Sequence[str] | None = None) -> None:
-    """Print a row for every fault."""
+def _nothing(why: str) -> Outcome:
+    return Outcome(None, math.nan, math.nan, math.nan, math.nan, why, (why,))
+
+
+def _judged(case: Case, devices: Devices, host: Host, code: int | None, fault_s: float, found: Recovered) -> Outcome:
+    zero = devices.first(OFF, fault_s)
+    zero_s = float(zero["time_s"]) - fault_s if zero is not None else math.nan
+    verdict_s = found.verdict_s - fault_s if found.verdict_s is not None else math.nan
+    end_s = found.verdict_s if found.verdict_s is not None and not case.host_dies else fault_s
+    lost_s = end_s - found.last_sample_s if found.last_sample_s is not None else math.nan
+    wrong = []
+    if code is None:
+        wrong.append(f"hung for {HANGS_S:g} s")
+    elif code not in case.codes:
+        wrong.append(f"exit {code}, expected {' or '.join(map(str, sorted(case.codes)))}")
+    if "Traceback" in host.said:
+        wrong.append("a traceback was shown")
+    if left := host.left_over():
+        wrong.append(f"left running: {left}")
+    if case.before:
+        if any(e["event"] == "enabled" for e in devices.events) != (case.path is Path_.WORKS):
+            wrong.append("enabled" if case.path is not Path_.WORKS else "never enabled")
+    elif code != 0:
+        wrong += _times(case, zero_s, verdict_s)
+        if not lost_s <= LOST_S:
+            wrong.append(f"{lost_s * 1e3:.0f} ms of the recording lost")
+    last = devices.events[-1]
+    if last.get("torque_nm", [0, 0])[1] != 0.0:
+        wrong.append("torque at the end")
+    return Outcome(code, zero_s, verdict_s, zero_s - verdict_s, lost_s, host.said, tuple(wrong))
+
+
+def _times(case: Case, zero_s: float, verdict_s: float) -> list[str]:
+    """What came too late, if anything."""
+    if math.isnan(zero_s):
+        return ["torque never zero"]
+    if case.path is not Path_.WORKS:
+        return [] if zero_s <= WATCHDOG_S else [f"zero after {zero_s * 1e3:.0f} ms, limit {WATCHDOG_S * 1e3:.0f}"]
+    wrong = []
+    if math.isnan(verdict_s):
+        return [] if zero_s <= case.detected_s + REACTION_S else [f"zero after {zero_s * 1e3:.0f} ms"]
+    if verdict_s > case.detected_s:
+        wrong.append(f"verdict after {verdict_s * 1e3:.0f} ms, stated {case.detected_s * 1e3:.0f}")
+    if zero_s - verdict_s > REACTION_S:
+        wrong.append(f"zero {1e3 * (zero_s - verdict_s):.0f} ms after the verdict")
+    return wrong
+
+
+def _span(values: Sequence[float]) -> str:
+    known = [v * 1e3 for v in values if not math.isnan(v)]
+    if not known:
+        return "-"
+    low, high = min(known), max(known)
+    return f"{low:.0f}" if round(low) == round(high) else f"{low:.0f} to {high:.0f}"
+
+
+def row(case: Case, tries: Sequence[Outcome]) -> str:
+    """One line of the table."""
+    codes = ", ".join(str(code) for code in sorted({t.code for t in tries if t.code is not None}))
+    wrong = sorted({text for t in tries for text in t.wrong})
+    reaction = _span([t.reaction_s for t in tries]) if case.path is Path_.WORKS and not case.before else "-"
+    stated = "-" if case.before or case.path is not Path_.WORKS else f"{case.detected_s * 1e3:.0f}"
+    limit = {Path_.WORKS: "verdict + 20", Path_.DEAD: "120", Path_.DRIVE: "120"}[case.path]
+    heard = next((t.said for t in tries if t.said), "")
+    said = case.quote(heard).replace("|", "/")
+    cells = (
+        case.name, _span([t.verdict_s for t in tries]) if not case.before else "-", stated, reaction,
+        _span([t.zero_s for t in tries]) if not case.before else "never on", "-" if case.before else limit, codes,
+        _span([t.lost_s for t in tries]) if not case.before else "-", "; ".join(wrong) or "pass", said,
+    )  # fmt: skip
+    return "| " + " | ".join(cells) + " |"
+
+
+HEAD = (
+    "| fault | verdict, ms | stated | verdict to zero, ms | fault to zero, ms | limit | exit | lost, ms | result | says |\n"
+    "|---|---|---|---|---|---|---|---|---|---|"
+)
+
+
+def main(given: Sequence[str] | None = None) -> int:
+    """Print a row for every fault; returns how many failed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("faults", nargs="*", default=list(FAULTS))
+    parser.add_argument("faults", nargs="*", default=[])
     parser.add_argument("--times", type=int, default=3)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--out", type=Path)
     arguments = parser.parse_args(given)
+    cases = [case for case in CASES if not arguments.faults or case.name in arguments.faults]
     moments = random.Random(arguments.seed)
-    print(f"{'fault':20s} {'exit':>9s}  {'ms to zero torque (each)':28s} what was said")
-    for fault in arguments.faults:
-        with tempfile.TemporaryDirectory() as scratch:
-            tries = [
-                one_try(fault, moments.uniform(0.8, 0.5 + 0.8 * SET_S), Path(scratch) / str(k))
+    print(HEAD, flush=True)
+    rows, failed = [HEAD], 0
+    with (
+        tempfile.TemporaryDirectory() as scratch,
+        concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool,
+    ):
+        waiting = [
+            (case, [
+                pool.submit(one_try, case, moments.uniform(0.1, 0.6 * SET_S), Path(scratch) / f"{n}-{k}")
                 for k in range(arguments.times)
-            ]
-        codes = "/".join(str(code) for code in sorted({t.code for t in tries}))
-        times = ", ".join("-" if t.zero_after_s is None else f"{1e3 * t.zero_after_s:.0f}" for t in tries)
-        print(f"{fault:20s} {codes:>9s}  {times:28s} {tries[0].said[:150]}", flush=True)
+            ])
+            for n, case in enumerate(cases)
+        ]  # fmt: skip
+        for case, tries in waiting:
+            outcomes = [t.result() for t in tries]
+            failed += any(t.wrong for t in outcomes)
+            rows.append(row(case, outcomes))
+            print(rows[-1], flush=True)
+    print(f"{len(cases)} faults, {len(cases) * arguments.times} tries, {failed} faults failed")
+    if arguments.out is not None:
+        arguments.out.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return failed
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(min(main(), 1))

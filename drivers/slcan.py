@@ -23,6 +23,7 @@ from drivers.listening import arrivals
 from drivers.ports import BytePort, SerialPort
 from rig.errors import DeviceFault
 
+LATE_S = 0.06  # an answer to a frame that takes longer: what is sent does not reach the bus in time
 QUIET_S = 0.05  # an adapter that has said nothing for so long has said all
 
 
@@ -63,8 +64,8 @@ class SlcanBulkBus(can.BusABC):
         self._decoder = LawicelDecoder()
         self._frames: deque[tuple[float, CanFrame]] = deque()  # with the time of their arrival
         self.clock: Callable[[], float] = time.monotonic
-        self._unanswered = 0
-        self._last_answer_s = 0.0
+        self._unanswered: deque[float] = deque()  # when each was sent
+        self._looked_s = 0.0
         self._answers_frames: bool | None = None
         self._answers: deque[Answer] = deque()
         self._clock_offset_s: float | None = None
@@ -127,8 +128,7 @@ class SlcanBulkBus(can.BusABC):
             if isinstance(item, CanFrame):
                 self._frames.append((at_s, item))
             elif self._unanswered and item.kind in ("sent", "ok", "error"):
-                self._unanswered -= 1
-                self._last_answer_s = time.monotonic()
+                self._unanswered.popleft()
                 self._answers_frames = True
                 refused += item.kind == "error"
             else:
@@ -188,23 +188,27 @@ class SlcanBulkBus(can.BusABC):
             As ``send`` does.
         """
         lines = b"".join(map(lawicel.encode_frame, frames))
-        self._count_unanswered(len(frames))  # before the write: a fast adapter answers during it
+        self._count_unanswered(len(frames), urgent)  # before the write: a fast adapter answers during it
         try:
             self._port.write(lawicel.OK + lines if urgent else lines, timeout)
             self._take()
         except DeviceFault as problem:
             raise CanOperationError(str(problem)) from None
 
-    def _count_unanswered(self, frames: int) -> None:
-        now = time.monotonic()
-        if not self._unanswered:
-            self._last_answer_s = now
-        self._unanswered += frames
-        if self._answers_frames and now - self._last_answer_s > self._answer_timeout_s:
+    def _count_unanswered(self, frames: int, urgent: bool) -> None:
+        """Note what is about to be sent. Raises CanOperationError where earlier frames wait too long.
+
+        What is urgent is sent all the same; and answers that nobody fetched meanwhile are not the adapter's fault.
+        """
+        now, waiting = time.monotonic(), self._unanswered
+        late = bool(waiting) and now - waiting[0] > LATE_S and now - self._looked_s < LATE_S
+        if late and self._answers_frames and not urgent:
             raise CanOperationError(
-                f"{self._port.name}: {self._unanswered} frames unanswered for "
-                f"{self._answer_timeout_s} s: the adapter has stopped working"
+                f"{self._port.name}: {len(waiting)} frames unanswered for {(now - waiting[0]) * 1e3:.0f} ms (limit "
+                f"{LATE_S * 1e3:.0f} ms): the adapter has stalled, is too slow, or loses frames"
             )
+        self._looked_s = now
+        waiting.extend([now] * frames)
 
     def _recv_internal(self, timeout: float | None) -> tuple[Message | None, bool]:
         if not self._frames:

@@ -112,7 +112,7 @@ class AdapterGarbled(Fault):
 
 
 class AdapterSlow(Fault):
-    """What the host sends reaches the bus ``value`` ms later (30 if not given)."""
+    """What the host sends reaches the bus ``value`` ms later (90 if not given)."""
 
     def __init__(self, value: float | None, random_bits: random.Random) -> None:
         super().__init__(value, random_bits)
@@ -122,7 +122,7 @@ class AdapterSlow(Fault):
         """What has waited long enough."""
         now_s = time.monotonic()
         self._held.append((now_s, data))
-        due_s = now_s - 1e-3 * (30.0 if self.value is None else self.value)
+        due_s = now_s - 1e-3 * (90.0 if self.value is None else self.value)
         due = [waiting for at_s, waiting in self._held if at_s <= due_s]
         del self._held[: len(due)]
         return b"".join(due)

@@ -1,0 +1,231 @@
+"""Emulated devices and a host that plays on them, each a process of its own, for what is done to either.
+
+The devices are those of `rig emulate`, so they outlive whatever is done to the host, and tell in their own words
+when the torque was zero.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from drivers.capture import FILE_NAME, MARK, TICK, read_capture
+from rig.errors import RigError
+from rig.recording.journal_reader import read_journal
+
+CONFIG = "examples/bench.yaml"
+SET_S = 6.0
+SHORT = (
+    f"excitation.sets=[{{torque_nm: 60, frequency_hz: 3, duration_s: {SET_S:g}}}]", "excitation.rest_s=0.5",
+    "bench.settle_s=1.5", "bench.emulator.start_up_s=0.1",
+)  # fmt: skip
+TO_THE_SET_S = 2.0  # from enabled to the first set: settling, probe, rest
+OFF = ("torque_zero", "watchdog", "fault", "disabled")
+START_S, STOP_S = 60.0, 5.0
+Event = dict[str, Any]
+
+# The host as users start it, and three things that only its own process can do to it.
+HOST = """
+import signal, sys, time
+jumped = [0.0]
+monotonic = time.monotonic
+time.monotonic = lambda: monotonic() + jumped[0]
+def hang(number, frame):
+    end = monotonic() + 1.5
+    while monotonic() < end:
+        time.sleep(0.01)
+def fail(number, frame):
+    raise RuntimeError("something that nobody foresaw")
+def jump(number, frame):
+    jumped[0] = 0.2
+signal.signal(signal.SIGUSR1, hang)
+signal.signal(signal.SIGUSR2, fail)
+signal.signal(signal.SIGALRM, jump)
+from rig.cli import main
+main()
+"""
+
+
+class Devices:
+    """`rig emulate`, while the context lasts. ``events`` so far, each with its time on the monotonic clock."""
+
+    def __init__(self, overrides: Sequence[str] = SHORT, config: str = CONFIG) -> None:
+        line = [sys.executable, "-c", "from rig.cli import main; main()", "emulate", config]
+        for override in overrides:
+            line += ["--set", override]
+        self.process = subprocess.Popen(
+            line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True
+        )
+        self.events: list[Event] = []
+        self._news: queue.SimpleQueue[Event] = queue.SimpleQueue()
+        threading.Thread(target=self._listen, daemon=True).start()
+        self.ports = self.wait_for(("listening",), START_S) or {}
+
+    def _listen(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            event = json.loads(line)
+            self.events.append(event)
+            self._news.put(event)
+
+    def wait_for(self, names: Sequence[str], timeout_s: float) -> Event | None:
+        """The next event of one of these names, or None."""
+        end_s = time.monotonic() + timeout_s
+        while (left_s := end_s - time.monotonic()) > 0.0:
+            try:
+                event = self._news.get(timeout=left_s)
+            except queue.Empty:
+                return None
+            if event["event"] in names:
+                return event
+        return None
+
+    def inject(self, **fault: object) -> None:
+        """Let a fault take hold."""
+        assert self.process.stdin is not None
+        self.process.stdin.write((json.dumps(fault) + "\n").encode())
+        self.process.stdin.flush()
+
+    def first(self, names: Sequence[str], from_s: float) -> Event | None:
+        """The first event of these names at or after a moment."""
+        return next((e for e in self.events if e["event"] in names and e["time_s"] >= from_s), None)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.process.terminate()
+        try:
+            self.process.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        for stream in (self.process.stdin, self.process.stdout):
+            if stream is not None:
+                stream.close()
+
+
+@dataclass
+class Host:
+    """A process that plays on emulated devices, by `rig play` unless told otherwise."""
+
+    devices: Devices
+    folder: Path
+    overrides: Sequence[str] = SHORT
+    command: str = "play"
+    program: str = HOST
+    terminal: int | None = None  # a descriptor of a terminal of its own, that it loses when that is closed
+    process: subprocess.Popen[bytes] = field(init=False)
+
+    def __post_init__(self) -> None:
+        ports = self.devices.ports
+        line = [sys.executable, "-c", self.program, self.command, CONFIG, "--yes", "--out", str(self.folder)]
+        taken = (f"bench.gyroscope.port={ports['gyro']}", f"bench.amplifier.can.channel={ports['can']}")
+        for override in (*taken, *self.overrides):
+            line += ["--set", override]
+        self.log = self.folder.with_suffix(".log")
+        if self.terminal is None:
+            with self.log.open("wb") as log:
+                self.process = subprocess.Popen(
+                    line, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True
+                )
+        else:
+            self.process = subprocess.Popen(
+                line, stdin=self.terminal, stdout=self.terminal, stderr=self.terminal, start_new_session=True,
+                preexec_fn=_take_terminal,
+            )  # fmt: skip
+
+    def send(self, *signals: int) -> float:
+        """Signals, one after the other; the moment of the first."""
+        at_s = time.monotonic()
+        for number in signals:
+            os.kill(self.process.pid, number)
+        return at_s
+
+    def ended(self, timeout_s: float) -> int | None:
+        """Its exit code, or None where it had to be killed because it hung."""
+        try:
+            return self.process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            return None
+
+    @property
+    def said(self) -> str:
+        """What it said, in one line."""
+        return " ".join(self.log.read_text(errors="replace").split()) if self.log.exists() else ""
+
+    def left_over(self) -> list[int]:
+        """Processes of its session that still live."""
+        found = []
+        for entry in Path("/proc").iterdir():
+            if entry.name.isdigit():
+                try:
+                    fields = (entry / "stat").read_text().rpartition(")")[2].split()
+                except OSError:
+                    continue
+                if int(fields[3]) == self.process.pid and fields[0] != "Z":
+                    found.append(int(entry.name))
+        return found
+
+
+def _take_terminal() -> None:
+    import fcntl  # noqa: PLC0415  POSIX only
+    import termios  # noqa: PLC0415
+
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+
+@dataclass(frozen=True)
+class Recovered:
+    """What is in the files of a run, whatever ended it; times on the monotonic clock, None where there is none.
+
+    ``verdict_s`` is the instant at which the host knew that something was wrong.
+    """
+
+    last_sample_s: float | None
+    last_tick_s: float | None
+    verdict_s: float | None
+    problem: str = ""
+
+
+def recovered(folder: Path) -> Recovered:
+    """Read the journal and the raw capture of a folder as `rig recover` does."""
+    starts: list[float] = []
+    last_tick: float | None = None
+    try:
+        for entry in read_capture(folder / "raw" / FILE_NAME):
+            if entry.kind == MARK and (mark := json.loads(entry.payload))["mark"] == "begin_set":
+                starts.append(float(mark["start_s"]))
+            elif entry.kind == TICK:
+                last_tick = entry.time_s
+        journal = read_journal(folder / "recording.journal")
+    except RigError as problem:
+        return Recovered(None, last_tick, None, str(problem))
+    verdicts = [event.values["verdict_s"] for event in journal.events if event.values.get("verdict_s") is not None]
+    last = None
+    if journal.runs and len(starts) >= len(journal.runs):
+        run = journal.runs[-1]
+        times = run.column("ticks", "time_s") if "ticks" in run.tables else ()
+        last = starts[len(journal.runs) - 1] + float(times[-1]) if len(times) else None
+    return Recovered(last, last_tick, verdicts[-1] if verdicts else None)
+
+
+def interrupt_twice(host: Host) -> float:
+    """Ctrl-C, and again before it can have been heeded."""
+    at_s = host.send(signal.SIGINT)
+    time.sleep(0.002)
+    host.send(signal.SIGINT)
+    return at_s
