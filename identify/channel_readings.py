@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import savgol_filter
+from scipy.ndimage import uniform_filter
+from scipy.signal import istft, savgol_filter, stft
 
 from rig.channels import Channel
 from rig.recording.run import Array, Run
@@ -14,6 +15,9 @@ from rig.recording.run import Array, Run
 FINER = 8  # entries of a table a sample: straight between them a 29 Hz acceleration at 1 kHz is right to 4e-5
 BRIDGED_S = 0.05  # of lost readings that a straight line may stand for
 SLOW_S = 1.0  # nothing that has a temperature changes it faster: readings are smoothed over this, their noise acts not
+CLEAR = 2.0  # times the noise's power, which is taken off a reading's spectrum: hardly any of it stays
+AROUND = 5  # lines, and stretches, over which a reading's power is averaged
+STRETCH = 2048  # samples
 OWN_STEPS = 2.5  # times a channel's own spacing that is no loss: a thermometer is read once a second
 
 
@@ -40,8 +44,9 @@ def lost(run: Run) -> Any:
 def table_of(run: Run, channel: Channel, step_s: float) -> tuple[Array, float]:
     """factor * (x - reference) from the start of the run on, and the entries a second.
 
-    A cubic spline where readings come with the samples; straight lines between slower ones and over losses; a
-    temperature's noise smoothed away. At its reference throughout where the run does not have the channel.
+    A cubic spline where readings come with the samples; straight lines between slower ones and over losses. The
+    sensor's noise is taken off: it would push the platform, which rings to it. At its reference throughout where
+    the run does not have the channel.
     """
     values = run.channels.get(channel.name)
     known = np.isfinite(values) if values is not None else np.zeros(0, dtype=bool)
@@ -59,6 +64,8 @@ def table_of(run: Run, channel: Channel, step_s: float) -> tuple[Array, float]:
     window = min(round(SLOW_S / step_s), n) // 2 * 2 + 1
     if channel.kind == "temperature" and window > 4 and window <= n:
         straight = savgol_filter(straight, window, 2)
+    elif channel.kind != "temperature" and n >= 64:
+        straight = _without_noise(straight)
     if n < 4:
         fine = straight
         per_s = 1.0 / step_s
@@ -68,3 +75,20 @@ def table_of(run: Run, channel: Channel, step_s: float) -> tuple[Array, float]:
         fine = np.interp(np.arange(n * FINER + 1) / per_s, samples, straight)
     factor = 1.0 if channel.factor is None else channel.factor
     return np.ascontiguousarray(factor * (fine - (channel.reference or 0.0))), per_s
+
+
+def _without_noise(x: Array) -> Array:
+    """A reading less what its white noise adds to each spectral line of a stretch (Wiener's filter), shape as given.
+
+    The noise's level is the median of the upper half of the spectrum. Stretches overlap and fade into each other;
+    at both ends the reading is turned round, so that nothing jumps there.
+    """
+    size = 2 * (min(STRETCH, len(x) - 1) // 2)
+    padded = np.concatenate([2.0 * x[0] - x[size:0:-1], x, 2.0 * x[-1] - x[-2 : -size - 2 : -1]])
+    overlap = 3 * size // 4
+    _, _, lines = stft(padded, nperseg=size, noverlap=overlap)
+    power = np.abs(lines) ** 2
+    noise = float(np.median(power[len(power) // 2 :])) / np.log(2.0)
+    level = np.maximum(uniform_filter(power, AROUND, mode="nearest"), 1e-300)
+    _, left = istft(lines * np.maximum(0.0, 1.0 - CLEAR * noise / level), nperseg=size, noverlap=overlap)
+    return np.asarray(left[size : size + len(x)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from identify.channels import REFUSED
 from identify.next_steps import opposite_signs
 from identify.results import Identification
 from identify.sign_check import SENTENCE
@@ -38,6 +39,14 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
         )
     if found.after is not None:
         out += [f"{capital(plain(d.name))} was left out of the refit: {d.reason}." for d in found.after.dropped]
+    refused = [c.status for c in found.verdict.candidates if c.status.startswith(REFUSED)]
+    out += [f"Not looked at as a cause: {status.removeprefix(REFUSED)}." for status in dict.fromkeys(refused)]
+    for name in found.verdict.effects:
+        read = effects.get(name).reads
+        if read is not None and not read.nature.from_zero:
+            out.append(f"{capital(plain(name))} counts from {number(read.reference, 5)}: J, C and K are those there.")
+        elif read is not None and read.kind == "current":
+            out.append(f"{capital(plain(read.name))} counts {number(read.factor, 5)} N m for an ampere.")
     out += [
         f"{capital(joined([plain(n) for n in pair.split(' / ')]))} cannot be told apart: {why}."
         for pair, why in found.verdict.never_separable.items()
