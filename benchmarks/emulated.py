@@ -49,6 +49,9 @@ def fail(number, frame):
     raise RuntimeError("something that nobody foresaw")
 def jump(number, frame):
     jumped[0] = 0.2
+if sys.stdin.isatty():
+    import fcntl, termios
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 signal.signal(signal.SIGUSR1, hang)
 signal.signal(signal.SIGUSR2, fail)
 signal.signal(signal.SIGALRM, jump)
@@ -142,9 +145,8 @@ class Host:
                 )
         else:
             self.process = subprocess.Popen(
-                line, stdin=self.terminal, stdout=self.terminal, stderr=self.terminal, start_new_session=True,
-                preexec_fn=_take_terminal,
-            )  # fmt: skip
+                line, stdin=self.terminal, stdout=self.terminal, stderr=self.terminal, start_new_session=True
+            )
 
     def send(self, *signals: int) -> float:
         """Signals, one after the other; the moment of the first."""
@@ -181,13 +183,6 @@ class Host:
         return found
 
 
-def _take_terminal() -> None:
-    import fcntl  # noqa: PLC0415  POSIX only
-    import termios  # noqa: PLC0415
-
-    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-
-
 @dataclass(frozen=True)
 class Recovered:
     """What is in the files of a run, whatever ended it; times on the monotonic clock, None where there is none.
@@ -218,8 +213,8 @@ def recovered(folder: Path) -> Recovered:
     last = None
     if journal.runs and len(starts) >= len(journal.runs):
         run = journal.runs[-1]
-        times = run.column("ticks", "time_s") if "ticks" in run.tables else ()
-        last = starts[len(journal.runs) - 1] + float(times[-1]) if len(times) else None
+        times = [float(t) for t in run.column("ticks", "time_s")] if "ticks" in run.tables else []
+        last = starts[len(journal.runs) - 1] + times[-1] if times else None
     return Recovered(last, last_tick, verdicts[-1] if verdicts else None)
 
 

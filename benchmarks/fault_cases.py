@@ -18,7 +18,7 @@ DISK_FULL_BYTES = 4096  # whatever stands further back in a file cannot be writt
 SAID = 110
 
 
-class Path_(Enum):  # noqa: N801 (Path is taken)
+class Road(Enum):
     """What takes the torque off."""
 
     WORKS = "the host, over a command path that works"
@@ -39,7 +39,7 @@ class Case:
     name: str
     strike: Strike
     codes: frozenset[int]
-    path: Path_ = Path_.WORKS
+    path: Road = Road.WORKS
     detected_s: float = 0.05
     before: bool = False
     host_dies: bool = False
@@ -121,19 +121,19 @@ def nothing(devices: Devices, host: Host | None) -> float:
     return time.monotonic()
 
 
-def of_emulators(name: str, codes: set[int], detected_s: float = 0.05, path: Path_ = Path_.WORKS, **more: Any) -> Case:
+def of_emulators(name: str, codes: set[int], detected_s: float = 0.05, path: Road = Road.WORKS, **more: Any) -> Case:
     """A fault of the emulators in the middle of a set."""
     return Case(name, injected(name, **more), frozenset(codes), path, detected_s)
 
 
-def at_start(name: str, fault: str, codes: set[int], path: Path_ = Path_.DEAD, **more: Any) -> Case:
+def at_start(name: str, fault: str, codes: set[int], path: Road = Road.DEAD, **more: Any) -> Case:
     """A fault that is there from the beginning."""
     return Case(name, injected(fault, **more), frozenset(codes), path, before=True)
 
 
-def of_host(name: str, strike: Strike, codes: set[int], detected_s: float = 0.05, path: Path_ = Path_.WORKS) -> Case:
+def of_host(name: str, strike: Strike, codes: set[int], detected_s: float = 0.05, path: Road = Road.WORKS) -> Case:
     """Something that is done to the host."""
-    return Case(name, strike, frozenset(codes), path, detected_s, host_dies=path is Path_.DEAD)
+    return Case(name, strike, frozenset(codes), path, detected_s, host_dies=path is Road.DEAD)
 
 
 def _terminal_closed(devices: Devices, host: Host | None) -> float:
@@ -165,33 +165,33 @@ CASES: tuple[Case, ...] = (
     of_emulators("gyro_spikes", {4}, 1.0),
     of_emulators("gyro_drifts", {4}, 1.5),
     of_emulators("gyro_saturated", {4}),
-    of_emulators("adapter_unplugged", {3}, path=Path_.DEAD),
-    of_emulators("adapter_replugged", {3}, path=Path_.DEAD, lasts_s=0.3),
-    of_emulators("both_unplugged", {3, 4}, path=Path_.DEAD),
-    of_emulators("adapter_stalls", {3}, path=Path_.DEAD),
-    of_emulators("adapter_garbled", {3}, path=Path_.DEAD),
-    of_emulators("adapter_slow", {3}, path=Path_.DEAD),
+    of_emulators("adapter_unplugged", {3}, path=Road.DEAD),
+    of_emulators("adapter_replugged", {3}, path=Road.DEAD, lasts_s=0.3),
+    of_emulators("both_unplugged", {3, 4}, path=Road.DEAD),
+    of_emulators("adapter_stalls", {3}, path=Road.DEAD),
+    of_emulators("adapter_garbled", {3}, path=Road.DEAD),
+    of_emulators("adapter_slow", {3}, path=Road.DEAD),
     of_emulators("adapter_drops", {0, 3}),
-    of_emulators("bus_off", {3}, path=Path_.DEAD),
+    of_emulators("bus_off", {3}, path=Road.DEAD),
     of_emulators("bus_deaf", {3}, 0.21),
-    of_emulators("host_beat_lost", {3}, path=Path_.DRIVE),
+    of_emulators("host_beat_lost", {3}, path=Road.DRIVE),
     of_emulators("drive_beat_lost", {3}, 0.21),
-    of_emulators("drive_fault", {3}, path=Path_.DRIVE),
+    of_emulators("drive_fault", {3}, path=Road.DRIVE),
     of_emulators("drive_emergency", {3}),
-    of_emulators("drive_reset", {3}, path=Path_.DRIVE),
-    of_emulators("drive_stopped", {3}, path=Path_.DRIVE),
-    of_emulators("drive_pre_operational", {3}, path=Path_.DRIVE),
-    of_emulators("drive_off", {3}, path=Path_.DRIVE),
+    of_emulators("drive_reset", {3}, path=Road.DRIVE),
+    of_emulators("drive_stopped", {3}, path=Road.DRIVE),
+    of_emulators("drive_pre_operational", {3}, path=Road.DRIVE),
+    of_emulators("drive_off", {3}, path=Road.DRIVE),
     of_emulators("torque_runs_away", {4}, 0.2),
     of_emulators("torque_reversed", {4}, 0.5),
     of_emulators("torque_doubled", {4}, 0.8),
     of_emulators("torque_dead", {4}, 1.5),
     of_emulators("torque_stuck", {4}, 1.5),
     of_emulators("torque_saturates", {0, 4}, 1.5),
-    of_host("kill -9", signals(signal.SIGKILL), {-signal.SIGKILL}, path=Path_.DEAD),
-    of_host("SIGSTOP for a second", stopped(1.0), {3, 4}, path=Path_.DEAD),
+    of_host("kill -9", signals(signal.SIGKILL), {-signal.SIGKILL}, path=Road.DEAD),
+    of_host("SIGSTOP for a second", stopped(1.0), {3, 4}, path=Road.DEAD),
     of_host("SIGSTOP for 60 ms", stopped(0.06), {4}, 0.1),
-    of_host("loop hangs, threads alive", signals(signal.SIGUSR1), {3, 4}, path=Path_.DEAD),
+    of_host("loop hangs, threads alive", signals(signal.SIGUSR1), {3, 4}, path=Road.DEAD),
     of_host("exception in the loop", signals(signal.SIGUSR2), {70}),
     of_host("clock jumps by 200 ms", signals(signal.SIGALRM), {4}, 0.26),
     of_host("Ctrl-C", signals(signal.SIGINT), {130}),
@@ -200,13 +200,13 @@ CASES: tuple[Case, ...] = (
     of_host("SIGHUP", signals(signal.SIGHUP), {130}),
     TERMINAL_CLOSED,
     of_host("disk full", disk_full, {130}, 0.2),
-    Case("wrong node number", nothing, frozenset({3}), Path_.DEAD, before=True, overrides=("bench.amplifier.node=2",)),
-    Case("wrong CAN bit rate (bus silent)", injected("adapter_stalls"), frozenset({3}), Path_.DEAD, before=True),
+    Case("wrong node number", nothing, frozenset({3}), Road.DEAD, before=True, overrides=("bench.amplifier.node=2",)),
+    Case("wrong CAN bit rate (bus silent)", injected("adapter_stalls"), frozenset({3}), Road.DEAD, before=True),
     at_start("gyro at another baud rate", "gyro_garbled", {3}),
     at_start("adapter at another baud rate", "adapter_garbled", {3}),
     at_start("gyro silent at the start", "gyro_silent", {3}),
-    at_start("gyro the wrong way round", "gyro_reversed", {4}, Path_.WORKS),
-    at_start("motor the wrong way round", "torque_reversed", {4}, Path_.WORKS),
-    at_start("gyro off its shaft", "gyro_loose", {4}, Path_.WORKS),
-    at_start("gyro of another scale", "gyro_scaled", {4}, Path_.WORKS),
+    at_start("gyro the wrong way round", "gyro_reversed", {4}, Road.WORKS),
+    at_start("motor the wrong way round", "torque_reversed", {4}, Road.WORKS),
+    at_start("gyro off its shaft", "gyro_loose", {4}, Road.WORKS),
+    at_start("gyro of another scale", "gyro_scaled", {4}, Road.WORKS),
 )
