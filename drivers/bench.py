@@ -263,8 +263,9 @@ def answer(
     reported = amplifier.take_reported()
     actual = amplifier.actual_torque_nm
     if actual is None:
-        return Exchange(gyro, sent)
+        return Exchange(gyro, sent, amplifier.readings)
     source = config.amplifier.torque_source
     from_drive = source == "actual" or (source == "auto" and amplifier.stamps_torque)
     channels = {"drive_torque_nm": actual, "sent_torque_nm": sent[-1].torque_nm if sent else 0.0}
+    channels |= amplifier.readings
     return Exchange(gyro, reported if from_drive else sent, channels)

@@ -8,6 +8,7 @@ called, so that other ports do not overflow meanwhile.
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -23,6 +24,7 @@ from rig.errors import ConfigError, DeviceFault
 POLL_INTERVAL_S = 0.0005
 MOST_FRAMES_A_POLL = 10_000
 SEND_TIMEOUT_S = 0.005
+MOST_ERRORS, ERRORS_WITHIN_S = 20, 0.1
 
 
 class Heard(NamedTuple):
@@ -57,6 +59,7 @@ class CanLink:
         self._lines = own.send_lines if own is not None else None
         self._take = own.take_frames if own is not None else None
         self.name = str(bus.channel_info)
+        self._errors: deque[float] = deque()
         self.record: Record | None = None
         self.idle: Callable[[], None] = lambda: None
         self.listeners: list[Callable[[Heard], None]] = []
@@ -106,9 +109,23 @@ class CanLink:
             message = self._bus.recv(0)
             if message is None:
                 break
-            if not message.is_error_frame:
+            if message.is_error_frame:
+                self._count_error(self.clock())
+            else:
                 heard.append(Heard(self.clock(), _frame(message)))
         return heard
+
+    def _count_error(self, now_s: float) -> None:
+        """Error frames come one by one on a bus that is disturbed, and in hundreds on one that is about to go off."""
+        errors = self._errors
+        errors.append(now_s)
+        while errors[0] < now_s - ERRORS_WITHIN_S:
+            errors.popleft()
+        if len(errors) > MOST_ERRORS:
+            raise DeviceFault(
+                f"CAN on {self.name}: {len(errors)} error frames within {ERRORS_WITHIN_S:g} s (limit {MOST_ERRORS}): "
+                "check termination, bit rate, shield and that another node acknowledges what is sent"
+            )
 
     def fileno(self) -> int:
         """File descriptor on which arriving frames show, or -1 where the bus has none."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import struct
 import threading
@@ -31,6 +32,7 @@ GYRO_READ, GYRO_SENT, CAN_READ, CAN_SENT = b"G"[0], b"g"[0], b"R"[0], b"S"[0]
 TICK, CLOCK, MARK = b"T"[0], b"C"[0], b"M"[0]
 KINDS = frozenset(b"GgRSTCM")
 LONGEST_PAYLOAD = 1 << 24
+LONGEST_FRAME = 64
 
 _HEAD = struct.Struct("<BdI")
 RECORD_HEAD_BYTES = _HEAD.size
@@ -205,8 +207,26 @@ def read_capture(path: Path) -> Iterator[Entry]:
         start = at + _HEAD.size
         if kind not in KINDS or length > LONGEST_PAYLOAD or start + length > len(data):
             return
-        yield Entry(kind, time_s, data[start : start + length])
+        payload = data[start : start + length]
+        if not math.isfinite(time_s) or not _is_whole(kind, payload):
+            return
+        yield Entry(kind, time_s, payload)
         at = start + length
+
+
+def _is_whole(kind: int, payload: bytes) -> bool:
+    """Whether the payload is what this kind of record carries."""
+    if kind in (CAN_READ, CAN_SENT):
+        return _CAN_HEAD.size <= len(payload) <= _CAN_HEAD.size + LONGEST_FRAME
+    if kind == TICK:
+        return len(payload) == _TORQUE.size
+    if kind == MARK:
+        try:
+            values = json.loads(payload)
+        except (ValueError, RecursionError):
+            return False
+        return isinstance(values, dict) and isinstance(values.get("mark"), str)
+    return True
 
 
 def export(path: Path, prefix: str = "") -> tuple[Path, Path]:

@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from drivers import capture
 from drivers.amplifiers import make_amplifier
 from drivers.bench import answer
@@ -96,7 +98,10 @@ class ReplayRig(Rig):
     def __init__(self, path: Path) -> None:
         self._entries = list(read_capture(path))
         section = _section(self._entries, path)
-        self.config, self._probed = BenchConfig.model_validate(section), "probe" in section
+        try:
+            self.config, self._probed = BenchConfig.model_validate(section), "probe" in section
+        except (ValidationError, TypeError) as error:
+            raise RecordingError(f"{path}: the configuration in it was changed: {error}") from None
         self.gyroscope = make_gyroscope(self.config.gyroscope)
         self.amplifier = make_amplifier(self.config.amplifier)
         self.clock = ReplayClock([e.time_s for e in self._entries if e.kind == capture.CLOCK])
@@ -221,6 +226,6 @@ def _section(entries: Sequence[Entry], path: Path) -> Mapping[str, Any]:
         if entry.kind == capture.MARK:
             values = json.loads(entry.payload)
             if values.get("mark") == "config":
-                section: Mapping[str, Any] = values["bench"]
+                section: Mapping[str, Any] = values.get("bench")
                 return section
     raise RecordingError(f"{path} holds no configuration: it was cut before the devices were contacted")

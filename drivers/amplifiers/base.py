@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
@@ -43,6 +43,11 @@ class Amplifier(ABC):
     @abstractmethod
     def actual_torque_nm(self) -> float | None:
         """Torque at the shaft as the drive last reported it; None where it does not."""
+
+    @property
+    def readings(self) -> Mapping[str, float]:
+        """What else the drive reports, by channel: ``drive_temperature_c``, ``drive_current_a`` (of the motor)."""
+        return {}
 
     @property
     def stamps_torque(self) -> bool:

@@ -20,6 +20,7 @@ from rig.errors import DeviceFault
 NMT_START, NMT_PRE_OPERATIONAL = 0x01, 0x80
 SYNCHRONOUS, EVENT_DRIVEN = 1, 255
 PER_MILLE = 1000
+ERROR_BEHAVIOUR, TO_PRE_OPERATIONAL, STAYS_OPERATIONAL = 0x1029, 0, 1
 COMMAND_LIMIT = 32_767
 OPTIONAL_OBJECTS = (
     cia402.MAX_TORQUE,
@@ -145,6 +146,21 @@ class Cia402Setup:
             objects.write(cia402.ABORT_CONNECTION_OPTION, 0, s.on_lost_host, 2)
             if objects.read(cia402.ABORT_CONNECTION_OPTION, signed=True) == 0:
                 raise DeviceFault(f"{self._label}: 0x6007 stays 0, so a lost computer would change nothing: refused")
+        else:
+            self._leave_operational_when_lost(objects)
+
+    def _leave_operational_when_lost(self, objects: RemoteObjects) -> None:
+        """Without 0x6007 it has to leave NMT operational, which no torque outlives; refuse where that is not so."""
+        behaviour = objects.read_if_there(ERROR_BEHAVIOUR, 1)
+        if behaviour == STAYS_OPERATIONAL:
+            objects.write(ERROR_BEHAVIOUR, 1, TO_PRE_OPERATIONAL, 1)
+            behaviour = objects.read(ERROR_BEHAVIOUR, 1)
+        if behaviour is None or behaviour == STAYS_OPERATIONAL:
+            raise DeviceFault(
+                f"{self._label} has no 0x6007 and "
+                + ("no 0x1029" if behaviour is None else "its 0x1029:01 stays 1 (no change)")
+                + ": nothing makes it cut the torque when this computer dies. Refused; use a drive or firmware that has."
+            )
 
     def _map(self, objects: RemoteObjects, plan: DrivePlan) -> bool:
         """Both PDOs; True where the drive stamps its torque."""

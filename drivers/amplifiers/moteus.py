@@ -2,7 +2,8 @@
 
 Register protocol (docs/protocol/registers.md of the firmware). Its watchdog latches mode 11 ("position
 timeout") a tenth of a second after the last command and holds it until a stop: that is the drive-side guard,
-armed as delivered. Needs an adapter for CAN-FD with bit-rate switching (``can.interface`` socketcan, ...).
+armed as delivered, and proved when it is armed here: with zero torque commanded, this computer falls silent once
+and a controller that goes on as if nothing were is refused. Needs an adapter for CAN-FD with bit-rate switching (``can.interface`` socketcan, ...).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from rig.errors import ConfigError, DeviceFault
 MODE_STOPPED, MODE_FAULT, MODE_POSITION, MODE_TIMEOUT = 0, 1, 10, 11
 ANSWER_TIMEOUT_S = 0.1
 SILENT_S = 0.05
+PROOF_FACTOR = 1.5
 
 _WRITE_I8_1 = 0x01  # write one int8 register
 _WRITE_F32_1, _WRITE_F32_2 = 0x0D, 0x0E
@@ -145,13 +147,28 @@ class Moteus(Amplifier):
             link.listeners.append(self.receive)
         if not self._ask(link, encode_stop()):
             raise DeviceFault(f"{self.label} does not answer: check its supply, id and the CAN-FD bit rates (1/5 M)")
-        return [f"peak {self.peak_torque_nm:.4g} N m as declared, watchdog {self.config.watchdog_ms} ms in each frame"]
+        return [f"peak {self.peak_torque_nm:.4g} N m as declared, watchdog {self.config.watchdog_ms} ms in each frame, "
+            "proved when it is armed"]
 
     def arm(self, link: CanLink) -> None:
         """Stop clears a latched timeout; then position mode at zero torque."""
         self._bring_to(link, encode_stop(), MODE_STOPPED)
         self._bring_to(link, encode_torque(0.0, self.config.watchdog_ms * 1e-3), MODE_POSITION)
+        self._prove_watchdog(link)
+        self._bring_to(link, encode_stop(), MODE_STOPPED)
+        self._bring_to(link, encode_torque(0.0, self.config.watchdog_ms * 1e-3), MODE_POSITION)
         self._armed = True
+
+    def _prove_watchdog(self, link: CanLink) -> None:
+        """Silence for longer than the watchdog, then a question that commands nothing."""
+        link.wait(PROOF_FACTOR * self.config.watchdog_ms * 1e-3, lambda: False)
+        heard = self._ask(link, _QUERY)
+        if not heard or self.mode != MODE_TIMEOUT:
+            link.send(self.off_frames())
+            raise DeviceFault(
+                f"{self.label} goes on without a sign of life of this computer (mode {self.mode}, {MODE_TIMEOUT} "
+                "expected): refused. Its firmware has to keep the watchdog of the position command (register 0x027)."
+            )
 
     def _bring_to(self, link: CanLink, body: bytes, mode: int) -> None:
         def again() -> None:

@@ -7,7 +7,7 @@ loop at zero torque it falls silent for the watchdog time, and refuses an axis t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 from pydantic import Field
@@ -67,6 +67,11 @@ class Odrive(Amplifier):
             return None
         return self.shaft_nm(self._current_a * self.settings.torque_constant_nm_a)
 
+    @property
+    def readings(self) -> Mapping[str, float]:
+        """Iq."""
+        return {} if self._current_a is None else {"drive_current_a": self._current_a}
+
     def contact(self, link: CanLink) -> list[str]:
         """Hear its heartbeat, clear its errors, set torque control; it stays idle."""
         if self.receive not in link.listeners:
@@ -77,7 +82,10 @@ class Odrive(Amplifier):
             self._frame(Command.CLEAR_ERRORS),
             self._frame(Command.SET_CONTROLLER_MODE, wire.CONTROL_TORQUE, wire.INPUT_PASSTHROUGH),
         ])  # fmt: skip
-        return [f"torque control, peak {self.peak_torque_nm:.4g} N m as declared"]
+        return [
+            f"torque control, peak {self.peak_torque_nm:.4g} N m as declared",
+            f"watchdog of {self.config.watchdog_ms} ms: CANSimple cannot read it, so it is proved when it is armed",
+        ]
 
     def arm(self, link: CanLink) -> None:
         """Closed loop at zero torque; then prove that its watchdog cuts in, and close the loop again."""

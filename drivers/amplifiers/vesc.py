@@ -8,7 +8,7 @@ timeout (1000 ms as delivered, app settings) is the drive-side watchdog: set it 
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 from pydantic import Field
@@ -20,7 +20,7 @@ from drivers.settings import Settings, read_settings
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 
-SET_CURRENT, STATUS = 1, 9
+SET_CURRENT, STATUS, STATUS_4 = 1, 9, 16
 STATUS_TIMEOUT_S = 0.5
 SILENT_S = 0.25
 ZERO_CURRENT_A = 0.5
@@ -43,6 +43,20 @@ def decode_status(data: bytes) -> tuple[float, float, float]:
         raise ValueError(f"VESC status of {len(data)} bytes, 8 expected: {data.hex()}")
     erpm, current, duty = struct.unpack(">ihh", data)
     return float(erpm), current / 10.0, duty / 1000.0
+
+
+def decode_temperatures(data: bytes) -> tuple[float, float]:
+    """(controller, motor) in deg C of a STATUS 4 frame.
+
+    Raises
+    ------
+    ValueError
+        If the payload is not eight bytes long.
+    """
+    if len(data) != 8:
+        raise ValueError(f"VESC status 4 of {len(data)} bytes, 8 expected: {data.hex()}")
+    controller, motor = struct.unpack_from(">hh", data)
+    return controller / 10.0, motor / 10.0
 
 
 class VescSettings(Settings):
@@ -68,6 +82,8 @@ class Vesc(Amplifier):
         self.label = f"VESC, id {config.node}"
         self._current_id = SET_CURRENT << 8 | config.node
         self._status_id = STATUS << 8 | config.node
+        self._temperatures_id = STATUS_4 << 8 | config.node
+        self._hottest_c: float | None = None
         self._current_a: float | None = None
         self._heard_s: float | None = None
         self._armed = False
@@ -83,6 +99,12 @@ class Vesc(Amplifier):
         if self._current_a is None:
             return None
         return self.shaft_nm(self._current_a * self.settings.torque_constant_nm_a)
+
+    @property
+    def readings(self) -> Mapping[str, float]:
+        """Motor current; the hotter of controller and motor where status 4 is switched on."""
+        known = {"drive_current_a": self._current_a, "drive_temperature_c": self._hottest_c}
+        return {name: value for name, value in known.items() if value is not None}
 
     def _command(self, current_a: float) -> CanFrame:
         return CanFrame(self._current_id, encode_current(current_a), extended=True)
@@ -117,9 +139,14 @@ class Vesc(Amplifier):
 
     def receive(self, heard: Heard) -> None:
         """Status frames."""
-        if heard.frame.identifier == self._status_id and heard.frame.extended and len(heard.frame.data) == 8:
+        frame = heard.frame
+        if not frame.extended or len(frame.data) != 8:
+            return
+        if frame.identifier == self._status_id:
             self._heard_s = heard.time_s
-            self._current_a = decode_status(heard.frame.data)[1]
+            self._current_a = decode_status(frame.data)[1]
+        elif frame.identifier == self._temperatures_id:
+            self._hottest_c = max(decode_temperatures(frame.data))
 
     def check(self, now_s: float) -> None:
         """Silence; a VESC reports no faults on CAN."""

@@ -43,6 +43,7 @@ class Tally:
         self.received = 0
         self.lost = 0
         self.invalid = 0
+        self.repeated = 0
         self.last_reason = ""
         self.recent_rates: deque[float] = deque(maxlen=4000)
 
@@ -79,6 +80,7 @@ class Gyroscope(ABC):
         self.tally = Tally()
         self.said: list[str] = []
         self._count: int | None = None
+        self._newest: tuple[Reading, float] | None = None
         self._replaced = 0
         self._late_since_s = math.inf
 
@@ -149,7 +151,24 @@ class Gyroscope(ABC):
                 readings.append((reading, read_at_s - on_wire_s - reading.latency_s))
         return self._stamp(readings[::-1])
 
-    def _stamp(self, readings: list[tuple[Reading, float]]) -> list[GyroSample]:
+    def _first_seen(self, readings: list[tuple[Reading, float]]) -> list[tuple[Reading, float]]:
+        """Without what came twice: the same number and rate soon after. The second would count as a turn of the counter.
+
+        Half a turn of the counter later it is another sample that happens to look alike.
+        """
+        turn_s = self.count_modulus * self.clock.period_s if self.count_modulus else math.inf
+        fresh = []
+        for reading, at_s in readings:
+            newest, self._newest = self._newest, (reading, at_s)
+            if newest is not None and reading.number is not None and reading[:3] == newest[0][:3]:
+                if at_s - newest[1] < 0.5 * turn_s:
+                    self.tally.repeated += 1
+                    continue
+            fresh.append((reading, at_s))
+        return fresh
+
+    def _stamp(self, every: list[tuple[Reading, float]]) -> list[GyroSample]:
+        readings = self._first_seen(every)
         if not readings:
             return []
         counts = self._unwrap([reading.number for reading, _ in readings], readings[-1][1])

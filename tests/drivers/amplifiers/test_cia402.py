@@ -230,3 +230,15 @@ def test_missing_eds_is_a_configuration_error(bench, tmp_path):
     other = Bench({"eds": str(broken)})
     with pytest.raises(ConfigError, match="cannot be read as EDS"):
         other.amplifier.contact(other.link)
+
+
+def without(bench, *objects):
+    """Take objects away from the drive."""
+    for index in objects:
+        del bench.drive.od._od[index]
+    return bench
+
+
+def test_a_drive_without_a_reaction_to_a_lost_computer_is_refused_at_contact(bench):
+    with pytest.raises(DeviceFault, match=r"has no 0x6007 and no 0x1029: nothing makes it cut the torque"):
+        without(bench, cia402.ABORT_CONNECTION_OPTION).amplifier.contact(bench.link)

@@ -1,11 +1,12 @@
 import math
 import struct
 
+import can
 import pytest
 
 import drivers.can_link
 from drivers.amplifiers import make_amplifier, moteus, vesc
-from drivers.can_link import CanLink
+from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
 from rig.config.bench import AmplifierConfig, CanConfig
 from rig.errors import ConfigError, DeviceFault
@@ -102,16 +103,29 @@ def test_moteus_command_is_torque_without_gains():
 
 
 class FakeMoteus:
-    """Answers each command with its mode and torque."""
+    """Answers each command with its mode and torque; its watchdog latches, where it has one."""
 
-    def __init__(self):
+    def __init__(self, watchdog=True):
         self.mode, self.torque_nm, self.out = moteus.MODE_TIMEOUT, 0.0, []
+        self.watchdog, self.fed_s = watchdog, 0.0
 
     def receive(self, frame, now_s):
-        wanted = frame.data[2]
-        if self.mode != moteus.MODE_TIMEOUT or wanted == moteus.MODE_STOPPED:
-            self.mode = wanted
+        commands = frame.data[0] == moteus._WRITE_I8_1
+        if self.watchdog and self.mode == moteus.MODE_POSITION and now_s - self.fed_s > 0.1:
+            self.mode = moteus.MODE_TIMEOUT
+        if commands:
+            self.fed_s = now_s
+            wanted = frame.data[2]
+            if self.mode != moteus.MODE_TIMEOUT or wanted == moteus.MODE_STOPPED:
+                self.mode = wanted
+        if not commands or len(frame.data) < 20:
+            self.torque_nm = 0.0
+            self.answer()
+            return
         self.torque_nm = struct.unpack_from("<f", frame.data, 16)[0] if self.mode == 10 else 0.0
+        self.answer()
+
+    def answer(self):
         body = bytes([0x21, 0, self.mode, 0x2D, 3]) + struct.pack("<f", self.torque_nm) + bytes([0x21, 0xF, 0])
         self.out.append(CanFrame(7 << 8, body, extended=True, fd=True))
 
@@ -138,6 +152,15 @@ def test_moteus_clears_a_latched_timeout_and_runs():
     bench.amplifier.disarm(bench.link)
 
 
+def test_moteus_whose_watchdog_does_nothing_is_refused():
+    bench = Bench(
+        "moteus", FakeMoteus(watchdog=False), node=7, can=CanConfig(interface="virtual", channel="x"),
+    )  # fmt: skip
+    with pytest.raises(DeviceFault, match="goes on without a sign of life"):
+        bench.armed()
+    assert bench.drive.mode == moteus.MODE_STOPPED
+
+
 def test_moteus_on_a_classic_can_adapter_is_refused():
     with pytest.raises(ConfigError, match="needs CAN-FD"):
         make_amplifier(AmplifierConfig(device="moteus"))
@@ -161,3 +184,23 @@ def test_vesc_takes_current_in_milliamperes_and_reports_amperes():
 def test_vesc_without_a_confirmed_timeout_is_refused():
     with pytest.raises(ConfigError, match="set the VESC's timeout to 100 ms"):
         make_amplifier(vesc_config(timeout_is_set=False))
+
+
+def test_vesc_reports_its_hottest_spot_and_its_current():
+    driver = make_amplifier(vesc_config())
+    assert driver.readings == {}
+    driver.receive(Heard(0.0, CanFrame(9 << 8 | 11, struct.pack(">ihh", 0, 125, 0), extended=True)))
+    driver.receive(Heard(0.0, CanFrame(16 << 8 | 11, struct.pack(">hhhh", 412, 655, 0, 0), extended=True)))
+    assert driver.readings == {"drive_current_a": 12.5, "drive_temperature_c": 65.5}
+
+
+def test_a_bus_full_of_errors_is_a_fault_and_a_few_are_not():
+    time = FakeTime()
+    bus = EmulatedBus(OdriveAxis(3, 20.0), time)
+    link = CanLink(bus, time)
+    errors = [can.Message(is_error_frame=True)] * 15
+    bus._recv_internal = lambda timeout: (errors.pop() if errors else None, False)
+    assert link.poll() == []
+    errors += [can.Message(is_error_frame=True)] * 15
+    with pytest.raises(DeviceFault, match=r"error frames within 0\.1 s \(limit 20\): check termination"):
+        link.poll()

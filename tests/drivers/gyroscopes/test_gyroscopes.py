@@ -169,3 +169,15 @@ def test_kvh_increments_become_rates_and_invalid_axes_are_marked():
         rates += gyro.feed(kvh1750.encode_kvh(message), 1.0 + k * 1e-3)
     assert rates[0].rate_rad_s == pytest.approx(-2.0)
     assert [s.valid for s in rates] == [True, False]
+
+
+def test_a_datagram_that_comes_twice_is_one_sample_and_no_turn_of_the_counter():
+    gyro = stim()
+    samples = []
+    for k in range(2000):
+        packet = datagram(k % 256, 10.0 + 0.01 * (k % 7))
+        samples += gyro.feed(packet + packet, 50.0 + k / 2000)
+    assert len(samples) == 2000
+    steps = [b.time_s - a.time_s for a, b in zip(samples[1000:], samples[1001:], strict=False)]
+    assert max(steps) == pytest.approx(0.5e-3, rel=0.05)
+    assert gyro.tally.repeated == 2000
