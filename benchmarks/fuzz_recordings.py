@@ -3,8 +3,8 @@
     python -m benchmarks.fuzz_recordings [--count 10000] [--seed 1] [FORMAT ...]
 
 Files are made by code, then bytes are changed, cut out, put in or cut off. Beside them stand files that are made to
-do harm: bombs of gzip, zip and zlib, pickles, huge declared shapes, links and datasets that lead elsewhere. A batch runs in
-a process of its own with a limit on its memory, so that a crash of a library is seen too.
+do harm: bombs of gzip, zip and zlib, pickles, huge declared shapes, links and datasets that lead elsewhere. A batch
+runs in a process of its own with a limit on its memory, so that a crash of a library is seen too.
 """
 
 from __future__ import annotations
@@ -33,7 +33,10 @@ BATCH = 250
 def read_as_recording(path: Path) -> None:
     """As a run of a `recorded` section."""
     yaml = path.with_name("rig.yaml")
-    yaml.write_text(f"backend: recorded\nrecorded: {{runs: [{{file: {path.name}}}]}}\n")
+    names = (
+        "columns: {time: log.time_s, torque: log.torque_nm, rate: log.rate_rad_s}, " if "struct" in path.name else ""
+    )
+    yaml.write_text(f"backend: recorded\nrecorded: {{{names}runs: [{{file: {path.name}}}]}}\n")
     for run in read_recording(load_config(yaml)).runs:
         assert np.isfinite(run.time_s).all() and len(run.time_s) >= 20
 

@@ -73,14 +73,16 @@ def _journal(path: Path) -> None:
 
 def _capture(path: Path) -> None:
     written = Capture(path.parent / "made")
-    bench = {"gyroscope": {"settings": {"datagram": 0x90}}, "amplifier": {"device": "odrive", "node": 1}}
+    settings = {"torque_constant_nm_a": 0.1, "peak_current_a": 50.0, "timeout_is_set": True}
+    amplifier = {"device": "vesc", "node": 1, "settings": settings}
+    bench = {"gyroscope": {"settings": {"datagram": 0x90}}, "amplifier": amplifier}
     written.mark(0.0, "config", {"bench": bench})
-    beat = CanFrame(0x21, bytes([0, 0, 0, 0, 1, 0, 0, 0]))
+    beat = CanFrame(9 << 8 | 1, bytes(8), extended=True)
     for k in range(60):
         datagram = stim300.Datagram(0x90, (0, 0, k), 0, k & 255, 500)
         written.gyro_read(k * 1e-3, stim300.encode_datagram(datagram))
         written.can(k * 1e-3, False, beat)
-        written.can(k * 1e-3, True, CanFrame(0x2E, struct.pack("<f", 0.0)))
+        written.can(k * 1e-3, True, CanFrame(1 << 8 | 1, bytes(4), extended=True))
         if k == 20:
             written.mark(k * 1e-3, "opened")
         if k == 30:
@@ -124,7 +126,7 @@ MAKERS: Mapping[str, Maker] = {
 def mutated(data: bytes, random: np.random.Generator) -> bytes:
     """``data`` with a few bytes changed, a stretch cut out, put in or doubled, or its end cut off."""
     changed = bytearray(data)
-    for _ in range(int(random.integers(1, 7))):
+    for _ in range(1 + int(random.exponential(1.0))):
         # Headers decide how the rest is read: half of the changes go there.
         end = min(len(changed), 600) if random.random() < 0.5 else len(changed)
         at = int(random.integers(0, max(1, end)))
