@@ -312,7 +312,7 @@ class FineSearch:
                 return best
         behind = {n: (good[n].penalised - good[best].penalised) / good[best].level for n in good}
         alike = [n for n in good if behind[n] < RIVAL]
-        return min(alike, key=lambda n: (*_simplicity(n), behind[n] > EQUAL, effects.names().index(n)))
+        return min(alike, key=lambda n: (*_simplicity(n), behind[n] > EQUAL, effects.known().index(n)))
 
     def _worth(self, name: str, new: Whole, now: Whole) -> bool:
         """Whether chi square falls beyond chance, also where nothing was fitted, with parameters that stand out."""

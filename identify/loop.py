@@ -97,7 +97,7 @@ class _Identifier:
         fitting = pieces(self.traces, self.split.fit, 3.0 * horizon)
         judging = pieces(self.traces, self.split.judge, 3.0 * horizon, 5_000)
         allowed = [
-            n for n in self.settings.candidates or effects.names()
+            n for n in self.settings.candidates or effects.known()
             if effects.get(n).reads is None or n in self.offer.candidates
         ]  # fmt: skip
         loop = Loop(fitting, judging, self.start, allowed, self.say, self.traces)

@@ -212,7 +212,7 @@ def _pair(names: str) -> str:
 
 def effect_cards(identification: Identification) -> Markup:
     """What each effect that was added is, with its equation, sign and source."""
-    known = set(effects.names())
+    known = set(effects.known())
     return join(_card(identification, name) for name in identification.verdict.effects if name in known)
 
 

@@ -35,7 +35,7 @@ def check_effect_names(names: Sequence[str]) -> None:
     """Raise KeyFaults naming every effect of a list that does not exist, with the nearest one that does."""
     from rig import effects  # noqa: PLC0415  compiled kernels: not paid for by a config that names no effect
 
-    known = effects.names()
+    known = effects.known()
     wrong = [((i,), unknown("effect", name, known)) for i, name in enumerate(names) if name not in known]
     if wrong:
         raise KeyFaults(wrong)
@@ -50,7 +50,7 @@ def check_effects(given: EffectValues) -> EffectValues:
         return given
     from rig import effects  # noqa: PLC0415  as above
 
-    known = effects.names()
+    known = effects.known()
     wrong: list[tuple[tuple[str | int, ...], str]] = []
     checked: dict[str, Mapping[str, float]] = {}
     for name, values in given.items():

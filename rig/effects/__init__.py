@@ -44,8 +44,13 @@ _MODULES = {
 
 
 def names() -> tuple[str, ...]:
-    """Names of all effects, in the order of the docs, then those from outside the package and of channels."""
-    return (*_MODULES, *_outside.names(_MODULES), *_channels.names())
+    """Names of all effects, in the order of the docs, those from outside the package last; none of channels."""
+    return (*_MODULES, *_outside.names(_MODULES))
+
+
+def known() -> tuple[str, ...]:
+    """Those names, and behind them the effects of measured channels that were declared."""
+    return (*names(), *_channels.names())
 
 
 def get(name: str) -> Effect:
@@ -104,6 +109,6 @@ def file_of(name: str) -> Path | None:
 
 
 __all__ = [
-    "Effect", "Parameter", "Place", "Scale", "declare_channels", "file_of", "filter_kernel", "get", "kernel", "names",
-    "of_channel", "read_file",
+    "Effect", "Parameter", "Place", "Scale", "declare_channels", "file_of", "filter_kernel", "get", "kernel", "known",
+    "names", "of_channel", "read_file",
 ]  # fmt: skip

@@ -69,4 +69,5 @@ def test_a_channel_declared_anew_takes_the_place_of_the_one_before() -> None:
     effects.declare_channels([Channel("probe", "temperature")])
     effects.declare_channels([Channel("probe", "acceleration")])
     assert effects.of_channel("probe") == ("probe_torque",)
-    assert "probe_gain" not in effects.names()
+    assert "probe_gain" not in effects.known()
+    assert "probe_torque" not in effects.names()
