@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.emulated import OFF, SET_S, SHORT, TO_THE_SET_S, Devices, Host, Recovered, recovered
-from benchmarks.fault_cases import CASES, Case, Road
+from benchmarks.fault_cases import CASES, LATER, Case, Road
 
 REACTION_S, WATCHDOG_S, LOST_S = 0.020, 0.120, 0.100
 HANGS_S = 30.0
@@ -139,6 +139,7 @@ def row(case: Case, tries: Sequence[Outcome]) -> str:
     wrong = sorted({text for t in tries for text in t.wrong})
     reaction = _span([t.reaction_s for t in tries]) if case.path is Road.WORKS and not case.before else "-"
     stated = "-" if case.before or case.path is not Road.WORKS else f"{case.detected_s * 1e3:.0f}"
+    stated = "may play on" if case.detected_s == LATER else stated
     limit = {Road.WORKS: "verdict + 20", Road.DEAD: "120", Road.DRIVE: "120"}[case.path]
     heard = next((t.said for t in tries if t.said), "")
     said = case.quote(heard).replace("|", "/")

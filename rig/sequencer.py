@@ -73,6 +73,9 @@ class Sequencer:
         Asked every tick; a text means: stop now, for this reason. Set by a signal handler, say.
     probe
         Small pulses before the first set, or None for none.
+    keep_runs
+        Whether runs stay in memory; where they do not, the journal has them, and a long campaign needs no more
+        memory than a short one.
     """
 
     def __init__(
@@ -87,6 +90,7 @@ class Sequencer:
         observer: Observer | None = None,
         stop: Callable[[], str | None] = lambda: None,
         probe: Probe | None = None,
+        keep_runs: bool = True,
     ) -> None:
         self._rig = rig
         self._clock = clock
@@ -96,7 +100,7 @@ class Sequencer:
         self._journal = journal
         self._observer = observer or Observer()
         self._stop = stop
-        self._probe = probe
+        self._probe, self._keep_runs = probe, keep_runs
         self._verdict_s: float | None = None
         self._runs: list[Run] = []
         self._statistics: list[SetStatistics] = []
@@ -280,7 +284,7 @@ class Sequencer:
 
     def _keep(self, recorder: SetRecorder, complete: bool) -> None:
         """Keep the run; a journal that fails on the way out of an error must not hide that error."""
-        run = recorder.run()
+        run = recorder.run() if self._keep_runs else None
         if run is not None:
             self._runs.append(run)
         statistics = recorder.statistics(complete)

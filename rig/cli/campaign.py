@@ -204,6 +204,7 @@ class _Recorder:
     def _play(self, journal: Journal) -> None:
         stage, config = self._stage, self._config
         platform, asked = config.model.platform(), stage.rig.probe
+        in_memory = stage.rig.statement().torque is Torque.SIMULATED  # the bench's are in the journal, however long
         sequencer = Sequencer(
             stage.rig,
             stage.clock,
@@ -214,11 +215,13 @@ class _Recorder:
             observer=self.tally,
             stop=self._desk.stops.poll,
             probe=None if asked is None else Probe(asked, config.limits, platform, self._sets),
+            keep_runs=in_memory,
         )
         try:
             with self._desk.stops.playing(stage.rig.torque_off):
                 campaign = sequencer.play(self._sets)
-            self.recording, self.cause = campaign.recording, campaign.cause
+            self.recording = campaign.recording if in_memory else None
+            self.cause = campaign.cause
             self.verdict_s = campaign.verdict_s
         except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (torque is off by now; what is there is saved)
             self.cause = as_known(error)
