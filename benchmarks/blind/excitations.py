@@ -31,7 +31,7 @@ def smooth(x):  # type: ignore[no-untyped-def]
 @jit
 def torque_at(t, kind, a, tones):  # type: ignore[no-untyped-def]
     """Torque in N m; ``a`` is gain, duration, soft start and up to five numbers of the kind."""
-    if t < 0.0 or t > a[1]:
+    if t < 0.0 or t > a[1] * (1.0 + 1e-12):  # the last stage of the last step may lie a rounding error behind
         return 0.0
     gain = a[0] * (smooth(t / a[2]) if a[2] > 0.0 else 1.0)
     if kind == 0:

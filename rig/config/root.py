@@ -40,7 +40,7 @@ class Config(Section):
     @field_validator("name")
     @classmethod
     def _name_fits_a_folder(cls, name: str) -> str:
-        if _NOT_IN_A_NAME.search(name) or name != name.strip(" ."):
+        if not name.isprintable() or _NOT_IN_A_NAME.search(name) or name != name.strip(" ."):
             raise ValueError("becomes part of a folder's name: use letters, digits, spaces, - _ . inside it")
         return name
 

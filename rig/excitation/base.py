@@ -6,7 +6,7 @@ from abc import abstractmethod
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from rig.recording.run import Use
 
@@ -47,6 +47,13 @@ class ExcitationSet(BaseModel):
     repeat_scales: Annotated[tuple[Positive, ...], Field(max_length=20)] = ()
     travel_cap_deg: Positive | None = None
     use: Use = "auto"
+
+    @field_validator("name")
+    @classmethod
+    def _name_is_printed(cls, name: str) -> str:
+        if not name.isprintable():
+            raise ValueError("holds a character that cannot be seen or that turns the text around: leave it out")
+        return name
 
     @property
     def title(self) -> str:

@@ -31,14 +31,11 @@ from rig.recording.journal import (
     RUN_END,
 )
 from rig.recording.rows import increasing, on_samples
-from rig.recording.run import Array, Recording, Run
+from rig.recording.run import Array, Recording, Run, printable
 
 RUN_META = (
     "torque_hold", "use", "min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "rate_corner_hz", "rate_delay_s",
 )  # fmt: skip
-
-
-LONGEST_NAME = 200
 
 
 @dataclass(frozen=True)
@@ -169,10 +166,10 @@ class _Reading:
         self.end = end
 
     def _begin(self, head: dict[str, Any]) -> None:
-        columns = {str(k): tuple(_printable(str(name)) for name in v) for k, v in head["columns"].items()}
+        columns = {str(k): tuple(printable(str(name)) for name in v) for k, v in head["columns"].items()}
         if "time_s" not in columns["samples"]:
             raise ValueError("a run without time_s among its samples")
-        self._open = _OpenRun(_printable(str(head["name"])), dict(head["meta"]), columns)
+        self._open = _OpenRun(printable(str(head["name"])), dict(head["meta"]), columns)
         self.runs.append(self._open)
 
     def _end(self, payload: bytes) -> None:
@@ -191,11 +188,6 @@ class _Reading:
         if width != len(self._open.columns[table]):
             raise ValueError(f"{table} has {width} columns, {len(self._open.columns[table])} declared")
         self._open.blocks.setdefault(table, []).append(rows.astype(np.float64))
-
-
-def _printable(name: str) -> str:
-    """Names go to terminals, files and the report; what only steers those is no part of a name."""
-    return "".join(c if c.isprintable() else "?" for c in name[:LONGEST_NAME])
 
 
 def read_journal(path: str | Path) -> JournalContents:

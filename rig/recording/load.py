@@ -14,7 +14,7 @@ from rig.errors import RecordingError
 from rig.recording.checks import check_channel, check_run, check_samples, missing_column
 from rig.recording.readers import read_file
 from rig.recording.readers.base import Table
-from rig.recording.run import Array, Recording, Run
+from rig.recording.run import Array, Recording, Run, printable
 
 if TYPE_CHECKING:
     from rig.config.load import LoadedConfig
@@ -212,7 +212,8 @@ def _leaks(runs: Sequence[Run], sources: Sequence[Path]) -> list[str]:
 
 
 def _named_apart(runs: Sequence[Run]) -> tuple[Run, ...]:
-    """Runs with names of their own, so that a table of them can be read."""
+    """Runs with names of their own, so that a table of them can be read; what steers a terminal is no part of them."""
+    runs = [dataclasses.replace(run, name=printable(run.name)) for run in runs]
     names = [run.name for run in runs]
     return tuple(
         run

@@ -14,6 +14,12 @@ from rig.channels import Channel
 Array = NDArray[np.floating[Any]]  # float64 in fact; numpy's annotations lose that in arithmetic
 TorqueHold = Literal["band_limited", "zero_order"]
 Use = Literal["auto", "fit", "holdout"]
+LONGEST_NAME = 200
+
+
+def printable(name: str) -> str:
+    """Names go to terminals, files and the report: what only steers those is no part of a name."""
+    return "".join(c if c.isprintable() else "?" for c in name[:LONGEST_NAME])
 
 
 @dataclass(frozen=True)

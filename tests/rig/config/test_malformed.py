@@ -52,6 +52,21 @@ CASES = {
     "infinity": (RUNS + "identify: {lowpass_hz: .inf}", ":5: identify.lowpass_hz", ".inf", "finite number"),
     "overflow": (RUNS + "identify: {lowpass_hz: 1e999}", ":5: identify.lowpass_hz", "1e999", "finite number"),
     "endless integer": (RUNS + f"identify: {{seed: {'9' * 5000}}}", ":5: identify.seed", "9999", "number"),
+    "whole number beyond all floats": (RUNS + f"identify: {{j_dec: {'9' * 400}}}", ":5: identify.j_dec", "9", "finite"),
+    "brackets without end": ("a: " + "[{" * 60_000, "rig.yaml", "nested too deeply", "at most 40 levels"),
+    "text turned around": (RUNS + 'name: "a\\u202eb"', ":5: name", "folder's name", "letters"),
+    "set turned around": (
+        'backend: simulated\nsimulated: {}\nexcitation:\n  sets: [{torque_nm: 1, frequency_hz: 1, name: "\\u202ea"}]',
+        ":4: excitation.sets.0.name",
+        "turns the text around",
+        "leave it out",
+    ),
+    "platform too fast to simulate": (
+        "backend: simulated\nsimulated: {platform: {inertia_kg_m2: 1.0e-9, stiffness_nm_rad: 1.0e+9}}",
+        ":2: simulated",
+        "1.59e+08 Hz",
+        "raise inertia_kg_m2",
+    ),
     "list for a mapping": (RUNS + "identify: [1, 2]", ":5: identify", "a list of 2", "mapping of keys"),
     "mapping for a list": (
         "backend: recorded\nrecorded: {runs: {file: a.csv}}",
