@@ -4,7 +4,7 @@
     python -m benchmarks.fuzz_codecs [--seconds 1200] [--megabytes 10] [--json FILE] [TARGET ...]
 
 Each target runs in a process of its own until it has had its share of the seconds and its megabytes. What breaks a
-promise (an exception, a hang of 10 s, more than 1 GiB, a packet accepted with a wrong checksum) ends it with the
+promise (an exception, a hang, more than 1 GiB, a packet accepted with a wrong checksum) ends it with the
 input that did it. Without atheris (``--plain``) inputs are mutated at random.
 """
 
@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-HANG_S, MEMORY_MB, LONGEST_INPUT = 10, 1024, 4096
+HANG_S, MEMORY_MB, LONGEST_INPUT = 60, 1024, 4096  # a minute on a busy machine is seconds of its own
 NAMES = ("stim300", "stim300_text", "vectornav", "kvh1750", "xbus", "lawicel", "odrive", "moteus", "vesc", "cia402",
          "clocks")  # fmt: skip
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ def estimates_figure(identification: Identification) -> Figure | None:
                 drawn.append(_point(point, at, label, color, panel))
             else:
                 notes.append(_note("not determined" if point is None else percent(point[0]), at, panel, color, point))
-        labels = [label[:20] for label, _, _ in rows]
+        labels = [escape(label[:20]) for label, _, _ in rows]  # plotly reads its texts as HTML
         ticks = {"tickvals": list(range(len(rows))), "ticktext": labels, "range": [len(rows) - 0.5, -0.5]}
         away = f"% from {value_of(final[name])}"
         extra_y: dict[str, Any] = {**ticks, "showticklabels": panel == 1, "showgrid": False}

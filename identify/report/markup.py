@@ -18,8 +18,10 @@ Piece = str | Markup
 
 
 def text(piece: Piece) -> str:
-    """HTML of a piece: markup as it is, a string escaped."""
-    return piece.html if isinstance(piece, Markup) else escape(piece)
+    """HTML of a piece: markup as it is, a string escaped and without what would turn the text around it."""
+    if isinstance(piece, Markup):
+        return piece.html
+    return escape("".join(c if c.isprintable() or c.isspace() else "?" for c in piece))
 
 
 def join(pieces: Iterable[Piece]) -> Markup:

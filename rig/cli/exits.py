@@ -100,9 +100,13 @@ def leave_warnings_to_developers() -> None:
 
 
 def say(text: str) -> None:
-    """Write to stderr; a terminal that is gone must not stop what remains to be done."""
+    """Write to stderr; a terminal that is gone must not stop what remains to be done.
+
+    Messages quote names and paths from outside, which must not steer the terminal or turn its text around.
+    """
+    shown = "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
     with contextlib.suppress(OSError, ValueError):
-        sys.stderr.write(text + "\n")
+        sys.stderr.write(shown + "\n")
         sys.stderr.flush()
 
 
