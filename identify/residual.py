@@ -218,7 +218,7 @@ def dependence(traces: Sequence[RunTraces], cutoff_hz: float) -> dict[str, float
 def _share(x: Array, y: Array) -> float:
     """Share of the mean square of y, (n,), that its mean over bins of x explains; scatter taken off."""
     edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
-    if len(edges) < 3 or not np.any(y):
+    if len(edges) < 3 or not np.mean(y * y) > 0.0:
         return 0.0
     at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
     count = np.maximum(np.bincount(at, minlength=len(edges) - 1), 1)

@@ -18,6 +18,7 @@ from rig.recording.run import Array, Run, TorqueHold, Use
 MIN_SAMPLES = 20
 # No torque, rate, angle or time of a machine in SI units comes near; squares of it would overflow.
 LARGEST_VALUE = 1e12
+SMALLEST_PEAK = 1e-30  # a channel that stays below: squares of it would vanish
 
 
 def missing_column(table: Table, quantity: str, names: Sequence[str], *, mapped: bool) -> RecordingError:
@@ -150,6 +151,12 @@ def _check_motion(run: Run, path: Path) -> None:
     channel, values = ("rate", run.rate_rad_s) if run.rate_rad_s is not None else ("angle", run.angle_rad)
     if values is None:
         raise RecordingError(f"{path}: holds neither rate nor angle: export one of them")
+    for name, given in ((channel, values[run.valid]), ("torque", run.torque_nm)):
+        largest = float(np.max(np.abs(given))) if given is not None and len(given) else 0.0
+        if 0.0 < largest < SMALLEST_PEAK:
+            raise RecordingError(
+                f"{path}: the {name} never exceeds {largest:g}, which nothing measures: correct recorded.scale.{name}"
+            )
     if np.ptp(values[run.valid]) > 0:
         return
     torque = run.torque_nm
