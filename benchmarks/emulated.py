@@ -52,6 +52,7 @@ def jump(number, frame):
 if sys.stdin.isatty():
     import fcntl, termios
     fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever started this may have had it ignored
 signal.signal(signal.SIGUSR1, hang)
 signal.signal(signal.SIGUSR2, fail)
 signal.signal(signal.SIGALRM, jump)

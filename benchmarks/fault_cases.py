@@ -143,7 +143,7 @@ def _terminal_closed(devices: Devices, host: Host | None) -> float:
     return at_s
 
 
-TERMINAL_CLOSED = Case("terminal_closed", _terminal_closed, frozenset({130}), has_terminal=True)
+TERMINAL_CLOSED = Case("terminal_closed", _terminal_closed, frozenset({130}), detected_s=0.25, has_terminal=True)
 
 CASES: tuple[Case, ...] = (
     of_emulators("gyro_unplugged", {3, 4}),

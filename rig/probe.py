@@ -79,8 +79,8 @@ class Probe:
         self._step_nm = LARGEST_TRAVEL * math.radians(limits.travel_deg) / (2.0 * peak_angle)
         campaign_nm = max(_largest(s) for s in sets) if sets else limits.torque_nm
         given = config.torque_nm
-        self._largest_nm = min(LARGEST_TORQUE * campaign_nm if given is None else given, limits.torque_nm)
-        self._torque_nm = min(FIRST_RATE * rate / peak_rate, self._largest_nm)
+        self.largest_nm = min(LARGEST_TORQUE * campaign_nm if given is None else given, limits.torque_nm)
+        self._torque_nm = min(FIRST_RATE * rate / peak_rate, self.largest_nm)
         self._clear_share = 0.25 * peak_rate
         self._answers: list[Answer] = []
         self._pulse_at_s = 0.0
@@ -107,7 +107,7 @@ class Probe:
         answer = self._heard()
         self._answers.append(answer)
         room_nm = min((self._most_rad_s - answer.peak_rad_s) / self._rate_per_nm, self._step_nm, self._torque_nm)
-        next_nm = min(self._torque_nm + room_nm, self._largest_nm)
+        next_nm = min(self._torque_nm + room_nm, self.largest_nm)
         is_last = next_nm < LEAST_STEP * self._torque_nm or len(self._answers) >= MOST_LEVELS
         if answer.inertia_kg_m2 is not None or is_last:
             self.over = True

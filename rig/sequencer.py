@@ -248,8 +248,10 @@ class Sequencer:
 
     def _tripped(self, trip: Trip) -> SafetyTrip:
         self._note_verdict()
-        with contextlib.suppress(RigError):
+        try:
             self._rig.torque_off()  # the shortest road: before anything is formatted or written
+        except RigError as fault:
+            return SafetyTrip(f"Tripped on {trip} Torque off could not be sent: {fault}")
         return SafetyTrip(f"Torque is off. Tripped on {trip}")
 
     def _zero(self, duration_s: float, period_s: float, recorder: SetRecorder | None = None) -> None:

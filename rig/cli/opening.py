@@ -12,6 +12,7 @@ from rig.config.root import Config
 from rig.errors import UsageError
 from rig.excitation import PlannedSet
 from rig.interface import Statement, Torque
+from rig.probe import Probe
 from rig.sequencer import SETTLE_S, TAIL_S
 
 RULE = "=" * 78
@@ -27,6 +28,8 @@ def opening(statement: Statement, config: Config, sets: Sequence[PlannedSet], fo
         f"limits    travel {limits.travel_deg:g} deg, rate {limits.rate_deg_s:g} deg/s, torque {limits.torque_nm:g} N m"
     )
     lines += [f"{'sets' if i == 0 else '':10}{_line(s)}" for i, s in enumerate(sets)]
+    if statement.torque is not Torque.SIMULATED and config.bench is not None:
+        lines.append(f"probe     {_probe(config, sets)}")
     lines += [f"time      {_time(statement, config, sets)}", f"results   {plain(str(folder))}"]
     return "\n".join(lines)
 
@@ -47,6 +50,14 @@ def _line(planned: PlannedSet) -> str:
     peak_nm = float(np.max(np.abs(planned.torque(np.arange(0.0, planned.duration_s, PEAK_STEP_S)))))
     scaled = "" if planned.scale == 1.0 else f", scaled to {100 * planned.scale:.1f} %"
     return f"{plain(planned.name)}: {planned.duration_s:g} s, up to {peak_nm:.1f} N m{scaled}"
+
+
+def _probe(config: Config, sets: Sequence[PlannedSet]) -> str:
+    assert config.bench is not None
+    if not config.bench.probe.play:
+        return "NONE (bench.probe.play is false): the first set is the first torque"
+    most_nm = Probe(config.bench.probe, config.limits, config.model.platform(), sets).largest_nm
+    return f"small pulses first, up to {most_nm:.1f} N m where nothing moves before"
 
 
 def _time(statement: Statement, config: Config, sets: Sequence[PlannedSet]) -> str:
