@@ -25,10 +25,10 @@ from rig.errors import RigError
 from rig.recording.journal_reader import read_journal
 
 CONFIG = "examples/bench.yaml"
-SET_S = 6.0
+SET_S = 4.0
 SHORT = (
     f"excitation.sets=[{{torque_nm: 60, frequency_hz: 3, duration_s: {SET_S:g}}}]", "excitation.rest_s=0.5",
-    "bench.settle_s=1.5", "bench.emulator.start_up_s=0.1",
+    "bench.settle_s=1", "bench.emulator.start_up_s=0.1",
 )  # fmt: skip
 TO_THE_SET_S = 2.0  # from enabled to the first set: settling, probe, rest
 OFF = ("torque_zero", "watchdog", "fault", "disabled")
