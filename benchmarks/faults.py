@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import concurrent.futures
+import json
 import math
 import random
 import sys
@@ -166,31 +167,49 @@ def main(given: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--keep", type=Path, help="where every try is kept, so that an interrupted call goes on")
     arguments = parser.parse_args(given)
     cases = [case for case in CASES if not arguments.faults or case.name in arguments.faults]
-    moments = random.Random(arguments.seed)
-    print(HEAD, flush=True)
-    rows, failed = [HEAD], 0
+    tries = _earlier(arguments.keep)
+    todo = [(case, k) for k in range(arguments.times) for case in cases if k >= len(tries.get(case.name, []))]
     with (
         tempfile.TemporaryDirectory() as scratch,
         concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool,
     ):
-        waiting = [
-            (case, [
-                pool.submit(undisturbed, case, moments.uniform(0.1, 0.6 * SET_S), Path(scratch) / f"{n}-{k}")
-                for k in range(arguments.times)
-            ])
-            for n, case in enumerate(cases)
-        ]  # fmt: skip
-        for case, tries in waiting:
-            outcomes = [t.result() for t in tries]
-            failed += any(t.wrong for t in outcomes)
-            rows.append(row(case, outcomes))
-            print(rows[-1], flush=True)
-    print(f"{len(cases)} faults, {len(cases) * arguments.times} tries, {failed} faults failed")
+        waiting = {
+            pool.submit(undisturbed, case, _moment_s(arguments.seed, case.name, k), Path(scratch) / f"{n}"): case
+            for n, (case, k) in enumerate(todo)
+        }
+        for future in concurrent.futures.as_completed(waiting):
+            case, outcome = waiting[future], future.result()
+            tries.setdefault(case.name, []).append(outcome)
+            print(row(case, [outcome]), flush=True)
+            if arguments.keep is not None:
+                with arguments.keep.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps({"fault": case.name, **outcome._asdict()}) + "\n")
+    table = [HEAD, *(row(case, tries[case.name]) for case in cases)]
+    failed = sum(any(t.wrong for t in tries[case.name]) for case in cases)
+    told = f"{len(cases)} faults, {sum(len(tries[c.name]) for c in cases)} tries, {failed} faults failed"
+    print("\n".join([*table, told]))
     if arguments.out is not None:
-        arguments.out.write_text("\n".join(rows) + "\n", encoding="utf-8")
+        arguments.out.write_text("\n".join([*table, "", told]) + "\n", encoding="utf-8")
     return failed
+
+
+def _moment_s(seed: int, name: str, k: int) -> float:
+    """When in the set: random, and the same whenever the benchmark is run with this seed."""
+    return random.Random(f"{seed} {name} {k}").uniform(0.1, 0.6 * SET_S)
+
+
+def _earlier(path: Path | None) -> dict[str, list[Outcome]]:
+    """Tries of an earlier call that was interrupted."""
+    found: dict[str, list[Outcome]] = {}
+    if path is not None and path.exists():
+        for line in path.read_text(encoding="utf-8").splitlines():
+            values = json.loads(line)
+            values["wrong"] = tuple(values["wrong"])
+            found.setdefault(values.pop("fault"), []).append(Outcome(**values))
+    return found
 
 
 if __name__ == "__main__":
