@@ -144,7 +144,7 @@ def _shots_for(
     for i, trace in enumerate(traces):
         equations = Equations(platform_of(structure, names, x, trace.number, trace.run.added_inertia_kg_m2))
         substeps = min(MAX_SUBSTEPS, equations.substeps(trace.step_s))
-        substeps = int(np.clip(substeps // 2, 2, COARSEST)) if coarse else substeps
+        substeps = int(np.clip((substeps + 1) // 2, 2, COARSEST)) if coarse else substeps
         if trace.torque is not None and trace.torque.hold == "zero_order":
             # A step that spans several held values sees only their mean: that alone is a sigma or two.
             held = trace.step_s / trace.torque.shortest_s

@@ -17,8 +17,8 @@ from identify.output_error import Estimate
 from identify.parameters import Name, platform_of
 from identify.screen import grid_of
 from identify.sensitivities import nuisance_basis, sensitivities
-from identify.shots import RUNAWAY, Shots, motion, predict
-from identify.traces import torque_along
+from identify.shots import RUNAWAY, Shots, make_shots, motion, predict
+from identify.traces import UPSAMPLING, torque_along
 from rig import effects
 from rig.dynamics import Equations, Grid
 from rig.dynamics.simulate import MAX_SUBSTEPS
@@ -28,6 +28,11 @@ from rig.recording.run import Array
 
 LITTLE = 1e-4  # of the torque: more of a candidate would shift the ring beyond where sensitivities hold
 PHASE_RAD = 0.2  # of a candidate's own fastest motion in one of its steps
+SHARPENED = 6  # candidates whose shapes are looked at between the grid
+WORTH_SHARPENING = 10.0  # expected fall of chi square
+NEARLY = 0.97  # of the squares of the busiest part of a run
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+SECTIONS = 6
 SCALED = (0.1, 10.0)  # by how much the score may scale a shape that means "none" at zero
 
 
@@ -43,12 +48,15 @@ class Scored:
         Parameter values for a fit to begin from.
     count
         Its number of parameters.
+    shape
+        The shape parameters that this is the gain of.
     """
 
     effect: str
     gain: float
     start: dict[Name, float]
     count: int
+    shape: tuple[float, ...] = ()
 
 
 @dataclass
@@ -81,7 +89,7 @@ class Scores:
     scale
         How large the motion is.
     share
-        How much of each run is looked at, from its start.
+        How much of each run is looked at, where most happens.
     """
 
     def __init__(
@@ -111,15 +119,23 @@ class Scores:
         tasks = [(effects.get(n), shape) for n in names for shape in grid_of(effects.get(n), self.scale)]
         with ThreadPoolExecutor(2) as workers:
             found = [s for s in workers.map(lambda t: self.score(*t), tasks) if s is not None]
+            found = [s for s in workers.map(self._at_its_size, found) if s is not None]
         best: dict[str, Scored] = {}
         for s in found:
             if s.effect not in best or s.gain > best[s.effect].gain:
                 best[s.effect] = s
-        return sorted(best.values(), key=lambda s: -s.gain)
+        ranked = sorted(best.values(), key=lambda s: -s.gain)
+        promising = [s for s in ranked[:SHARPENED] if s.gain > WORTH_SHARPENING]
+        with ThreadPoolExecutor(2) as workers:
+            sharper = list(workers.map(self.sharpened, promising))
+        return sorted(sharper + ranked[len(promising) :], key=lambda s: -s.gain)
 
     @RUNAWAY
-    def score(self, effect: Effect, shape: tuple[float, ...]) -> Scored | None:
-        """One candidate at given shapes; None where it does nothing or its motion runs away."""
+    def score(self, effect: Effect, shape: tuple[float, ...], as_it_is: bool = False) -> Scored | None:
+        """One candidate at given shapes; None where it does nothing or its motion runs away.
+
+        ``as_it_is`` scores a candidate that has no gain at its own size, not at the best multiple of it.
+        """
         pushes = self._pushes(effect, shape)
         if not pushes:
             return None
@@ -137,9 +153,57 @@ class Scores:
         along -= across.T @ self.inverse @ self.toward
         lowest = np.array([-np.inf if p[-1] else 0.0 for p in pushes])
         share, gain = _bounded(square, along, lowest)
+        if as_it_is:  # without a gain to scale it the candidate is what it is
+            share, gain = np.ones(1), max(0.0, float(2.0 * along[0] - square[0, 0]))
         return Scored(
-            effect.name, gain / self.sigma**2, self._start(effect, shape, pushes, share), len(effect.parameters)
+            effect.name, gain / self.sigma**2, self._start(effect, shape, pushes, share), len(effect.parameters), shape
         )
+
+    def _at_its_size(self, found: Scored) -> Scored | None:
+        """A candidate without a gain, at the shape on the grid or the multiple of it that promises more."""
+        effect = effects.get(found.effect)
+        if any(p.linear for p in effect.parameters):
+            return found
+        multiple = tuple(found.start[(effect.name, p.name)] for p in effect.parameters)
+        looks = [self.score(effect, shape, as_it_is=True) for shape in dict.fromkeys((found.shape, multiple))]
+        return max((s for s in looks if s is not None), key=lambda s: s.gain, default=None)
+
+    def sharpened(self, found: Scored) -> Scored:
+        """The same candidate at the best shapes between the neighbours on the grid, one axis after the other."""
+        effect = effects.get(found.effect)
+        shapes = [p for p in effect.parameters if not p.linear]
+        for i, p in enumerate(shapes):
+            grid = sorted(p.start(self.scale)) if p.start else []
+            if len(grid) < 2:
+                continue
+            beyond = grid[1] / grid[0], grid[-1] / grid[-2]  # the true shape may lie outside the grid
+            below = max((g for g in grid if g < found.shape[i]), default=found.shape[i] / beyond[0])
+            above = min((g for g in grid if g > found.shape[i]), default=found.shape[i] * beyond[1])
+            found = self._between(effect, found, i, max(below, p.low), min(above, p.high))
+        return found
+
+    def _between(self, effect: Effect, found: Scored, axis: int, below: float, above: float) -> Scored:
+        """Golden section on one shape, in its logarithm; the best of all that were looked at."""
+        if not 0.0 < below < above < np.inf:
+            return found
+        lo, hi = float(np.log(below)), float(np.log(above))
+        at = [hi - GOLDEN * (hi - lo), lo + GOLDEN * (hi - lo)]
+        looks = [self._at(effect, found, axis, x) for x in at]
+        best = found
+        for _ in range(SECTIONS):
+            gains = [0.0 if s is None else s.gain for s in looks]
+            best = max((best, *(s for s in looks if s is not None)), key=lambda s: s.gain)
+            left = gains[0] > gains[1]
+            lo, hi = (lo, at[1]) if left else (at[0], hi)
+            new = hi - GOLDEN * (hi - lo) if left else lo + GOLDEN * (hi - lo)
+            look = self._at(effect, found, axis, new)
+            at, looks = ([new, at[0]], [look, looks[0]]) if left else ([at[1], new], [looks[1], look])
+        return max((best, *(s for s in looks if s is not None)), key=lambda s: s.gain)
+
+    def _at(self, effect: Effect, found: Scored, axis: int, logarithm: float) -> Scored | None:
+        shape = list(found.shape)
+        shape[axis] = float(np.exp(logarithm))
+        return self.score(effect, tuple(shape), as_it_is=not any(p.linear for p in effect.parameters))
 
     def _pushes(self, effect: Effect, shape: tuple[float, ...]) -> list[tuple[dict[Name, float], bool]]:
         """A little of the candidate, once for every gain: parameter values, and whether they may turn their sign."""
@@ -271,20 +335,30 @@ def _half_steps(s: Shots, equations: Equations) -> tuple[Array, Array, Array, Ar
 
 
 def _cut(shots: Shots, share: float) -> Shots:
-    """The first part of a run, begun as the whole was."""
+    """The part of a run in which most happens: a soft start shows neither saturation nor travel."""
     if share >= 1.0:
         return shots
-    last = int(share * (len(shots.trace.measured) - 1))
-    trace = shots.trace.piece(0, last)
-    inside = shots.first < last
-    time = trace.start_s + trace.step_s * np.arange(len(trace.measured))
-    substeps = round(trace.step_s / shots.grid.step_s)
-    weight = shots.weight[: last + 1]
+    whole = shots.trace
+    n = len(whole.measured)
+    length = int(share * (n - 1))
+    begin = _busiest(whole.measured if whole.torque is None else whole.fine[3][::UPSAMPLING], length)
+    trace = whole.piece(begin, begin + length)
+    weight = shots.weight[begin : begin + length + 1]
     if not trace.stretches or not np.any(weight):
         return shots
-    return Shots(
-        trace, Grid(time, trace.torque, substeps), shots.first[inside], shots.starts[inside], shots.bias, weight
-    )
+    ratio = round(whole.step_s / shots.grid.step_s)
+    cut = make_shots(trace, ratio, None, weight)
+    if begin == 0:
+        cut.starts[: len(shots.first)] = shots.starts[: len(cut.first)]
+    cut.bias = shots.bias
+    return cut
+
+
+def _busiest(values: Array, length: int) -> int:
+    """Where a window begins that holds the most of a signal's squares; the first of those that hold nearly as much."""
+    sums = np.concatenate([[0.0], np.cumsum((values - np.mean(values)) ** 2)])
+    held = sums[length:] - sums[: len(sums) - length]
+    return int(np.argmax(held[:-1] >= NEARLY * np.max(held[:-1])))
 
 
 def _bounded(square: Array, along: Array, lowest: Array) -> tuple[Array, float]:

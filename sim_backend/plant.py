@@ -9,8 +9,6 @@ the steps themselves.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from rig.dynamics import Equations, integrator
@@ -23,7 +21,7 @@ ANGLE, RATE, SENSED, TORQUE = range(4)  # columns of what Plant.follow and its l
 RK4_PHASE_RAD = 0.03  # of the fastest motion in one fine step: leaves (0.03)^4 / 120, 7e-9, of a frequency
 MOST_PARTS = 4096  # fine steps in a tick: a minute at 1 kHz takes some minutes then, and beyond that has no end
 FOLLOW, HOLD, MOTOR = range(3)
-_DRIVE, _SENSOR = 12, 18  # where the filter chains begin in the table of addresses
+_DRIVE, _SENSOR = 14, 20  # where the filter chains begin in the table of addresses
 
 
 @integrator.jit
@@ -46,7 +44,8 @@ def _fine_steps(table, values, torque, motor, n, mode, out):  # type: ignore[no-
         scratch, of(scratch, width), of(scratch, 2 * width),
         of(scratch, 3 * width), of(scratch, 4 * width), of(scratch, 5 * width),
     )  # fmt: skip
-    saved = of(scratch, 6 * width)
+    saved, before = of(scratch, 6 * width), of(scratch, 7 * width)
+    kinks, bends = table[12], at(table[13])
     h = values[0]
     for i in range(n):
         begin = values[2]
@@ -61,7 +60,9 @@ def _fine_steps(table, values, torque, motor, n, mode, out):  # type: ignore[no-
             middle = begin
             end = begin
         values[2] = end
-        integrator.step(motion, states, z, work, saved, h, begin, middle, end, jck, body)
+        integrator.step_over_kinks(
+            motion, states, z, work, saved, h, begin, middle, end, jck, body, bends, kinks, before
+        )
         out[i, 0] = motion[0]
         out[i, 1] = motion[1]
         out[i, 2] = integrator._chain(motion[1], h, table, _SENSOR)
@@ -98,13 +99,10 @@ class Plant:
         self.step_s = coarsest_step_s / self.parts
         self._values = np.array([self.step_s, 0.0, 0.0])
         self._out: Array = np.zeros((64, 4))
-        motion, z, scratch = np.zeros(4), e.rest_states(0.0, 0.0), np.zeros((7, max(4, e.states)))
+        motion, z, scratch = np.zeros(4), e.rest_states(0.0, 0.0), e.scratch()
         drive, sensor = e.drive.arrays(0.5 * self.step_s), e.sensor.arrays(self.step_s)
         self._kept = (e, motion, z, scratch, drive, sensor)  # the table holds bare addresses of these
-        table: list[Any] = [motion.ctypes.data, e.states, z.ctypes.data, scratch.ctypes.data]
-        table += [e.loads, len(e.kernels)]
-        table += [a.ctypes.data for a in (e.kernels, e.z_at, e.p, e.p_at, e.jck)]
-        table.append(0)
+        table = e.table(motion, z, scratch)
         for chain in (drive, sensor):
             table += [len(chain[0]), *(a.ctypes.data for a in chain)]
         self._table = np.array(table, dtype=np.int64)

@@ -3,7 +3,8 @@
 One fine step of length h is a classical fourth-order Runge-Kutta step while the motion keeps its
 direction. Dry friction makes the right-hand side jump where the rate changes sign; smoothing that jump
 moves ten seconds of simulated rate by many sigma however fine the step is, so the instants of
-sticking, breaking away and reversing are found by root search and the step is split there.
+sticking, breaking away and reversing are found by root search and the step is split there. Where the
+angle passes a kink of the torque (a gap, a support on one side) it is split as well.
 
 Layout of the arrays, so that any set of effects runs through one compiled function:
 ``motion`` holds angle, rate, slip direction (-1, 0 stuck, +1) and time; ``z`` the internal states of all
@@ -255,19 +256,62 @@ def step(motion, n, z, work, saved, h, m0, m1, m2, jck, body):  # type: ignore[n
 
 
 @jit
-def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, out):  # type: ignore[no-untyped-def]
+def _first_kink(th, w, end, w_end, h, kinks, count):  # type: ignore[no-untyped-def]
+    """Fraction of a step at which the angle first passes a kink of the torque; one where it passes none."""
+    first = 1.0
+    for k in range(count):
+        a, b = th - kinks[k], end - kinks[k]
+        if a == 0.0 or a * b >= 0.0:
+            continue
+        x = a / (a - b)
+        for _ in range(4):  # Newton on the cubic through both ends
+            u = 1.0 - x
+            f = a * u * u * (1.0 + 2.0 * x) + b * x * x * (1.0 + 2.0 * u) + h * x * u * (w * u - w_end * x)
+            slope = 6.0 * x * u * (b - a) + h * (w * u * (1.0 - 3.0 * x) - w_end * x * (2.0 - 3.0 * x))
+            if slope == 0.0:
+                break
+            x = min(max(x - f / slope, 0.0), 1.0)
+        first = min(first, x)
+    return first
+
+
+@jit
+def step_over_kinks(motion, n, z, work, saved, h, m0, m1, m2, jck, body, kinks, count, before):  # type: ignore[no-untyped-def]
+    """``step``, cut where the angle passes a kink of the torque: a Runge-Kutta step must not span one.
+
+    ``before`` has room for the motion and z. Of several kinks in one step the first is where it is cut.
+    """
+    if count == 0:
+        step(motion, n, z, work, saved, h, m0, m1, m2, jck, body)
+        return
+    kept = _offset(before, 4)
+    _copy(motion, before, 4)
+    _copy(z, kept, n)
+    step(motion, n, z, work, saved, h, m0, m1, m2, jck, body)
+    x = _first_kink(before[0], before[1], motion[0], motion[1], h, kinks, count)
+    if not 1e-9 < x < 1.0 - 1e-9:
+        return
+    _copy(before, motion, 4)
+    _copy(kept, z, n)
+    at = _quadratic(m0, m1, m2, x)
+    step(motion, n, z, work, saved, x * h, m0, _quadratic(m0, m1, m2, 0.5 * x), at, jck, body)
+    step(motion, n, z, work, saved, (1.0 - x) * h, at, _quadratic(m0, m1, m2, 0.5 + 0.5 * x), m2, jck, body)
+
+
+@jit
+def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, kinks, out):  # type: ignore[no-untyped-def]
     """Integrate ``len(torque)`` fine steps.
 
     ``torque`` has shape (n, 3): start, middle, end of each step. ``out`` has shape (n + 1, 3) and takes
     angle, rate and acceleration at every fine instant, the start included.
     """
     n, states = torque.shape[0], len(z)
-    room = np.zeros((8, max(4, states)))
+    room = np.zeros((10, max(4, states)))
     work = (
         _pointer(room[0]), _pointer(room[1]), _pointer(room[2]),
         _pointer(room[3]), _pointer(room[4]), _pointer(room[5]),
     )  # fmt: skip
-    saved, dz = _pointer(room[6]), _pointer(room[7])
+    saved, dz, before, bends = _pointer(room[6]), _pointer(room[7]), _pointer(room[8:]), _pointer(kinks)
     mo, zp = _pointer(motion), _pointer(z)
     jck = (jck[0], jck[1], jck[2])
     body = (loads, len(kernels), _pointer(kernels), _pointer(z_at), _pointer(p), _pointer(p_at))
@@ -279,7 +323,10 @@ def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, out):  #
             a = 0.0
         out[i, 0], out[i, 1], out[i, 2] = mo[0], mo[1], a
         if i < n:
-            step(mo, states, zp, work, saved, h, torque[i, 0], torque[i, 1], torque[i, 2], jck, body)
+            step_over_kinks(
+                mo, states, zp, work, saved, h, torque[i, 0], torque[i, 1], torque[i, 2], jck, body,
+                bends, len(kinks), before,
+            )  # fmt: skip
             mo[3] = t0 + (i + 1) * h
             if not abs(mo[0]) < 1e9:  # diverged (or not a number): nothing after it means anything
                 out[i + 1 :, :] = np.nan
@@ -288,7 +335,7 @@ def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, out):  #
 
 
 @jit
-def run_spans(starts, spans, offset_s, z, h, torque, jck, kernels, loads, z_at, p, p_at, out):  # type: ignore[no-untyped-def]
+def run_spans(starts, spans, offset_s, z, h, torque, jck, kernels, loads, z_at, p, p_at, kinks, out):  # type: ignore[no-untyped-def]
     """``run_steps`` over spans (first, last) of fine steps, each begun from its row of ``starts``.
 
     Internal states go on from span to span.
@@ -298,7 +345,9 @@ def run_spans(starts, spans, offset_s, z, h, torque, jck, kernels, loads, z_at, 
         first, last = spans[k, 0], spans[k, 1]
         motion[0], motion[1] = starts[k, 0], starts[k, 1]
         motion[2], motion[3] = np.sign(starts[k, 1]), offset_s + first * h
-        run_steps(motion, z, h, torque[first:last], jck, kernels, loads, z_at, p, p_at, out[first : last + 1])
+        run_steps(
+            motion, z, h, torque[first:last], jck, kernels, loads, z_at, p, p_at, kinks, out[first : last + 1]
+        )  # fmt: skip
 
 
 @jit
@@ -347,13 +396,16 @@ def advance(table, values):  # type: ignore[no-untyped-def]
         scratch, _offset(scratch, width), _offset(scratch, 2 * width),
         _offset(scratch, 3 * width), _offset(scratch, 4 * width), _offset(scratch, 5 * width),
     )  # fmt: skip
-    saved = _offset(scratch, 6 * width)
+    saved, before = _offset(scratch, 6 * width), _offset(scratch, 7 * width)
+    kinks, bends = table[12], _floats_at(table[13])
     h, m_start, m_end, steps = values[0], values[1], values[2], table[11]
     for i in range(steps):
-        shaft = _chain(m_start + (m_end - m_start) * (i + 1) / steps, h, table, 12)
+        shaft = _chain(m_start + (m_end - m_start) * (i + 1) / steps, h, table, 14)
         begin = values[6]
-        if m_start == m_end and table[12] == 0:
+        if m_start == m_end and table[14] == 0:
             begin = m_start  # held: the torque jumps at the start of the step
-        step(motion, states, z, work, saved, h, begin, 0.5 * (begin + shaft), shaft, jck, body)
+        step_over_kinks(
+            motion, states, z, work, saved, h, begin, 0.5 * (begin + shaft), shaft, jck, body, bends, kinks, before
+        )
         values[3], values[4], values[6] = motion[0], motion[1], shaft
-        values[5] = _chain(motion[1], h, table, 18)
+        values[5] = _chain(motion[1], h, table, 20)

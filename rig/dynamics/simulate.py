@@ -108,6 +108,9 @@ class Equations:
         self.sensor = _Filters(sensor, sensors, tuple(values[n] for n in sensors))
         self._values = values
         self._body = body
+        bends = [effects.get(name).kinks for name in body]
+        found = [at(values[name]) for name, at in zip(body, bends, strict=True) if at]
+        self.kinks = np.unique(np.array([x for each in found for x in each], dtype=float))
 
     @property
     def states(self) -> int:
@@ -124,6 +127,16 @@ class Equations:
             if rest:
                 z[self.z_at[i] : self.z_at[i + 1]] = rest(angle_rad, rate_rad_s)
         return z
+
+    def scratch(self) -> Array:
+        """Room for one step."""
+        return np.zeros((9, max(4, self.states)))
+
+    def table(self, motion: Array, z: Array, scratch: Array, steps: int = 0) -> list[int]:
+        """Bare addresses for ``integrator.advance`` and its like; the chains of filters follow behind."""
+        at = [a.ctypes.data for a in (self.kernels, self.z_at, self.p, self.p_at, self.jck)]
+        begin = [motion.ctypes.data, self.states, z.ctypes.data, scratch.ctypes.data, self.loads, len(self.kernels)]
+        return [*begin, *at, steps, len(self.kinks), self.kinks.ctypes.data]
 
     def fastest_rad_s(self) -> float:
         """The fastest motion that a fine step has to follow."""
@@ -170,6 +183,7 @@ class Equations:
             self.z_at,
             p,
             self.p_at,
+            self.kinks,
             out,
         )
         return out
@@ -188,7 +202,7 @@ class Equations:
             return out
         integrator.run_spans(
             starts, np.array(spans, dtype=np.int64), offset_s, self.rest_states(*starts[0]), step_s, torque,
-            self.jck, self.kernels, self.loads, self.z_at, p, self.p_at, out,
+            self.jck, self.kernels, self.loads, self.z_at, p, self.p_at, self.kinks, out,
         )  # fmt: skip
         return out
 
@@ -319,20 +333,10 @@ class Stepper:
         fine_s = self.step_s / self.substeps
         motion = np.array([angle_rad, rate_rad_s, np.sign(rate_rad_s), 0.0])
         z = e.rest_states(angle_rad, rate_rad_s)
-        scratch = np.zeros((7, max(4, e.states)))
+        scratch = e.scratch()
         drive, sensor = e.drive.arrays(fine_s), e.sensor.arrays(fine_s)
         self._kept = (motion, z, scratch, drive, sensor)  # the table below holds bare addresses of these
-        at = [a.ctypes.data for a in (e.kernels, e.z_at, e.p, e.p_at, e.jck)]
-        table = [
-            motion.ctypes.data,
-            e.states,
-            z.ctypes.data,
-            scratch.ctypes.data,
-            e.loads,
-            len(e.kernels),
-            *at,
-        ]
-        table.append(self.substeps)
+        table = e.table(motion, z, scratch, self.substeps)
         for chain in (drive, sensor):
             table += [len(chain[0]), *(a.ctypes.data for a in chain)]
         self._table = np.array(table, dtype=np.int64)

@@ -24,6 +24,7 @@ EFFECT = Effect(
     sign="The gap is symmetric about the encoder's zero, or about the rest angle of a gyro-only run.",
     parameters=(Parameter("half_gap", "rad", "half of the play", low=0.0, high=10.0, suffix="rad", start=_gaps),),
     kernel=_torque,
+    kinks=lambda values: (-values[0], values[0]),
     leans_on=("stiffness",),
     separated_by="from cubic stiffness and cogging: small and large amplitudes",
 )

@@ -29,5 +29,6 @@ EFFECT = Effect(
         ),
     ),
     kernel=_torque,
+    kinks=lambda values: (0.0,),
     separated_by="from quadratic stiffness: small and large amplitudes",
 )

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from rig.effects.base import Effect, Parameter, Place, filter_kernel
 
+# Of the largest torque asked for: a limit just below it clips one set for an instant, and shows at no other value.
+FRACTIONS = (0.5, 0.7, 0.8, 0.87, 0.92, 0.95, 0.97, 0.98, 0.987, 0.993, 0.997)
+
 
 @filter_kernel
 def _clip(x, step, state, p):  # type: ignore[no-untyped-def]
@@ -25,7 +28,7 @@ EFFECT = Effect(
             "largest torque",
             low=1e-9,
             suffix="nm",
-            start=lambda scale: tuple(scale.torque_nm * f for f in (0.5, 0.7, 0.85, 0.95)),
+            start=lambda scale: tuple(scale.torque_nm * f for f in FRACTIONS),
         ),
     ),
     kernel=_clip,
