@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from identify.results import Identification
-    from rig.cli.campaign import Played
+    from rig.cli.parts import Played
     from rig.cli.results_folder import ResultsFolder
     from rig.config.load import LoadedConfig
     from rig.platform import Platform

@@ -9,9 +9,10 @@ from dataclasses import replace
 from typing import Any
 
 from rig.cli.backends import backend_name
-from rig.cli.campaign import Part, Played, play
+from rig.cli.campaign import play
 from rig.cli.desk import Desk
 from rig.cli.opening import ask_consent
+from rig.cli.parts import Part, Played
 from rig.cli.results_folder import RAW_FOLDER, ResultsFolder
 from rig.config.excitation import ExcitationConfig
 from rig.config.load import LoadedConfig

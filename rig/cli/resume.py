@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.cli.backends import EMULATED, RECORDED, SIMULATED, backend_name
-from rig.cli.campaign import Part, Played, export_earlier, play
+from rig.cli.campaign import play
 from rig.cli.desk import Desk
+from rig.cli.parts import Part, Played
 from rig.cli.results_folder import JOURNAL_FILE, ResultsFolder
+from rig.cli.saving import export_earlier
 from rig.cli.terminal import plain
 from rig.config.load import LoadedConfig
 from rig.errors import RecordingError, UsageError
