@@ -13,6 +13,8 @@ from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
 from rig.errors import ConfigError, DeviceFault
 
+MAX_EDS_BYTES = 4 << 20  # the largest of the trade have one
+
 # What the library logs is said by our own faults; without a handler it would go to the operator's terminal.
 logging.getLogger("canopen").addHandler(logging.NullHandler())
 
@@ -66,9 +68,16 @@ def read_dictionary(path: Path, node: int) -> canopen.ObjectDictionary:
         If the file is missing or not an EDS.
     """
     try:
+        if not path.exists():
+            raise ConfigError(f"bench.amplifier.settings.eds: there is no file {path}")
+        if not path.is_file() or path.stat().st_size > MAX_EDS_BYTES:
+            raise ConfigError(
+                f"bench.amplifier.settings.eds: {path} is no regular file of at most {MAX_EDS_BYTES >> 20} MiB: "
+                "give the EDS or DCF of the drive's maker"
+            )
         return canopen.import_od(str(path), node_id=node)
-    except FileNotFoundError:
-        raise ConfigError(f"bench.amplifier.settings.eds: there is no file {path}") from None
+    except ConfigError:
+        raise
     except Exception as problem:  # noqa: BLE001  the library lets parser errors of any kind through
         raise ConfigError(f"bench.amplifier.settings.eds: {path} cannot be read as EDS: {problem}") from None
 
