@@ -146,7 +146,8 @@ def index() -> str:
     out = [
         "# Effects", "",
         "One object each in `rig/effects/`, read by simulator, identifier, report and these pages",
-        "(`python benchmarks/effect_pages.py`). [An effect of your own](your-own.md) is a file of thirty lines.", "",
+        "(`python benchmarks/effect_pages.py`). [An effect of your own](your-own.md) is a file of thirty lines;",
+        "[a measured channel](channels.md) (a current, a temperature, another axis) may be a cause too.", "",
         "| effect | family | equation |", "|---|---|---|",
     ]  # fmt: skip
     for name in effects.names():
