@@ -10,6 +10,7 @@ import numpy as np
 from identify import persets
 from identify.channels import Offer
 from identify.finish import Fitted
+from identify.glitches import told
 from identify.holdout import Split
 from identify.measures import Measured
 from identify.next_steps import opposite_signs, unexplained_reason
@@ -88,7 +89,7 @@ def conclude(
     found = Identification(
         accepted=not reasons and not unexplained, reasons=(), axis=case.recording.axis, before=result_before,
         verdict=verdict, after=result_after, noise_floor=floor, per_set=per_set, joint=joint,
-        traces=_series(case, measured_before, measured_after), holdout_note=case.split.note,
+        traces=_series(case, measured_before, measured_after), holdout_note=_note(case),
         max_error_percent=reference,
     )  # fmt: skip
     if unexplained:
@@ -97,6 +98,12 @@ def conclude(
         reasons.insert(0, SENTENCE)
     found = replace(found, accepted=not reasons, reasons=tuple(reasons))
     return replace(found, verdict=replace(verdict, sentences=sentences_of(found)))
+
+
+def _note(case: Case) -> str:
+    """What was held out, and what was left out."""
+    torn = told([(t.run.name, t.glitches_s) for t in case.traces])
+    return f"{case.split.note}. {torn}" if torn else case.split.note
 
 
 def _ratio(case: Case, after: Fitted, search: Search) -> float:

@@ -12,6 +12,7 @@ from scipy import signal
 from scipy.interpolate import CubicSpline
 
 from identify.channel_readings import lost, table_of
+from identify.glitches import glitches
 from identify.prefilter import held_pieces, linear_pieces, smooth_pieces
 from rig import effects
 from rig.channels import Channel
@@ -130,6 +131,7 @@ class Trace:
     cutoff_hz: float  # of the zero-phase low-pass behind ``fine``
     number: int = 0  # which run of the recording
     offset_s: float = 0.0  # of the first sample from the start of the run
+    glitches_s: Array = field(default_factory=lambda: np.zeros(0))  # times of samples left out as such
     motion: tuple[Array, Array, Array, Array, float] | None = None  # of a piece: cut out of the whole run's
     _series: dict[Any, Any] = field(default_factory=dict)
     _tables: dict[Channel, tuple[Array, float]] = field(default_factory=dict)  # shared by the pieces of a run
@@ -331,13 +333,17 @@ def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: fl
     filled = np.where(broken, np.interp(grid, time[good], values[good]), filled)  # a spline would swing through a gap
     broken |= (grid < time[good][0] - 0.5 * step) | (grid > time[good][-1] + 0.5 * step)
     quiet = max(_gaps(broken), key=lambda ab: ab[1] - ab[0])  # a jump over a gap would pass for noise
+    torn = glitches(filled, keep & ~broken, noise)
+    if np.any(torn):
+        filled = np.where(torn, np.interp(grid, grid[~torn], filled[~torn]), filled)
+        keep &= ~torn
     whole = filled[quiet[0] : quiet[1] + 1]
     torque = None
     if run.torque_nm is not None and run.torque_time_s is not None:
         torque = TorqueSignal(run.torque_time_s, run.torque_nm, run.torque_hold)
     trace = Trace(
         run, channel, step, filled, keep, [], torque, noise if noise is not None else noise_of(whole),
-        bandwidth_of(whole, step), number,
+        bandwidth_of(whole, step), number, glitches_s=float(run.time_s[0]) + step * np.flatnonzero(torn),
     )  # fmt: skip
     if run.min_rate_rad_s > 0.0:
         slow = np.abs(trace.fine[1][::UPSAMPLING]) <= run.min_rate_rad_s
