@@ -105,7 +105,7 @@ class RecordedConfig(Section):
     scale: Scale = Scale()
     axis: Literal["rotary", "linear"] = "rotary"
     torque_hold: Literal["band_limited", "zero_order"] = "band_limited"
-    noise: Positive | None = None
+    noise: Annotated[float, Field(ge=1e-30, le=1e12)] | None = None
     min_rate_rad_s: NonNegative = 0.0
 
     @field_validator("runs")

@@ -15,7 +15,7 @@ from rig.recording.consistency import check_angle_against_rate, check_time_unit
 from rig.recording.readers.base import Table
 from rig.recording.run import Array, Run, TorqueHold, Use
 
-MIN_SAMPLES = 20
+MIN_SAMPLES = 40  # in a row, fewer tell nothing of two states, three parameters and the noise
 # No torque, rate, angle or time of a machine in SI units comes near; squares of it would overflow.
 LARGEST_VALUE = 1e12
 SMALLEST_PEAK = 1e-30  # a channel that stays below: squares of it would vanish

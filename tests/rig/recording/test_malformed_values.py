@@ -79,7 +79,7 @@ ARRAYS: dict[str, tuple[Columns, str, str, str, str]] = {
         {k: v[:2] for k, v in motion().items()},
         "",
         "",
-        "2 valid samples, at least 20",
+        "2 valid samples, at least 40",
         "record longer",
     ),
     "no samples": ({k: v[:0] for k, v in motion().items()}, "", "", "0 valid samples", "record longer"),
