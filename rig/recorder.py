@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from array import array
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -43,7 +44,10 @@ class SetStatistics:
 
 
 class SetRecorder:
-    """One set while it plays. Times are kept in seconds since ``start_s``."""
+    """One set while it plays. Times are kept in seconds since ``start_s``.
+
+    With ``keep`` false what the journal has is let go of, and there is no ``run``.
+    """
 
     def __init__(
         self,
@@ -52,6 +56,7 @@ class SetRecorder:
         torque_hold: TorqueHold,
         journal: Journal | None,
         low_pass: LowPass | None = None,
+        keep: bool = True,
     ) -> None:
         self._planned = planned
         self._start_s = start_s
@@ -62,6 +67,8 @@ class SetRecorder:
             {} if low_pass is None else {"rate_corner_hz": low_pass.corner_hz, "rate_delay_s": low_pass.delay_s}
         )
         self._open = False
+        self._keep = keep or journal is None
+        self._late_s = array("d")
         self._samples: list[tuple[float, float, bool]] = []
         self._commands: list[tuple[float, float, float]] = []
         self._ticks: list[tuple[float, ...]] = []
@@ -87,12 +94,13 @@ class SetRecorder:
             if -EDGE_S <= at <= end:
                 self._commands.append((at, torque, tick.torque_nm))
                 self.peak_torque_nm = max(self.peak_torque_nm, abs(torque))
-        if not self._ticks and tick.channels:
+        if not self._late_s and tick.channels:
             self._channel_names = tuple(tick.channels)
         late = tick.late_s
         if tick.now_s - start <= end:
             readings = [tick.channels[name] for name in self._channel_names] if self._channel_names else ()
             self._ticks.append((tick.now_s - start, late, *readings))
+            self._late_s.append(late)
             self.late_max_s = max(self.late_max_s, late)
             if late >= tick.period_s:
                 self.missed_ticks += int(late / tick.period_s + 1e-9)
@@ -114,7 +122,7 @@ class SetRecorder:
             columns = {"ticks": ("time_s", "late_s", *self._channel_names)}
             self._journal.begin_run(self._planned.name, meta, columns)
             self._open = True
-        tables: tuple[tuple[str, Sequence[tuple[float, ...]]], ...] = (
+        tables: tuple[tuple[str, list[Any]], ...] = (
             ("samples", self._samples),
             ("commands", self._commands),
             ("ticks", self._ticks),
@@ -123,6 +131,10 @@ class SetRecorder:
             if len(rows) > self._written[i]:
                 self._journal.append(kind, np.array(rows[self._written[i] :], dtype=float))
                 self._written[i] = len(rows)
+        if not self._keep:
+            for _, rows in tables:
+                rows.clear()
+            self._written = [0, 0, 0]
 
     def close(self, complete: bool = True) -> None:
         """Write the rest and end the run in the journal, which notes whether the set was played whole."""
@@ -132,7 +144,7 @@ class SetRecorder:
 
     def statistics(self, complete: bool) -> SetStatistics:
         """How the set went."""
-        late = np.array([row[1] for row in self._ticks])
+        late = np.array(self._late_s)
         return SetStatistics(self._planned.name, late, self.missed_ticks, self.drops, self.peak_torque_nm, complete)
 
     def run(self) -> Run | None:

@@ -190,7 +190,9 @@ class Sequencer:
         start_s = self._clock.now_s() + self._period_s
         self._guard.begin(start_s, self._resting())
         rig = self._rig
-        recorder = SetRecorder(planned, start_s, rig.torque_hold, self._journal, rig.rate_low_pass)
+        recorder = SetRecorder(
+            planned, start_s, rig.torque_hold, self._journal, rig.rate_low_pass, keep=self._keep_runs
+        )
         complete = False
         try:
             self._rig.begin_set(planned.torque, start_s)
