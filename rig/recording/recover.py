@@ -17,7 +17,7 @@ from rig.recording.journal_reader import JournalContents, JournalRun, read_journ
 from rig.recording.results import RECORDING_FILE, RECOVERED_FILE, free_name, joined, journals_of
 from rig.recording.run import Recording
 
-UNWRITTEN_S = 0.1  # a kill costs at most this, see docs/recordings.md
+UNWRITTEN_S = 0.1  # a kill costs less than this, a power cut hardly more; see docs/recordings.md
 
 
 @dataclass(frozen=True)
