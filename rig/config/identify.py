@@ -45,7 +45,7 @@ class IdentifyConfig(Section):
     candidates: tuple[str, ...] | None = None  # None: every effect of the registry
     follow_up: Literal["auto", "ask", "never"] = "ask"
     holdout: Literal["auto"] | Annotated[float, Field(ge=0.05, le=0.5)] = "auto"
-    lowpass_hz: Positive | None = None  # None: chosen from the data
+    lowpass_hz: Annotated[float, Field(ge=1e-3, le=1e6)] | None = None  # None: chosen from the data
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
 
     @field_validator("candidates")
