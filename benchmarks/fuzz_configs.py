@@ -131,7 +131,9 @@ class Mutator:
             key = self._one_of(keys)
             where[self._one_of((f"{key}x", str(key)[1:], "", "a.b", 7, None, "effects", key))] = where.pop(key)
         elif what == 2 and isinstance(where, dict):
-            where[self._one_of(("kind", "effects", "settings", "faults", "x", "model"))] = copy.deepcopy(self._one_of(HOSTILE))
+            where[self._one_of(("kind", "effects", "settings", "faults", "x", "model"))] = copy.deepcopy(
+                self._one_of(HOSTILE)
+            )
         elif what == 3 and keys:
             graft = self._one_of(list(_containers(self._one_of(self.trees))))
             where[self._one_of(keys)] = copy.deepcopy(graft)
