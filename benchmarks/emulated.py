@@ -28,7 +28,7 @@ CONFIG = "examples/bench.yaml"
 SET_S = 4.0
 SHORT = (
     f"excitation.sets=[{{torque_nm: 60, frequency_hz: 3, duration_s: {SET_S:g}}}]", "excitation.rest_s=0.5",
-    "bench.settle_s=1", "bench.emulator.start_up_s=0.1",
+    "bench.settle_s=1", "bench.emulator.start_up_s=0.1", "bench.emulator.ports=socket",
 )  # fmt: skip
 TO_THE_SET_S = 2.0  # from enabled to the first set: settling, probe, rest
 OFF = ("torque_zero", "watchdog", "fault", "disabled")

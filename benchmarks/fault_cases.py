@@ -64,7 +64,7 @@ class Case:
         """The sentence that matters of all that was said."""
         found = re.search(r"(Device fault|Safety trip|Stopped|Internal error|Error)[^:]{0,40}:.*", said)
         text = found.group(0) if found else ""
-        text = re.sub(r"/dev/pts/\d+|/tmp/\S+", "...", text)
+        text = re.sub(r"/dev/pts/\d+|(unix:)?/tmp/\S+", "...", text)
         return text if len(text) <= SAID else text[:SAID].rsplit(" ", 1)[0] + " ..."
 
 

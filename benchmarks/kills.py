@@ -27,7 +27,7 @@ SET_S = 1.5
 SHORT = (
     f"excitation.sets=[{{torque_nm: 60, frequency_hz: 3, duration_s: {SET_S:g}}}, "
     f"{{torque_nm: 30, frequency_hz: 6, duration_s: {SET_S:g}}}]",
-    "excitation.rest_s=0.3", "bench.settle_s=1", "bench.emulator.start_up_s=0.1",
+    "excitation.rest_s=0.3", "bench.settle_s=1", "bench.emulator.start_up_s=0.1", "bench.emulator.ports=socket",
 )  # fmt: skip
 LONGEST_S = 6.5  # from enabled to the end of the campaign
 WATCHDOG_S, LOST_S = 0.120, 0.100

@@ -12,7 +12,7 @@ from drivers.capture import Capture
 from drivers.gyro_line import GyroLine
 from drivers.gyroscopes.base import Gyroscope
 from drivers.listening import ListeningPort
-from drivers.ports import SerialPort
+from drivers.socket_port import open_port
 from rig.config.bench import BenchConfig
 from rig.errors import ConfigError, DeviceFault, RigError
 from rig.interface import GyroSample
@@ -74,7 +74,7 @@ class BenchDevices:
                 "bench.gyroscope.port is empty: name its serial port (`rig devices` lists them) or run with --emulate"
             )
         try:
-            serial = ListeningPort(SerialPort(port, self.gyroscope.baud), self._time)
+            serial = ListeningPort(open_port(port, self.gyroscope.baud), self._time)
             self.line = GyroLine(self.gyroscope, serial, self.capture, self._time)
             self.line.greet()
         except RigError as fault:

@@ -16,8 +16,8 @@ import can
 
 from drivers.codecs.lawicel import CanFrame
 from drivers.listening import ListeningPort
-from drivers.ports import SerialPort
 from drivers.slcan import SlcanBulkBus
+from drivers.socket_port import open_port
 from rig.config.bench import CanConfig
 from rig.errors import ConfigError, DeviceFault
 
@@ -196,7 +196,7 @@ def open_bus(config: CanConfig) -> can.BusABC:
     try:
         if config.interface == "slcan_bulk":
             baud = options.pop("tty_baudrate", config.tty_baud)
-            return SlcanBulkBus(ListeningPort(SerialPort(config.channel, baud)), **options)
+            return SlcanBulkBus(ListeningPort(open_port(config.channel, baud)), **options)
         return can.Bus(channel=config.channel, interface=config.interface, **options)
     except can.CanInterfaceNotImplementedError as problem:
         raise ConfigError(f"bench.amplifier.can.interface: {config.interface!r}: {problem}") from None

@@ -159,7 +159,7 @@ class Cia402Setup:
             raise DeviceFault(
                 f"{self._label} has no 0x6007 and "
                 + ("no 0x1029" if behaviour is None else "its 0x1029:01 stays 1 (no change)")
-                + ": nothing makes it cut the torque when this computer dies. Refused; use a drive or firmware that has."
+                + ": nothing makes it cut the torque when this computer dies. Refused; use another drive or firmware."
             )
 
     def _map(self, objects: RemoteObjects, plan: DrivePlan) -> bool:

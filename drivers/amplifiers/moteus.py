@@ -3,7 +3,8 @@
 Register protocol (docs/protocol/registers.md of the firmware). Its watchdog latches mode 11 ("position
 timeout") a tenth of a second after the last command and holds it until a stop: that is the drive-side guard,
 armed as delivered, and proved when it is armed here: with zero torque commanded, this computer falls silent once
-and a controller that goes on as if nothing were is refused. Needs an adapter for CAN-FD with bit-rate switching (``can.interface`` socketcan, ...).
+and a controller that goes on as if nothing were is refused. Needs an adapter for CAN-FD with bit-rate switching
+(``can.interface`` socketcan, ...).
 """
 
 from __future__ import annotations
@@ -147,8 +148,10 @@ class Moteus(Amplifier):
             link.listeners.append(self.receive)
         if not self._ask(link, encode_stop()):
             raise DeviceFault(f"{self.label} does not answer: check its supply, id and the CAN-FD bit rates (1/5 M)")
-        return [f"peak {self.peak_torque_nm:.4g} N m as declared, watchdog {self.config.watchdog_ms} ms in each frame, "
-            "proved when it is armed"]
+        return [
+            f"peak {self.peak_torque_nm:.4g} N m as declared, watchdog {self.config.watchdog_ms} ms in each frame, "
+            "proved when it is armed"
+        ]
 
     def arm(self, link: CanLink) -> None:
         """Stop clears a latched timeout; then position mode at zero torque."""

@@ -152,7 +152,7 @@ class Gyroscope(ABC):
         return self._stamp(readings[::-1])
 
     def _first_seen(self, readings: list[tuple[Reading, float]]) -> list[tuple[Reading, float]]:
-        """Without what came twice: the same number and rate soon after. The second would count as a turn of the counter.
+        """Without what came twice, the same number and rate soon after: it would count as a turn of the counter.
 
         Half a turn of the counter later it is another sample that happens to look alike.
         """
@@ -160,11 +160,11 @@ class Gyroscope(ABC):
         fresh = []
         for reading, at_s in readings:
             newest, self._newest = self._newest, (reading, at_s)
-            if newest is not None and reading.number is not None and reading[:3] == newest[0][:3]:
-                if at_s - newest[1] < 0.5 * turn_s:
-                    self.tally.repeated += 1
-                    continue
-            fresh.append((reading, at_s))
+            before, before_s = newest if newest is not None else (None, -math.inf)
+            if before is None or reading.number is None or reading[:3] != before[:3] or at_s - before_s > 0.5 * turn_s:
+                fresh.append((reading, at_s))
+            else:
+                self.tally.repeated += 1
         return fresh
 
     def _stamp(self, every: list[tuple[Reading, float]]) -> list[GyroSample]:

@@ -111,7 +111,9 @@ class EmulatorConfig(Section):
     ``gyro_drift_ppm``, ``drive_drift_ppm``: their clocks against the host's. ``rated_torque_nm`` and
     ``peak_torque_nm``: nameplate of the drive; the command's step is a thousandth of the former.
     ``drive_delay_ms``: from the frame to the torque. ``start_up_s`` of start-up status precede the first
-    good gyro sample. ``faults`` are injected on request.
+    good gyro sample. ``ports``: pseudo terminals, as other programs can open them, or local sockets, which do
+    not stall on a busy machine; where left out, `rig emulate` makes the former and `--emulate` the latter.
+    ``faults`` are injected on request.
     """
 
     gyro_drift_ppm: Annotated[float, Field(ge=-500, le=500)] = 20.0
@@ -120,6 +122,7 @@ class EmulatorConfig(Section):
     rated_torque_nm: Positive = 150.0
     peak_torque_nm: Positive = 300.0
     drive_delay_ms: Annotated[float, Field(ge=0, le=20)] = 0.0
+    ports: Literal["terminal", "socket"] | None = None
     faults: tuple[InjectedFault, ...] = ()
 
 

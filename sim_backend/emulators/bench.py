@@ -25,6 +25,7 @@ from sim_backend.emulators.gyro import GYROS, AnyGyro, GyroSettings, flat_low_pa
 from sim_backend.emulators.odrive import OdriveAxis
 from sim_backend.emulators.overslept import TOLD_S, Arrivals
 from sim_backend.emulators.pty_port import PtyPort
+from sim_backend.emulators.socket_port import SocketListener
 from sim_backend.emulators.world import World
 
 WORLD_STEPS_PER_SAMPLE = 5
@@ -66,6 +67,9 @@ def _make_odrive(config: Config) -> EmulatedDrive:
     peak = config.bench.emulator.peak_torque_nm
     return OdriveAxis(amplifier.node, peak, constant, amplifier.watchdog_ms * 1e-3)
 
+
+PORTS: dict[str, Callable[[], PtyPort | SocketListener]] = {"terminal": PtyPort, "socket": SocketListener}
+"""What the devices are reached through, by `bench.emulator.ports`."""
 
 DRIVES: dict[str, Callable[[Config], EmulatedDrive]] = {"cia402": _make_cia402, "odrive": _make_odrive}
 """Emulated drives by the name of the driver that commands them."""
@@ -119,7 +123,8 @@ class EmulatedBench:
         self._slot = 0
         self._adapter = LawicelAdapter(self._from_host, clock)
         self._arrivals = Arrivals()
-        self.gyro_port, self.can_port = PtyPort(), PtyPort()
+        self._port = PORTS[emulator.ports or "terminal"]
+        self.gyro_port, self.can_port = self._port(), self._port()
         self._now_s = self._start_s = clock() + 0.05
         self._world = World(config.simulated.platform.platform(), self._start_s, step_s)
         self._samples = 0
@@ -145,12 +150,12 @@ class EmulatedBench:
 
     def replug_gyro(self) -> None:
         """Its port is there again, under another name, which is told."""
-        self.gyro_port = PtyPort()
+        self.gyro_port = self._port()
         self._tell_of_fault(self._now_s, f"the gyro is plugged in again: {self.gyro_port.path}")
 
     def replug_adapter(self) -> None:
         """As ``replug_gyro``."""
-        self.can_port = PtyPort()
+        self.can_port = self._port()
         self._tell_of_fault(self._now_s, f"the CAN adapter is plugged in again: {self.can_port.path}")
 
     def flag_gyro(self, status: int) -> None:

@@ -89,7 +89,7 @@ def started(config: Config) -> Iterator[Emulators]:
 
 def _listening(process: subprocess.Popen[bytes], config: Config) -> Emulators:
     assert process.stdin is not None and process.stdout is not None and process.stderr is not None
-    process.stdin.write(config.model_dump_json().encode())
+    process.stdin.write(_on_sockets(config).model_dump_json().encode())
     process.stdin.close()
     deadline = time.monotonic() + START_TIMEOUT_S
     while time.monotonic() < deadline:
@@ -102,6 +102,14 @@ def _listening(process: subprocess.Popen[bytes], config: Config) -> Emulators:
     process.kill()
     said = process.stderr.read().decode(errors="replace").strip()
     raise DeviceFault(f"the emulators did not start: {said[-2000:] or 'they said nothing'}")
+
+
+def _on_sockets(config: Config) -> Config:
+    """Nobody but this program opens these ports: sockets do, unless the file wants terminals."""
+    if config.bench is None or config.bench.emulator.ports is not None:
+        return config
+    emulator = config.bench.emulator.model_copy(update={"ports": "socket"})
+    return config.model_copy(update={"bench": config.bench.model_copy(update={"emulator": emulator})})
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:

@@ -70,7 +70,7 @@ def bench(monkeypatch, tmp_path):
     monkeypatch.setattr(drivers.can_link.time, "sleep", lambda s: None)
     monkeypatch.setattr(drivers.bench_devices, "open_bus", lambda config: EmulatedBus(drive, time))
     monkeypatch.setattr(drivers.bench_devices, "ListeningPort", lambda port, clock: port)
-    monkeypatch.setattr(drivers.bench_devices, "SerialPort", lambda path, baud: GyroPort(time))
+    monkeypatch.setattr(drivers.bench_devices, "open_port", lambda path, baud: GyroPort(time))
     rig = BenchRig(CONFIG, Torque.EMULATED, tmp_path / "raw", time)
     rig.time, rig.drive = time, drive
     return rig
@@ -152,7 +152,7 @@ def test_all_that_is_wrong_is_listed_at_once(bench, monkeypatch):
         def read(self):
             return b""
 
-    monkeypatch.setattr(drivers.bench_devices, "SerialPort", lambda path, baud: Silent(bench.time))
+    monkeypatch.setattr(drivers.bench_devices, "open_port", lambda path, baud: Silent(bench.time))
     bench.drive.receive = lambda frame, now_s: None
     with pytest.raises(DeviceFault, match=r"(?s)2 things are wrong.*does not answer.*no byte in 1"), bench.opened():
         pass
