@@ -105,8 +105,11 @@ def _word(name: str) -> str:
     return word if word.strip(".") else f"channel_{word}"
 
 
-def read_recording_h5(path: str | Path) -> Recording:
-    """The Recording that was written, bit for bit. Raises RecordingError where the file is not ours or damaged."""
+def read_recording_h5(path: str | Path, *, with_info: bool = True) -> Recording:
+    """The Recording that was written, bit for bit; without its ``info`` where nobody reads that.
+
+    Raises RecordingError where the file is not ours or damaged.
+    """
     try:
         with h5py.File(path, "r") as file:
             if file.attrs.get("format") != FORMAT:
@@ -114,7 +117,7 @@ def read_recording_h5(path: str | Path) -> Recording:
             if int(file.attrs["version"]) > VERSION:
                 raise RecordingError(f"{path}: written by a later version: read it with that one")
             noise = file.attrs.get("noise")
-            info = json.loads(file["info"][()])
+            info = json.loads(file["info"][()]) if with_info else {}
             reader = _Reader(path)
             return Recording(
                 runs=tuple(reader.run(group) for _, group in sorted(file["runs"].items())),

@@ -19,7 +19,7 @@ def read(path: Path) -> Sequence[Run]:
     recovered = sorted(path.glob(f"{Path(RECOVERED_FILE).stem}*.h5"), reverse=True)
     for file in (path / RECORDING_FILE, *recovered):
         try:
-            if file.is_file() and (runs := read_recording_h5(file).runs):
+            if file.is_file() and (runs := read_recording_h5(file, with_info=False).runs):
                 return runs
         except RecordingError as error:
             wrong.append(str(error))

@@ -27,7 +27,7 @@ def read(path: Path) -> Sequence[Table | Run]:
     except _DAMAGE as error:
         raise RecordingError(f"{path}: is no HDF5 file that can be read ({error}): export it again") from error
     if ours:
-        return hdf5.read_recording_h5(path).runs
+        return hdf5.read_recording_h5(path, with_info=False).runs
     if not datasets:
         raise RecordingError(f"{path}: holds no datasets: write time_s, torque_nm, rate_rad_s as datasets")
     return [Table(path, tuple(datasets), read_each(path, lambda name: _array(path, name, datasets[name])))]
