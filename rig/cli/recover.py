@@ -26,7 +26,15 @@ def recover_folder(folder: Path) -> int:
     captured = list(_captures(folder))
     for line in captured:
         sys.stdout.write(plain(line) + "\n")
-    recovery = recover(folder)
+    try:
+        recovery = recover(folder)
+    except RecordingError as error:
+        if not captured:
+            raise
+        raise RecordingError(
+            f"{error}; its raw capture can still be played through the drivers: rig play CONFIG --set "
+            f"bench.replay={folder.resolve()}, with the configuration of then"
+        ) from None
     for line in recovery.lines:
         sys.stdout.write(plain(line) + "\n")
     if not recovery.is_new:
