@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import Discriminator, Field, Tag, field_validator
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from rig.config.base import NonNegative, Section
 from rig.excitation import Chirp, FreeDecay, Multisine, RampHoldRelease, Sine
 
+LEAST_SAMPLES = 40
 PAPER_SETS: tuple[tuple[float, float], ...] = ((300, 0.5), (300, 1.0), (250, 3.0), (200, 6.0), (150, 9.0))
 
 
@@ -53,3 +54,14 @@ class ExcitationConfig(Section):
         if not 1 <= len(sets) <= 200:
             raise ValueError(f"has {len(sets)} sets: give 1 to 200, or leave the key out for the paper's five")
         return sets
+
+    @model_validator(mode="after")
+    def _sets_are_long_enough(self) -> Self:
+        for number, planned in enumerate(self.sets):
+            if planned.duration_s * self.sample_rate_hz < LEAST_SAMPLES:
+                raise ValueError(
+                    f"sets.{number}: {planned.duration_s:g} s are "
+                    f"{planned.duration_s * self.sample_rate_hz:.3g} samples at {self.sample_rate_hz:g} Hz, from which nothing can be identified: duration_s has to be at "
+                    f"least {LEAST_SAMPLES / self.sample_rate_hz:g} s"
+                )
+        return self

@@ -61,6 +61,12 @@ CASES = {
         "turns the text around",
         "leave it out",
     ),
+    "set of a single sample": (
+        "backend: simulated\nsimulated: {}\nexcitation:\n  sets: [{torque_nm: 1, frequency_hz: 1, duration_s: 0.001}]",
+        ":3: excitation",
+        "0.001 s are 1 samples at 1000 Hz",
+        "at least 0.04 s",
+    ),
     "platform too fast to simulate": (
         "backend: simulated\nsimulated: {platform: {inertia_kg_m2: 1.0e-9, stiffness_nm_rad: 1.0e+9}}",
         ":2: simulated",
