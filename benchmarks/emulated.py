@@ -9,9 +9,10 @@ from __future__ import annotations
 import json
 import os
 import queue
+import select
 import signal
 import subprocess
-import sys
+import tempfile
 import threading
 import time
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from benchmarks.preloaded import Started, parent
 from drivers.capture import FILE_NAME, MARK, TICK, read_capture
 from rig.errors import RigError
 from rig.recording.journal_reader import read_journal
@@ -35,53 +37,40 @@ OFF = ("torque_zero", "watchdog", "fault", "disabled")
 START_S, STOP_S = 60.0, 5.0
 Event = dict[str, Any]
 
-# The host as users start it, and three things that only its own process can do to it.
-HOST = """
-import signal, sys, time
-jumped = [0.0]
-monotonic = time.monotonic
-time.monotonic = lambda: monotonic() + jumped[0]
-def hang(number, frame):
-    end = monotonic() + 1.5
-    while monotonic() < end:
-        time.sleep(0.01)
-def fail(number, frame):
-    raise RuntimeError("something that nobody foresaw")
-def jump(number, frame):
-    jumped[0] = 0.2
-if sys.stdin.isatty():
-    import fcntl, termios
-    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever started this may have had it ignored
-signal.signal(signal.SIGUSR1, hang)
-signal.signal(signal.SIGUSR2, fail)
-signal.signal(signal.SIGALRM, jump)
-from rig.cli import main
-main()
-"""
-
 
 class Devices:
     """`rig emulate`, while the context lasts. ``events`` so far, each with its time on the monotonic clock."""
 
     def __init__(self, overrides: Sequence[str] = SHORT, config: str = CONFIG) -> None:
-        line = [sys.executable, "-c", "from rig.cli import main; main()", "emulate", config]
+        line = ["emulate", config]
         for override in overrides:
             line += ["--set", override]
-        self.process = subprocess.Popen(
-            line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True
-        )
+        self._folder = tempfile.TemporaryDirectory()
+        pipes = [str(Path(self._folder.name) / name) for name in ("requests", "events")]
+        for pipe in pipes:
+            os.mkfifo(pipe)
+        self._requests = os.open(pipes[0], os.O_RDWR)
+        self._told = os.open(pipes[1], os.O_RDONLY | os.O_NONBLOCK)
+        os.set_blocking(self._told, True)
+        self.process = parent().start("rig", line, pipes[0], pipes[1], os.devnull)
         self.events: list[Event] = []
         self._news: queue.SimpleQueue[Event] = queue.SimpleQueue()
         threading.Thread(target=self._listen, daemon=True).start()
         self.ports = self.wait_for(("listening",), START_S) or {}
 
     def _listen(self) -> None:
-        assert self.process.stdout is not None
-        for line in self.process.stdout:
-            event = json.loads(line)
-            self.events.append(event)
-            self._news.put(event)
+        rest = b""
+        while select.select([self._told], [], [], START_S)[0]:
+            part = os.read(self._told, 65_536)
+            if not part:
+                if self.process.poll() is not None:
+                    break
+                time.sleep(0.01)  # not open yet at the other end
+            *lines, rest = (rest + part).split(b"\n")
+            for line in lines:
+                event = json.loads(line)
+                self.events.append(event)
+                self._news.put(event)
 
     def wait_for(self, names: Sequence[str], timeout_s: float) -> Event | None:
         """The next event of one of these names, or None."""
@@ -97,9 +86,7 @@ class Devices:
 
     def inject(self, **fault: object) -> None:
         """Let a fault take hold."""
-        assert self.process.stdin is not None
-        self.process.stdin.write((json.dumps(fault) + "\n").encode())
-        self.process.stdin.flush()
+        os.write(self._requests, (json.dumps(fault) + "\n").encode())
 
     def first(self, names: Sequence[str], from_s: float) -> Event | None:
         """The first event of these names at or after a moment."""
@@ -115,9 +102,10 @@ class Devices:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
-        for stream in (self.process.stdin, self.process.stdout):
-            if stream is not None:
-                stream.close()
+        time.sleep(0.05)  # until the listening thread has seen the end
+        for descriptor in (self._requests, self._told):
+            os.close(descriptor)
+        self._folder.cleanup()
 
 
 @dataclass
@@ -128,26 +116,18 @@ class Host:
     folder: Path
     overrides: Sequence[str] = SHORT
     command: str = "play"
-    program: str = HOST
-    terminal: int | None = None  # a descriptor of a terminal of its own, that it loses when that is closed
-    process: subprocess.Popen[bytes] = field(init=False)
+    terminal: str | None = None  # a terminal of its own, that it loses when the other end is closed
+    process: Started = field(init=False)
 
     def __post_init__(self) -> None:
         ports = self.devices.ports
-        line = [sys.executable, "-c", self.program, self.command, CONFIG, "--yes", "--out", str(self.folder)]
+        line = [self.command, CONFIG, "--yes", "--out", str(self.folder)]
         taken = (f"bench.gyroscope.port={ports['gyro']}", f"bench.amplifier.can.channel={ports['can']}")
         for override in (*taken, *self.overrides):
             line += ["--set", override]
         self.log = self.folder.with_suffix(".log")
-        if self.terminal is None:
-            with self.log.open("wb") as log:
-                self.process = subprocess.Popen(
-                    line, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True
-                )
-        else:
-            self.process = subprocess.Popen(
-                line, stdin=self.terminal, stdout=self.terminal, stderr=self.terminal, start_new_session=True
-            )
+        said = self.terminal or str(self.log)
+        self.process = parent().start("host", line, self.terminal or os.devnull, said, said)
 
     def send(self, *signals: int) -> float:
         """Signals, one after the other; the moment of the first."""

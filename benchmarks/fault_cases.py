@@ -49,7 +49,7 @@ class Case:
     has_terminal: bool = False
     _terminals: list[int] = field(default_factory=list)
 
-    def terminal(self) -> int | None:
+    def terminal(self) -> str | None:
         """A terminal for the host, where it is to lose one."""
         if not self.has_terminal:
             return None
@@ -57,8 +57,8 @@ class Case:
 
         master, slave = pty.openpty()
         os.set_blocking(master, False)
-        self._terminals.append(master)
-        return slave
+        self._terminals += [master, slave]
+        return os.ttyname(slave)
 
     def quote(self, said: str) -> str:
         """The sentence that matters of all that was said."""
@@ -139,7 +139,8 @@ def of_host(name: str, strike: Strike, codes: set[int], detected_s: float = 0.05
 
 def _terminal_closed(devices: Devices, host: Host | None) -> float:
     at_s = time.monotonic()
-    os.close(TERMINAL_CLOSED._terminals.pop(0))
+    while TERMINAL_CLOSED._terminals:
+        os.close(TERMINAL_CLOSED._terminals.pop(0))
     return at_s
 
 
