@@ -80,8 +80,8 @@ def _nothing(why: str) -> Outcome:
 def _judged(case: Case, devices: Devices, host: Host, code: int | None, fault_s: float, found: Recovered) -> Outcome:
     zero = devices.first(OFF, fault_s)
     zero_s = float(zero["time_s"]) - fault_s if zero is not None else math.nan
-    verdict_s = found.verdict_s - fault_s if found.verdict_s is not None else math.nan
-    end_s = found.verdict_s if found.verdict_s is not None and not case.host_dies else fault_s
+    verdict_s = found.verdict_s - case.ahead_s - fault_s if found.verdict_s is not None else math.nan
+    end_s = fault_s + (0.0 if case.host_dies or math.isnan(verdict_s) else verdict_s)
     lost_s = end_s - found.last_sample_s if found.last_sample_s is not None else math.nan
     wrong = []
     if code is None:
