@@ -201,7 +201,7 @@ def plan(
     sets = tuple(s for s in playable if s is not None)
     if len(sets) < len(predictions):
         error = PreflightRefusal(refusal(predictions, platform, excitation.scale_to_limits))
-        error.keys = tuple(dict.fromkeys(key for p in predictions for key in p.broken))
+        error.keys = unstable_keys(platform) or tuple(dict.fromkeys(key for p in predictions for key in p.broken))
         raise error
     return sets
 
@@ -220,7 +220,8 @@ def refusal(predictions: Sequence[Prediction], platform: Platform, scaling: bool
     """The message that refuses a campaign: every set, what it would do, and how to mend it."""
     failing = [p for p in predictions if not p.passes]
     lines = [f"{len(failing)} of {len(predictions)} sets would break a limit; nothing was moved."]
-    lines += [f"  {p.sentence()}" for p in predictions]
+    if not unstable_keys(platform):  # which runs away at any torque: figures of each set would say nothing
+        lines += [f"  {p.sentence()}" for p in predictions]
     hint = model_hint(platform)
     if hint:
         lines.append(hint)
@@ -232,12 +233,25 @@ def refusal(predictions: Sequence[Prediction], platform: Platform, scaling: bool
     return "\n".join(lines)
 
 
+def unstable_keys(platform: Platform) -> tuple[str, ...]:
+    """The keys that make the declared model run away by itself: a negative stiffness, a negative damping."""
+    given = (
+        ("model.stiffness_nm_rad", platform.stiffness_nm_rad),
+        ("model.damping_nm_s_rad", platform.damping_nm_s_rad),
+    )
+    return tuple(key for key, value in given if value < 0)
+
+
 def model_hint(platform: Platform) -> str:
     """What about the declared model makes it hard to stay within any travel; empty where nothing does."""
-    if platform.stiffness_nm_rad < 0 or platform.damping_nm_s_rad < 0:
+    if wrong := unstable_keys(platform):
+        values = {
+            "model.stiffness_nm_rad": platform.stiffness_nm_rad,
+            "model.damping_nm_s_rad": platform.damping_nm_s_rad,
+        }
+        told = " and ".join(f"{key} is {values[key]:g}" for key in wrong)
         return (
-            "The declared model is unstable (negative stiffness or damping): any torque makes it run away. "
-            "Correct model.stiffness_nm_rad and model.damping_nm_s_rad."
+            f"The declared model is unstable ({told}): any torque makes it run away. Turn the sign; both are 0 or more."
         )
     if platform.stiffness_nm_rad == 0:
         return (

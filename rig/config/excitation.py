@@ -59,9 +59,10 @@ class ExcitationConfig(Section):
     def _sets_are_long_enough(self) -> Self:
         for number, planned in enumerate(self.sets):
             if planned.duration_s * self.sample_rate_hz < LEAST_SAMPLES:
+                count = planned.duration_s * self.sample_rate_hz
                 raise ValueError(
-                    f"sets.{number}: {planned.duration_s:g} s are "
-                    f"{planned.duration_s * self.sample_rate_hz:.3g} samples at {self.sample_rate_hz:g} Hz, from which nothing can be identified: duration_s has to be at "
-                    f"least {LEAST_SAMPLES / self.sample_rate_hz:g} s"
+                    f"sets.{number}: {planned.duration_s:g} s are {count:.3g} samples at {self.sample_rate_hz:g} Hz, "
+                    "from which nothing can be identified: duration_s has to be at least "
+                    f"{LEAST_SAMPLES / self.sample_rate_hz:g} s"
                 )
         return self
