@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
-from rig.config.base import NonNegative, Section
+from rig.config.base import Section
 from rig.excitation import Chirp, FreeDecay, Multisine, RampHoldRelease, Sine
 
 LEAST_SAMPLES = 40
@@ -43,7 +43,7 @@ class ExcitationConfig(Section):
 
     sample_rate_hz: Annotated[float, Field(ge=10, le=20_000)] = 1000.0
     sets: tuple[AnySet, ...] = Field(default_factory=paper_sets)
-    rest_s: NonNegative = 12.0
+    rest_s: Annotated[float, Field(ge=0, le=3600)] = 12.0
     scale_to_limits: bool = False
     margin: Annotated[float, Field(gt=0, le=1)] = 0.95
 
@@ -56,8 +56,15 @@ class ExcitationConfig(Section):
         return sets
 
     @model_validator(mode="after")
-    def _sets_are_long_enough(self) -> Self:
+    def _sets_can_be_played_and_measured(self) -> Self:
         for number, planned in enumerate(self.sets):
+            stated = (planned.sine_hz, getattr(planned, "from_hz", None), getattr(planned, "to_hz", None))
+            highest_hz = max(hz or 0.0 for hz in stated)
+            if highest_hz > self.sample_rate_hz / 2:
+                raise ValueError(
+                    f"sets.{number}: {highest_hz:g} Hz cannot be played at {self.sample_rate_hz:g} ticks a second: "
+                    f"at most {self.sample_rate_hz / 2:g} Hz, or raise sample_rate_hz"
+                )
             if planned.duration_s * self.sample_rate_hz < LEAST_SAMPLES:
                 count = planned.duration_s * self.sample_rate_hz
                 raise ValueError(

@@ -18,6 +18,7 @@ from rig.recording.run import Array, Run, TorqueHold, Use
 MIN_SAMPLES = 40  # in a row, fewer tell nothing of two states, three parameters and the noise
 # No torque, rate, angle or time of a machine in SI units comes near; squares of it would overflow.
 LARGEST_VALUE = 1e12
+SHORTEST_STEP_S = 1e-8
 SMALLEST_PEAK = 1e-30  # a channel that stays below: squares of it would vanish
 
 
@@ -108,6 +109,11 @@ def check_run(run: Run, path: Path, scales_given: Collection[str] = ()) -> Run:
 def _check_order(time_s: Array, path: Path) -> None:
     step = np.diff(time_s)
     if (step > 0).all():
+        if len(step) and float(np.median(step)) < SHORTEST_STEP_S:
+            raise RecordingError(
+                f"{path}: samples stand {float(np.median(step)):g} s apart (median), which nothing measures: correct "
+                "recorded.scale.time"
+            )
         return
     i = int(np.argmin(step > 0))
     before, after = time_s[i], time_s[i + 1]
@@ -151,6 +157,15 @@ def _check_motion(run: Run, path: Path) -> None:
     channel, values = ("rate", run.rate_rad_s) if run.rate_rad_s is not None else ("angle", run.angle_rad)
     if values is None:
         raise RecordingError(f"{path}: holds neither rate nor angle: export one of them")
+    if (
+        run.rate_rad_s is not None
+        and run.angle_rad is not None
+        and np.ptp(run.angle_rad[run.valid]) == 0.0 < np.ptp(run.rate_rad_s[run.valid])
+    ):
+        raise RecordingError(
+            f"{path}: the angle never changes ({run.angle_rad[run.valid][0]:g}) though the rate does: check that the "
+            "encoder was connected, or name no angle column and delete that one"
+        )
     for name, given in ((channel, values[run.valid]), ("torque", run.torque_nm)):
         largest = float(np.max(np.abs(given))) if given is not None and len(given) else 0.0
         if 0.0 < largest < SMALLEST_PEAK:

@@ -61,6 +61,18 @@ CASES = {
         "turns the text around",
         "leave it out",
     ),
+    "set faster than its ticks": (
+        "backend: simulated\nsimulated: {}\nexcitation:\n  sets: [{torque_nm: 1, frequency_hz: 1.0e+6}]",
+        ":3: excitation",
+        "1e+06 Hz cannot be played",
+        "raise sample_rate_hz",
+    ),
+    "rest without end": (
+        "backend: simulated\nsimulated: {}\nexcitation: {rest_s: 1.0e+9}",
+        ":3: excitation.rest_s",
+        "1000000000",
+        "at most 3600",
+    ),
     "set of a single sample": (
         "backend: simulated\nsimulated: {}\nexcitation:\n  sets: [{torque_nm: 1, frequency_hz: 1, duration_s: 0.001}]",
         ":3: excitation",

@@ -173,6 +173,8 @@ ARRAYS: dict[str, tuple[Columns, str, str, str, str]] = {
         "the file runs from 0 to 0.499 s",
     ),
     "window too narrow": (motion(), "", "      to_s: 0.005\n", "6 valid samples", "widen from_s and to_s"),
+    "dead encoder": (changed(angle_rad=np.full(500, 0.3)), "", "", "the angle never changes (0.3)", "encoder"),
+    "next to no time": (changed(time_s=1e-290 * motion()["time_s"]), "", "", "1e-293 s apart", "recorded.scale.time"),
     "next to no torque": (changed(torque_nm=1e-200 * motion()["time_s"]), "", "", "the torque never exceeds", "scale"),
     "valid is a half": (changed(valid=np.full(500, 0.5)), "", "", "index 0: valid is 0.5", "write 1 for a good sample"),
     "valid is NaN": (changed(valid=np.full(500, np.nan)), "", "", "valid is empty", "write 1 for a good sample"),
