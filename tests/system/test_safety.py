@@ -16,12 +16,9 @@ from benchmarks.faults import undisturbed
 from benchmarks.kills import one_kill
 from sim_backend.emulators.fault_kinds import FAULTS
 
-QUICK = ("loop hangs, threads alive",)
 
-
-@pytest.mark.parametrize(
-    "name", [case.name if case.name in QUICK else pytest.param(case.name, marks=pytest.mark.slow) for case in CASES]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [case.name for case in CASES])
 def test_a_fault_ends_in_zero_torque_in_time_with_its_exit_code_and_its_record(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
