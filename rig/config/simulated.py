@@ -61,7 +61,7 @@ class MotorAmplifier(Section):
     inductance_h: Positive = 2e-3
     torque_constant_nm_a: Positive = 6.0
     voltage_limit_v: Positive = 300.0
-    gear_ratio: Positive = 1.0
+    gear_ratio: Annotated[float, Field(gt=0, le=1e6)] = 1.0
     gear_efficiency: Annotated[float, Field(gt=0, le=1)] = 1.0
     rotor_inertia_kg_m2: NonNegative = 0.0
     resolution_nm: Positive | None = None
