@@ -168,23 +168,28 @@ class Host:
 class Recovered:
     """What is in the files of a run, whatever ended it; times on the monotonic clock, None where there is none.
 
-    ``verdict_s`` is the instant at which the host knew that something was wrong.
+    ``verdict_s`` is the instant at which the host knew that something was wrong; ``in_set`` whether the last that the
+    files tell of is a set that has begun.
     """
 
     last_sample_s: float | None
     last_tick_s: float | None
     verdict_s: float | None
     problem: str = ""
+    in_set: bool = False
 
 
 def recovered(folder: Path) -> Recovered:
     """Read the journal and the raw capture of a folder as `rig recover` does."""
     starts: list[float] = []
+    in_set = False
     last_tick: float | None = None
     try:
         for entry in read_capture(folder / "raw" / FILE_NAME):
-            if entry.kind == MARK and (mark := json.loads(entry.payload))["mark"] == "begin_set":
-                starts.append(float(mark["start_s"]))
+            if entry.kind == MARK:
+                mark = json.loads(entry.payload)
+                in_set = mark["mark"] == "begin_set"
+                starts += [float(mark["start_s"])] if in_set else []
             elif entry.kind == TICK:
                 last_tick = entry.time_s
         journal = read_journal(folder / "recording.journal")
@@ -196,7 +201,7 @@ def recovered(folder: Path) -> Recovered:
         run = journal.runs[-1]
         times = [float(t) for t in run.column("ticks", "time_s")] if "ticks" in run.tables else []
         last = starts[len(journal.runs) - 1] + times[-1] if times else None
-    return Recovered(last, last_tick, verdicts[-1] if verdicts else None)
+    return Recovered(last, last_tick, verdicts[-1] if verdicts else None, in_set=in_set)
 
 
 def interrupt_twice(host: Host) -> float:
