@@ -15,6 +15,7 @@ from rig.errors import RecordingError
 
 CONFIG_FILE = "recovered.yaml"
 CAPTURE_FILE = "wire.cap"
+RESULT_FILE = "result.json"
 
 
 def recover_folder(folder: Path) -> int:
@@ -37,6 +38,8 @@ def recover_folder(folder: Path) -> int:
         ) from None
     for line in recovery.lines:
         sys.stdout.write(plain(line) + "\n")
+    if not (folder / RESULT_FILE).exists():
+        sys.stdout.write(f"{RESULT_FILE}: absent: nothing was identified before it ended\n")
     if not recovery.is_new:
         sys.stdout.write(f"Nothing had to be recovered: {plain(str(recovery.export))} has everything.\n")
         return OK

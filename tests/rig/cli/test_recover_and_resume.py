@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import json
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,7 @@ def test_what_is_cut_is_said_and_what_is_there_is_exported(played: Path, tmp_pat
     before = contents(folder)
     done = command(app, "recover", folder)
     assert done.exit_code == 0, done.output
+    assert "result.json: absent" in done.stdout
     assert "its writer was killed" in done.stdout and "7 Hz: CUT SHORT" in done.stdout
     runs = read_recording_h5(folder / "recording.h5").runs
     whole = read_recording_h5(played / "recording.h5").runs
@@ -140,6 +142,21 @@ def test_only_the_sets_that_are_missing_are_played_and_all_are_joined(played: Pa
     again = command(app, "play", write_config(tmp_path), "--quiet", "--resume", out, "--out", tmp_path / "again")
     assert again.exit_code == 0, again.output  # everything is finished: nothing moves, all is there
     assert len(read_recording_h5(tmp_path / "again" / "recording.h5").runs) == 2
+
+
+def test_a_resumed_campaign_is_identified_from_all_its_sets(played: Path, tmp_path: Path) -> None:
+    folder, out = killed(played, tmp_path / "killed"), tmp_path / "out"
+    quick = (
+        "--set",
+        "identify.candidates=[]",
+        "--set",
+        "identify.genetic={population: 4, generations: 1, restarts: 0}",
+    )
+    done = command(identify_run, write_config(tmp_path), "--quiet", "--resume", folder, "--out", out, *quick)
+    assert done.exit_code in (0, 1), done.output
+    result = json.loads((out / "result.json").read_text())
+    assert [row["frequency_hz"] for row in result["per_set"]] == [5.0, 7.0]
+    assert (out / "report.html").exists() and not (folder / "result.json").exists()
 
 
 def test_a_resumed_campaign_that_is_cut_again_is_resumed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
