@@ -25,7 +25,7 @@ from rig.recording.hdf5 import read_recording_h5
 from rig.recording.run import Run
 
 SET_S = 60.0
-TORQUE_NM, FREQUENCY_HZ = 40.0, 3.0
+TORQUE_NM, FREQUENCY_HZ = 10.0, 3.0
 # A machine that others use stalls within half an hour; what is looked at here is what grows.
 PATIENT = (
     "limits.missed_ticks=500", "limits.stale_gyro_ms=500", "bench.amplifier.watchdog_ms=1000",

@@ -14,7 +14,6 @@ from pathlib import Path
 _PR_SET_TIMERSLACK = 29
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 HAND_OVER_S = 50e-6  # how long the loop waits at most for another thread of ours to leave the interpreter to it
-HELPERS_PRIORITY = 1
 _usual_hand_over_s = sys.getswitchinterval()
 _lifted: list[int] = []
 
@@ -56,8 +55,8 @@ def _first_in_first_out(priority: int) -> str:
     return ""
 
 
-def _lift_helpers() -> None:
-    """Threads that were there before come just above the ordinary, far below the loop.
+def _lift_helpers(priority: int) -> None:
+    """Threads that were there before come just below the loop.
 
     Whoever holds the interpreter's lock and has to wait for a processor lets the loop wait with it; among ordinary
     programs on a busy machine that takes tens of milliseconds.
@@ -70,7 +69,7 @@ def _lift_helpers() -> None:
         if thread != threading.get_native_id() and thread not in _lifted:
             with contextlib.suppress(OSError, ValueError):  # it may have ended meanwhile
                 if os.sched_getscheduler(thread) == os.SCHED_OTHER:
-                    os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(HELPERS_PRIORITY))
+                    os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
                     _lifted.append(thread)
 
 
@@ -94,7 +93,7 @@ def acquire(priority: int, lock_memory: bool) -> RealTimeGrant:
     refused += [problem] if problem else []
     granted = priority if priority and not problem else 0
     if granted and sys.platform == "linux":
-        _lift_helpers()
+        _lift_helpers(max(granted - 1, 1))
     return RealTimeGrant(granted, locked, fine_timers, tuple(refused))
 
 
