@@ -135,19 +135,19 @@ def _span(values: Sequence[float]) -> str:
 
 
 def row(case: Case, tries: Sequence[Outcome]) -> str:
-    """One line of the table."""
+    """One line of the table; what played on to its end has no times."""
     codes = ", ".join(str(code) for code in sorted({t.code for t in tries if t.code is not None}))
     wrong = sorted({text for t in tries for text in t.wrong})
-    reaction = _span([t.reaction_s for t in tries]) if case.path is Road.WORKS and not case.before else "-"
-    stated = "-" if case.before or case.path is not Road.WORKS else f"{case.detected_s * 1e3:.0f}"
+    ended = [] if case.before else [t for t in tries if t.code != 0]
+    by_host = case.path is Road.WORKS and not case.before
+    stated = f"{case.detected_s * 1e3:.0f}" if by_host else "-"
     stated = "may play on" if case.detected_s == LATER else stated
-    limit = {Road.WORKS: "verdict + 20", Road.DEAD: "120", Road.DRIVE: "120"}[case.path]
-    heard = next((t.said for t in tries if t.said), "")
-    said = case.quote(heard).replace("|", "/")
+    limit = "-" if case.before else "verdict + 20" if by_host else "120"
     cells = (
-        case.name, _span([t.verdict_s for t in tries]) if not case.before else "-", stated, reaction,
-        _span([t.zero_s for t in tries]) if not case.before else "never on", "-" if case.before else limit, codes,
-        _span([t.lost_s for t in tries]) if not case.before else "-", "; ".join(wrong) or "pass", said,
+        case.name, _span([t.verdict_s for t in ended]), stated, _span([t.reaction_s for t in ended] if by_host else []),
+        "never on" if case.before else _span([t.zero_s for t in ended]), limit, codes,
+        _span([t.lost_s for t in ended]), "; ".join(wrong) or "pass",
+        case.quote(next((t.said for t in tries if t.said), "")).replace("|", "/"),
     )  # fmt: skip
     return "| " + " | ".join(cells) + " |"
 
