@@ -75,7 +75,8 @@ def main(given: Sequence[str] | None = None) -> int:
             time.sleep(1.0)
         code = host.ended(120.0)
         print(f"exit code {code}: {host.said[-300:]}")
-        runs = read_recording_h5(Path(scratch) / "run" / "recording.h5").runs
+        file = Path(scratch) / "run" / "recording.h5"
+        runs = read_recording_h5(file).runs if file.exists() else ()
         pauses = [e for e in devices.events if e["event"] == "paused"]
     quarter = max(1, len(memory) // 4)
     playing = memory[: -max(1, min(30, len(memory) // 10))]  # at the end everything is put together

@@ -32,7 +32,7 @@ PERIOD_SHARE = 0.5  # of the declared period of the ring: the length of a pulse
 LISTEN_PERIODS = 0.6
 LATE_S = 0.05  # samples and torque may be so late
 FIRST_RATE, LARGEST_RATE, LARGEST_TRAVEL = 0.05, 0.6, 0.3  # of the limits, by the declared model
-LEAST_STEP = 1.02
+LEAST_STEP, GENTLE_STEPS = 1.02, 8.0
 LARGEST_TORQUE = 0.3  # of the campaign's
 CLEAR_SIGMAS, CLEAR_LEAST_RAD_S = 40.0, math.radians(5.0)
 MOST_LEVELS = 16
@@ -79,8 +79,11 @@ class Probe:
         self._step_nm = LARGEST_TRAVEL * math.radians(limits.travel_deg) / (2.0 * peak_angle)
         campaign_nm = max(_largest(s) for s in sets) if sets else limits.torque_nm
         given = config.torque_nm
-        self.largest_nm = min(LARGEST_TORQUE * campaign_nm if given is None else given, limits.torque_nm)
-        self._torque_nm = min(FIRST_RATE * rate / peak_rate, self.largest_nm)
+        first_nm = FIRST_RATE * rate / peak_rate
+        # A campaign of little torque is probed with more of it, as far as that is little for the platform.
+        own_nm = max(LARGEST_TORQUE * campaign_nm, min(campaign_nm, GENTLE_STEPS * first_nm))
+        self.largest_nm = min(own_nm if given is None else given, limits.torque_nm)
+        self._torque_nm = min(first_nm, self.largest_nm)
         self._clear_share = 0.25 * peak_rate
         self._answers: list[Answer] = []
         self._pulse_at_s = 0.0
@@ -104,11 +107,13 @@ class Probe:
             self._judge(at_s)
 
     def _judge(self, at_s: float) -> None:
-        answer = self._heard()
-        self._answers.append(answer)
+        answer = self._heard(self._clear_share)
         room_nm = min((self._most_rad_s - answer.peak_rad_s) / self._rate_per_nm, self._step_nm, self._torque_nm)
         next_nm = min(self._torque_nm + room_nm, self.largest_nm)
         is_last = next_nm < LEAST_STEP * self._torque_nm or len(self._answers) >= MOST_LEVELS
+        if is_last and answer.inertia_kg_m2 is None:
+            answer = self._heard(0.0)  # what little there is has to do, friction being fitted too
+        self._answers.append(answer)
         if answer.inertia_kg_m2 is not None or is_last:
             self.over = True
             return
@@ -116,11 +121,11 @@ class Probe:
         self._pulse_at_s = at_s
         self._samples.clear()
 
-    def _heard(self) -> Answer:
+    def _heard(self, clear_share: float) -> Answer:
         data = np.array(self._samples, dtype=float).reshape(-1, 2)
         data = data[(data[:, 0] >= self._pulse_at_s) & (data[:, 0] <= self._pulse_at_s + self.pulse_s + self._listen_s)]
         peak = float(np.max(np.abs(data[:, 1]))) if len(data) else 0.0
-        clear = max(CLEAR_SIGMAS * self._rest.noise_rad_s, CLEAR_LEAST_RAD_S, self._clear_share * self._torque_nm)
+        clear = max(CLEAR_SIGMAS * self._rest.noise_rad_s, CLEAR_LEAST_RAD_S, clear_share * self._torque_nm)
         # An answer that is larger than foreseen is clear too: the inertia may be the one that is wrong.
         if peak < clear or len(data) < FEWEST_SAMPLES:
             return Answer(self._torque_nm, peak, None)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from rig.config.limits import LimitsConfig
 from rig.config.root import Config
 from rig.errors import SafetyTrip
 from rig.excitation import Sine
-from rig.excitation.planned import planned
+from rig.excitation.planned import PlannedSet, planned
 from rig.guard_base import Rest, Tick
 from rig.platform import Platform
 from rig.probe import Probe
@@ -29,13 +29,13 @@ USUAL = ProbeConfig()
 
 def probed(
     truth: Mapping[str, object], declared: Platform = DECLARED, sign: float = 1.0, config: ProbeConfig = USUAL,
-    rate_hz: float = 2000.0,
+    rate_hz: float = 2000.0, sets: Sequence[PlannedSet] = SETS,
 ) -> tuple[str, float, float]:  # fmt: skip
     """(finding, seconds it took, largest torque) on the simulated platform."""
     simulated = {"platform": truth, "gyro": {"full_scale_deg_s": None, "sample_rate_hz": rate_hz}}
     whole = Config.model_validate({"name": "x", "backend": "simulated", "simulated": simulated})
     rig = SimulatedRig(whole.simulated, 1000.0)
-    probe = Probe(config, LIMITS, declared, SETS)
+    probe = Probe(config, LIMITS, declared, sets)
     probe.begin(Rest(noise_rad_s=NOISE))
     peak, k = 0.0, 0
     with rig.opened(), rig.armed():
@@ -115,6 +115,14 @@ def test_a_platform_that_is_held_is_refused_and_how_hard_it_was_pushed_is_said()
 def test_harder_pulses_are_played_only_as_far_as_the_file_allows() -> None:
     with pytest.raises(SafetyTrip, match=r"3 N m for 17 ms"):
         probed(platform(coulomb_friction={"level_nm": 60.0}), config=ProbeConfig(torque_nm=3.0))
+
+
+@pytest.mark.parametrize("friction_nm", [0.3, 1.0, 2.0])
+def test_a_campaign_of_little_torque_is_probed_too(friction_nm: float) -> None:
+    little = planned([Sine(torque_nm=10.0, frequency_hz=3.0)])
+    finding, _, peak_nm = probed(platform(coulomb_friction={"level_nm": friction_nm}), sets=little)
+    assert inertia_in(finding) == pytest.approx(0.0203, rel=0.3)
+    assert peak_nm <= 7.0
 
 
 def test_a_slow_gyro_is_enough() -> None:
