@@ -95,7 +95,7 @@ def write_journal(path: Path, names: tuple[str, ...]) -> None:
 
 
 def test_a_journal_full_of_markup_gives_a_clean_report(tmp_path: Path) -> None:
-    write_journal(tmp_path / "recording.journal", (SCRIPT, IMAGE, BREAKOUT, TURNED, STEERING, FORMULA))
+    write_journal(tmp_path / "recording.journal", (SCRIPT + FORMULA, BREAKOUT + TURNED + STEERING))
     config = tmp_path / "rig.yaml"
     config.write_text("backend: recorded\nrecorded: {runs: [{file: recording.journal}]}\n")
     done = command(identify_run, config, "--out", tmp_path / "out", *QUICK)
@@ -111,7 +111,7 @@ def test_a_journal_full_of_markup_gives_a_clean_report(tmp_path: Path) -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="such names cannot be given to files there")
 def test_files_and_columns_with_markup_in_their_names_give_a_clean_report(tmp_path: Path) -> None:
     time_s, torque, rate = motion()
-    names = [f"{name.replace('/', '_')}.csv" for name in (SCRIPT, IMAGE, TURNED, STEERING, FORMULA)]
+    names = [f"{name.replace('/', '_')}.csv" for name in (SCRIPT + TURNED, IMAGE + STEERING)]
     for name in names:
         rows = "".join(
             f"{a!r},{b!r},{c!r}\n" for a, b, c in zip(*(x.tolist() for x in (time_s, torque, rate)), strict=True)
@@ -130,7 +130,7 @@ def test_files_and_columns_with_markup_in_their_names_give_a_clean_report(tmp_pa
 def test_sets_with_markup_in_their_names_give_a_clean_report(tmp_path: Path) -> None:
     sets = [
         {"torque_nm": 20, "frequency_hz": hz, "duration_s": 0.5, "name": name}
-        for hz, name in ((5, SCRIPT), (7, IMAGE), (9, BREAKOUT), (11, FORMULA))
+        for hz, name in ((5, SCRIPT), (9, BREAKOUT))
     ]
     config = tmp_path / "rig.yaml"
     config.write_text(f"backend: simulated\nsimulated: {{}}\nexcitation: {{rest_s: 0.3, sets: {json.dumps(sets)}}}\n")
