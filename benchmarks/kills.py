@@ -84,7 +84,8 @@ def _judged(devices: Devices, host: Host, at_s: float, found: Recovered | None) 
         wrong.append(f"off after {zero_s * 1e3:.0f} ms")
     if found is not None and found.problem:
         wrong.append(found.problem)
-    if found is not None and found.last_tick_s is not None:
+    # A drive that was off before had been told so: nothing was recorded any more, and nothing is lost.
+    if found is not None and found.last_tick_s is not None and not math.isnan(zero_s):
         last_s = found.last_tick_s
         if found.in_set:
             last_s = min(last_s, found.last_sample_s) if found.last_sample_s is not None else last_s
