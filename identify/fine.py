@@ -16,7 +16,7 @@ import numpy as np
 from identify.channels import simplicity
 from identify.holdout import Split
 from identify.lines import foreign_lines_hz
-from identify.output_error import refine
+from identify.output_error import refine, squares_at
 from identify.parameters import Name
 from identify.regression import Structure
 from identify.results import Candidate
@@ -260,14 +260,17 @@ class FineSearch:
         return whole + [s for s in part if s.effect not in shown]
 
     def _from(self, now: Whole, look: Scored, hopeless: float) -> Whole | None:
-        """A candidate fitted from where its score points; with dry friction by way of a short horizon.
+        """A candidate fitted from where its score points, if need be by way of a short horizon.
 
-        Over whole runs friction has false minima: a standstill that comes too soon puts the rest of the run off.
+        Over whole runs friction has false minima: a standstill that comes too soon puts the rest of the run off. So
+        has whatever moves the resonance: a start that is worse than the model without the candidate has lost it.
         """
         structure = now.structure.plus(look.effect)
-        start = {**now.values(), **look.start}
-        if effects.get(look.effect).place is Place.FRICTION:
-            traces, use = [self.traces[i] for i in self.fit], [self.split.fit[i] for i in self.fit]
+        traces, use = [self.traces[i] for i in self.fit], [self.split.fit[i] for i in self.fit]
+        starts = [{**now.values(), **look.start}, {**now.values(), **look.besides, **look.start}]
+        squares = [squares_at(traces, structure, start, use) / self.noise**2 for start in starts]
+        start = starts[int(np.argmin(squares))]
+        if effects.get(look.effect).place is Place.FRICTION or min(squares) > now.squares:
             near = refine(traces, structure, start, self.horizon, 8, use, fixed=self.fixed, coarse=True, tolerance=1e-3)
             if np.isfinite(near.sigma):
                 start = dict(zip(near.names, near.values.tolist(), strict=True))

@@ -18,7 +18,7 @@ import numpy as np
 from identify.parameters import Name, bounds_of, equations_of, names_of, ordered, platform_of
 from identify.regression import Structure
 from identify.sensitivities import Reduced, at_residual, linearise
-from identify.shots import RUNAWAY, Shots, losses_of, make_shots, moved, predict, residual_at
+from identify.shots import RUNAWAY, Shots, from_rest, losses_of, make_shots, moved, predict, residual_at
 from identify.traces import Trace
 from rig.dynamics import Equations
 from rig.dynamics.simulate import MAX_SUBSTEPS
@@ -150,7 +150,7 @@ def _shots_for(
             held = trace.step_s / trace.torque.shortest_s
             substeps = min(MAX_SUBSTEPS, max(substeps, round(held)))
         length = None if shot_s is None else max(8, round(shot_s / trace.step_s))
-        shots = make_shots(trace, substeps, length, None if use is None else use[i])
+        shots = from_rest(make_shots(trace, substeps, length, None if use is None else use[i]), equations)
         if carry is not None and len(carry[i].first) == len(shots.first):
             shots.starts, shots.bias = carry[i].starts.copy(), carry[i].bias
         out.append(shots)
@@ -263,35 +263,50 @@ class _Step(NamedTuple):
 
 
 def _levenberg(descent: _Descent, iterations: int, tolerance: float, hopeless: float, coarse: bool) -> Estimate:
-    d, converged = descent, False
-    for k in range(iterations):
-        if d.lost or (k == 3 and d.cost > hopeless**2 * d.count):
+    d, converged, left, age = descent, False, iterations, 0
+    while left > 0 and not d.lost:
+        if iterations - left >= 3 and d.cost > hopeless**2 * d.count:
             break
         step = d.step()
-        for _ in range(KEPT):
-            if step is None or _arrived(step, tolerance) or not step.foretold:
-                break
-            d.keep()
-            step = d.step()
-        kept = not d.fresh
-        if step is None and not kept:
+        left -= step is not None
+        if step is None and d.fresh:
             converged = True
             break
+        # Sensitivities from elsewhere lead beside the minimum, the further the more the model leaves.
         arrived = step is not None and _arrived(step, tolerance)
-        if arrived and coarse:
-            d.keep()
-        else:
-            d.renew()
-        # Sensitivities from elsewhere lead beside the minimum, by a part of a standard error: for a comparison near.
-        if arrived and (coarse or not kept):
+        age += 1
+        if step is not None and d.fresh and arrived:
             converged = True
+            d.keep() if coarse else d.renew()
             break
+        if step is not None and step.foretold and not arrived and age <= KEPT:
+            d.keep()
+            continue
+        age = 0
+        d.renew()
     sigma = float(np.sqrt(d.cost / max(d.count, 1)))
     return Estimate(d.structure, d.names, d.x, sigma, d.count, d.a, tuple(d.shots), converged)
 
 
 def _arrived(step: _Step, tolerance: float) -> bool:
     return step.length <= 30.0 * tolerance or step.fall < 1e-2 * tolerance * step.cost
+
+
+def squares_at(
+    traces: Sequence[Trace], structure: Structure, values: Mapping[Name, float], use: Sequence[Any]
+) -> float:  # fmt: skip
+    """Sum of squares over whole runs at given parameters, start states and biases fitted by one step."""
+    names = names_of(structure, 1 + max(t.number for t in traces))
+    x = np.array([values.get(name, 0.0) if len(name) == 3 else values[name] for name in names])
+    still = np.ones(len(x), dtype=bool)
+
+    def of(s: Shots) -> float:
+        part = linearise(s, structure, names, x, np.ones(len(x)), still, np.inf)
+        found = [part.losses, residual_at(moved(s, part.back(np.zeros(len(x)))), structure, names, x)[1]]
+        return min(float(np.sum(np.where(np.isfinite(each), each, np.inf))) for each in found)
+
+    with ThreadPoolExecutor(2) as workers:
+        return sum(workers.map(of, _shots_for(traces, structure, names, x, None, use, None, coarse=True)))
 
 
 def evaluate(

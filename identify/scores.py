@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from identify.output_error import Estimate
-from identify.parameters import Name, platform_of
+from identify.parameters import Name, bounds_of, platform_of
 from identify.screen import grid_of
 from identify.sensitivities import nuisance_basis, sensitivities
-from identify.shots import RUNAWAY, Shots, make_shots, motion, predict
+from identify.shots import RUNAWAY, Shots, from_rest, make_shots, motion, predict
 from identify.traces import UPSAMPLING, torque_along
 from rig import effects
 from rig.dynamics import Equations, Grid
@@ -46,6 +46,8 @@ class Scored:
         Expected fall of chi square.
     start
         Parameter values for a fit to begin from.
+    besides
+        Where the parameters of the model at hand go to make room for it.
     count
         Its number of parameters.
     shape
@@ -57,6 +59,7 @@ class Scored:
     start: dict[Name, float]
     count: int
     shape: tuple[float, ...] = ()
+    besides: dict[Name, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -99,12 +102,33 @@ class Scores:
         self.keep = np.array([n not in fixed for n in estimate.names])
         self._finer_ones: dict[tuple[int, int], tuple[Shots, Array]] = {}
         with ThreadPoolExecutor(2) as workers:
-            self.runs = list(workers.map(self._around, [_cut(s, share) for s in estimate.shots]))
+            self.runs = list(workers.map(self._around, [self._cut(s, share) for s in estimate.shots]))
         self.largest_first = sorted(self.runs, key=lambda r: -float(np.std(r.base)))
         information = np.sum([r.columns.T @ r.columns for r in self.runs], axis=0)
         self.size = np.sqrt(np.maximum(np.diag(information), 1e-300))
         self.inverse = np.linalg.pinv(information / np.outer(self.size, self.size), rcond=1e-12, hermitian=True)
         self.toward = np.sum([r.columns.T @ r.residual for r in self.runs], axis=0) / self.size
+
+    def _cut(self, shots: Shots, share: float) -> Shots:
+        """The part of a run in which most happens: a soft start shows neither saturation nor travel."""
+        if share >= 1.0:
+            return shots
+        whole = shots.trace
+        n = len(whole.measured)
+        length = int(share * (n - 1))
+        begin = _busiest(whole.measured if whole.torque is None else whole.fine[3][::UPSAMPLING], length)
+        trace = whole.piece(begin, begin + length)
+        weight = shots.weight[begin : begin + length + 1]
+        if not trace.stretches or not np.any(weight):
+            return shots
+        ratio = round(whole.step_s / shots.grid.step_s)
+        e = self.estimate
+        model = Equations(platform_of(e.structure, e.names, e.values, shots.number, shots.added))
+        cut = from_rest(make_shots(trace, ratio, None, weight), model)
+        if begin == 0:
+            cut.starts[: len(shots.first)] = shots.starts[: len(cut.first)]
+        cut.bias = shots.bias
+        return cut
 
     def _around(self, shots: Shots) -> _Run:
         e = self.estimate
@@ -156,8 +180,16 @@ class Scores:
         if as_it_is:  # without a gain to scale it the candidate is what it is
             share, gain = np.ones(1), max(0.0, float(2.0 * along[0] - square[0, 0]))
         return Scored(
-            effect.name, gain / self.sigma**2, self._start(effect, shape, pushes, share), len(effect.parameters), shape
-        )
+            effect.name, gain / self.sigma**2, self._start(effect, shape, pushes, share), len(effect.parameters), shape,
+            self._besides(across @ share),
+        )  # fmt: skip
+
+    def _besides(self, taken: Array) -> dict[Name, float]:
+        """The parameters at hand, moved by what a candidate takes from their directions."""
+        e = self.estimate
+        moved = e.values[self.keep] - self.inverse @ taken / self.size
+        names = [n for n, on in zip(e.names, self.keep, strict=True) if on]
+        return {n: float(np.clip(v, *bounds_of(n))) for n, v in zip(names, moved, strict=True)}
 
     def _at_its_size(self, found: Scored) -> Scored | None:
         """A candidate without a gain, at the shape on the grid or the multiple of it that promises more."""
@@ -166,7 +198,8 @@ class Scores:
             return found
         multiple = tuple(found.start[(effect.name, p.name)] for p in effect.parameters)
         looks = [self.score(effect, shape, as_it_is=True) for shape in dict.fromkeys((found.shape, multiple))]
-        return max((s for s in looks if s is not None), key=lambda s: s.gain, default=None)
+        best = max((s for s in looks if s is not None), key=lambda s: s.gain, default=found)
+        return best if best.gain > 0.0 else found  # far from the truth only a part of it may promise anything
 
     def sharpened(self, found: Scored) -> Scored:
         """The same candidate at the best shapes between the neighbours on the grid, one axis after the other."""
@@ -332,26 +365,6 @@ def _half_steps(s: Shots, equations: Equations) -> tuple[Array, Array, Array, Ar
     torque = np.empty(len(out))
     torque[::2], torque[1::2] = np.append(steps[:, 0], steps[-1, 2]), steps[:, 1]
     return out[:, 0].copy(), out[:, 1].copy(), s.trace.offset_s + 0.5 * h * np.arange(len(out)), torque
-
-
-def _cut(shots: Shots, share: float) -> Shots:
-    """The part of a run in which most happens: a soft start shows neither saturation nor travel."""
-    if share >= 1.0:
-        return shots
-    whole = shots.trace
-    n = len(whole.measured)
-    length = int(share * (n - 1))
-    begin = _busiest(whole.measured if whole.torque is None else whole.fine[3][::UPSAMPLING], length)
-    trace = whole.piece(begin, begin + length)
-    weight = shots.weight[begin : begin + length + 1]
-    if not trace.stretches or not np.any(weight):
-        return shots
-    ratio = round(whole.step_s / shots.grid.step_s)
-    cut = make_shots(trace, ratio, None, weight)
-    if begin == 0:
-        cut.starts[: len(shots.first)] = shots.starts[: len(cut.first)]
-    cut.bias = shots.bias
-    return cut
 
 
 def _busiest(values: Array, length: int) -> int:

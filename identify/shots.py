@@ -79,6 +79,17 @@ def make_shots(trace: Trace, substeps: int, length: int | None, use: Any = None)
     return Shots(trace, Grid(time, trace.torque, substeps, min(LEAD_S, trace.offset_s)), first, starts, 0.0, weight)
 
 
+def from_rest(shots: Shots, equations: Equations) -> Shots:
+    """The same shots with their angles counted from where the model stands without torque.
+
+    A gyro's angle begins at zero wherever the platform rests; a load that pulls there (gravity, a magnet, a constant
+    torque) would otherwise set it in motion, and the fit off for good.
+    """
+    if shots.trace.biased:
+        shots.starts = shots.starts + np.array([equations.rest_angle_rad(), 0.0])
+    return shots
+
+
 def predict(shots: Shots, equations: Equations, starts: Array, bias: float, push: Array | None = None) -> Array:
     """The measured channel as the model gives it, shape (n,); ``push`` is a further resisting torque (see motion)."""
     fine, first = motion(shots, equations, starts, push)

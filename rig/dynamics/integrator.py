@@ -299,6 +299,18 @@ def step_over_kinks(motion, n, z, work, saved, h, m0, m1, m2, jck, body, kinks, 
 
 
 @jit
+def pull(angle, z, jck, kernels, loads, z_at, p, p_at):  # type: ignore[no-untyped-def]
+    """Torque of spring and loads on a platform that stands still at an angle, at time zero."""
+    scratch = np.zeros(max(1, len(z)))
+    held = np.zeros(max(1, len(z)))
+    held[: len(z)] = z
+    return jck[2] * angle + _sum(
+        0, loads, angle, 0.0, 0.0, 0.0, _pointer(held), _pointer(scratch), _pointer(kernels), _pointer(z_at),
+        _pointer(p), _pointer(p_at),
+    ) + 0.0 * scratch[0] * held[0]  # keeps both alive  # fmt: skip
+
+
+@jit
 def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, kinks, out):  # type: ignore[no-untyped-def]
     """Integrate ``len(torque)`` fine steps.
 

@@ -22,6 +22,31 @@ from rig.recording.run import Array
 
 STEP_PHASE_RAD = 0.06  # of the fastest motion in one fine step: 4th order leaves 1e-7 of a frequency
 MAX_SUBSTEPS = 64
+_NEWTON = 12
+_BESIDE_RAD = 1e-6
+
+
+def _projection(parts: int) -> Array:
+    """From values at the ends of equal parts of a step to its start, middle and end, shape (parts + 1, 3).
+
+    They stand for the quadratic with the same mean, first and second moment as the straight lines between the values.
+    """
+    x = np.linspace(-0.5, 0.5, parts + 1)
+    out = np.zeros((parts + 1, 3))
+    nodes, share = np.polynomial.legendre.leggauss(3)
+    for k in range(parts):
+        for node, weight in zip(0.5 * (nodes + 1.0), 0.5 * share / parts, strict=True):
+            u = x[k] + node / parts
+            moments = np.array([1.0, 12.0 * u, 180.0 * (u * u - 1.0 / 12.0)])
+            a, b, c = weight * moments
+            at = np.array([a - 0.5 * b + c / 6.0, a - c / 12.0, a + 0.5 * b + c / 6.0])
+            out[k] += (1.0 - node) * at
+            out[k + 1] += node * at
+    return out
+
+
+_PARTS = 8  # of a step, where the torque has corners
+_PROJECTION = _projection(_PARTS)
 
 
 class Readings(Protocol):
@@ -127,6 +152,30 @@ class Equations:
             if rest:
                 z[self.z_at[i] : self.z_at[i + 1]] = rest(angle_rad, rate_rad_s)
         return z
+
+    def rest_angle_rad(self) -> float:
+        """Where the platform stands without torque, near zero: what its loads pull there, the spring holds.
+
+        Loads with a memory or a clock of their own are taken as they are at the start. Zero where no such place is
+        found within a turn.
+        """
+        if not self.loads or not self.jck[2] > 0.0:
+            return 0.0
+        at = 0.0
+        for _ in range(_NEWTON):
+            here, beside = self._pull_nm(at), self._pull_nm(at + _BESIDE_RAD)
+            slope = (beside - here) / _BESIDE_RAD
+            if not slope > 0.0 or not abs(at) < 2.0 * np.pi:
+                return 0.0
+            at -= here / slope
+        return at if abs(self._pull_nm(at)) <= 1e-9 * self.jck[2] else 0.0
+
+    def _pull_nm(self, angle_rad: float) -> float:
+        """Torque by which spring and loads pull a platform back that stands still at an angle."""
+        return float(integrator.pull(angle_rad, self.rest_states(0.0, 0.0), self.jck, *self._loads_only()))
+
+    def _loads_only(self) -> tuple[Any, int, Any, Array, Any]:
+        return self.kernels, self.loads, self.z_at, self.p, self.p_at
 
     def scratch(self) -> Array:
         """Room for one step."""
@@ -243,24 +292,45 @@ class Grid:
         torque = torque or NO_TORQUE
         self._held = torque.hold == "zero_order"
         self._plain: Array | None = None
+        self._finer: Array | None
         self._lead = 2 * int(lead_s / self.step_s)
-        begin = float(time_s[0]) - 0.5 * self.step_s * self._lead
-        self._half = torque.on_half_steps(begin, 0.5 * self.step_s, 2 * self.n + 1 + self._lead)
+        self._torque, self._factor, self._finer = torque, 1.0, None
+        self._half = self._torque_every(0.5 * self.step_s)
 
     def scaled(self, factor: float) -> Grid:
         """The same grid with its torque multiplied: reading a smooth torque off its samples costs more than that."""
         other = copy(self)
-        other._half, other._plain = factor * self._half, None
+        other._half, other._plain, other._factor = factor * self._half, None, factor * self._factor
+        other._finer = None
         return other
+
+    def _torque_every(self, step_s: float) -> Array:
+        """The torque asked of the drive, from the lead to the last instant."""
+        lead_s = 0.5 * self.step_s * self._lead
+        count = round((self.n * self.step_s + lead_s) / step_s) + 1
+        return self._torque.on_half_steps(float(self.time_s[0]) - lead_s, step_s, count)
 
     def shaft_torque(self, equations: Equations) -> Array:
         """Torque behind the drive effects at start, middle and end of each fine step, shape (n, 3)."""
         if not equations.drive.names and self._plain is not None:
             return self._plain
+        if not self._held and any(effects.get(name).bends_torque for name in equations.drive.names):
+            return self._bent(equations)
         steps = self._by_step(equations.drive.apply(self._half, 0.5 * self.step_s)[self._lead :])
         if not equations.drive.names:
             self._plain = steps
         return steps
+
+    def _bent(self, equations: Equations) -> Array:
+        """Torque with corners inside of steps: the quadratics that push, twist and bend each step as it does."""
+        parts = _PARTS
+        if self._finer is None:
+            self._finer = self._factor * self._torque_every(self.step_s / parts)
+        torque = equations.drive.apply(self._finer, self.step_s / parts)[self._lead // 2 * parts :]
+        weights, values = _PROJECTION, np.empty((self.n, parts + 1))
+        values[:, :parts] = torque[: self.n * parts].reshape(self.n, parts)
+        values[:, parts] = torque[parts : self.n * parts + 1 : parts]
+        return np.ascontiguousarray(values @ weights)
 
     def _by_step(self, half: Array) -> Array:
         if self._held:

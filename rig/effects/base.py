@@ -110,6 +110,7 @@ class Effect:
     rest_state: Callable[[float, float], tuple[float, ...]] | None = None  # of angle and rate at the start
     fastest_rad_s: Callable[[tuple[float, ...]], float] | None = None  # of (J, C, K, *values): sets the step
     kinks: Callable[[tuple[float, ...]], tuple[float, ...]] | None = None  # angles at which its torque bends
+    bends_torque: bool = False  # a drive effect that puts corners into a smooth torque
     leans_on: tuple[str, ...] = ()  # terms of the platform that scale its torque (backlash: the stiffness)
     ordered: tuple[tuple[str, str], ...] = ()  # pairs of parameters of which the first is the smaller
     lower_order: tuple[str, ...] = ()  # effects that come first by marginality: a constant before a slope

@@ -29,5 +29,6 @@ EFFECT = Effect(
         ),
     ),
     kernel=_dead,
+    bends_torque=True,
     separated_by="from backlash and Coulomb friction: several frequencies",
 )

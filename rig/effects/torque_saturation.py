@@ -32,5 +32,6 @@ EFFECT = Effect(
         ),
     ),
     kernel=_clip,
+    bends_torque=True,
     separated_by="from cubic stiffness: several frequencies at the same amplitude",
 )

@@ -117,3 +117,16 @@ def test_a_kink_of_the_torque_costs_no_order(effects: dict[str, dict[str, float]
     coarse, finer = (np.abs(simulate(platform, time, torque, substeps=n).rate_rad_s - fine).max() for n in (2, 8))
     assert coarse < 0.5 * NOISE_RAD_S
     assert coarse / finer > 100.0
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [{"torque_deadzone": {"width": 1.4}}, {"torque_saturation": {"limit": 30.0}},
+     {"torque_deadzone": {"width": 1.4}, "torque_delay": {"delay": 3e-4}}],
+    ids=["deadzone", "saturation", "late"],
+)  # fmt: skip
+def test_a_corner_of_the_torque_inside_a_step_is_felt_as_it_is(effects: dict[str, dict[str, float]]) -> None:
+    time, torque = sine(40, 3, 2)
+    platform = Platform(effects=effects)
+    fine = simulate(platform, time, torque, substeps=128).rate_rad_s
+    assert np.abs(simulate(platform, time, torque, substeps=4).rate_rad_s - fine).max() < 0.05 * NOISE_RAD_S
