@@ -55,7 +55,7 @@ MOST_SHOWN = 10
 PLAIN = 300.0  # fall of chi square on that part at which it tells enough
 LONG = 14_000  # samples; of a longer recording a first part is scored first
 FEW_STEPS = 8  # of a fit that is only compared
-TAKEN_ON = 4  # times so many more, while each time the squares fall
+TAKEN_ON = 4  # times as many as a fit has, while each time the squares fall
 GOING = 0.95  # to less than this share
 NEAR_THEN = 4.0  # times the best squares of its round: asked again in the finished model
 AT_FLOOR = 1.1  # mean square over the noise's variance: who is there has found what there is
@@ -225,21 +225,24 @@ class FineSearch:
         looks = self._looks(now, [n for n in self.allowed if n not in now.structure.effects])
         tried: dict[str, Whole] = {}
         short = self._shortlist(looks, now)
-        for look in short:
+        for look in sorted(short, key=lambda s: (effects.get(s.effect).states > 0, s.count)):  # the cheap ones first
             best = min(tried.values(), key=lambda w: w.squares, default=now)
             if best.level < AT_FLOOR and look.gain < FAR_BEHIND * short[0].gain:
                 continue
             fitted = self._from(now, look, HOPELESS * best.estimate.sigma)
             if fitted is not None:
                 tried[look.effect] = fitted
-        return {n: self._on(w) if w.squares < now.squares else w for n, w in tried.items()}, looks
+        best = min(tried.values(), key=lambda w: w.squares, default=now)
+        if best.level > AT_FLOOR:
+            tried = {n: self._on(w) if w.squares < NEAR_THEN * best.squares else w for n, w in tried.items()}
+        return tried, looks
 
     def _on(self, fitted: Whole) -> Whole:
         """A fit that still goes down, taken on: a sharp resonance is found late, and then at once."""
         for _ in range(TAKEN_ON):
             if fitted.estimate.converged or fitted.level < AT_FLOOR:
                 break
-            further = self.whole(fitted.structure, fitted.values(), steps=FEW_STEPS)
+            further = self.whole(fitted.structure, fitted.values())
             if further is None or further.squares >= fitted.squares:
                 break
             slow, fitted = further.squares > GOING * fitted.squares, further

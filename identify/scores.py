@@ -116,14 +116,15 @@ class Scores:
         whole = shots.trace
         n = len(whole.measured)
         length = int(share * (n - 1))
-        begin = _busiest(whole.measured if whole.torque is None else whole.fine[3][::UPSAMPLING], length)
+        e = self.estimate
+        model = Equations(platform_of(e.structure, e.names, e.values, shots.number, shots.added))
+        told = whole.measured if whole.torque is None else whole.fine[3][::UPSAMPLING]
+        begin = 0 if model.states else _busiest(told, length)  # what remembers is known only where the run begins
         trace = whole.piece(begin, begin + length)
         weight = shots.weight[begin : begin + length + 1]
         if not trace.stretches or not np.any(weight):
             return shots
         ratio = round(whole.step_s / shots.grid.step_s)
-        e = self.estimate
-        model = Equations(platform_of(e.structure, e.names, e.values, shots.number, shots.added))
         cut = from_rest(make_shots(trace, ratio, None, weight), model)
         if begin == 0:
             cut.starts[: len(shots.first)] = shots.starts[: len(cut.first)]
