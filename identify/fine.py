@@ -233,8 +233,11 @@ class FineSearch:
             if fitted is not None:
                 tried[look.effect] = fitted
         best = min(tried.values(), key=lambda w: w.squares, default=now)
-        if best.level > AT_FLOOR:
-            tried = {n: self._on(w) if w.squares < NEAR_THEN * best.squares else w for n, w in tried.items()}
+        for name, w in list(tried.items()):
+            simpler = [tried[n] for n in effects.get(name).nests if n in tried]
+            chosen_anyway = any(n.squares < TWICE * w.squares for n in simpler)
+            if best.level > AT_FLOOR and w.squares < NEAR_THEN * best.squares and not chosen_anyway:
+                tried[name] = self._on(w)
         return tried, looks
 
     def _on(self, fitted: Whole) -> Whole:

@@ -203,8 +203,13 @@ class Scores:
         return best if best.gain > 0.0 else found  # far from the truth only a part of it may promise anything
 
     def sharpened(self, found: Scored) -> Scored:
-        """The same candidate at the best shapes between the neighbours on the grid, one axis after the other."""
+        """The same candidate at the best shapes between the neighbours on the grid, one axis after the other.
+
+        Friction finds its shapes over a short horizon, and each look at it costs a simulation of stick and slip.
+        """
         effect = effects.get(found.effect)
+        if effect.family == "friction":
+            return found
         shapes = [p for p in effect.parameters if not p.linear]
         for i, p in enumerate(shapes):
             grid = sorted(p.start(self.scale)) if p.start else []
