@@ -32,6 +32,7 @@ from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
 MOVES = 3.0  # times the sensor's noise that a motion has to reach
+MUCH_CLOSER = 0.5  # times the free-run error of the other fit
 STOPPED = "stopped before the search was through: what is missing may still be unnamed"
 SHOWS = 5.0  # standard errors from zero at which whole runs show damping
 
@@ -180,7 +181,13 @@ class _Identifier:
         )  # fmt: skip
         if fitted.sensor_limited:
             return self._with_dropped_damping(search, fitted)
-        return fitted if self.torque_free else self._regressed(search.best)
+        if self.torque_free:
+            return fitted
+        regressed = self._regressed(search.best)
+        runs = fitted.free_run, regressed.free_run
+        if all(r is not None for r in runs) and runs[0].sigma < MUCH_CLOSER * runs[1].sigma:  # type: ignore[union-attr]
+            return fitted  # a few disturbed seconds keep it from the noise; a torque's weights lead far astray
+        return regressed
 
     def _regressed(self, best: Judged) -> Fitted:
         return by_regression(
