@@ -136,3 +136,11 @@ def test_interface_is_registered_with_python_can():
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())
     module, _, name = project["project"]["entry-points"]["can.interface"]["slcan_bulk"].partition(":")
     assert getattr(import_module(module), name) is SlcanBulkBus
+
+
+def test_a_port_that_never_stops_sending_is_no_adapter(port, monkeypatch):
+    monkeypatch.setattr("drivers.slcan.TALKS_S", 0.01)
+    port.wait_readable = lambda timeout_s: True
+    port.read = lambda: b"\x90\x00"
+    with pytest.raises(can.CanInitializationError, match=r"goes on sending.*swapped"):
+        SlcanBulkBus(port)
