@@ -197,7 +197,10 @@ def recovered(folder: Path) -> Recovered:
         return Recovered(None, last_tick, None, str(problem))
     verdicts = [event.values["verdict_s"] for event in journal.events if event.values.get("verdict_s") is not None]
     last = None
-    if journal.runs and len(starts) >= len(journal.runs):
+    if in_set and len(starts) > len(journal.runs):
+        # The set has begun and no row of it is in the file yet: it is lost from its start, and not the rest before it.
+        last = starts[len(journal.runs)]
+    elif journal.runs and len(starts) >= len(journal.runs):
         run = journal.runs[-1]
         times = [float(t) for t in run.column("ticks", "time_s")] if "ticks" in run.tables else []
         last = starts[len(journal.runs) - 1] + times[-1] if times else None
