@@ -20,10 +20,11 @@ from drivers.can_link import CanLink
 from drivers.capture import Capture, export
 from drivers.gyro_line import GyroReport
 from drivers.gyroscopes import make_gyroscope
+from drivers.restamping import Restamping, takes_reported
 from rig import realtime
 from rig.config.bench import BenchConfig, ProbeConfig
 from rig.errors import DeviceFault
-from rig.interface import Exchange, GyroSample, LowPass, Rig, Statement, Torque, TorqueOfTime, TorqueSample
+from rig.interface import Correction, Exchange, GyroSample, LowPass, Rig, Statement, Torque, TorqueOfTime, TorqueSample
 from rig.recording.run import TorqueHold
 
 
@@ -74,6 +75,7 @@ class BenchRig(Rig):
         self._time = clock
         self.gyroscope = make_gyroscope(config.gyroscope)
         self.amplifier: Amplifier = make_amplifier(config.amplifier)
+        self._restamping = Restamping(config.amplifier, self.gyroscope, self.amplifier)
         self._capture: Capture | None = None
         self._devices: BenchDevices | None = None
         self._armed = False
@@ -186,6 +188,8 @@ class BenchRig(Rig):
         amplifier.check(now_s)
         if self._capture is not None:
             self._capture.tick(now_s, torque_nm)
+        self._restamping.tick()
+        if self._capture is not None:
             self._capture.flush_if_due(now_s)
         return answer(self._config, amplifier, gyro, [TorqueSample(sent_s, nm) for nm in sent])
 
@@ -222,12 +226,18 @@ class BenchRig(Rig):
                 self._capture = None
 
     def begin_set(self, torque: TorqueOfTime, start_s: float) -> None:
-        """Marks the capture."""
+        """Marks the capture; the clocks keep what is needed to stamp the set anew."""
         self._mark("begin_set", {"start_s": start_s})
+        self._restamping.begin_set(start_s)
 
     def end_set(self) -> None:
         """Marks the capture."""
         self._mark("end_set")
+        self._restamping.end_set()
+
+    def corrections(self) -> tuple[Correction, ...]:
+        """Of both clocks, by straight lines through all that was heard around a set."""
+        return self._restamping.corrections()
 
     # -- account ---------------------------------------------------------------------------------
 
@@ -264,8 +274,7 @@ def answer(
     actual = amplifier.actual_torque_nm
     if actual is None:
         return Exchange(gyro, sent, amplifier.readings)
-    source = config.amplifier.torque_source
-    from_drive = source == "actual" or (source == "auto" and amplifier.stamps_torque)
     channels = {"drive_torque_nm": actual, "sent_torque_nm": sent[-1].torque_nm if sent else 0.0}
     channels |= amplifier.readings
+    from_drive = takes_reported(config.amplifier, amplifier)
     return Exchange(gyro, reported if from_drive else sent, channels)

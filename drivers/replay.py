@@ -20,9 +20,20 @@ from drivers.can_link import CanLink, Heard
 from drivers.capture import Entry, read_capture, unpack_frame, unpack_torque
 from drivers.codecs.lawicel import CanFrame
 from drivers.gyroscopes import make_gyroscope
+from drivers.restamping import Restamping
 from rig.config.bench import BenchConfig, ProbeConfig
 from rig.errors import RecordingError
-from rig.interface import Exchange, GyroSample, LowPass, Rig, Statement, Torque, TorqueSample
+from rig.interface import (
+    Correction,
+    Exchange,
+    GyroSample,
+    LowPass,
+    Rig,
+    Statement,
+    Torque,
+    TorqueOfTime,
+    TorqueSample,
+)
 from rig.recording.run import TorqueHold
 
 SAME_TORQUE_NM = 1e-6
@@ -104,6 +115,7 @@ class ReplayRig(Rig):
             raise RecordingError(f"{path}: the configuration in it was changed: {error}") from None
         self.gyroscope = make_gyroscope(self.config.gyroscope)
         self.amplifier = make_amplifier(self.config.amplifier)
+        self._restamping = Restamping(self.config.amplifier, self.gyroscope, self.amplifier)
         self.clock = ReplayClock([e.time_s for e in self._entries if e.kind == capture.CLOCK])
         self._at = 0
         self._time_s = self._entries[0].time_s
@@ -200,6 +212,7 @@ class ReplayRig(Rig):
                 sent += [] if nm is None else [TorqueSample(entry.time_s, nm)]
             elif entry.kind == capture.TICK:
                 self._same_campaign(torque_nm, unpack_torque(entry.payload))
+                self._restamping.tick()
                 return answer(self.config, self.amplifier, gyro, sent)
         raise RecordingError(f"{self._path} ends here: the campaign that it holds was cut short")
 
@@ -210,6 +223,18 @@ class ReplayRig(Rig):
                 f"{self._path} holds another campaign: {played_nm:.6g} N m were played where this configuration asks "
                 f"for {asked_nm:.6g} N m. Replay it with the model, limits and excitation that it was played with."
             )
+
+    def begin_set(self, torque: TorqueOfTime, start_s: float) -> None:
+        """As on the bench."""
+        self._restamping.begin_set(start_s)
+
+    def end_set(self) -> None:
+        """As on the bench."""
+        self._restamping.end_set()
+
+    def corrections(self) -> tuple[Correction, ...]:
+        """As on the bench: the same bytes, so the same lines."""
+        return self._restamping.corrections()
 
     def torque_off(self) -> None:
         """There is no torque."""

@@ -3,20 +3,20 @@
 A datagram is read some time after its sample was taken, never before. Per quarter of a second the
 datagram that came through fastest says where the device's clock stands; a straight line through those
 gives offset and drift. So one late read, or a thousand, do not move a sample in time.
+
+This is the map that runs along: the guard and the live display need a time at once. What is kept is stamped anew
+by a line that also knows what came afterwards (``drivers.hindsight``).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from drivers.straight_line import lower_line
+
 BLOCK_S = 0.25
 BLOCKS_KEPT = 240
-DRIFT_LIMIT = 1e-3
 MIN_BLOCKS_FOR_DRIFT = 6
-TRIMS = 2
-TRIM_FLOOR_S = 30e-6
-TRIM_DEVIATIONS = 4.0  # below the median: blocks in which a latency was misreported
-LOWER_SHARE = 0.5  # of the blocks: the others are late, because the host was busy or had to wake up first
 
 
 class SourceClock:
@@ -40,6 +40,13 @@ class SourceClock:
         self._offset_s = 0.0
         self._base_s = 0.0
         self._drift = 0.0
+        self.fits = 0
+        """Counts the changes of the map: between two of them it is one straight line."""
+
+    @property
+    def drift(self) -> float:
+        """How much slower the device's clock runs than the host's."""
+        return self._drift
 
     @property
     def drift_ppm(self) -> float:
@@ -68,6 +75,7 @@ class SourceClock:
             self._best_s, self._best_at_s = excess_s, source_s
             if not self._blocks:
                 self._offset_s = self._base_s + excess_s  # before the first block is full, follow at once
+                self.fits += 1
         if source_s >= self._block_end_s:
             self._close_block(source_s)
 
@@ -81,28 +89,14 @@ class SourceClock:
         self._fit()
 
     def _fit(self) -> None:
+        self.fits += 1
         n = min(self._blocks, BLOCKS_KEPT)
         x, y = self._source_s[:n], self._excess_s[:n]
         if n < MIN_BLOCKS_FOR_DRIFT:
             self._offset_s = self._base_s + float(y.min())
             return
-        half, lower = n // 2, int(LOWER_SHARE * (n - 1))
-        # Median slope across half the span: a start that a few outliers cannot pull.
-        drift = float(np.median((y[n - half :] - y[:half]) / (x[n - half :] - x[:half])))
-        level = 0.0
-        for _ in range(TRIMS):
-            residual = y - drift * x
-            middle = float(np.median(residual))
-            spread = float(np.median(np.abs(residual - middle)))
-            low = middle - max(TRIM_FLOOR_S, TRIM_DEVIATIONS * spread)
-            use = (residual >= low) & (residual <= np.partition(residual, lower)[lower])
-            xu, yu = x[use], y[use]
-            mean_x, mean_y = float(xu.mean()), float(yu.mean())
-            centred = xu - mean_x
-            drift = float(centred @ (yu - mean_y)) / max(float(centred @ centred), 1e-12)
-            drift = max(-DRIFT_LIMIT, min(DRIFT_LIMIT, drift))
-            level = mean_y - drift * mean_x
-        self._drift, self._offset_s = drift, self._base_s + level
+        self._drift, level = lower_line(x, y)
+        self._offset_s = self._base_s + level
 
     def host_time_s(self, count: int) -> float:
         """Host time at which the sample of this count was taken."""

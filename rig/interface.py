@@ -68,6 +68,21 @@ class TorqueSample(NamedTuple):
     torque_nm: float
 
 
+StampPoints = tuple[Sequence[float], Sequence[float]]
+"""Points of a piecewise straight map from times as they were handed over to better ones; each strictly increasing."""
+
+
+class Correction(NamedTuple):
+    """Better time stamps of the set that began at ``start_s``, known only afterwards.
+
+    ``samples`` are for its gyro samples, ``torque`` for its torque samples; without points nothing is to be changed.
+    """
+
+    start_s: float
+    samples: StampPoints
+    torque: StampPoints
+
+
 class LowPass(NamedTuple):
     """A gyro's own filter: its -3 dB corner and its group delay, which its samples' times have taken off."""
 
@@ -163,6 +178,13 @@ class Rig(ABC):
 
     def end_set(self) -> None:  # noqa: B027
         """Told after the last tick of a set, whatever ended it."""
+
+    def corrections(self) -> Sequence[Correction]:
+        """Better time stamps of the sets played, asked for when nothing is played any more, open or not.
+
+        A rig whose stamps are final has none.
+        """
+        return ()
 
     @contextmanager
     def opened(self) -> Iterator[Self]:

@@ -12,6 +12,7 @@ from rig.excitation import PlannedSet
 from rig.guard import Tick
 from rig.interface import LowPass
 from rig.recording.journal import Journal
+from rig.recording.restamped import BEGUN_S, NO_RESTAMPS, Restamps, restamped
 from rig.recording.rows import increasing, on_samples
 from rig.recording.run import Array, Run, TorqueHold
 
@@ -59,7 +60,7 @@ class SetRecorder:
         keep: bool = True,
     ) -> None:
         self._planned = planned
-        self._start_s = start_s
+        self.start_s = start_s
         self._end_s = planned.duration_s + EDGE_S
         self._torque_hold = torque_hold
         self._journal = journal
@@ -74,6 +75,7 @@ class SetRecorder:
         self._ticks: list[tuple[float, ...]] = []
         self._channel_names: tuple[str, ...] = ()
         self._written = [0, 0, 0]
+        self._packed: tuple[Array, Array, Array] | None = None
         self._handed_s = start_s
         self.late_max_s = 0.0
         self.missed_ticks = 0
@@ -82,7 +84,7 @@ class SetRecorder:
 
     def take(self, tick: Tick) -> None:
         """Keep what this tick brought, as far as it belongs to the set."""
-        start, end = self._start_s, self._end_s
+        start, end = self.start_s, self._end_s
         for time_s, rate, valid in tick.gyro:
             at = time_s - start
             if -EDGE_S <= at <= end:
@@ -118,6 +120,7 @@ class SetRecorder:
                 "torque_hold": self._torque_hold,
                 "frequency_hz": self._planned.frequency_hz,
                 "scale": self._planned.scale,
+                BEGUN_S: self.start_s,
             } | self._low_pass
             columns = {"ticks": ("time_s", "late_s", *self._channel_names)}
             self._journal.begin_run(self._planned.name, meta, columns)
@@ -137,34 +140,47 @@ class SetRecorder:
             self._written = [0, 0, 0]
 
     def close(self, complete: bool = True) -> None:
-        """Write the rest and end the run in the journal, which notes whether the set was played whole."""
+        """Write the rest and end the run in the journal, which notes whether the set was played whole.
+
+        The rows are kept as arrays from here on, in a fifth of the memory.
+        """
+        self._packed = self._rows()
         self.write()
         if self._journal is not None and self._open:
             self._journal.end_run(complete)
+        for rows in (self._samples, self._commands, self._ticks):
+            rows.clear()
+
+    def _rows(self) -> tuple[Array, Array, Array]:
+        """Samples, commands and ticks, shape (n, columns) each."""
+        if self._packed is not None:
+            return self._packed
+        samples = np.array(self._samples, dtype=float).reshape(-1, 3)
+        commands = np.array(self._commands, dtype=float).reshape(-1, 3)
+        return samples, commands, np.array(self._ticks, dtype=float)
 
     def statistics(self, complete: bool) -> SetStatistics:
         """How the set went."""
         late = np.array(self._late_s)
         return SetStatistics(self._planned.name, late, self.missed_ticks, self.drops, self.peak_torque_nm, complete)
 
-    def run(self) -> Run | None:
-        """The set as a Run, or None where fewer than two samples arrived.
+    def run(self, better: Restamps = NO_RESTAMPS) -> Run | None:
+        """The set as a Run, with what is known better of its times; None where fewer than two samples arrived.
 
         Time stamps that run backwards are dropped: a device that repeats itself must not spoil the record.
         """
-        samples = increasing(np.array(self._samples, dtype=float).reshape(-1, 3))
-        commands = increasing(np.array(self._commands, dtype=float).reshape(-1, 3))
+        samples, commands, ticks = self._rows()
+        samples, commands = increasing(samples), increasing(commands)
         if len(samples) < 2 or len(commands) < 1:
             return None
-        time_s = samples[:, 0].copy()
-        ticks = np.array(self._ticks, dtype=float)
+        time_s = restamped(samples[:, 0].copy(), better.samples)
         channels = on_samples(ticks, self._channel_names, 2, time_s)
         return Run(
             name=self._planned.name,
             time_s=time_s,
             valid=samples[:, 2] > 0.5,
             rate_rad_s=samples[:, 1].copy(),
-            torque_time_s=commands[:, 0].copy(),
+            torque_time_s=restamped(commands[:, 0].copy(), better.torque),
             torque_nm=commands[:, 1].copy(),
             torque_hold=self._torque_hold,
             use=self._planned.use,

@@ -20,12 +20,14 @@ from rig.clock import Clock
 from rig.errors import Aborted, DeviceFault, RigError, SafetyTrip
 from rig.excitation import PlannedSet
 from rig.guard import Guard, Rest, Tick, Trip
+from rig.hindsight import better_times
 from rig.interface import Rig
 from rig.observer import Observer, Progress
 from rig.probe import Probe
 from rig.recorder import SetRecorder, SetStatistics
 from rig.recording.journal import Journal
-from rig.recording.run import Recording, Run
+from rig.recording.restamped import NO_RESTAMPS
+from rig.recording.run import Recording
 
 __all__ = ["Campaign", "Observer", "Progress", "Sequencer"]
 
@@ -102,7 +104,7 @@ class Sequencer:
         self._stop = stop
         self._probe, self._keep_runs = probe, keep_runs
         self._verdict_s: float | None = None
-        self._runs: list[Run] = []
+        self._recorders: list[SetRecorder] = []
         self._statistics: list[SetStatistics] = []
         self._still: deque[tuple[float, float]] = deque()
 
@@ -112,7 +114,7 @@ class Sequencer:
         Any other exception passes through once torque is off; the journal then has the samples.
         """
         cause: RigError | None = None
-        self._runs, self._statistics = [], []
+        self._recorders, self._statistics = [], []
         try:
             with _without_collector(), self._rig.opened(), self._rig.armed():
                 self._guard.begin(self._clock.now_s(), Rest())
@@ -130,8 +132,11 @@ class Sequencer:
         if cause is not None and self._journal is not None:
             with contextlib.suppress(RigError):
                 self._journal.event(self._now_s(), str(cause), {"aborted": True, "verdict_s": self._verdict_s})
+        better = better_times(self._rig, self._journal, self._now_s)
         info = {"backend": str(self._rig.statement()), "aborted": str(cause) if cause else None}
-        recording = Recording(tuple(self._runs), noise=self._rig.noise_rad_s, info=info)
+        played = (one.run(better.get(one.start_s, NO_RESTAMPS)) for one in self._recorders)
+        runs = tuple(run for run in played if run is not None)
+        recording = Recording(runs, noise=self._rig.noise_rad_s, info=info)
         return Campaign(recording, tuple(self._statistics), cause, self._verdict_s)
 
     def _now_s(self) -> float:
@@ -287,10 +292,9 @@ class Sequencer:
         self._observer.progress(Progress(planned.name, at_s, planned.duration_s, *told))
 
     def _keep(self, recorder: SetRecorder, complete: bool) -> None:
-        """Keep the run; a journal that fails on the way out of an error must not hide that error."""
-        run = recorder.run() if self._keep_runs else None
-        if run is not None:
-            self._runs.append(run)
+        """Keep the set; a journal that fails on the way out of an error must not hide that error."""
+        if self._keep_runs:
+            self._recorders.append(recorder)
         statistics = recorder.statistics(complete)
         self._statistics.append(statistics)
         self._observer.set_ends(statistics)

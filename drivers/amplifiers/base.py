@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
+from drivers.hindsight import Hindsight
 from rig.config.bench import AmplifierConfig
 from rig.interface import TorqueSample
 
@@ -53,6 +54,11 @@ class Amplifier(ABC):
     def stamps_torque(self) -> bool:
         """True if the drive reports its torque with the time of its own clock."""
         return False
+
+    @property
+    def hindsight(self) -> Hindsight | None:
+        """What is needed to stamp the reported torques anew; None where the drive has no clock."""
+        return None
 
     def take_reported(self) -> list[TorqueSample]:
         """Torques at the shaft that the drive reported since the last call, with the best time known."""

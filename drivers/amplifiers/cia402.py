@@ -27,6 +27,7 @@ from drivers.can_link import CanLink, Heard
 from drivers.codecs import cia402
 from drivers.codecs.cia402 import State
 from drivers.codecs.lawicel import CanFrame
+from drivers.hindsight import Hindsight
 from drivers.settings import read_settings
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
@@ -241,6 +242,11 @@ class Cia402(Amplifier):
     def stamps_torque(self) -> bool:
         """True where 0x1013 is mapped beside the actual torque."""
         return self._agreed is not None and self._agreed.stamped
+
+    @property
+    def hindsight(self) -> Hindsight | None:
+        """Of its 0x1013."""
+        return self._clock.hindsight if self.stamps_torque else None
 
     def receive(self, heard: Heard) -> None:
         """Status, actual torque with its time, heartbeat, emergencies."""

@@ -12,6 +12,7 @@ import math
 import statistics
 from collections import deque
 
+from drivers.hindsight import OWN_LINE, Hindsight
 from drivers.source_clock import SourceClock
 
 BLOCK_S = 0.25
@@ -33,6 +34,7 @@ class TorqueClock:
 
     def __init__(self, unit_s: float, modulus: int) -> None:
         self._back = SourceClock(unit_s)
+        self.hindsight = Hindsight(self._back)
         self._unit_s, self._modulus = unit_s, modulus
         self._stamp: int | None = None
         self._asked_s: deque[float] = deque(maxlen=MOST_UNANSWERED)
@@ -41,6 +43,7 @@ class TorqueClock:
         self._block_end_s = 0.0
         self._last_s = -math.inf
         self.way_s = 0.0
+        self._ways_known = 0
 
     def asked(self, at_s: float) -> None:
         """A request to apply and stamp was handed over."""
@@ -58,9 +61,16 @@ class TorqueClock:
             before_it.append(self._asked_s.popleft())
         if len(before_it) == 1:  # two at once cannot be told apart
             self._note_way(stamped_s - before_it[0], heard_s)
+        source_s = self._stamp * self._unit_s
+        self.hindsight.observe(source_s, heard_s, before_it[0] if len(before_it) == 1 else math.nan)
+        line = self._back.fits + self._ways_known
         # Set points that the drive took up together carry one stamp; the last of them is the one that holds.
-        self._last_s = max(stamped_s - self.way_s, self._last_s + self._unit_s)
-        return self._last_s
+        time_s = stamped_s - self.way_s
+        if time_s < self._last_s + self._unit_s:
+            time_s, line = self._last_s + self._unit_s, OWN_LINE
+        self._last_s = time_s
+        self.hindsight.stamped(time_s, source_s, line)
+        return time_s
 
     def _note_way(self, way_s: float, now_s: float) -> None:
         """Of each block a fast way, not the fastest; of the blocks the median: neither a stall nor a slip moves it."""
@@ -71,5 +81,6 @@ class TorqueClock:
             self._ways_s.sort()
             self._blocks_s.append(self._ways_s[int(FAST_SHARE * (len(self._ways_s) - 1))])
             self.way_s = max(0.0, statistics.median(self._blocks_s))
+            self._ways_known += 1
         self._block_end_s = now_s + BLOCK_S
         self._ways_s.clear()

@@ -13,6 +13,7 @@ from collections import deque
 from typing import NamedTuple
 
 from drivers.codecs.framing import Matcher, StreamFramer
+from drivers.hindsight import Hindsight
 from drivers.source_clock import SourceClock
 from rig.config.bench import GyroscopeConfig
 from rig.interface import GyroSample, LowPass
@@ -77,6 +78,7 @@ class Gyroscope(ABC):
         self.sign = -1.0 if config.invert else 1.0
         self.framer = StreamFramer(matcher)
         self.clock = SourceClock(1.0 / (self.sample_rate_hz * self.counts_per_sample))
+        self.hindsight = Hindsight(self.clock)
         self.tally = Tally()
         self.said: list[str] = []
         self._count: int | None = None
@@ -177,6 +179,7 @@ class Gyroscope(ABC):
             self._mark_lost(count, samples)
             if reading.valid or not self.clock.started:  # a device that starts up misreports its latency
                 self.clock.observe(count, taken_at_s)
+                self.hindsight.observe(count * self.clock.period_s, taken_at_s)
             samples.append(self._sample(count, reading))
             self._count = count
         return samples
@@ -193,7 +196,10 @@ class Gyroscope(ABC):
         self.tally.invalid += not valid
         if valid:
             self.tally.recent_rates.append(rate)
-        return GyroSample(self.clock.host_time_s(count) - self.delay_s, rate, valid)
+        clock = self.clock
+        time_s = clock.host_time_s(count) - self.delay_s
+        self.hindsight.stamped(time_s, count * clock.period_s, clock.fits)
+        return GyroSample(time_s, rate, valid)
 
     def _mark_lost(self, count: int, samples: list[GyroSample]) -> None:
         if self._count is None:
@@ -247,4 +253,5 @@ class Gyroscope(ABC):
         """Forget the count and the clock: the device was switched off and on, or its port reopened."""
         self.framer.flush()
         self.clock = SourceClock(self.clock.period_s)
+        self.hindsight.forget(self.clock)
         self._count = None

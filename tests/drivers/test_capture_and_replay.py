@@ -176,3 +176,42 @@ def test_report_tells_of_both_devices(bench):
     assert report.gyro.rate_hz == pytest.approx(2000, rel=0.05)
     assert "watchdog of 100 ms set in the drive and read back" in report.amplifier_notes
     assert "ordinary scheduling" in report.real_time
+
+
+def test_replay_stamps_its_sets_anew_exactly_as_the_bench_did(bench, tmp_path):
+    def play_set(rig, start_s, ticks):
+        rig.begin_set(lambda t: 0.0, start_s)
+        for k in range(ticks):
+            now_s = rig.clock.now_s()
+            bench.time.now_s += 1e-3 if rig is bench else 0.0
+            rig.exchange(now_s, math.sin(k / 20))
+        rig.end_set()
+
+    found = []
+    for make in (lambda: bench, lambda: ReplayRig(tmp_path / "raw" / "wire.cap")):
+        rig = make()
+        with rig.opened(), rig.armed():
+            play_set(rig, 3.0, 6000)
+            play_set(rig, 9.5, 2000)
+        found.append(rig.corrections())
+    live, again = found
+    assert len(live) == 2
+    assert [len(one.samples[0]) > 10 and len(one.torque[0]) > 10 for one in live] == [True, True]
+    assert live == again
+
+
+def test_a_bench_that_was_never_opened_has_nothing_to_better(bench):
+    assert bench.corrections() == ()
+
+
+def test_torque_that_is_recorded_as_it_was_sent_needs_no_drives_clock(bench):
+    bench.amplifier.config = bench._restamping._config = CONFIG.amplifier.model_copy(update={"torque_source": "sent"})
+    with bench.opened(), bench.armed():
+        bench.begin_set(lambda t: 0.0, 3.0)
+        for _ in range(6000):
+            bench.time.now_s += 1e-3
+            bench.exchange(bench.clock.now_s(), 0.0)
+        bench.end_set()
+    (one,) = bench.corrections()
+    assert len(one.samples[0]) > 10
+    assert one.torque == ((), ())
