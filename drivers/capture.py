@@ -14,7 +14,6 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-import os
 import struct
 import threading
 from collections import deque
@@ -24,7 +23,8 @@ from typing import Any, NamedTuple
 
 from drivers.codecs.lawicel import CanFrame
 from rig.errors import Aborted, RecordingError
-from rig.recording.flushing import SYNC_EVERY_S, WRITE_EVERY_S, Repeating, sync, sync_folder
+from rig.recording.flushing import SYNC_EVERY_S, WRITE_EVERY_S, Repeating, sync_folder
+from rig.recording.steady import SteadyFile, whole
 
 MAGIC = b"ISPRAW1\n"
 FILE_NAME = "wire.cap"
@@ -85,8 +85,7 @@ class Capture:
         self.path = folder / FILE_NAME
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
-            self._descriptor = os.open(self.path, flags, 0o644)
+            self._file = SteadyFile(self.path)
         except OSError as problem:
             raise Aborted(f"cannot write the raw capture {self.path}: {problem.strerror}") from None
         # A deque because appending and taking are each done at once, whichever thread is at it.
@@ -95,11 +94,11 @@ class Capture:
         self._open = True
         self._writing = threading.Lock()
         self._threads: tuple[Repeating, ...] = ()
-        self._is_synced = False
         self._failure: Aborted | None = None
 
     def start(self) -> None:
         """Let threads write and sync from here on."""
+        self._file.expect_syncs()
         sync_folder(self.path.parent)
         self._threads = (
             Repeating("capture", self._flush_quietly, WRITE_EVERY_S),
@@ -116,10 +115,9 @@ class Capture:
 
     def _sync_quietly(self) -> None:
         """A disk that cannot sync cannot be written either, which the next write says."""
-        if self._open and not self._is_synced:
-            self._is_synced = True
+        if self._open:
             with contextlib.suppress(OSError):
-                sync(self._descriptor)
+                self._file.sync()
 
     def _add(self, kind: int, time_s: float, payload: bytes) -> None:
         self._pending.append(_HEAD.pack(kind, time_s, len(payload)) + payload)
@@ -165,14 +163,13 @@ class Capture:
             if not self._open:
                 self._pending.clear()
                 return
-            data = memoryview(b"".join(self._pending.popleft() for _ in range(len(self._pending))))
+            data = b"".join(self._pending.popleft() for _ in range(len(self._pending)))
             try:
-                while data:
-                    data = data[os.write(self._descriptor, data) :]
-                    self._is_synced = False
+                self._file.write(data)
             except OSError as problem:
                 self._open = False  # once is enough: the way out must not stumble over it again
-                os.close(self._descriptor)
+                with contextlib.suppress(OSError):
+                    self._file.close()
                 raise Aborted(f"the raw capture {self.path} cannot be written: {problem.strerror}") from None
 
     def close(self) -> None:
@@ -184,7 +181,8 @@ class Capture:
             self.flush()
             self._sync_quietly()
             self._open = False
-            os.close(self._descriptor)
+            with contextlib.suppress(OSError):
+                self._file.close()
 
 
 def read_capture(path: Path) -> Iterator[Entry]:
@@ -196,7 +194,7 @@ def read_capture(path: Path) -> Iterator[Entry]:
         If the file is missing or not a capture.
     """
     try:
-        data = path.read_bytes()
+        data = whole(path)
     except OSError as problem:
         raise RecordingError(f"cannot read the raw capture {path}: {problem.strerror}") from None
     if not data.startswith(MAGIC):

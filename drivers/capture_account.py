@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from drivers.capture import CAN_READ, CAN_SENT, GYRO_READ, MAGIC, RECORD_HEAD_BYTES, TICK, export, read_capture
+from rig.recording.steady import whole
 
 
 class CaptureAccount(NamedTuple):
@@ -35,7 +36,7 @@ def account_of(path: Path) -> CaptureAccount:
         first_s = entry.time_s if first_s is None else first_s
         last_s = entry.time_s
     duration_s = last_s - first_s if first_s is not None and last_s is not None else 0.0
-    return CaptureAccount(gyro_bytes, frames, ticks, duration_s, path.stat().st_size - read)
+    return CaptureAccount(gyro_bytes, frames, ticks, duration_s, len(whole(path)) - read)
 
 
 def export_if_missing(path: Path, account: CaptureAccount) -> list[Path]:

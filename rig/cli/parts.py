@@ -12,6 +12,7 @@ from rig.cli.opening import ask_consent
 from rig.cli.results_folder import JOURNAL_FILE, RAW_FOLDER
 from rig.interface import Statement
 from rig.recording.run import Recording
+from rig.recording.steady import tail_of
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,8 @@ class Part:
         """Copy what was played before into the folder of this part. Raises OSError."""
         for source, name in self.brought:
             shutil.copyfile(source, path / name)
+            if tail_of(source).is_file():
+                shutil.copyfile(tail_of(source), tail_of(path / name), follow_symlinks=False)
 
 
 ALL_OF_IT = Part()

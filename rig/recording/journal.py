@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import struct
 import threading
 import time
@@ -28,7 +27,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.errors import Aborted
-from rig.recording.flushing import SYNC_EVERY_S, WRITE_EVERY_S, Repeating, sync, sync_folder
+from rig.recording.flushing import SYNC_EVERY_S, WRITE_EVERY_S, Repeating, sync_folder
+from rig.recording.steady import SteadyFile
 
 MARKER = b"ISPJ"
 FRAME_HEAD = struct.Struct("<4sB3xII")
@@ -62,9 +62,9 @@ class Journal:
     it, a thread writes and forces the data to the disk, and the control loop never waits for either.
     """
 
-    def __init__(self, path: Path, descriptor: int, flush_interval_s: float, clock: Callable[[], float]) -> None:
-        self.path = path
-        self._descriptor = descriptor
+    def __init__(self, file: SteadyFile, flush_interval_s: float, clock: Callable[[], float]) -> None:
+        self.path = file.path
+        self._file = file
         self._interval_s = flush_interval_s
         self._clock = clock
         self._flushed_at_s = clock()
@@ -73,8 +73,6 @@ class Journal:
         self._columns: dict[str, tuple[str, ...]] = {}
         self._in_run = False
         self._closed = False
-        self._good_bytes = 0
-        self._synced_bytes = 0
         self._failure: JournalError | None = None
         self._background = False
         self._buffer_lock = threading.Lock()
@@ -95,12 +93,11 @@ class Journal:
         worth keeping. Raises JournalError where the file cannot be made.
         """
         path = Path(path)
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
         try:
-            descriptor = os.open(path, flags, 0o644)
+            file = SteadyFile(path)
         except OSError as error:
             raise JournalError(f"cannot start journal {path}: {error.strerror}; choose another --out") from error
-        journal = cls(path, descriptor, flush_interval_s, clock)
+        journal = cls(file, flush_interval_s, clock)
         journal._pending.append(frame(HEADER, _json({"format": "isp-rig journal", "version": 1} | dict(header))))
         journal.flush(to_disk=True)
         sync_folder(path.parent)
@@ -168,9 +165,9 @@ class Journal:
                 data = b"".join(self._pending)
                 taken = len(self._pending)
             try:
-                self._write(data)
+                self._file.write(data)
                 if to_disk:
-                    sync(self._descriptor)
+                    self._file.sync()
             except OSError as error:
                 self._failure = self._failed(error)
                 raise self._failure from error
@@ -182,7 +179,7 @@ class Journal:
     def _failed(self, error: OSError) -> JournalError:
         return JournalError(
             f"cannot write {self.path}: {error.strerror}. What was recorded until now "
-            f"({self._good_bytes} bytes) is kept there; free space or choose another --out, "
+            f"({self._file.written} bytes) is kept there; free space or choose another --out, "
             "then play again"
         )
 
@@ -201,7 +198,14 @@ class Journal:
             if not reported:
                 raise
         finally:
-            os.close(self._descriptor)
+            self._close_file(quietly=reported)
+
+    def _close_file(self, quietly: bool) -> None:
+        try:
+            self._file.close()
+        except OSError as error:
+            if not quietly:
+                raise self._failed(error) from error
 
     def end_run_quietly(self) -> None:
         """Mark the open run as ended without writing yet: the last step of an aborted campaign."""
@@ -212,13 +216,15 @@ class Journal:
     def flushing_in_background(self) -> Iterator[None]:
         """Let threads write and sync; a failure of theirs is raised by the next call here.
 
-        Two of them: a disk that takes its time to sync must not hold up what a mere kill would cost.
+        Two of them, and a file that takes what comes during a sync: a disk that takes its time to sync must not hold
+        up what a mere kill would cost.
         """
         threads = (
             Repeating("journal", self._flush_quietly, self._interval_s),
             Repeating("journal sync", self._sync_quietly, SYNC_EVERY_S),
         )
         self._background = True
+        self._file.expect_syncs()
         for thread in threads:
             thread.start()
         try:
@@ -233,14 +239,10 @@ class Journal:
             self.flush()
 
     def _sync_quietly(self) -> None:
-        written = self._good_bytes
-        if written == self._synced_bytes:
-            return
         try:
-            sync(self._descriptor)
+            self._file.sync()
         except OSError as error:
             self._failure = self._failed(error)
-        self._synced_bytes = written
 
     def __enter__(self) -> Journal:
         return self
@@ -276,16 +278,3 @@ class Journal:
                 head = BLOCK_HEAD.pack(kind.encode("ascii"), part.shape[1])
                 self._pending.append(frame(BLOCK, head + part.tobytes()))
         self._rows.clear()
-
-    def _write(self, data: bytes) -> None:
-        view = memoryview(data)
-        written = 0
-        try:
-            while written < len(view):
-                written += os.write(self._descriptor, view[written:])
-        except OSError:
-            # A frame cut by a full disk would hide whatever is appended once there is room again.
-            os.ftruncate(self._descriptor, self._good_bytes)
-            os.lseek(self._descriptor, self._good_bytes, os.SEEK_SET)
-            raise
-        self._good_bytes += len(view)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
@@ -33,6 +34,7 @@ from rig.recording.journal import (
 from rig.recording.restamped import BEGUN_S, NO_RESTAMPS, Restamps, restamped, restamps_of
 from rig.recording.rows import increasing, on_samples
 from rig.recording.run import Array, Recording, Run, printable
+from rig.recording.steady import opened
 
 RUN_META = (
     "torque_hold", "use", "min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "rate_corner_hz", "rate_delay_s",
@@ -203,8 +205,9 @@ def read_journal(path: str | Path) -> JournalContents:
     path = Path(path)
     reading = _Reading()
     try:
-        size = path.stat().st_size
-        with path.open("rb") as file:
+        with opened(path) as file:
+            size = file.seek(0, os.SEEK_END)
+            file.seek(0)
             is_one = file.read(len(MARKER)) == MARKER
             for found in _frames(file, size) if is_one else ():
                 reading.take(*found)
