@@ -61,7 +61,7 @@ class SteadyFile:
         self._synced = 0
 
     def expect_syncs(self) -> None:
-        """From here on ``sync`` may be called beside ``write``: make the tail. Never raises: without one writes wait."""
+        """From here on ``sync`` may be called beside ``write``: make the tail. Never raises."""
         flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
         if self._tail is None:
             with contextlib.suppress(OSError):
