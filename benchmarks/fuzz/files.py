@@ -23,6 +23,7 @@ from drivers.codecs import stim300
 from drivers.codecs.lawicel import CanFrame
 from rig.recording import Journal, Recording, Run
 from rig.recording.hdf5 import write_recording_h5
+from rig.recording.steady import record, tail_of
 
 ROOT = Path(__file__).resolve().parents[2]
 Maker = Callable[[Path], None]
@@ -260,6 +261,23 @@ def _own_circle(file: h5py.File, path: Path) -> None:
     file["runs/002"] = file["runs"]
 
 
+def _own_long_text(path: Path) -> None:
+    """The first text's length as its reference states it: some gigabytes."""
+    _own(path)
+    data = bytearray(path.read_bytes())
+    reference = data.index(struct.pack("<Q", data.index(b"GCOL"))) - 4
+    assert struct.unpack_from("<I", data, reference)[0] == len("isp-rig recording")
+    struct.pack_into("<I", data, reference, 0xFFFFFFF0)
+    path.write_bytes(data)
+
+
+def _journal_tail_lies(path: Path) -> None:
+    _journal(path)
+    size = path.stat().st_size
+    lies = b"".join(struct.pack("<4sQII", b"ISPT", size, 1 << k % 32, 0) for k in range(300_000))
+    tail_of(path).write_bytes(lies + record(size + 10**9, b"far behind"))
+
+
 def _journal_lies(path: Path) -> None:
     _journal(path)
     path.write_bytes(path.read_bytes() + struct.pack("<4sB3xII", b"ISPJ", 3, 1_000_000, 0) * 200_000)
@@ -313,7 +331,9 @@ HARMFUL: Mapping[str, Maker] = {
     "refuse own_linked.h5": _h5_with(_own_linked, own=True),
     "refuse own_external.h5": _h5_with(_own_external, own=True),
     "refuse own_circle.h5": _h5_with(_own_circle, own=True),
+    "refuse own_long_text.h5": _own_long_text,
     "read lies.journal": _journal_lies,
+    "read tail_lies.journal": _journal_tail_lies,
     "refuse deep.journal": _journal_deep,
     "refuse odd.journal": _journal_odd,
     "refuse huge.eds": _eds_of("[{index}]\nParameterName=x{k}\nObjectType=0x7\nDataType=0x7\nAccessType=rw\n", 200_000),

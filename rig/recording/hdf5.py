@@ -20,6 +20,7 @@ from rig.channels import KINDS, Channel
 from rig.errors import RecordingError
 from rig.recording.journal import JournalError
 from rig.recording.journal_reader import JournalContents
+from rig.recording.memory import at_most
 from rig.recording.run import Array, Recording, Run
 
 FORMAT = "isp-rig recording"
@@ -29,6 +30,9 @@ _NUMBERS = ("min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "rate_corne
 _VALUES = ("name", "torque_hold", "use", *_NUMBERS)
 # What h5py raises over a damaged file; a link that leads nowhere reads as None.
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, MemoryError, RecursionError)
+# The library takes what a damaged reference to a text says it is long, up to 4 GiB, before it looks for the text.
+MOST_TEXT_BYTES = 256 << 20
+MOST_BYTES = 2 << 30  # all that is read, twice
 MOST_VALUES = 60_000_000  # half a gigabyte of numbers: an hour of six channels at 2 kHz is a third of it
 
 
@@ -111,17 +115,18 @@ def read_recording_h5(path: str | Path, *, with_info: bool = True) -> Recording:
     Raises RecordingError where the file is not ours or damaged.
     """
     try:
-        with h5py.File(path, "r") as file:
-            if file.attrs.get("format") != FORMAT:
-                raise RecordingError(f"{path}: is no recording of this program: map its columns under `recorded`")
-            if int(file.attrs["version"]) > VERSION:
-                raise RecordingError(f"{path}: written by a later version: read it with that one")
-            noise = file.attrs.get("noise")
-            info = json.loads(file["info"][()]) if with_info else {}
+        with h5py.File(path, "r") as file, at_most(MOST_BYTES):
+            with at_most(MOST_TEXT_BYTES):
+                if file.attrs.get("format") != FORMAT:
+                    raise RecordingError(f"{path}: is no recording of this program: map its columns under `recorded`")
+                if int(file.attrs["version"]) > VERSION:
+                    raise RecordingError(f"{path}: written by a later version: read it with that one")
+                noise, axis = file.attrs.get("noise"), file.attrs["axis"]
+                info = json.loads(file["info"][()]) if with_info else {}
             reader = _Reader(path)
             return Recording(
                 runs=tuple(reader.run(group) for _, group in sorted(file["runs"].items())),
-                axis="linear" if file.attrs["axis"] == "linear" else "rotary",
+                axis="linear" if axis == "linear" else "rotary",
                 noise=None if noise is None else float(noise),
                 info=info if isinstance(info, dict) else {},
             )
@@ -138,13 +143,15 @@ class _Reader:
 
     def run(self, group: h5py.Group) -> Run:
         """One run. Raises RecordingError, or what _DAMAGE lists."""
-        values: dict[str, Any] = {name: group.attrs[name] for name in _VALUES if name in group.attrs}
+        with at_most(MOST_TEXT_BYTES):
+            values: dict[str, Any] = {name: group.attrs[name] for name in _VALUES if name in group.attrs}
         values = {name: float(value) if name in _NUMBERS else str(value) for name, value in values.items()}
         arrays: dict[str, Any] = {name: self._numbers(group, name) for name in _ARRAYS if name in group}
         arrays["valid"] = np.asarray(arrays["valid"], dtype=bool)
         inner = group.get("channels", {})
         channels = {name: self._numbers(inner, name) for name in inner}
-        causes = {name: _cause(name, inner[name].attrs) for name in inner if inner[name].attrs.get("kind") in KINDS}
+        with at_most(MOST_TEXT_BYTES):
+            causes = {name: _cause(name, inner[name].attrs) for name in inner if inner[name].attrs.get("kind") in KINDS}
         return Run(**values, **arrays, channels=channels, causes=causes)
 
     def _numbers(self, group: Any, name: str) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 
 from rig.errors import RecordingError
 from rig.recording import hdf5
+from rig.recording.memory import at_most
 from rig.recording.readers.base import MAX_SAMPLES, Table, read_each, too_long
 from rig.recording.run import Run
 
@@ -22,7 +23,8 @@ def read(path: Path) -> Sequence[Table | Run]:
     """The runs of our own file, else one table of all datasets. Raises RecordingError where unreadable."""
     try:
         with h5py.File(path, "r") as file:
-            ours = file.attrs.get("format") == hdf5.FORMAT
+            with at_most(hdf5.MOST_TEXT_BYTES):
+                ours = file.attrs.get("format") == hdf5.FORMAT
             datasets = {} if ours else _datasets(file)
     except _DAMAGE as error:
         raise RecordingError(f"{path}: is no HDF5 file that can be read ({error}): export it again") from error
@@ -57,9 +59,12 @@ def _array(path: Path, name: str, inner: str) -> Any:
                 raise RecordingError(
                     f"{path}: {name!r} keeps its values in another file: copy them into this one (h5repack)"
                 )
+            if dataset.dtype.hasobject:
+                raise RecordingError(f"{path}: column {name!r} holds texts or lists, not numbers: save it as numbers")
             count = int(np.prod(dataset.shape or (0,), dtype=object))
             if count * max(1, dataset.dtype.itemsize) > 16 * MAX_SAMPLES:
                 raise too_long(path, count)
-            return dataset[()]
+            with at_most(hdf5.MOST_BYTES):
+                return dataset[()]
     except _DAMAGE as error:
         raise RecordingError(f"{path}: dataset {name!r} is damaged ({error}): export it again") from error
