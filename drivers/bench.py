@@ -164,7 +164,7 @@ class BenchRig(Rig):
             raise DeviceFault("the bench is armed before it is open: open it first")
         self._armed = True
         self.amplifier.arm(devices.link)
-        devices.gather([])
+        devices.gather()
         devices.waiting.clear()
         self.amplifier.take_reported()
         self._mark("armed", {"real_time": str(self._grant)})
@@ -246,12 +246,11 @@ class BenchRig(Rig):
         devices = self._devices
         if devices is None or devices.line is None:
             raise DeviceFault("there is nothing to report of a bench that was never open")
-        emergencies = getattr(self.amplifier, "emergencies", [])
         return BenchReport(
             devices.line.report(),
             tuple(devices.notes),
             str(self._grant) if self._grant is not None else "not open yet",
-            tuple(text for _, text in emergencies),
+            self.amplifier.emergencies.told(lambda one: one[1]),
         )
 
     def _mark(self, what: str, values: dict[str, object] | None = None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import select
 import time
 from collections.abc import Callable
@@ -60,7 +61,7 @@ class BenchDevices:
         if self.line is not None:
             while self._time() - begin_s < self._config.settle_s:
                 time.sleep(CONTACT_TIME_S)
-                self.gather(faults)
+                self.gather()
                 self._settle_drive(faults)
             self.line.note_noise()
             faults += [DeviceFault(text) for text in self.line.problems(self._time() - begin_s)]
@@ -84,7 +85,7 @@ class BenchDevices:
     def _open_drive(self) -> RigError | None:
         try:
             self.link = CanLink(open_bus(self._config.amplifier.can), self._time)
-            self.link.idle = lambda: self.gather([])
+            self.link.idle = self.gather
             self.link.on_sent = self.amplifier.note_sent
             self.link.record = self.capture.can if self.capture is not None else None
             self.notes = self.amplifier.contact(self.link)
@@ -102,14 +103,15 @@ class BenchDevices:
         except RigError as fault:
             faults.append(fault)
 
-    def gather(self, faults: list[RigError]) -> None:
-        """Decode what has arrived, so that no buffer overflows; samples wait for the next exchange."""
+    def gather(self) -> None:
+        """Decode what has arrived, so that no buffer overflows; samples wait for the next exchange.
+
+        A line that fails keeps its fault, and whoever asks it next is told.
+        """
         if self.line is None or self.line.fault is not None:
             return
-        try:
+        with contextlib.suppress(DeviceFault):
             self.waiting += self.line.collect()
-        except DeviceFault as fault:
-            faults.append(fault)
         if len(self.waiting) > MOST_WAITING:
             del self.waiting[:-NEWEST_KEPT]
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import statistics
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.capture import Capture
-from drivers.gyroscopes.base import Gyroscope
+from drivers.gyroscopes.base import Gyroscope, line_too_slow
 from drivers.listening import arrivals
 from drivers.ports import BytePort
 from rig.errors import DeviceFault
@@ -17,6 +19,10 @@ from rig.interface import GyroSample
 
 RAW_KEPT = 4096
 LEAST_SHARE_RECEIVED = 0.5
+RATE_TOLERANCE = 0.05  # of what the file says; crystals are better by far, a stall of this computer looks worse
+PACE_S = 0.25
+PACES_KEPT = 240
+LEAST_FOR_NOISE = 100  # samples
 
 
 @dataclass(frozen=True)
@@ -71,6 +77,7 @@ class GyroLine:
         self._last_s = 0.0
         self.fault: DeviceFault | None = None
         self._noise_deg_s = 0.0
+        self._paces: deque[tuple[float, int]] = deque(maxlen=PACES_KEPT)  # (read at, samples until then)
 
     def note_noise(self) -> None:
         """Take the scatter of the last two seconds as the noise: call it while nothing moves."""
@@ -114,7 +121,31 @@ class GyroLine:
         self._last_s = read_at_s
         if len(self._raw) < RAW_KEPT:
             self._raw += data
-        return self.gyroscope.feed(data, read_at_s)
+        samples = self.gyroscope.feed(data, read_at_s)
+        if not self._paces or read_at_s >= self._paces[-1][0] + PACE_S:
+            self._paces.append((read_at_s, self.gyroscope.tally.received))
+        return samples
+
+    def _other_rate(self) -> str:
+        """What is wrong with the number of samples a second; empty where nothing is.
+
+        A stall of this computer, or of an emulated device, bends the mean and not the median over quarters of a
+        second; what is lost all the time bends both.
+        """
+        if len(self._paces) < 3:
+            return ""
+        (first_s, first), (last_s, last) = self._paces[0], self._paces[-1]
+        mean_hz = (last - first) / (last_s - first_s)
+        median_hz = statistics.median((m - n) / (t - s) for (s, n), (t, m) in itertools.pairwise(self._paces))
+        wanted_hz, lost = self.gyroscope.sample_rate_hz, self.gyroscope.tally.lost
+        shares = (mean_hz / wanted_hz - 1.0, median_hz / wanted_hz - 1.0)
+        if min(map(abs, shares)) <= RATE_TOLERANCE:
+            return ""
+        where = f"; by its counter {lost} were lost on the way" if lost else ""
+        return (
+            f"{mean_hz:.0f} samples/s instead of {wanted_hz:g}{where}: set bench.gyroscope.sample_rate_hz to what the "
+            "device is set to; if that is right, the line or the adapter loses the rest (baud rate, buffers, cable)"
+        )
 
     def problems(self, listened_s: float) -> list[str]:
         """Why this gyroscope cannot be used, after listening to it for so long; empty when all is well."""
@@ -132,8 +163,18 @@ class GyroLine:
                 f"{where}: {tally.received / listened_s:.0f} samples/s instead of {gyro.sample_rate_hz:g}: set "
                 "bench.gyroscope.sample_rate_hz to what the device sends"
             )
-        if not tally.recent_rates:
+        elif other_rate := self._other_rate():
+            found.append(f"{where}: {other_rate}")
+        if too_slow := line_too_slow(gyro.packet_bytes, gyro.sample_rate_hz, gyro.baud):
+            found.append(f"{where}: {too_slow}: let the device send less in a packet, or less often, or faster")
+        rates = tally.recent_rates
+        if not rates:
             found.append(f"{where}: no valid sample ({tally.last_reason or 'no reason given'})")
+        elif len(rates) >= LEAST_FOR_NOISE and min(rates) == max(rates):
+            found.append(
+                f"{where}: all of {len(rates)} samples read exactly {math.degrees(rates[0]):.6g} deg/s: what measures "
+                f"shows noise. Is {gyro.config.axis} an axis that it measures (bench.gyroscope.axis), does it hang?"
+            )
         return found
 
     def report(self) -> GyroReport:
@@ -149,7 +190,7 @@ class GyroLine:
             rate_hz=tally.received / span_s if span_s > 0 else 0.0,
             noise_deg_s=self._noise_deg_s,
             drift_ppm=gyro.clock.drift_ppm,
-            said=tuple(gyro.said[-10:]),
+            said=gyro.said.told(),
         )
 
     def close(self) -> None:

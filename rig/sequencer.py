@@ -303,9 +303,10 @@ class Sequencer:
 
 
 def _with_context(error: RigError) -> RigError:
-    """A fault while disarming after another error: both matter, the fault decides the exit code."""
+    """A fault while disarming after another error: both matter, the fault decides the exit code; none is told twice."""
     earlier = error.__context__
-    if isinstance(error, DeviceFault) and isinstance(earlier, (RigError, KeyboardInterrupt)):
+    told = bool(str(earlier)) and str(earlier) in str(error)
+    if isinstance(error, DeviceFault) and isinstance(earlier, (RigError, KeyboardInterrupt)) and not told:
         return DeviceFault(f"{error} This happened on the way out of: {earlier or 'Ctrl-C'}")
     return error
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
+from drivers.bounded import FirstAndLast
 from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
 from drivers.hindsight import Hindsight
@@ -54,6 +55,11 @@ class Amplifier(ABC):
     def stamps_torque(self) -> bool:
         """True if the drive reports its torque with the time of its own clock."""
         return False
+
+    @property
+    def emergencies(self) -> FirstAndLast[tuple[float, str]]:
+        """What the drive reported of itself as gone wrong, each with the time at which it was heard."""
+        return FirstAndLast()
 
     @property
     def hindsight(self) -> Hindsight | None:

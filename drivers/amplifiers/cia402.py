@@ -23,6 +23,7 @@ from drivers.amplifiers.cia402_setup import (
 )
 from drivers.amplifiers.cia402_status import NMT_OPERATIONAL, DriveStatus
 from drivers.amplifiers.torque_clock import TorqueClock
+from drivers.bounded import FirstAndLast
 from drivers.can_link import CanLink, Heard
 from drivers.codecs import cia402
 from drivers.codecs.cia402 import State
@@ -85,8 +86,8 @@ class Cia402(Amplifier):
         return None if self._agreed is None else self._agreed.plan
 
     @property
-    def emergencies(self) -> list[tuple[float, str]]:
-        """All emergency messages so far, each with the time at which it was heard."""
+    def emergencies(self) -> FirstAndLast[tuple[float, str]]:
+        """Emergency messages so far, the first and the last, each with the time at which it was heard."""
         return self._status.emergencies
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from drivers.bounded import FirstAndLast
 from drivers.can_link import Heard
 from drivers.codecs import cia402
 from drivers.codecs.cia402 import State
@@ -28,7 +29,7 @@ class DriveStatus:
         self._last_beat_s: float | None = None
         self._nmt_state: int | None = None
         self.statusword = 0
-        self.emergencies: list[tuple[float, str]] = []
+        self.emergencies: FirstAndLast[tuple[float, str]] = FirstAndLast()
         self.new_emergency = ""
 
     @property

@@ -12,15 +12,18 @@ from abc import ABC, abstractmethod
 from collections import deque
 from typing import NamedTuple
 
+from drivers.bounded import FirstAndLast
 from drivers.codecs.framing import Matcher, StreamFramer
 from drivers.hindsight import Hindsight
 from drivers.source_clock import SourceClock
 from rig.config.bench import GyroscopeConfig
+from rig.errors import ConfigError
 from rig.interface import GyroSample, LowPass
 
 AXES = "xyz"
 BITS_PER_BYTE = 10  # start, eight data bits, stop
 CATCHES_UP_S = 0.03  # a kernel that was busy hands out what it kept back within this time
+SAID_KEPT = 5
 MOST_LOST_MARKED = 20_000  # ten seconds at 2 kHz: more is a new start, not a gap
 
 
@@ -49,6 +52,17 @@ class Tally:
         self.recent_rates: deque[float] = deque(maxlen=4000)
 
 
+def line_too_slow(packet_bytes: int, sample_rate_hz: float, baud: int) -> str:
+    """Why a line cannot carry packets of this length at this rate; empty where it can."""
+    needed = BITS_PER_BYTE * packet_bytes * sample_rate_hz
+    if needed <= baud:
+        return ""
+    return (
+        f"bench.gyroscope.baud: {packet_bytes} bytes {sample_rate_hz:g} times a second need {needed:.0f} baud, the "
+        f"line has {baud}"
+    )
+
+
 class Gyroscope(ABC):
     """A gyroscope's protocol.
 
@@ -67,6 +81,8 @@ class Gyroscope(ABC):
     default_rate_hz = 1000.0
     count_modulus = 0
     """The device's counter wraps here; 0 where it does not, or there is none."""
+    shortest_sample_bytes = 0
+    """No packet with a sample is shorter: a line that cannot carry those is refused before it is opened."""
     answers_replace_samples = False
     """True where an answer of the device is sent in the place of a sample, which is then not lost."""
 
@@ -74,13 +90,18 @@ class Gyroscope(ABC):
         self.config = config
         self.baud = config.baud or self.default_baud
         self.sample_rate_hz = config.sample_rate_hz or self.default_rate_hz
+        too_slow = line_too_slow(self.shortest_sample_bytes, self.sample_rate_hz, self.baud)
+        if too_slow:
+            raise ConfigError(f"{too_slow}: choose a lower rate or a faster line")
         self.axis = AXES.index(config.axis)
         self.sign = -1.0 if config.invert else 1.0
         self.framer = StreamFramer(matcher)
         self.clock = SourceClock(1.0 / (self.sample_rate_hz * self.counts_per_sample))
         self.hindsight = Hindsight(self.clock)
         self.tally = Tally()
-        self.said: list[str] = []
+        self.said: FirstAndLast[str] = FirstAndLast(SAID_KEPT)
+        self.packet_bytes = 0
+        """Length of the last packet with a sample."""
         self._count: int | None = None
         self._newest: tuple[Reading, float] | None = None
         self._replaced = 0
@@ -150,6 +171,7 @@ class Gyroscope(ABC):
             if reading is None:
                 self._replaced += self.answers_replace_samples
             else:
+                self.packet_bytes = len(packet)
                 readings.append((reading, read_at_s - on_wire_s - reading.latency_s))
         return self._stamp(readings[::-1])
 

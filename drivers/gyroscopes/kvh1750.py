@@ -32,6 +32,7 @@ class Kvh1750(Gyroscope):
     default_baud = 921_600
     default_rate_hz = 1000.0
     count_modulus = wire.SEQUENCE_MODULO
+    shortest_sample_bytes = 36  # format A
 
     def __init__(self, config: GyroscopeConfig) -> None:
         self.settings = read_settings(KvhSettings, config.settings, "bench.gyroscope.settings")

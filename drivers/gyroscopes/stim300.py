@@ -13,7 +13,7 @@ from typing import Literal
 from drivers.codecs import stim300 as wire
 from drivers.codecs import stim300_special as special
 from drivers.codecs.framing import StreamFramer
-from drivers.gyroscopes.base import Gyroscope, Reading
+from drivers.gyroscopes.base import Gyroscope, Reading, line_too_slow
 from drivers.settings import Settings, read_settings
 from rig.config.bench import GyroscopeConfig
 from rig.errors import ConfigError
@@ -66,12 +66,9 @@ class Stim300(Gyroscope):
     @staticmethod
     def _check_line_carries(s: Stim300Settings, rate_hz: float, baud: int) -> None:
         length = wire.LAYOUTS[s.datagram].length + 2 * s.line_ending
-        needed = 10 * length * rate_hz
-        if needed > baud:
-            raise ConfigError(
-                f"bench.gyroscope.baud: {length} bytes {rate_hz:g} times a second need {needed:.0f} baud, the "
-                f"line has {baud}: choose datagram 0x90, a lower rate or a faster line"
-            )
+        too_slow = line_too_slow(length, rate_hz, baud)
+        if too_slow:
+            raise ConfigError(f"{too_slow}: choose datagram 0x90, a lower rate or a faster line")
 
     @property
     def counts_per_sample(self) -> int:

@@ -30,6 +30,7 @@ class VectorNav(Gyroscope):
     label = "VectorNav"
     default_baud = 921_600
     default_rate_hz = 400.0
+    shortest_sample_bytes = 18  # binary, the rate alone; what the device really sends shows when it is heard
 
     def __init__(self, config: GyroscopeConfig) -> None:
         self.settings = read_settings(VectorNavSettings, config.settings, "bench.gyroscope.settings")

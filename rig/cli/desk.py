@@ -34,10 +34,11 @@ class Options:
 
     def load(self) -> LoadedConfig:
         """The checked configuration, --set and --seed applied. Raises ConfigError."""
+        from rig.cli.device_settings import device_faults
         from rig.config.load import load_config
 
         seeds = [] if self.seed is None else [f"simulated.seed={self.seed}", f"identify.seed={self.seed}"]
-        return load_config(self.config, [*self.overrides, *seeds])
+        return load_config(self.config, [*self.overrides, *seeds], device_faults)
 
 
 @dataclass

@@ -21,6 +21,10 @@ from rig.errors import UsageError
 from rig.interface import Statement, Torque
 from rig.platform import Platform
 
+NOBODY_AGREED = (  # the same whether it was asked, could not be, or is a replay: results are compared
+    "it is not played: identify.follow_up is ask, and nobody said yes (without a terminal nobody can be asked); "
+    "identify.follow_up: auto plays it (real torque needs --yes as well)"
+)
 QUESTION = "Play this follow-up now? Type yes to play it: "
 NEXT_SEED = 1_000_003  # a simulated gyro must not repeat its noise
 
@@ -63,14 +67,10 @@ def _refusal(desk: Desk, loaded: LoadedConfig) -> str:
     if config.identify.follow_up == "never":
         return "it is not played: identify.follow_up is never"
     backend = backend_name(config, desk.options.dry_run, desk.options.emulate)
-    if backend == "bench" and config.bench is not None and config.bench.replay is not None:
-        return "it is not played: a capture that is replayed has nothing more to tell"
-    if config.identify.follow_up == "ask" and not _somebody_there():
-        return (
-            "it is not played: identify.follow_up is ask, and without a terminal nobody can be asked; "
-            "identify.follow_up: auto plays it (real torque needs --yes as well)"
-        )
-    return ""
+    replayed = backend == "bench" and config.bench is not None and config.bench.replay is not None
+    if config.identify.follow_up == "ask" and (replayed or not _somebody_there()):
+        return NOBODY_AGREED
+    return "it is not played: a capture that is replayed has nothing more to tell" if replayed else ""
 
 
 def _somebody_there() -> bool:
@@ -91,7 +91,7 @@ def _consent(mode: str) -> Callable[[Statement, bool, bool, Callable[[str], str]
         except EOFError:
             answer = ""
         if answer.strip().lower() not in ("yes", "y"):
-            raise UsageError("it is not played: the answer was not yes")
+            raise UsageError(NOBODY_AGREED)
 
     return ask_each_time
 

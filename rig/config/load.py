@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ INCLUDES: tuple[KeyPath, ...] = (*MODELS, ("excitation",))
 _A_FILE: Mapping[str | int, str] = {
     "model": "a model file", "platform": "a model file", "excitation": "an excitation file"
 }  # fmt: skip
+FurtherFaults = Callable[[Mapping[str, Any]], Iterable[tuple[KeyPath, str]]]
 _FIRST: Mapping[str | int, str] = {"model": "inertia_kg_m2", "platform": "inertia_kg_m2", "excitation": "sets"}
 
 
@@ -47,8 +48,12 @@ class LoadedConfig:
         return self.path.parent
 
 
-def load_config(path: str | Path, overrides: Sequence[str] = ()) -> LoadedConfig:
+def load_config(
+    path: str | Path, overrides: Sequence[str] = (), also_wrong: FurtherFaults = lambda data: ()
+) -> LoadedConfig:
     """Read, override and check a configuration.
+
+    ``also_wrong`` says what else is wrong with the mapping as read: paths and texts, told with all the rest.
 
     Raises ConfigError whose message has one line a fault: file, line, key, value, what is allowed.
     """
@@ -65,7 +70,7 @@ def load_config(path: str | Path, overrides: Sequence[str] = ()) -> LoadedConfig
         apply_override(document, override)
         _include_files(document, path.parent, included)  # the next one may reach into it
     _read_effects(document, path.parent, included)
-    config = _validate(document, name_from_stem(path.stem))
+    config = _validate(document, name_from_stem(path.stem), also_wrong)
     return LoadedConfig(config, text, path, tuple(overrides), included)
 
 
@@ -134,7 +139,7 @@ def _read_effects(document: Document, folder: Path, included: dict[str, str]) ->
                 document.faults.append(Fault(place_of(document, where), where, str(error)))
 
 
-def _validate(document: Document, default_name: str) -> Config:
+def _validate(document: Document, default_name: str, also_wrong: FurtherFaults) -> Config:
     data = document.data
     data.setdefault("name", default_name)
     _require_backend_section(document)
@@ -148,6 +153,10 @@ def _validate(document: Document, default_name: str) -> Config:
     except ValidationError as error:
         known = {fault.path for fault in document.faults}
         document.faults += [f for f in faults_of(error, document, Config) if f.path not in known]
+    known = {fault.path for fault in document.faults}
+    document.faults += [
+        Fault(place_of(document, path), path, text) for path, text in also_wrong(data) if path not in known
+    ]
     if document.faults or config is None:
         raise ConfigError(_listing(document.faults))
     return config

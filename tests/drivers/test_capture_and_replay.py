@@ -158,6 +158,18 @@ def test_all_that_is_wrong_is_listed_at_once(bench, monkeypatch):
         pass
 
 
+def test_a_gyro_that_vanishes_while_it_is_contacted_is_told_once(bench, monkeypatch):
+    class Killed(GyroPort):
+        def read(self):
+            self.vanished = self.vanished or self.time.now_s > self.begin_s + 0.5
+            return super().read()
+
+    monkeypatch.setattr(drivers.bench_devices, "open_port", lambda path, baud: Killed(bench.time))
+    with pytest.raises(DeviceFault) as caught, bench.opened():
+        pass
+    assert str(caught.value).count("wire has vanished") == 1
+
+
 def test_torque_is_refused_before_arming_and_off_is_safe_at_any_time(bench):
     bench.torque_off()
     bench.disarm()

@@ -278,3 +278,15 @@ def test_the_same_loop_runs_against_the_clock_on_the_wall() -> None:
         assert campaign.recording.runs[0].duration_s == pytest.approx(0.05, abs=0.01)
     else:
         assert isinstance(campaign.cause, SafetyTrip)
+
+
+@pytest.mark.parametrize(("also", "count"), [("the adapter has vanished", 1), ("the drive does not answer", 2)])
+def test_two_faults_on_the_way_out_are_both_told_and_the_same_one_once(also: str, count: int) -> None:
+    def fail() -> None:
+        raise DeviceFault(f"the drive could not be shown to be off: {also}")
+
+    rig = ScriptedRig(raising(DeviceFault("the adapter has vanished"), 0.8), fail)
+    told = str(sequencer(rig).play(plan()).cause)
+    assert told.count("vanished") == 1
+    assert told.count("the drive could not be shown to be off") == 1
+    assert ("on the way out of" in told) is (count == 2)
