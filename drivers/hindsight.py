@@ -75,7 +75,7 @@ class Hindsight:
         """The device begins to count anew: what was learnt of its clock before says nothing any more."""
         self._clock = clock or self._clock
         self._source_s, self._late_s, self._early_s = array("d"), array("d"), array("d")
-        self._block: list[tuple[float, float, float]] = []
+        self._block = array("d")  # source time, latest and earliest host time of every reading, one after the other
         self._block_end_s = -math.inf
         self._base_s = 0.0
         self._whole = 0
@@ -94,11 +94,12 @@ class Hindsight:
             else:
                 self._base_s = late_s - source_s
             self._block_end_s = source_s + BLOCK_S
-        self._block.append((source_s, late_s - source_s - self._base_s, early_s - source_s - self._base_s))
+        base_s = self._base_s
+        self._block.extend((source_s, late_s - source_s - base_s, early_s - source_s - base_s))
 
     def _close_block(self) -> None:
-        source_s, late_s, early_s = np.array(self._block).T
-        self._block.clear()
+        source_s, late_s, early_s = np.array(self._block).reshape(-1, 3).T
+        del self._block[:]
         drifted_s = self._clock.drift * (source_s - source_s[0])
         fast = _fast(late_s - drifted_s)
         way_there_s = drifted_s - early_s
