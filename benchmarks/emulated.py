@@ -117,6 +117,7 @@ class Host:
     overrides: Sequence[str] = SHORT
     command: str = "play"
     terminal: str | None = None  # a terminal of its own, that it loses when the other end is closed
+    log: Path | None = None  # where it says what it says; beside the folder unless told otherwise
     process: Started = field(init=False)
 
     def __post_init__(self) -> None:
@@ -125,7 +126,7 @@ class Host:
         taken = (f"bench.gyroscope.port={ports['gyro']}", f"bench.amplifier.can.channel={ports['can']}")
         for override in (*taken, *self.overrides):
             line += ["--set", override]
-        self.log = self.folder.with_suffix(".log")
+        self.log = self.log or self.folder.with_suffix(".log")
         said = self.terminal or str(self.log)
         self.process = parent().start("host", line, self.terminal or os.devnull, said, said)
 
@@ -148,7 +149,9 @@ class Host:
     @property
     def said(self) -> str:
         """What it said, in one line."""
-        return " ".join(self.log.read_text(errors="replace").split()) if self.log.exists() else ""
+        if self.log is None or not self.log.exists():
+            return ""
+        return " ".join(self.log.read_text(errors="replace").split())
 
     def left_over(self) -> list[int]:
         """Processes of its session that still live."""
