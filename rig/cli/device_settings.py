@@ -53,7 +53,7 @@ def _known(given: Mapping[str, Any], section: type[BaseModel]) -> dict[str, Any]
         field = section.model_fields.get(key)
         if field is None:
             continue
-        inner = field.annotation
+        inner: Any = field.annotation
         is_section = isinstance(inner, type) and issubclass(inner, BaseModel) and isinstance(value, dict)
-        known[key] = _known(value, inner) if is_section and inner is not None else value
+        known[key] = _known(value, inner) if is_section else value
     return known
