@@ -212,3 +212,13 @@ def test_a_few_points_a_second_are_kept_however_many_samples_come():
     play_gyro(clock, hindsight, 20e-6, 2)
     for one in hindsight.refined():
         assert len(one.recorded_s) <= 2 + 2 * math.ceil(SET_S / 0.25)
+
+
+def test_of_a_long_day_the_last_readings_stay_and_the_last_sets_are_refined(monkeypatch):
+    monkeypatch.setattr("drivers.hindsight.BLOCKS_KEPT", 60)
+    clock = SourceClock(5e-3)
+    hindsight = Hindsight(clock)
+    played = play_gyro(clock, hindsight, 20e-6, 2, rate_hz=200.0, played=phases(40))
+    found = hindsight.refined()
+    assert 0 < len(found) < len(played), "of the first sets nothing is known any more"
+    assert np.ptp(errors(found, played[-len(found) :])[-1]) < 6e-6
