@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import struct
 
+import numpy as np
+
 from benchmarks.fuzz import checksums
 from drivers.amplifiers import make_amplifier
 from drivers.amplifiers.base import Amplifier
@@ -17,6 +19,7 @@ from drivers.capture import pack_frame, unpack_frame
 from drivers.codecs import cia402, lawicel, odrive_cansimple
 from drivers.codecs.lawicel import CanFrame, LawicelDecoder
 from drivers.gyroscopes import make_gyroscope
+from drivers.hindsight import LARGEST_CORRECTION_S
 from drivers.source_clock import SourceClock
 from rig.config.bench import AmplifierConfig, CanConfig, GyroscopeConfig
 from rig.errors import DeviceFault
@@ -25,6 +28,8 @@ HEX = frozenset(b"0123456789abcdefABCDEF")
 LONGEST_LINE = 160
 FD_LENGTHS = frozenset((*range(9), 12, 16, 20, 24, 32, 48, 64))
 MOST_EMERGENCIES = 10_000
+ANOTHER_SET = 77
+DRIVE_TICK, GYRO_TICK = 218, 18  # 10 ms more on either clock, and settled
 
 
 def lawicel_stream(data: bytes) -> int:
@@ -162,16 +167,29 @@ def cia402_frames(data: bytes) -> int:
 
 
 def clocks(data: bytes) -> int:
-    """Counters that jump, run backwards or stand still, at times that do the same: every time stays a number."""
+    """Counters that jump, run backwards or stand still, at times that do the same: every time stays a number.
+
+    What is said of the times in hindsight is in order and near what was recorded.
+    """
     source, torque = SourceClock(1e-3), TorqueClock(1e-6, 1 << 32)
     gyro = make_gyroscope(GyroscopeConfig(sample_rate_hz=2000))
+    both = (torque.hindsight, gyro.hindsight)
     count, now_s, at = 0, 100.0, 0
+    for hindsight in both:
+        hindsight.begin_set(now_s)
     while at + 8 <= len(data):
         kind, counter, latency, step, wait = struct.unpack_from("<BBHhh", data, at)
         at += 8
         scale = 10.0 ** (kind % 8 - 5)
         now_s = min(max(now_s + wait * scale, 0.0), 1e9)
         count = min(max(count + (step << kind % 24), -(1 << 62)), 1 << 62)
+        if kind & 16:
+            for hindsight in both:
+                hindsight.settle()
+        if counter == ANOTHER_SET:
+            for hindsight in both:
+                hindsight.end_set()
+                hindsight.begin_set(now_s)
         if kind & 32:
             source.observe(count, now_s)
             assert math.isfinite(source.host_time_s(count)), "the device's clock was lost"
@@ -185,4 +203,18 @@ def clocks(data: bytes) -> int:
         body = b"\x90" + bytes(10) + bytes([counter]) + latency.to_bytes(2, "big")
         for sample in gyro.feed(body + checksums.stim300_crc(body).to_bytes(4, "big"), now_s):
             assert math.isfinite(sample.time_s)
+    for hindsight in both:
+        hindsight.settle()
+        hindsight.end_set()
+        for one in hindsight.refined():
+            assert len(one.recorded_s) == len(one.refined_s) > 0
+            assert np.all(np.diff(one.recorded_s) > 0.0) and np.all(np.diff(one.refined_s) > 0.0), "times out of order"
+            assert np.max(np.abs(one.refined_s - one.recorded_s)) <= LARGEST_CORRECTION_S + 1e-9, "too far"
     return len(data)
+
+
+def regular_clocks() -> list[bytes]:
+    """Inputs of ``clocks`` in which nothing is wrong: four seconds of a drive's stamps, and of a gyro's samples."""
+    drive = b"".join(struct.pack("<BBHhh", DRIVE_TICK, 0, 0, 2500, 10) for _ in range(400))
+    gyro = b"".join(struct.pack("<BBHhh", GYRO_TICK, 20 * k & 255, 300, 1, 10) for k in range(400))
+    return [drive, gyro]

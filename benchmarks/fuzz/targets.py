@@ -33,6 +33,7 @@ def seeds(name: str) -> list[bytes]:
         "vectornav": [sealed, b"\x01\x20YMR,1.0,2,3,4,5,6,7,8,9,+01.0,-2,3\x01\x06ERR,12\x02\x05RRG,1"],
         "lawicel": [b"\r\a", b"z\rZ\rF20\rV1013\rt1812AABB\rT0000018F8AABBCCDDEEFF0011\rr1230\rR000001238\r"
                     b"t12310012AB\rd1239" + b"0" * 24 + b"\r", b"t" * 300],
+        "clocks": can_targets.regular_clocks(),
     }  # fmt: skip
     frames = b"".join(bytes([0, n >> 3, n & 7 | 1, 8]) + bytes(range(8)) for n in (0x81, 0x181, 0x701, 0x21, 0x34))
     moteus = bytes([5, 1, 0, 16]) + bytes.fromhex("2400010a2c0d00000000002500000f00")

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from benchmarks import fuzz_configs, fuzz_recordings
-from benchmarks.fuzz import checksums, files
+from benchmarks.fuzz import can_targets, checksums, files
+from benchmarks.fuzz.can_targets import clocks, regular_clocks
 from benchmarks.fuzz.framed import check_framing
 from benchmarks.fuzz.streams import Pieces
 from benchmarks.fuzz.targets import TARGETS, seeds
@@ -28,6 +29,17 @@ def test_a_codec_holds_on_a_few_hostile_streams(name: str) -> None:
     went_through = sum(TARGETS[name](data) for data in begun[:4])
     went_through += sum(TARGETS[name](mutated(begun[k % len(begun)], random)) for k in range(12))
     assert went_through > 1000
+
+
+def test_regular_clocks_are_stamped_anew_so_that_what_is_said_of_them_is_looked_at(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    drive, gyro = regular_clocks()
+    assert clocks(drive) == len(drive) and clocks(gyro) == len(gyro)
+    monkeypatch.setattr(can_targets, "LARGEST_CORRECTION_S", -1.0)
+    for regular in (drive, gyro):
+        with pytest.raises(AssertionError, match="too far"):
+            clocks(regular)
 
 
 def test_every_target_is_named() -> None:
