@@ -25,8 +25,9 @@ WINDOW_S = 60.0  # on either side of a set
 LONGEST_LINE_S = 60.0  # longer sets get a line a minute, joined: no crystal runs straight for ever
 BLOCKS_KEPT = int(24 * 3600 / BLOCK_S)
 MIN_BLOCKS = 12
-FAST_SHARE = 0.05  # of the readings of a block: the fastest one may be a slip
-LOWER_SHARE = 0.25  # of the blocks with answers alone: the others came by a slower way
+# Of the readings of a block; the fastest one may be a slip. The more of them count, the less they scatter and the more
+# they follow how busy the machine is, which cancels where both ways are known.
+FAST_TWO_WAY, FAST_ONE_WAY = 0.05, 0.01
 FAST_WAYS = 0.5  # of the blocks with requests and answers
 LARGEST_CORRECTION_S = 5e-3  # beyond that one of the two maps is wrong, and nobody can say which
 OWN_LINE = -1
@@ -101,12 +102,12 @@ class Hindsight:
         source_s, late_s, early_s = np.array(self._block).reshape(-1, 3).T
         del self._block[:]
         drifted_s = self._clock.drift * (source_s - source_s[0])
-        fast = _fast(late_s - drifted_s)
         way_there_s = drifted_s - early_s
         known = np.flatnonzero(np.isfinite(way_there_s))
+        fast = _fast(late_s - drifted_s, FAST_TWO_WAY if len(known) else FAST_ONE_WAY)
         early = math.nan
         if len(known):
-            quick = known[_fast(way_there_s[known])]
+            quick = known[_fast(way_there_s[known], FAST_TWO_WAY)]
             early = float(early_s[quick] + drifted_s[fast] - drifted_s[quick])
         for kept, value in ((self._source_s, source_s[fast]), (self._late_s, late_s[fast]), (self._early_s, early)):
             kept.append(float(value))
@@ -220,13 +221,13 @@ class _Readings:
             return None
         x, late_s = self.source_s[near] - first_s, self.late_s[near]
         if self.way_s is None:
-            return lower_line(x, late_s, LOWER_SHARE)
+            return lower_line(x, late_s)
         way_s = self.way_s[near]
         fast = way_s <= np.quantile(way_s, FAST_WAYS)
         return middle_line(x[fast], late_s[fast] - 0.5 * way_s[fast])
 
 
-def _fast(late_s: Numbers) -> int:
-    """Index of a reading that is hardly later than any other."""
-    rank = int(FAST_SHARE * (len(late_s) - 1))
+def _fast(late_s: Numbers, share: float) -> int:
+    """Index of a reading that only this share of the others precedes."""
+    rank = int(share * (len(late_s) - 1))
     return int(np.argpartition(late_s, rank)[rank])

@@ -32,8 +32,8 @@ def _least_squares(x: Numbers, y: Numbers) -> tuple[float, float]:
     return slope, mean_y - slope * mean_x
 
 
-def lower_line(x: Numbers, y: Numbers, share: float = LOWER_SHARE) -> tuple[float, float]:
-    """Slope and value at x = 0 of the line through the lowest ``share`` of points that can only be too high.
+def lower_line(x: Numbers, y: Numbers) -> tuple[float, float]:
+    """Slope and value at x = 0 of the line through the lower half of points that can only be too high.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def lower_line(x: Numbers, y: Numbers, share: float = LOWER_SHARE) -> tuple[floa
         Shape (n,), seconds; n of six or more.
     """
     slope, level = _half_span_slope(x, y), 0.0
-    lower = int(share * (len(x) - 1))
+    lower = int(LOWER_SHARE * (len(x) - 1))
     for _ in range(TRIMS):
         residual = y - slope * x
         middle = float(np.median(residual))
