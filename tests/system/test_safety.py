@@ -52,10 +52,12 @@ def test_emulators_end_when_nobody_listens_any_more(request: pytest.FixtureReque
     process = subprocess.Popen(
         line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=request.config.rootpath
     )
-    assert process.stdout is not None
+    assert process.stdin is not None and process.stdout is not None
     assert b"listening" in process.stdout.readline()
     process.stdout.close()
     try:
         assert process.wait(10.0) == 0
     finally:
         process.kill()
+        process.wait()
+        process.stdin.close()
