@@ -63,8 +63,9 @@ class Judged:
     def strength(self, name: str) -> float:
         """How many standard errors, taken as white, a term or an effect stands from zero.
 
-        Of an effect's gains it is the joint distance (one of a sine and a cosine may well be nothing), of
-        its shapes the smallest.
+        Of an effect's gains it is the joint distance (one of a sine and a cosine may well be nothing). Of its shapes
+        it is the smallest, where some shape makes it a simpler effect. Elsewhere a shape that the data hardly know (a
+        relaxation slower than all motion) is no reason to doubt the effect: its gains are taken at that shape.
         """
         covariance = self._covariance()
         if covariance is None:
@@ -72,8 +73,13 @@ class Judged:
         linear = {p.name: p.linear for p in effects.get(name).parameters} if name not in TERMS else {}
         mine = [i for i, n in enumerate(self.estimate.names) if n[0] == name]
         gains = [i for i in mine if len(self.estimate.names[i]) == 1 or linear[self.estimate.names[i][1]]]
+        shapes = [i for i in mine if i not in gains]
         x = self.estimate.values
-        out = [abs(x[i]) / float(np.sqrt(max(covariance[i, i], 1e-300))) for i in mine if i not in gains]
+        out = []
+        if gains and shapes and not effects.get(name).nests:
+            covariance = _given(covariance, shapes)
+        else:
+            out = [abs(x[i]) / float(np.sqrt(max(covariance[i, i], 1e-300))) for i in shapes]
         if gains:
             part = covariance[np.ix_(gains, gains)]
             size = np.sqrt(np.maximum(np.diag(part), 1e-300))
@@ -89,6 +95,15 @@ class Judged:
             name: tuple(values[(name, p.name)] for p in effects.get(name).parameters if not p.linear)
             for name in self.structure.effects
         }
+
+
+def _given(covariance: Array, known: Sequence[int]) -> Array:
+    """Covariance of all parameters were some of them known."""
+    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    scaled = covariance / np.outer(size, size)
+    across = scaled[:, known]
+    left = scaled - across @ np.linalg.pinv(scaled[np.ix_(known, known)], rcond=1e-12, hermitian=True) @ across.T
+    return np.asarray(left * np.outer(size, size))
 
 
 def _scaled(a: Array) -> Array:

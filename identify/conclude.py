@@ -241,9 +241,11 @@ def _never(structure: Structure) -> dict[str, str]:
 
 
 def _fraction(before: Measured, after: Measured, floor: NoiseFloor) -> float:
-    """Share of the torque residual above the noise floor that is left."""
+    """Share of the squared residual above the noise floor that is left: of the torque, or of a decay's free run."""
     a, b = after.errors.residual_rms_torque, before.errors.residual_rms_torque
     f = floor.residual_rms_torque
+    if a is None or b is None:
+        a, b, f = after.errors.holdout_rate_rms, before.errors.holdout_rate_rms, floor.holdout_rate_rms
     if a is None or b is None or f is None:
         return 0.0
     excess = b * b - f * f

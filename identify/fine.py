@@ -13,87 +13,43 @@ from dataclasses import replace
 
 import numpy as np
 
+from identify.candidates import Candidates
 from identify.channels import simplicity
-from identify.holdout import Split
-from identify.lines import foreign_lines_hz
-from identify.output_error import refine, squares_at
 from identify.parameters import Name
-from identify.regression import Structure
 from identify.results import Candidate
-from identify.scores import Scored, Scores
-from identify.screen import scale_of
+from identify.scores import Scored
 from identify.search import MOST_EFFECTS, MOST_NAMED, Search
-from identify.traces import Trace
-from identify.whole_runs import STEPS, Whole, fit_whole
+from identify.whole_runs import AT_FLOOR, CHANCE, ENDS_NEAR, NEAR_THEN, TWICE, Whole
 from rig import effects
-from rig.effects.base import Place, Scale
+from rig.effects.base import Place
 from rig.platform import TERMS
 
 NEAR_SIGNAL = 0.3  # of the signal that a free run may leave for this search to begin
-TRIED = 4  # candidates of a round that are fitted
-CHANNELS_TRIED = 2  # effects of measured channels, beside them
-WORTH_A_FIT = 15.0  # expected fall of chi square
-CHANCE = 20.0  # fall of chi square, beyond the penalty, that no chance among all candidates and shapes makes
 HELD = 4.0  # the same on the held-out samples
 EQUAL = 4.0  # fall of chi square that says nothing: the library's order, simple before special, decides
 RIVAL = 10.0  # what parts two candidates for good
-TWICE = 2.0  # times the squares of the best: a special case of it does as well while much is missing
 CERTAIN = 30.0  # standard errors beyond which nobody asks whether a term is needed
 STRONG = 4.0  # standard errors by which every parameter of a new effect must differ from zero
 SHARE = 0.2  # of the excess over the noise that an effect has to take away
 FARTHEST = 3000.0  # times the noise: beyond, the sensor's noise is not what limits this record
 CLOSER = 0.5  # of the mean square at the last attempt
-ENDS_NEAR = 2.0  # mean square over the noise's variance at the end for what was found to be believed
 ATTEMPTS = 2
 STILL_FAR = 100.0  # mean square over the noise's variance
 VERY_FAR = 1e4
 LEAP = 0.03  # of the squares that the right effect leaves where it is the only one that is large
 LEAST = 0.4  # of the squares that the best candidate takes while the noise is still far
 PATIENCE = 3  # effects after which the end must be near
-SHOWN = 6.0  # fall of chi square on that part at which the whole is looked at
-MOST_SHOWN = 10
-PLAIN = 300.0  # fall of chi square on that part at which it tells enough
-LONG = 14_000  # samples; of a longer recording a first part is scored first
-FEW_STEPS = 8  # of a fit that is only compared
-TAKEN_ON = 4  # times as many as a fit has, while each time the squares fall
-GOING = 0.95  # to less than this share
-NEAR_THEN = 4.0  # times the best squares of its round: asked again in the finished model
-AT_FLOOR = 1.1  # mean square over the noise's variance: who is there has found what there is
-FAR_BEHIND = 0.7  # of the best score: not fitted any more once another candidate is at the floor
-HOPELESS = 3.0  # times the best error of the round after three steps
 
 
 class FineSearch:
     """The search over whole runs of one recording."""
 
-    def __init__(
-        self, traces: Sequence[Trace], split: Split, allowed: Sequence[str], say: Callable[[str], None]
-    ) -> None:
-        self.traces, self.say = traces, say
-        self.fit = [i for i, m in enumerate(split.fit) if np.any(m)]
-        self.split = split
-        self.noise = float(np.sqrt(np.mean([t.noise**2 for t in traces])))
-        self.torque_free = all(t.torque is None for t in traces)
-        self.fixed: list[Name] = [("inertia",)] if self.torque_free else []
-        self.allowed = [n for n in allowed if self._possible(n)]
+    def __init__(self, candidates: Candidates, say: Callable[[str], None]) -> None:
+        self.on_offer, self.say = candidates, say
+        self.whole, self.noise = candidates.whole, candidates.noise
         self.tried_at = np.inf
-        self.horizon = 1.0
         self.attempts = 0
         self.came_near: dict[str, dict[str, Whole]] = {}
-
-    def _possible(self, name: str) -> bool:
-        """A bias is a nuisance; a constant torque only shifts the unseen rest angle behind a gyro."""
-        if name == "rate_bias" or (self.torque_free and effects.get(name).place is Place.DRIVE):
-            return False
-        if effects.get(name).needs_added_inertia and not _loads_differ(self.traces):
-            return False
-        return not (name == "torque_offset" and all(t.biased for t in self.traces))
-
-    def whole(
-        self, structure: Structure, start: Mapping[Name, float], hopeless: float = np.inf, steps: int = STEPS
-    ) -> Whole | None:
-        """A structure fitted over whole runs; None where it runs away."""
-        return fit_whole(self.traces, self.split, structure, start, self.noise, self.fixed, hopeless, steps)
 
     def take_over(self, found: Search) -> bool:
         """Go on from the model at hand, if it runs free near the data; ``found`` is brought up to date.
@@ -104,7 +60,8 @@ class FineSearch:
         begin = self.whole(found.best.structure, found.best.values())
         if begin is None or not self._near(begin):
             return False
-        self.tried_at, self.horizon, self.attempts = begin.level, found.horizon, self.attempts + 1
+        self.tried_at, self.attempts = begin.level, self.attempts + 1
+        self.on_offer.horizon = found.horizon
         trial = replace(
             found, candidates=list(found.candidates), rivals=dict(found.rivals), dropped=list(found.dropped),
             rival_models=dict(found.rival_models),
@@ -118,10 +75,9 @@ class FineSearch:
 
     def _near(self, model: Whole) -> bool:
         """Whether the free run stays close enough, and closer than where this was tried before."""
-        moving = np.concatenate([self.traces[i].measured[self.split.fit[i]] for i in self.fit])
-        if self.attempts >= ATTEMPTS:
+        if self.attempts >= ATTEMPTS and model.level > ENDS_NEAR:
             return False
-        close = model.estimate.sigma < NEAR_SIGNAL * float(np.std(moving)) and model.level < FARTHEST**2
+        close = model.estimate.sigma < NEAR_SIGNAL * self.on_offer.moving and model.level < FARTHEST**2
         return close and model.level < CLOSER * self.tried_at
 
     def _rounds(self, found: Search, now: Whole) -> bool:
@@ -188,7 +144,7 @@ class FineSearch:
         }  # fmt: skip
         mine = {n[1:]: v for n, v in now.values().items() if n[0] == name}
         for twin in effects.get(name).never_separable or {}:
-            if twin in self.allowed and {p.name for p in effects.get(twin).parameters} == {k[0] for k in mine}:
+            if twin in self.on_offer.allowed and {p.name for p in effects.get(twin).parameters} == {k[0] for k in mine}:
                 out.setdefault(twin, {(twin, *k): v for k, v in mine.items()})
         return out
 
@@ -206,7 +162,7 @@ class FineSearch:
         return now
 
     def _round(self, found: Search, now: Whole, round_: int) -> Whole | None:
-        tried, looks = self._tried(now)
+        tried, looks = self.on_offer.tried(now)
         name = self._chosen(tried, now)
         self._keep_books(found, now, tried, looks, name, round_)
         if name is None:
@@ -219,86 +175,6 @@ class FineSearch:
             best = self.whole(best.structure, best.values()) or best
         self.say(f"added {name}: free-run error {now.estimate.sigma:.3g} -> {best.estimate.sigma:.3g}")
         return best
-
-    def _tried(self, now: Whole) -> tuple[dict[str, Whole], list[Scored]]:
-        """The most promising candidates, fitted on top of a model, and all that were looked at."""
-        looks = self._looks(now, [n for n in self.allowed if n not in now.structure.effects])
-        tried: dict[str, Whole] = {}
-        short = self._shortlist(looks, now)
-        for look in sorted(short, key=lambda s: (effects.get(s.effect).states > 0, s.count)):  # the cheap ones first
-            best = min(tried.values(), key=lambda w: w.squares, default=now)
-            if best.level < AT_FLOOR and look.gain < FAR_BEHIND * short[0].gain:
-                continue
-            fitted = self._from(now, look, HOPELESS * best.estimate.sigma)
-            if fitted is not None:
-                tried[look.effect] = fitted
-        best = min(tried.values(), key=lambda w: w.squares, default=now)
-        for name, w in list(tried.items()):
-            simpler = [tried[n] for n in effects.get(name).nests if n in tried]
-            chosen_anyway = any(n.squares < TWICE * w.squares for n in simpler)
-            if best.level > AT_FLOOR and w.squares < NEAR_THEN * best.squares and not chosen_anyway:
-                tried[name] = self._on(w)
-        return tried, looks
-
-    def _on(self, fitted: Whole) -> Whole:
-        """A fit that still goes down, taken on: a sharp resonance is found late, and then at once."""
-        for _ in range(TAKEN_ON):
-            if fitted.estimate.converged or fitted.level < AT_FLOOR:
-                break
-            further = self.whole(fitted.structure, fitted.values())
-            if further is None or further.squares >= fitted.squares:
-                break
-            slow, fitted = further.squares > GOING * fitted.squares, further
-            if slow:
-                break
-        return fitted
-
-    def _looks(self, now: Whole, names: Sequence[str]) -> list[Scored]:
-        """Scores of all candidates: of a long recording first on part of it, then on all for those that show there."""
-        sigma, scale = self.noise * float(np.sqrt(now.level)), self._scale(now)
-        if now.count < LONG:
-            return Scores(now.estimate, self.fixed, sigma, scale).all(names)
-        part = Scores(now.estimate, self.fixed, sigma, scale, LONG / now.count).all(names)
-        if part and part[0].gain > PLAIN:
-            return part
-        shown = [s.effect for s in part if s.gain > SHOWN][:MOST_SHOWN]
-        whole = Scores(now.estimate, self.fixed, sigma, scale).all(shown) if shown else []
-        return whole + [s for s in part if s.effect not in shown]
-
-    def _from(self, now: Whole, look: Scored, hopeless: float) -> Whole | None:
-        """A candidate fitted from where its score points, if need be by way of a short horizon.
-
-        Over whole runs friction has false minima: a standstill that comes too soon puts the rest of the run off. So
-        has whatever moves the resonance: a start that is worse than the model without the candidate has lost it.
-        """
-        structure = now.structure.plus(look.effect)
-        traces, use = [self.traces[i] for i in self.fit], [self.split.fit[i] for i in self.fit]
-        starts = [{**now.values(), **look.start}, {**now.values(), **look.besides, **look.start}]
-        squares = [squares_at(traces, structure, start, use) / self.noise**2 for start in starts]
-        start = starts[int(np.argmin(squares))]
-        if effects.get(look.effect).place is Place.FRICTION or min(squares) > now.squares:
-            near = refine(traces, structure, start, self.horizon, 8, use, fixed=self.fixed, coarse=True, tolerance=1e-3)
-            if np.isfinite(near.sigma):
-                start = dict(zip(near.names, near.values.tolist(), strict=True))
-        return self.whole(structure, start, hopeless, FEW_STEPS)
-
-    def _scale(self, now: Whole) -> Scale:
-        values, traces = now.values(), [self.traces[i] for i in self.fit]
-        inertia, damping, stiffness = (values.get((t,), 0.0) for t in TERMS)
-        natural_hz = float(np.sqrt(max(stiffness, 0.0) / max(inertia, 1e-300)) / (2.0 * np.pi))
-        lines = foreign_lines_hz(traces, now.estimate.residuals(), self.noise, natural_hz)
-        return scale_of(traces, (inertia, damping, stiffness), lines)
-
-    def _shortlist(self, looks: Sequence[Scored], now: Whole) -> list[Scored]:
-        """The largest gains beyond their penalty, and what comes first by order or simplicity."""
-        penalty = float(np.log(max(now.count, 2)))
-        worth = sorted((s for s in looks if s.gain > WORTH_A_FIT), key=lambda s: s.count * penalty - s.gain)
-        gains = {s.effect: s.gain for s in worth}  # what contains another and promises less is not it
-        worth = [s for s in worth if all(gains.get(n, 0.0) <= s.gain for n in effects.get(s.effect).nests)]
-        short = [s for s in worth if not simplicity(s.effect)][:TRIED]  # channels come beside, they displace nothing
-        short = sorted(short + [s for s in worth if simplicity(s.effect)][:CHANNELS_TRIED], key=worth.index)
-        wanted = {n for s in short for n in (*effects.get(s.effect).nests, *effects.get(s.effect).lower_order)}
-        return short + [s for s in worth if s.effect in wanted and s not in short]
 
     def _chosen(self, tried: Mapping[str, Whole], now: Whole) -> str | None:
         """The candidate to add: the likeliest, or the simplest of those that are as likely."""
@@ -335,7 +211,7 @@ class FineSearch:
         """Without every term or effect that the data do as well without."""
         for name in names:
             kept_by = [e for e in now.structure.effects if name in effects.get(e).lower_order]
-            last = len(now.structure.terms) - len(self.fixed) + len(now.structure.effects) <= 1
+            last = len(now.structure.terms) - len(self.on_offer.fixed) + len(now.structure.effects) <= 1
             if name == "inertia" or kept_by or last:
                 continue
             start = {n: v for n, v in now.values().items() if n[0] != name}
@@ -395,11 +271,6 @@ def _taken_in(start: Mapping[Name, float], values: Mapping[Name, float], name: s
 def _own_in_each_run(name: str) -> bool:
     """Whether an effect has gains of its own in every run, with which it soaks up much."""
     return name not in TERMS and any(p.per_run for p in effects.get(name).parameters)
-
-
-def _loads_differ(traces: Sequence[Trace]) -> bool:
-    """Whether a known inertia was mounted for some of the runs."""
-    return len({t.run.added_inertia_kg_m2 for t in traces}) > 1
 
 
 def _simplicity(name: str) -> tuple[int, int, bool]:

@@ -22,6 +22,7 @@ from identify.traces import Trace
 from rig.recording.run import Array
 
 NEAR_FLOOR = 1.3  # times the sensor's noise: close enough for a free run over the whole set
+FREER = 0.95  # of the free-run error
 BLOCKS_PER_RUN = 20
 SEGMENT = 256  # samples of a stretch whose spectrum is averaged
 SINGULAR = 1e-11  # smallest over largest eigenvalue of the scaled information
@@ -102,7 +103,7 @@ def by_output_error(
     torque_free = all(t.torque is None for t in traces)
     fixed = [("inertia",)] if torque_free else []
     noise = noise_of_all(traces)
-    best = refine(traces, structure, start, None, 12, use, fixed=fixed)
+    best = at_once = refine(traces, structure, start, None, 12, use, fixed=fixed)
     straight = best.sigma <= NEAR_FLOOR * noise  # the search came close enough: no ladder of horizons needed
     if not straight:
         best = refine(traces, structure, start, horizon, 12, use, fixed=fixed)
@@ -111,6 +112,10 @@ def by_output_error(
         trial = refine(traces, structure, values, longer, 12, use, fixed=fixed)
         if trial.sigma <= NEAR_FLOOR * noise:
             best = trial
+    if torque_free and not straight:  # only the model itself leads a decay astray: whole runs are its measure
+        held = _free_run(traces, structure, dict(zip(best.names, best.values.tolist(), strict=True)), use)
+        if held is None or at_once.sigma < FREER * held.sigma:
+            best = at_once
     values = dict(zip(best.names, best.values.tolist(), strict=True))
     whole = best if len(best.shots[0].first) == len(make_whole(best.shots[0])) else None
     same = all(np.array_equal(u, e) for u, e in zip(use, everything, strict=True))

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from identify import persets
+from identify import decay, persets
+from identify.candidates import Candidates
 from identify.channels import offer_of, with_causes
 from identify.compare import Judged, horizon_s
 from identify.conclude import Case, conclude
@@ -95,19 +96,28 @@ class _Identifier:
         """The whole way; where somebody stops it in the middle, what there is so far."""
         shapes = {n: shape_values(n, _plain(self.declared, n)) for n in self.structure.effects}
         horizon = horizon_s(self.start.platform, self.traces)
-        fitting = pieces(self.traces, self.split.fit, 3.0 * horizon)
-        judging = pieces(self.traces, self.split.judge, 3.0 * horizon, 5_000)
+        traces, parts = self._searched()
+        fitting = pieces(traces, parts.fit, 3.0 * horizon)
+        judging = pieces(traces, parts.judge, 3.0 * horizon, 5_000)
         allowed = [
             n for n in self.settings.candidates or effects.known()
             if effects.get(n).reads is None or n in self.offer.candidates
         ]  # fmt: skip
-        loop = Loop(fitting, judging, self.start, allowed, self.say, self.traces)
+        loop = Loop(fitting, judging, self.start, allowed, self.say, traces)
         d = self.declared
         try:
             self.say("fitting the declared model")
             nominal = (d.inertia_kg_m2, d.damping_nm_s_rad, d.stiffness_nm_rad)
-            fine = FineSearch(self.traces, self.split, allowed, self.say)
-            search = loop.run(self.structure, shapes, nominal, fine.take_over)
+            on_offer = Candidates(traces, parts, allowed)
+            fine = FineSearch(on_offer, self.say)
+
+            def take_over(found: Search) -> bool:
+                over = self.torque_free and decay.take_over(on_offer, found, self.say)
+                if over and found.best.sigma > decay.STILL_COARSE * on_offer.noise:
+                    return True  # whole runs have had their say, and the noise is not what is left
+                return fine.take_over(found) or over
+
+            search = loop.run(self.structure, shapes, nominal, take_over)
             search.drop_a_bad_lot()
             before = self._before(search)
             after = self._after(search) if search.best.structure != self.structure else before
@@ -119,6 +129,16 @@ class _Identifier:
             search = loop.so_far
             found = self._report(search, self._regressed(search.base), self._regressed(search.best), in_full=False)
             return replace(found, aborted=True, accepted=False, reasons=(STOPPED,))
+
+    def _searched(self) -> tuple[list[Trace], Split]:
+        """What the search looks at: of a slow decay that was sampled fast only every so manyth sample."""
+        runs = [t.run for t in self.traces]
+        j, _, k = self.start.platform
+        few = decay.thinned(runs, float(np.sqrt(max(k / j, 0.0)) / (2.0 * np.pi))) if self.torque_free else runs
+        if all(a is b for a, b in zip(few, runs, strict=True)):
+            return self.traces, self.split
+        traces = _one_noise([prepare(r, t.number, self.recording.noise) for r, t in zip(few, self.traces, strict=True)])
+        return traces, split(traces)
 
     def _report(self, search: Search, before: Fitted, after: Fitted, in_full: bool = True) -> Identification:
         changed = after.structure != self.structure

@@ -8,6 +8,7 @@ objective is then a quadratic form whose cost does not grow with the number of s
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -191,12 +192,15 @@ def each_set(
     whole = [replace(t, number=i) for i, t in enumerate(linear)]
     bounds = _bounds(traces, fitted) if fitted.sensor_limited and fitted.structure.effects else [{} for _ in traces]
     rho = 0.0 if fitted.sensor_limited else start.rho
-    results = []
-    for i, trace in enumerate(whole):
+
+    def alone(i: int) -> SetResult:
+        trace = whole[i]
         run = genetic(trace.run.name, [trace], terms, begin, centre, settings, settings.seed + i, rho, False)
-        results.append(_result(trace, run, terms, begin, rho, axis, bounds[i]))
-    joint = genetic("all sets", whole, terms, begin, centre, settings, settings.seed, rho, True)
-    return tuple(results), joint
+        return _result(trace, run, terms, begin, rho, axis, bounds[i])
+
+    with ThreadPoolExecutor(2) as workers:
+        results = tuple(workers.map(alone, range(len(whole))))
+    return results, genetic("all sets", whole, terms, begin, centre, settings, settings.seed, rho, True)
 
 
 def _least_errors(trace: Trace, values: Mapping[str, float], labels: Sequence[Name]) -> Array:

@@ -72,11 +72,14 @@ class Search:
         """Name nothing where all effects together leave much of what they were to explain.
 
         Something that is not in the library is always resembled by something that is: part of it goes away,
-        and more of it with every further effect.
+        and more of it with every further effect. What can bend to follow anything (a waviness of any order, a tone of
+        any frequency, a memory of any length) is believed only where nothing is left.
         """
         kept = set(self.base.structure.effects)
         few = len(self.best.structure.effects) <= len(kept) + MOST_NAMED
-        if few and (self.best.sigma < LEFT * self.floor or self.share > BULK):
+        nothing_left = self.best.sigma < LEFT * self.floor
+        pliant = any(effects.get(e).resembles_much for e in self.best.structure.effects if e not in kept)
+        if few and (nothing_left or (self.share > BULK and not pliant)):
             return
         self.candidates = [
             replace(c, status="best of a bad lot") if c.status == "added" and c.effect not in kept else c

@@ -28,6 +28,7 @@ SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than 
 LEAD_S = 0.1
 LEAD_IN_S = 0.01  # at the start of a run that carry no weight
 MOST_HOLES = 20  # times as many missing samples as there are
+STRAIGHT = 0.1  # of the sensor's noise
 LONGEST_FILL = 25  # missing samples that a spline may bridge
 STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
 
@@ -203,6 +204,16 @@ class Trace:
             left = self.noise * 2.0 * np.pi * self.cutoff_hz / np.sqrt(3.0) * np.sqrt(min(1.0, wn))
         torque = np.zeros_like(fine_t) if self.torque is None else self.torque.at(fine_t + self.start_s)
         return angle, rate, fine_t + self.offset_s, torque, float(left)
+
+    @cached_property
+    def straight_s(self) -> float:
+        """Longest step over which the rate runs straight, within a tenth of the sensor's noise.
+
+        A gyro's filter takes it for straight between two instants of the simulation; a sine is not.
+        """
+        rate = self.fine[1]
+        bend = np.diff(rate, 2) / (self.step_s / UPSAMPLING) ** 2
+        return float(np.sqrt(8.0 * STRAIGHT * self.noise / max(float(np.sqrt(np.mean(bend**2))), 1e-300)))
 
     def torque_pieces(self, drive: tuple[tuple[str, tuple[float, ...]], ...]) -> tuple[Array, int] | None:
         """Torque behind the given drive effects as polynomials, and how many of them a sample holds."""

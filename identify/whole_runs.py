@@ -15,6 +15,11 @@ from identify.regression import Structure
 from identify.traces import Trace
 from rig.recording.run import Array
 
+CHANCE = 20.0  # fall of chi square, beyond the penalty, that no chance among all candidates and shapes makes
+TWICE = 2.0  # times the squares of the best: a special case of it does as well while much is missing
+NEAR_THEN = 4.0  # times the best squares of its round: asked again in the finished model
+AT_FLOOR = 1.1  # mean square over the noise's variance: who is there has found what there is
+ENDS_NEAR = 2.0  # mean square over the noise's variance at the end for what was found to be believed
 TOLERANCE = 3e-4
 STEPS = 15
 

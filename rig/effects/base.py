@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 from numba import types
@@ -88,6 +88,13 @@ class Parameter:
         return f"{self.name}_{self.suffix}" if self.suffix else self.name
 
 
+class LargeStart(NamedTuple):
+    """Where the fit of an effect may begin that is no small addition: terms of the platform, own parameters."""
+
+    terms: Mapping[str, float]
+    own: Mapping[str, float]
+
+
 @dataclass(frozen=True)
 class Effect:
     """A physical effect, described once.
@@ -117,6 +124,9 @@ class Effect:
     nests: tuple[str, ...] = ()  # simpler effects that this one contains as a special case
     never_separable: Mapping[str, str] | None = None  # rival -> why no torque-to-rate data can tell
     needs_added_inertia: bool = False  # shows only where runs carry a known inertia besides the platform's own
+    # Of (J, C, K): terms of the platform and own parameters to begin from where the effect is large.
+    large_starts: Callable[[tuple[float, float, float]], tuple[LargeStart, ...]] | None = None
+    resembles_much: bool = False  # its shapes make it follow whatever else is missing
     separated_by: str = ""
     reads: Channel | None = None  # the measured channel that it is an effect of
 

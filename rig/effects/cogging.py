@@ -36,5 +36,6 @@ EFFECT = Effect(
         Parameter("order", "1/rad", "periods a turn", low=0.5, high=2000.0, start=_orders),
     ),
     kernel=_torque,
+    resembles_much=True,
     separated_by="from backlash and cubic stiffness: several amplitudes, slow motion through the whole travel",
 )

@@ -36,5 +36,6 @@ EFFECT = Effect(
     states=1,
     rest_state=lambda angle, rate: (angle,),
     fastest_rad_s=lambda values: 0.3 / values[4],
+    resembles_much=True,
     separated_by="from damping: several frequencies; from drift: a hold at constant torque",
 )

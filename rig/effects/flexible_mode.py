@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rig.effects.base import Effect, Parameter, Place, Scale, kernel
+from rig.effects.base import Effect, LargeStart, Parameter, Place, Scale, kernel
 
 
 @kernel
@@ -21,6 +21,16 @@ def _frequencies(scale: Scale) -> tuple[float, ...]:
     lowest = max(0.5, 2.0 / scale.duration_s)
     count = 20
     return tuple(lowest * (highest / lowest) ** (i / (count - 1)) for i in range(count))
+
+
+def _large(jck: tuple[float, float, float]) -> tuple[LargeStart, ...]:
+    """A quarter of the inertia on a spring somewhat above the natural frequency: slow motion moves both as one."""
+    inertia, _, stiffness = jck
+    natural_hz = math.sqrt(max(stiffness, 0.0) / inertia) / (2.0 * math.pi)
+    if natural_hz <= 0.0:
+        return ()
+    own = {"inertia": 0.25 * inertia, "ratio": 0.02}
+    return tuple(LargeStart({"inertia": 0.75 * inertia}, {**own, "frequency": n * natural_hz}) for n in (1.2, 1.8))
 
 
 EFFECT = Effect(
@@ -48,5 +58,7 @@ EFFECT = Effect(
     states=2,
     rest_state=lambda angle, rate: (angle, rate),
     fastest_rad_s=lambda values: 2.0 * math.pi * values[4] * (1.0 + values[3] / values[0]) ** 0.5,
+    large_starts=_large,
+    resembles_much=True,
     separated_by="from inertia: frequencies on both sides of the mode; a multisine or chirp",
 )

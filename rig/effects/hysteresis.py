@@ -49,5 +49,6 @@ EFFECT = Effect(
     states=1,
     fastest_rad_s=_fastest,
     nests=("presliding_friction",),
+    resembles_much=True,
     separated_by="from presliding friction: repeats at several amplitudes",
 )

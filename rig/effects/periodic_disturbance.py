@@ -32,5 +32,6 @@ EFFECT = Effect(
     ),
     kernel=_torque,
     fastest_rad_s=lambda values: 2.0 * math.pi * values[5],
+    resembles_much=True,
     separated_by="from harmonics of friction or stiffness: excite at other frequencies",
 )

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identify.candidates import Candidates
 from identify.fine import FineSearch
 from identify.holdout import split
 from identify.regression import Structure
@@ -25,7 +26,7 @@ ALLOWED = (
 
 def searched(recording: Recording, allowed: tuple[str, ...] = ALLOWED) -> tuple[Search, bool]:
     traces = traces_of(recording)
-    fine = FineSearch(traces, split(traces), allowed, lambda text: None)
+    fine = FineSearch(Candidates(traces, split(traces), allowed), lambda text: None)
     begin = fine.whole(Structure(), START)
     assert begin is not None
     found = Search(begin.judged(), begin.judged(), 0.1, fine.noise)

@@ -1,0 +1,186 @@
+"""What may be added to a model that runs free: scored, fitted on top of it over whole runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from identify.channels import simplicity
+from identify.holdout import Split
+from identify.lines import foreign_lines_hz
+from identify.output_error import refine, squares_at
+from identify.parameters import Name
+from identify.regression import Structure
+from identify.scores import Scored, Scores
+from identify.screen import scale_of
+from identify.traces import Trace
+from identify.whole_runs import AT_FLOOR, CHANCE, ENDS_NEAR, NEAR_THEN, STEPS, TWICE, Whole, fit_whole
+from rig import effects
+from rig.effects.base import Place, Scale
+from rig.platform import TERMS
+
+TRIED = 4  # candidates of a round that are fitted
+CHANNELS_TRIED = 2  # effects of measured channels, beside them
+WORTH_A_FIT = 15.0  # expected fall of chi square
+SHOWN = 6.0  # fall of chi square on that part at which the whole is looked at
+MOST_SHOWN = 10
+PLAIN = 300.0  # fall of chi square on that part at which it tells enough
+LONG = 14_000  # samples; of a longer recording a first part is scored first
+FEW_STEPS = 8  # of a fit that is only compared
+TAKEN_ON = 4  # times as many as a fit has, while each time the squares fall
+GOING = 0.95  # to less than this share
+FAR_BEHIND = 0.7  # of the best score: not fitted any more once another candidate is at the floor
+HOPELESS = 3.0  # times the best error of the round after three steps
+
+
+class Candidates:
+    """All that the library offers for one recording.
+
+    Parameters
+    ----------
+    traces, split
+        The runs, and which of their samples fit and judge.
+    allowed
+        Names of the effects that may be named at all.
+    """
+
+    def __init__(self, traces: Sequence[Trace], split: Split, allowed: Sequence[str]) -> None:
+        self.traces, self.split = traces, split
+        self.fit = [i for i, m in enumerate(split.fit) if np.any(m)]
+        self.noise = float(np.sqrt(np.mean([t.noise**2 for t in traces])))
+        self.torque_free = all(t.torque is None for t in traces)
+        self.fixed: list[Name] = [("inertia",)] if self.torque_free else []
+        self.allowed = [n for n in allowed if self._possible(n)]
+        self.horizon = 1.0  # of a first fit over short runs, in seconds
+        self.moving = float(np.std(np.concatenate([traces[i].measured[split.fit[i]] for i in self.fit])))
+
+    def _possible(self, name: str) -> bool:
+        """A bias is a nuisance; a constant torque only shifts the unseen rest angle behind a gyro."""
+        if name == "rate_bias" or (self.torque_free and effects.get(name).place is Place.DRIVE):
+            return False
+        if effects.get(name).needs_added_inertia and not _loads_differ(self.traces):
+            return False
+        return not (name == "torque_offset" and all(t.biased for t in self.traces))
+
+    def whole(
+        self, structure: Structure, start: Mapping[Name, float], hopeless: float = np.inf, steps: int = STEPS
+    ) -> Whole | None:
+        """A structure fitted over whole runs; None where it runs away."""
+        return fit_whole(self.traces, self.split, structure, start, self.noise, self.fixed, hopeless, steps)
+
+    def tried(self, now: Whole, most: int = TRIED, in_full: bool = False) -> tuple[dict[str, Whole], list[Scored]]:
+        """The most promising candidates, fitted on top of a model, and all that were looked at.
+
+        ``in_full`` scores on all samples at once: what a decay tells is in how it ends.
+        """
+        looks = self._looks(now, [n for n in self.allowed if n not in now.structure.effects], in_full)
+        tried: dict[str, Whole] = {}
+        short = self._shortlist(looks, now, most)
+        for look in sorted(short, key=lambda s: (effects.get(s.effect).states > 0, s.count)):  # the cheap ones first
+            best = min(tried.values(), key=lambda w: w.squares, default=now)
+            if best.level < AT_FLOOR and look.gain < FAR_BEHIND * short[0].gain:
+                continue
+            fitted = self._from(now, look, HOPELESS * best.estimate.sigma)
+            if fitted is not None:
+                tried[look.effect] = fitted
+        best = min(tried.values(), key=lambda w: w.squares, default=now)
+        for name, w in list(tried.items()):
+            simpler = [tried[n] for n in effects.get(name).nests if n in tried]
+            chosen_anyway = any(n.squares < TWICE * w.squares for n in simpler)
+            if best.level > AT_FLOOR and w.squares < NEAR_THEN * best.squares and not chosen_anyway:
+                tried[name] = self._on(w)
+        return tried, looks
+
+    def _on(self, fitted: Whole) -> Whole:
+        """A fit that still goes down, taken on: a sharp resonance is found late, and then at once."""
+        for _ in range(TAKEN_ON):
+            if fitted.estimate.converged or fitted.level < AT_FLOOR:
+                break
+            further = self.whole(fitted.structure, fitted.values())
+            if further is None or further.squares >= fitted.squares:
+                break
+            slow, fitted = further.squares > GOING * fitted.squares, further
+            if slow:
+                break
+        return fitted
+
+    def _looks(self, now: Whole, names: Sequence[str], in_full: bool = False) -> list[Scored]:
+        """Scores of all candidates: of a long recording first on part of it, then on all for those that show there."""
+        sigma, scale = self.noise * float(np.sqrt(now.level)), self._scale(now)
+        if in_full or now.count < LONG:
+            return Scores(now.estimate, self.fixed, sigma, scale).all(names)
+        part = Scores(now.estimate, self.fixed, sigma, scale, LONG / now.count).all(names)
+        if part and part[0].gain > PLAIN:
+            return part
+        shown = [s.effect for s in part if s.gain > SHOWN][:MOST_SHOWN]
+        whole = Scores(now.estimate, self.fixed, sigma, scale).all(shown) if shown else []
+        return whole + [s for s in part if s.effect not in shown]
+
+    def _from(self, now: Whole, look: Scored, hopeless: float) -> Whole | None:
+        """A candidate fitted from where its score points, if need be by way of a short horizon.
+
+        Over whole runs friction has false minima: a standstill that comes too soon puts the rest of the run off. So
+        has whatever moves the resonance: a start that is worse than the model without the candidate has lost it.
+        """
+        structure = now.structure.plus(look.effect)
+        traces, use = [self.traces[i] for i in self.fit], [self.split.fit[i] for i in self.fit]
+        starts = [{**now.values(), **look.start}, {**now.values(), **look.besides, **look.start}]
+        squares = [squares_at(traces, structure, start, use) / self.noise**2 for start in starts]
+        start = starts[int(np.argmin(squares))]
+        if effects.get(look.effect).place is Place.FRICTION or min(squares) > now.squares:
+            fitted = self.by_way_of_a_short_horizon(structure, start, hopeless, FEW_STEPS)
+        else:
+            fitted = self.whole(structure, start, hopeless, FEW_STEPS)
+        return self._or_large(look.effect, now, fitted, hopeless)
+
+    def by_way_of_a_short_horizon(
+        self, structure: Structure, start: Mapping[Name, float], hopeless: float = np.inf, steps: int = STEPS
+    ) -> Whole | None:
+        """A structure fitted over whole runs, from where a short horizon leads: few starts are lost on that."""
+        traces, use = [self.traces[i] for i in self.fit], [self.split.fit[i] for i in self.fit]
+        near = refine(traces, structure, start, self.horizon, 8, use, fixed=self.fixed, coarse=True, tolerance=1e-3)
+        if np.isfinite(near.sigma):
+            start = dict(zip(near.names, near.values.tolist(), strict=True))
+        return self.whole(structure, start, hopeless, steps)
+
+    def _or_large(self, name: str, now: Whole, small: Whole | None, hopeless: float) -> Whole | None:
+        """The same from where the effect is no small addition, while neither the fit nor another is near the noise."""
+        effect, best, values = effects.get(name), small, now.values()
+        jck = tuple(values.get((t,), 0.0) for t in TERMS)
+        for large in effect.large_starts(jck) if effect.large_starts else ():  # type: ignore[arg-type]
+            if best is not None and best.level < ENDS_NEAR:
+                break
+            start: dict[Name, float] = dict(values)
+            start |= {(t,): v for t, v in large.terms.items()}
+            start |= {(name, p): v for p, v in large.own.items()}
+            other = self.by_way_of_a_short_horizon(now.structure.plus(name), start, hopeless)
+            best = min((w for w in (best, other) if w is not None), key=lambda w: w.squares, default=None)
+        return best
+
+    def _scale(self, now: Whole) -> Scale:
+        values, traces = now.values(), [self.traces[i] for i in self.fit]
+        inertia, damping, stiffness = (values.get((t,), 0.0) for t in TERMS)
+        natural_hz = float(np.sqrt(max(stiffness, 0.0) / max(inertia, 1e-300)) / (2.0 * np.pi))
+        lines = foreign_lines_hz(traces, now.estimate.residuals(), self.noise, natural_hz)
+        return scale_of(traces, (inertia, damping, stiffness), lines)
+
+    def _shortlist(self, looks: Sequence[Scored], now: Whole, most: int = TRIED) -> list[Scored]:
+        """The largest gains beyond their penalty, and what comes first by order or simplicity."""
+        penalty = float(np.log(max(now.count, 2)))
+        hope = 0.5 if now.level < AT_FLOOR else 0.0  # there a score is nearly what a fit would bring
+        worth = sorted(
+            (s for s in looks if s.gain > max(WORTH_A_FIT, hope * (CHANCE + s.count * penalty))),
+            key=lambda s: s.count * penalty - s.gain,
+        )
+        gains = {s.effect: s.gain for s in worth}  # what contains another and promises less is not it
+        worth = [s for s in worth if all(gains.get(n, 0.0) <= s.gain for n in effects.get(s.effect).nests)]
+        short = [s for s in worth if not simplicity(s.effect)][:most]  # channels come beside, they displace nothing
+        short = sorted(short + [s for s in worth if simplicity(s.effect)][:CHANNELS_TRIED], key=worth.index)
+        wanted = {n for s in short for n in (*effects.get(s.effect).nests, *effects.get(s.effect).lower_order)}
+        return short + [s for s in worth if s.effect in wanted and s not in short]
+
+
+def _loads_differ(traces: Sequence[Trace]) -> bool:
+    """Whether a known inertia was mounted for some of the runs."""
+    return len({t.run.added_inertia_kg_m2 for t in traces}) > 1
