@@ -29,6 +29,7 @@ _HEAD = struct.Struct("<4sQII")
 _SUMMED = struct.Struct("<QI")
 RESERVED_BYTES = 256 * 1024  # half a second of a bench: pages that are there already need nothing of the file system
 LONGEST_TAIL = 64 * 1024 * 1024
+LONGEST_JOINED = 2 << 30
 
 
 def tail_of(path: Path) -> Path:
@@ -145,8 +146,9 @@ def whole(path: Path) -> bytes:
 
 
 def opened(path: Path) -> BinaryIO:
-    """The same to be read in pieces. Raises OSError."""
-    return io.BytesIO(whole(path)) if tail_of(path).exists() else path.open("rb")
+    """The same to be read in pieces; of a file too long to be joined in memory, the file itself. Raises OSError."""
+    is_joined = tail_of(path).exists() and path.stat().st_size <= LONGEST_JOINED
+    return io.BytesIO(whole(path)) if is_joined else path.open("rb")
 
 
 def missing_of(path: Path, size: int) -> bytes:

@@ -19,7 +19,7 @@ from drivers.capture_account import account_of
 from rig.cli.parts import Part
 from rig.recording.journal import Journal
 from rig.recording.journal_reader import read_journal
-from rig.recording.steady import RESERVED_BYTES, SteadyFile, missing_of, record, tail_of, whole
+from rig.recording.steady import RESERVED_BYTES, SteadyFile, missing_of, opened, record, tail_of, whole
 
 
 class Hanging:
@@ -174,6 +174,19 @@ def test_a_tail_from_elsewhere_does_no_harm(tmp_path: Path) -> None:
     except OSError:
         return  # a system that has no links for everyone
     assert whole(path) == b"0123"
+
+
+def test_a_file_of_many_gigabytes_is_not_taken_into_memory_for_its_tail(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a"
+    path.write_bytes(b"0123")
+    tail_of(path).write_bytes(record(4, b"45"))
+    with opened(path) as file:
+        assert file.read() == b"012345"
+    monkeypatch.setattr(steady_module, "LONGEST_JOINED", 3)
+    with opened(path) as file:
+        assert file.read() == b"0123"
 
 
 def test_what_a_journal_and_a_capture_hold_in_their_tails_is_read(tmp_path: Path, hanging: Hanging) -> None:
