@@ -38,6 +38,7 @@ STILL_FAR = 100.0  # mean square over the noise's variance
 VERY_FAR = 1e4
 LEAP = 0.03  # of the squares that the right effect leaves where it is the only one that is large
 LEAST = 0.4  # of the squares that the best candidate takes while the noise is still far
+CLEARLY_LEFT = 5.0  # standard deviations of chi square
 PATIENCE = 3  # effects after which the end must be near
 
 
@@ -190,11 +191,10 @@ class FineSearch:
     def _simplest(self, good: Mapping[str, Whole]) -> str:
         """The likeliest, or the simplest of those that are as likely."""
         best = min(good, key=lambda n: good[n].penalised)
-        if good[best].level > AT_FLOOR:  # the richer one may only soak up what is still missing
-            nested = [n for n in effects.get(best).nests if n in good and good[n].squares < TWICE * good[best].squares]
-            best = min(nested, key=lambda n: good[n].squares, default=best)
-            if nested:
-                return best
+        # The richer one may only soak up what is still missing.
+        nested = [n for n in effects.get(best).nests if n in good and _as_near(good[n], good[best])]
+        if nested:
+            return min(nested, key=lambda n: good[n].squares)
         behind = {n: (good[n].penalised - good[best].penalised) / good[best].level for n in good}
         alike = [n for n in good if behind[n] < RIVAL]
         return min(alike, key=lambda n: (*_simplicity(n), behind[n] > EQUAL, effects.known().index(n)))
@@ -203,7 +203,7 @@ class FineSearch:
         """Whether chi square falls beyond chance, also where nothing was fitted, with parameters that stand out."""
         fall, held = (now.penalised - new.penalised) / new.level, (now.held - new.held) / new.level
         excess = now.squares - now.count
-        large = excess > 5.0 * np.sqrt(2.0 * now.count)
+        large = excess > CLEARLY_LEFT * np.sqrt(2.0 * now.count)
         enough = not large or now.squares - new.squares > SHARE * excess
         return fall > CHANCE and held > HELD and enough and new.judged().strength(name) > STRONG
 
@@ -259,6 +259,14 @@ class FineSearch:
             if s.effect not in tried:
                 penalty = s.count * float(np.log(max(now.count, 2)))
                 found.candidates.append(Candidate(s.effect, round_, penalty - s.gain, None, "screened out"))
+
+
+def _as_near(simple: Whole, rich: Whole) -> bool:
+    """Whether a special case leaves at most twice as much, where something is left that noise does not explain."""
+    if rich.level > AT_FLOOR:
+        return simple.squares < TWICE * rich.squares
+    excess, chance = rich.squares - rich.count, CLEARLY_LEFT * float(np.sqrt(2.0 * rich.count))
+    return excess > chance and simple.squares - simple.count < TWICE * excess
 
 
 def _taken_in(start: Mapping[Name, float], values: Mapping[Name, float], name: str, wider: str) -> dict[Name, float]:

@@ -146,7 +146,7 @@ def _shots_for(
         substeps = min(MAX_SUBSTEPS, equations.substeps(trace.step_s))
         substeps = int(np.clip((substeps + 1) // 2, 2, COARSEST)) if coarse else substeps
         if equations.sensor.names:
-            substeps = int(np.clip(np.ceil(trace.step_s / trace.straight_s), substeps, MAX_SUBSTEPS))
+            substeps = int(np.clip(np.ceil(trace.step_s / trace.straight_s), substeps, max(substeps, COARSEST)))
         if trace.torque is not None and trace.torque.hold == "zero_order":
             # A step that spans several held values sees only their mean: that alone is a sigma or two.
             held = trace.step_s / trace.torque.shortest_s

@@ -209,7 +209,7 @@ class EmulatedBench:
         shaft_nm = self._faults.torque(self._sign * self.drive.torque_nm)
         if shaft_nm != self._shaft_nm:
             self._shaft_nm = shaft_nm
-            self._world.change_torque(now_s + self._delay_s, shaft_nm)
+            self._world.change_torque(self.drive.acts_at(now_s) + self._delay_s, shaft_nm)
         out = answer + b"".join(self._adapter.to_host(frame) for frame in self.drive.take_frames())
         if out:
             self.can_port.write(self._faults.to_host(out))

@@ -42,6 +42,10 @@ class EmulatedDrive(Protocol):
         """A frame from the host."""
         ...
 
+    def acts_at(self, now_s: float) -> float:
+        """The instant, by the drive's own clock and no later, at which it acts on what reached it at ``now_s``."""
+        ...
+
     def tick(self, now_s: float) -> None:
         """Let time pass: watchdogs, heartbeats, timers."""
         ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from drivers.codecs import cia402
@@ -68,9 +69,13 @@ class Cia402Drive(CanopenNode):
         if frame.identifier == 0x600 + self.node:
             self.on_pdo(now_s)
 
+    def acts_at(self, now_s: float) -> float:
+        """The tick of its own clock that it stamps: a drive changes its current by its clock, never in between."""
+        return math.floor(now_s * self._us_per_s) / self._us_per_s
+
     def on_sync(self, now_s: float) -> None:
         """Stamp the torque that was just put on the shaft with the drive's own time."""
-        self.od.set(cia402.TIME_STAMP, int(now_s * self._us_per_s) & 0xFFFFFFFF)
+        self.od.set(cia402.TIME_STAMP, math.floor(now_s * self._us_per_s) & 0xFFFFFFFF)
 
     # -- state machine ---------------------------------------------------------------------------
 

@@ -119,6 +119,10 @@ class OdriveAxis:
     def _send(self, command: Command, *values: float) -> None:
         self._out.append(CanFrame(wire.identifier(self._node, command), wire.encode(command, *values)))
 
+    def acts_at(self, now_s: float) -> float:
+        """At once: it stamps nothing that this could be held against."""
+        return now_s
+
     def tick(self, now_s: float) -> None:
         """Watchdog and heartbeat."""
         running = self._axis_state == wire.AXIS_CLOSED_LOOP
