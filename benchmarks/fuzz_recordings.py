@@ -28,6 +28,7 @@ from rig.recording.load import read_recording
 LONGEST_S = 20.0  # of this process' own time
 MOST_MEMORY_BYTES = 6 << 30  # of addresses; what is really used is said at the end
 BATCH = 250
+HANG_S = 600.0  # of a batch, which a library that hangs would keep for ever
 
 
 def read_as_recording(path: Path) -> None:
@@ -165,7 +166,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for k in range(1 if name == "harmful" else -(-each // BATCH)):
             line = [sys.executable, "-m", "benchmarks.fuzz_recordings", "--child", name, "--count",
                     str(min(BATCH, each - k * BATCH)), "--seed", str(given.seed + k)]  # fmt: skip
-            done = subprocess.run(line, capture_output=True, text=True, check=False)
+            try:
+                done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=HANG_S)
+            except subprocess.TimeoutExpired:
+                print(f"BROKE {name}: seed {given.seed + k} hangs")
+                figures[2] += 1
+                continue
             *said, last = done.stdout.splitlines() or [""]
             sys.stdout.writelines(f"{text}\n" for text in said)
             if not last.startswith("DONE"):

@@ -271,6 +271,22 @@ def _own_long_text(path: Path) -> None:
     path.write_bytes(data)
 
 
+def _own_endless(size: int) -> Maker:
+    """The free space at the end of a heap of texts, of such a size that a walk over the heap does not move on."""
+
+    def make(path: Path) -> None:
+        _own(path)
+        data = bytearray(path.read_bytes())
+        at = data.index(b"GCOL") + 16
+        while index := struct.unpack_from("<H", data, at)[0]:
+            at += 16 + (struct.unpack_from("<Q", data, at + 8)[0] + 7 & ~7)
+        assert index == 0
+        struct.pack_into("<HHIQ", data, at, 1 if size else 0, 0, 0, size)
+        path.write_bytes(data)
+
+    return make
+
+
 def _journal_tail_lies(path: Path) -> None:
     _journal(path)
     size = path.stat().st_size
@@ -332,6 +348,8 @@ HARMFUL: Mapping[str, Maker] = {
     "refuse own_external.h5": _h5_with(_own_external, own=True),
     "refuse own_circle.h5": _h5_with(_own_circle, own=True),
     "refuse own_long_text.h5": _own_long_text,
+    "refuse own_endless.h5": _own_endless(0),
+    "refuse own_round_and_round.h5": _own_endless((1 << 64) - 16),
     "read lies.journal": _journal_lies,
     "read tail_lies.journal": _journal_tail_lies,
     "refuse deep.journal": _journal_deep,

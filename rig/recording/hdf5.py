@@ -21,6 +21,7 @@ from rig.errors import RecordingError
 from rig.recording.journal import JournalError
 from rig.recording.journal_reader import JournalContents
 from rig.recording.memory import at_most
+from rig.recording.readers.h5_heaps import check_heaps
 from rig.recording.run import Array, Recording, Run
 
 FORMAT = "isp-rig recording"
@@ -115,6 +116,7 @@ def read_recording_h5(path: str | Path, *, with_info: bool = True) -> Recording:
     Raises RecordingError where the file is not ours or damaged.
     """
     try:
+        check_heaps(path)
         with h5py.File(path, "r") as file, at_most(MOST_BYTES):
             with at_most(MOST_TEXT_BYTES):
                 if file.attrs.get("format") != FORMAT:

@@ -14,6 +14,7 @@ from rig.errors import RecordingError
 from rig.recording import hdf5
 from rig.recording.memory import at_most
 from rig.recording.readers.base import MAX_SAMPLES, Table, read_each, too_long
+from rig.recording.readers.h5_heaps import check_heaps
 from rig.recording.run import Run
 
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, MemoryError)
@@ -22,6 +23,7 @@ _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeErro
 def read(path: Path) -> Sequence[Table | Run]:
     """The runs of our own file, else one table of all datasets. Raises RecordingError where unreadable."""
     try:
+        check_heaps(path)
         with h5py.File(path, "r") as file:
             with at_most(hdf5.MOST_TEXT_BYTES):
                 ours = file.attrs.get("format") == hdf5.FORMAT

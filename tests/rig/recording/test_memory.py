@@ -1,4 +1,4 @@
-"""A damaged reference to a text does not cost gigabytes."""
+"""Damaged texts in an HDF5 file cost neither gigabytes nor for ever."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from benchmarks.fuzz.files import HARMFUL
 from rig.errors import RecordingError
 from rig.recording.memory import at_most
-from rig.recording.readers import read_file
+from rig.recording.readers import h5_heaps, read_file
 
 if sys.platform != "linux":
     pytest.skip("other systems have no limit that holds", allow_module_level=True)
@@ -63,3 +63,27 @@ def test_a_column_of_texts_is_refused_unread(tmp_path: Path) -> None:
     (table,) = read_file(path)
     with pytest.raises(RecordingError, match="'time_s' holds texts or lists, not numbers: save it as numbers"):
         table.read(["time_s"])  # type: ignore[union-attr]
+
+
+def test_more_texts_than_a_recording_has_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        file["notes"] = [f"note {k}" for k in range(200)]
+    read_file(path)
+    monkeypatch.setattr(h5_heaps, "MOST_TEXTS", 150)
+    with pytest.raises(RecordingError, match="holds more than 150 texts"):
+        read_file(path)
+
+
+def test_a_file_with_a_block_of_its_user_before_it_is_walked_too(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w", userblock_size=1024) as file:
+        file["time_s"] = [0.0, 1.0]
+        file.attrs["note"] = "a text"
+    read_file(path)
+    data = bytearray(path.read_bytes())
+    at = data.index(b"GCOL") + 16 + 16 + 8
+    data[at : at + 16] = bytes(16)
+    path.write_bytes(data)
+    with pytest.raises(RecordingError, match="a heap of texts has no end"):
+        read_file(path)
