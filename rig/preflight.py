@@ -112,16 +112,18 @@ class _Forecast:
 
     def __init__(self, platform: Platform, planned_set: PlannedSet) -> None:
         self._equations = Equations(platform)
-        self._time_s: Array = np.arange(math.ceil(planned_set.duration_s * PEAK_RATE_HZ) + 1) / PEAK_RATE_HZ
-        self._torque_nm: Array = np.asarray(planned_set.torque(self._time_s), dtype=float)
+        time_s: Array = np.arange(math.ceil(planned_set.duration_s * PEAK_RATE_HZ) + 1) / PEAK_RATE_HZ
+        self._torque_nm: Array = np.asarray(planned_set.torque(time_s), dtype=float)
+        substeps = self._equations.substeps(1.0 / PEAK_RATE_HZ)
+        self._grid = Grid(time_s, TorqueSignal(time_s, self._torque_nm), substeps)
 
     def peaks(self, scale: float) -> Peaks:
-        torque = scale * self._torque_nm
-        substeps = self._equations.substeps(1.0 / PEAK_RATE_HZ)
-        grid = Grid(self._time_s, TorqueSignal(self._time_s, torque), substeps)
         with np.errstate(all="ignore"):
-            motion = grid.simulate(self._equations, (0.0, 0.0))
-        return Peaks(math.degrees(_peak(motion.angle_rad)), math.degrees(_peak(motion.rate_rad_s)), _peak(torque))
+            motion = self._grid.scaled(scale).simulate(self._equations, (0.0, 0.0))
+        return Peaks(
+            math.degrees(_peak(motion.angle_rad)), math.degrees(_peak(motion.rate_rad_s)),
+            _peak(scale * self._torque_nm),
+        )  # fmt: skip
 
 
 def _peak(x: Array) -> float:
@@ -197,6 +199,13 @@ def plan(
         Listing every set with its predicted travel and the torque that would pass.
     """
     predictions = predict_all(platform, excitation, limits, rate_full_scale_rad_s, full_scale_key)
+    return playable_of(predictions, platform, excitation)
+
+
+def playable_of(
+    predictions: Sequence[Prediction], platform: Platform, excitation: ExcitationConfig
+) -> tuple[PlannedSet, ...]:
+    """As ``plan``, from predictions that were made before; raises PreflightRefusal alike."""
     playable = [_playable(p, excitation.scale_to_limits) for p in predictions]
     sets = tuple(s for s in playable if s is not None)
     if len(sets) < len(predictions):

@@ -11,18 +11,19 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from rig.cli.backends import BACKENDS, RECORDED, Stage, backend_name
-from rig.cli.campaign import planned_sets
 from rig.cli.desk import Desk
 from rig.cli.exits import OK
+from rig.cli.places import with_places
 from rig.cli.terminal import plain
 from rig.config.load import LoadedConfig
-from rig.errors import RecordingError, RigError
+from rig.errors import PreflightRefusal, RecordingError, RigError
 from rig.interface import Torque
-from rig.preflight import predict_all
+from rig.preflight import Prediction, playable_of, predict_all
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,14 @@ class Known:
 
     loaded: LoadedConfig
     stage: Stage | None
+
+    @cached_property
+    def predictions(self) -> tuple[Prediction, ...]:
+        """What every set of the campaign would do."""
+        config, rig = self.loaded.config, self.stage.rig if self.stage else None
+        assert rig is not None
+        scale, key = rig.rate_full_scale_rad_s, rig.rate_full_scale_key
+        return predict_all(config.model.platform(), config.excitation, config.limits, scale, key)
 
 
 Check = Callable[[Known], list[str]]
@@ -47,14 +56,13 @@ def forecast(known: Known) -> list[str]:
     if known.stage is None:
         return []
     config = known.loaded.config
-    platform = config.model.platform()
-    rig = known.stage.rig
-    planned_sets(rig, known.loaded)
-    scale, key = rig.rate_full_scale_rad_s, rig.rate_full_scale_key
-    predictions = predict_all(platform, config.excitation, config.limits, scale, key)
+    try:
+        playable_of(known.predictions, config.model.platform(), config.excitation)
+    except PreflightRefusal as error:
+        raise with_places(error, known.loaded) from None
     return [
         f"forecast {plain(p.sentence())}" + ("" if p.passes else f", scaled to {100 * p.scale:.1f} % as asked")
-        for p in predictions
+        for p in known.predictions
     ]
 
 
@@ -91,9 +99,8 @@ def identifiability(known: Known) -> list[str]:
     else:
         rig = known.stage.rig
         platform = config.model.platform()
-        predictions = predict_all(platform, config.excitation, config.limits, rig.rate_full_scale_rad_s)
         # A set that would break a limit is refused by the forecast; here it speaks at the torque that passes.
-        sets = [p.planned.scaled(p.scale) for p in predictions if p.scale > 0.0]
+        sets = [p.planned.scaled(p.scale) for p in known.predictions if p.scale > 0.0]
         lines = of_planned_campaign(platform, sets, config.excitation.sample_rate_hz, rig.noise_rad_s)
     return [f"identifiability {plain(line)}" for line in lines]
 
