@@ -22,6 +22,7 @@ from identify.traces import Trace
 from rig.recording.run import Array
 
 NEAR_FLOOR = 1.3  # times the sensor's noise: close enough for a free run over the whole set
+FEW_NOISES = 5.0  # times the noise that a free run leaves: disturbed moments, not a wrong model
 FREER = 0.95  # of the free-run error
 BLOCKS_PER_RUN = 20
 SEGMENT = 256  # samples of a stretch whose spectrum is averaged
@@ -112,7 +113,8 @@ def by_output_error(
         trial = refine(traces, structure, values, longer, 12, use, fixed=fixed)
         if trial.sigma <= NEAR_FLOOR * noise:
             best = trial
-    if torque_free and not straight:  # only the model itself leads a decay astray: whole runs are its measure
+    # Only the model itself leads a decay astray, and near the noise a few disturbed moments do: whole runs decide.
+    if not straight and (torque_free or at_once.sigma < FEW_NOISES * noise):
         held = _free_run(traces, structure, dict(zip(best.names, best.values.tolist(), strict=True)), use)
         if held is None or at_once.sigma < FREER * held.sigma:
             best = at_once
@@ -123,7 +125,7 @@ def by_output_error(
     limited = whole is not None and whole.sigma <= NEAR_FLOOR * noise
     free_names = tuple(n for n in best.names if n not in fixed)
     covariance, determined = _output_covariance(best, free_names)
-    method = "output error over whole runs" if limited else f"output error over {horizon:.3g} s"
+    method = "output error over whole runs" if whole is not None else f"output error over {horizon:.3g} s"
     return Fitted(structure, values, covariance, free_names, best.sigma, free, limited, determined, method)
 
 

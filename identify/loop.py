@@ -14,7 +14,7 @@ from identify.channels import offer_of, with_causes
 from identify.compare import Judged, horizon_s
 from identify.conclude import Case, conclude
 from identify.fine import FineSearch
-from identify.finish import Fitted, by_output_error, by_regression
+from identify.finish import Fitted, by_output_error, by_regression, noise_of_all
 from identify.holdout import Split, pieces, split
 from identify.measures import floor_of, measure
 from identify.regression import Structure, shape_values
@@ -33,6 +33,7 @@ from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
 MOVES = 3.0  # times the sensor's noise that a motion has to reach
+TWICE_THE_NOISE = 2.0
 MUCH_CLOSER = 0.5  # times the free-run error of the other fit
 STOPPED = "stopped before the search was through: what is missing may still be unnamed"
 SHOWS = 5.0  # standard errors from zero at which whole runs show damping
@@ -203,6 +204,8 @@ class _Identifier:
             return self._with_dropped_damping(search, fitted)
         if self.torque_free:
             return fitted
+        if fitted.sigma < TWICE_THE_NOISE * noise_of_all(self.traces):
+            return fitted  # over its horizon the model is right: what throws a free run off is a moment, not a torque
         regressed = self._regressed(search.best)
         runs = fitted.free_run, regressed.free_run
         if all(r is not None for r in runs) and runs[0].sigma < MUCH_CLOSER * runs[1].sigma:  # type: ignore[union-attr]
