@@ -67,20 +67,20 @@ def main(given: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory() as scratch, Devices(overrides) as devices:
         host = Host(devices, Path(scratch) / "run", overrides)
         devices.wait_for(("enabled",), 60.0)
-        while host.process.poll() is None:
+        # Once the drive is off again everything is put together, which takes more.
+        while host.process.poll() is None and devices.first(("disabled",), 0.0) is None:
             try:
                 memory.append(resident_mb(host.process.pid))
             except (OSError, struct.error):
                 break
             time.sleep(1.0)
-        code = host.ended(120.0)
+        code = host.ended(300.0)
         print(f"exit code {code}: {host.said[-300:]}")
         file = Path(scratch) / "run" / "recording.h5"
         runs = read_recording_h5(file).runs if file.exists() else ()
         pauses = [e for e in devices.events if e["event"] == "paused"]
-    quarter = max(1, len(memory) // 4)
-    playing = memory[: -max(1, min(30, len(memory) // 10))]  # at the end everything is put together
-    print("memory, MB: " + ", ".join(f"{m:.0f}" for m in playing[::quarter]) + f", {playing[-1]:.0f}")
+    quarters = [memory[k * (len(memory) - 1) // 4] for k in range(5)]
+    print("memory at every quarter, MB: " + ", ".join(f"{m:.0f}" for m in quarters))
     for k, run in enumerate(runs):
         largest, mean = drift_of(run)
         print(
