@@ -39,6 +39,7 @@ VERY_FAR = 1e4
 LEAP = 0.03  # of the squares that the right effect leaves where it is the only one that is large
 LEAST = 0.4  # of the squares that the best candidate takes while the noise is still far
 CLEARLY_LEFT = 5.0  # standard deviations of chi square
+AT_NOISE = 1.05  # mean square over the noise's variance: the noise is known to a percent or two
 PATIENCE = 3  # effects after which the end must be near
 
 
@@ -201,6 +202,8 @@ class FineSearch:
 
     def _worth(self, name: str, new: Whole, now: Whole) -> bool:
         """Whether chi square falls beyond chance, also where nothing was fitted, with parameters that stand out."""
+        if effects.get(name).resembles_much and now.level < ENDS_NEAR and new.level > AT_NOISE:
+            return False  # near the noise it follows a few disturbed moments as gladly as anything
         fall, held = (now.penalised - new.penalised) / new.level, (now.held - new.held) / new.level
         excess = now.squares - now.count
         large = excess > CLEARLY_LEFT * np.sqrt(2.0 * now.count)

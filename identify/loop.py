@@ -36,6 +36,10 @@ MOVES = 3.0  # times the sensor's noise that a motion has to reach
 TWICE_THE_NOISE = 2.0
 MUCH_CLOSER = 0.5  # times the free-run error of the other fit
 STOPPED = "stopped before the search was through: what is missing may still be unnamed"
+NOTHING_YET = (
+    "The search was stopped before it was through: of what the declared model lacks nothing can be said yet. Run it "
+    "again on this recording."
+)
 SHOWS = 5.0  # standard errors from zero at which whole runs show damping
 
 
@@ -129,6 +133,8 @@ class _Identifier:
             self.say("stopped: reporting what there is")
             search = loop.so_far
             found = self._report(search, self._regressed(search.base), self._regressed(search.best), in_full=False)
+            if not found.verdict.effects:  # the search may have been about to name what this model lacks
+                found = replace(found, verdict=replace(found.verdict, sentences=(NOTHING_YET,)))
             return replace(found, aborted=True, accepted=False, reasons=(STOPPED,))
 
     def _searched(self) -> tuple[list[Trace], Split]:
