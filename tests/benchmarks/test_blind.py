@@ -228,6 +228,7 @@ def test_a_pair_that_physics_cannot_part_counts_where_both_are_named() -> None:
     assert both.wrong == "" and both.declared
 
 
+@pytest.mark.slow
 def test_a_rival_that_passes_for_the_truth_in_this_record_has_to_be_declared() -> None:
     late = Hidden(*JCK, {"torque_delay": {"delay": 5e-5}}, noise=math.radians(0.2))
     (energy,) = imitation.confusable(late, SETS, "torque_delay").values()
@@ -274,6 +275,7 @@ def test_anything_named_on_a_clean_platform_is_a_false_alarm() -> None:
     assert scored(clean, result(clean, {"torque_delay": {"delay": 1e-5}})).wrong == "false alarm"
 
 
+@pytest.mark.slow
 def test_an_effect_outside_the_library_has_to_stay_unexplained() -> None:
     bump = cases.make(11, 3, cases.Order("outside", ("bump_stop",), 0.01, 1, "five_sines"))
     silent = result(bump, {})

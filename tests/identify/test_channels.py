@@ -89,6 +89,7 @@ def assert_number(found: Identification, effect: str, parameter: str, truth: flo
     assert abs(estimate.value - truth) < 5.0 * estimate.std_error
 
 
+@pytest.mark.slow
 def test_a_winding_that_warms_is_named_as_what_lowers_the_torque_with_its_slope() -> None:
     found = of_the_magnet()
     assert found.accepted, found.reasons
@@ -104,6 +105,7 @@ def test_the_verdict_says_at_which_temperature_the_parameters_hold() -> None:
     assert float(said[0].split("counts from ")[1].split(":")[0]) == pytest.approx(21.0, abs=0.02)
 
 
+@pytest.mark.slow
 def test_another_axis_that_accelerates_is_named_and_its_coupling_measured() -> None:
     found = identified(coupled())
     assert found.accepted, found.reasons

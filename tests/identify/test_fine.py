@@ -59,6 +59,7 @@ def test_a_lag_of_the_sensor_is_named_in_the_drive_which_no_record_tells_from_it
     assert "sensor_lag" in (effects.get("actuator_lag").never_separable or {})
 
 
+@pytest.mark.slow
 def test_what_no_candidate_brings_down_to_the_noise_is_left_to_others_untouched() -> None:
     found, took = searched(campaign({"hysteresis": {"level": 1.0, "yield_angle": 0.05, "exponent": 1.5, "share": 0.5}}))
     assert not took
