@@ -25,6 +25,7 @@ from rig.recording.run import Array, Run
 
 A_PERIOD = 100  # samples that show everything a slow swing does
 PLENTY = 15_000  # samples a search needs
+SHORTEST = 200  # samples that the shortest run keeps
 LEFT = 0.6  # of the squares, at most, that an effect leaves which is worth its name
 ALIKE = 1.2  # times the squares of the best: the simpler of two does as well
 NEEDLESS = 1.05  # times the squares without a term that nothing asks for
@@ -37,7 +38,8 @@ def thinned(runs: Sequence[Run], natural_hz: float) -> list[Run]:
     """Every so manyth sample of runs without torque, where a period has far more than show anything."""
     count = sum(len(r.time_s) for r in runs)
     step_s = float(np.median(np.diff(runs[0].time_s)))
-    every = int(min(1.0 / max(A_PERIOD * natural_hz * step_s, 1e-12), count / PLENTY))
+    shortest = min(len(r.time_s) for r in runs)
+    every = int(min(1.0 / max(A_PERIOD * natural_hz * step_s, 1e-12), count / PLENTY, shortest / SHORTEST))
     return [_every(r, every) for r in runs] if every > 1 else list(runs)
 
 

@@ -8,6 +8,7 @@ import json
 import os
 import pickle
 import struct
+import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
@@ -27,6 +28,7 @@ from rig.recording.steady import record, tail_of
 
 ROOT = Path(__file__).resolve().parents[2]
 Maker = Callable[[Path], None]
+WITNESS = Path(tempfile.gettempdir()) / "isp_rig_fuzz_was_here"  # made by code in a file, if that is ever run
 
 
 def columns(count: int = 80) -> dict[str, Any]:
@@ -150,7 +152,7 @@ def mutated(data: bytes, random: np.random.Generator) -> bytes:
 
 class _Evil:
     def __reduce__(self) -> Any:
-        return os.system, ("touch /tmp/isp_rig_fuzz_was_here",)
+        return os.mkdir, (str(WITNESS),)
 
 
 def _gzip_of(head: str, line: bytes, megabytes: int) -> Maker:
@@ -232,7 +234,7 @@ def _external_storage(file: h5py.File, path: Path) -> None:
 def _virtual(file: h5py.File, path: Path) -> None:
     del file["rate_rad_s"], file["angle_rad"]
     layout = h5py.VirtualLayout(shape=(80,), dtype="f8")
-    layout[:] = h5py.VirtualSource("/tmp/other.h5", "rate_rad_s", shape=(80,))
+    layout[:] = h5py.VirtualSource("/elsewhere/other.h5", "rate_rad_s", shape=(80,))
     file.create_virtual_dataset("rate_rad_s", layout)
 
 
@@ -249,7 +251,7 @@ def _own_huge(file: h5py.File, path: Path) -> None:
 
 def _own_linked(file: h5py.File, path: Path) -> None:
     del file["runs/000/time_s"]
-    file["runs/000/time_s"] = h5py.ExternalLink("/tmp/other.h5", "/time_s")
+    file["runs/000/time_s"] = h5py.ExternalLink("/elsewhere/other.h5", "/time_s")
 
 
 def _own_external(file: h5py.File, path: Path) -> None:

@@ -101,4 +101,4 @@ def test_a_file_made_to_do_harm_is_refused(tmp_path: Path, name: str) -> None:
     path = tmp_path / name.partition(" ")[2]
     files.HARMFUL[name](path)
     assert fuzz_recordings.one(path) == ("refused" if name.startswith("refuse") else "read")
-    assert not Path("/tmp/isp_rig_fuzz_was_here").exists()
+    assert not files.WITNESS.exists()

@@ -54,6 +54,11 @@ def test_a_slow_decay_is_searched_in_every_so_manyth_sample() -> None:
     assert len(few.valid) == len(few.time_s)
 
 
+def test_a_short_run_beside_long_ones_keeps_enough_samples_to_be_used() -> None:
+    long, short = decay(step_s=0.001, duration_s=60.0), decay(step_s=0.001, duration_s=0.3)
+    assert min(len(r.time_s) for r in thinned([long, short], 0.7)) >= 200
+
+
 def test_a_fast_decay_keeps_every_sample() -> None:
     run = decay(step_s=0.001, duration_s=60.0)
     assert thinned([run], 30.0) == [run]

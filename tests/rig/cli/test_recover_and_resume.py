@@ -116,7 +116,9 @@ def test_where_nothing_is_left_it_says_so(tmp_path: Path, text: bytes | None) ->
 def test_code_that_a_recording_names_is_never_taken_over(played: Path, tmp_path: Path) -> None:
     from rig.recording.journal import Journal  # noqa: PLC0415
 
-    header = {"config": {"model": {"inertia_kg_m2": 0.02, "effects_from": ["/tmp/evil.py"], "effects": {"evil": {}}}}}
+    header = {
+        "config": {"model": {"inertia_kg_m2": 0.02, "effects_from": ["/elsewhere/evil.py"], "effects": {"evil": {}}}}
+    }
     with Journal.create(tmp_path / "recording.journal", header) as journal:
         journal.begin_run("r", {})
         journal.append("samples", [(k * 1e-3, np.sin(k), 1.0) for k in range(50)])
