@@ -17,8 +17,6 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from drivers.bench import BenchRig
 from rig import realtime
 from rig.clock import MonotonicClock
@@ -26,32 +24,33 @@ from rig.config.load import load_config
 from rig.config.root import Config
 from rig.guard import Guard
 from rig.interface import Torque
+from rig.lateness import Lateness
 from rig.preflight import plan
-from rig.recording.run import Array
 from rig.sequencer import Sequencer
 from sim_backend.emulators.launch import Emulators, on_emulated_ports, started
 
-QUANTILES = (0.5, 0.99, 0.999, 1.0)
+P99_9 = 0.999
+QUANTILES = (0.5, 0.99, P99_9, 1.0)
 PERIOD_S = 1e-3
 
 
-def bare_loop(config: Config, seconds: float) -> tuple[Array, float]:
-    """Lateness of each tick in s, and CPU as a share of one core."""
+def bare_loop(config: Config, seconds: float) -> tuple[Lateness, float]:
+    """Lateness of the ticks, and CPU as a share of one core."""
     assert config.bench is not None
     real_time = config.bench.real_time
     realtime.acquire(real_time.priority, real_time.lock_memory)
     clock = MonotonicClock(real_time.spin_us * 1e-6)
-    late = np.zeros(int(seconds / PERIOD_S))
+    late, ticks = Lateness(), int(seconds / PERIOD_S)
     start_s, cpu_s = clock.now_s() + 0.01, time.process_time()
-    tick = n = 0
-    while tick < len(late):
+    tick = 0
+    while tick < ticks:
         deadline_s = start_s + tick * PERIOD_S
-        late[n] = clock.wait_until(deadline_s) - deadline_s
-        tick += 1 + int(late[n] / PERIOD_S)
-        n += 1
+        late_s = clock.wait_until(deadline_s) - deadline_s
+        late.add(late_s)
+        tick += 1 + int(late_s / PERIOD_S)
     cpu = (time.process_time() - cpu_s) / seconds
     realtime.release()
-    return late[:n], cpu
+    return late, cpu
 
 
 class SetCpu:
@@ -73,24 +72,24 @@ class SetCpu:
         rig.begin_set, rig.end_set = begins, ends  # type: ignore[method-assign]
 
 
-def bench_loop(config: Config, emulators: Emulators, raw: Path) -> tuple[Array, float, str]:
-    """Lateness of each tick in s, CPU as a share of one core, and what was lost."""
+def bench_loop(config: Config, emulators: Emulators, raw: Path) -> tuple[Lateness, float, str]:
+    """Lateness of the ticks, CPU as a share of one core, and what was lost."""
     section = on_emulated_ports(config, emulators).bench
     assert section is not None
     rig = BenchRig(section, Torque.EMULATED, raw)
     cpu = SetCpu(rig)
     sets = plan(config.model.platform(), config.excitation, config.limits, rig.rate_full_scale_rad_s)
     played = Sequencer(rig, rig.clock, Guard(config.limits), sample_rate_hz=1.0 / PERIOD_S, rest_s=0.0).play(sets)
-    gyro, late = rig.report().gyro, played.statistics[0]
-    account = f"{late.missed_ticks} missed, {gyro.lost} of {gyro.received} datagrams lost"
+    gyro, one = rig.report().gyro, played.statistics[0]
+    account = f"{one.missed_ticks} missed, {gyro.lost} of {gyro.received} datagrams lost"
     if played.cause is not None:
         account += f", ended early: {played.cause}"
-    return np.asarray(late.late_s), cpu.cpu_s / max(cpu.wall_s, 1e-9), account
+    return one.late, cpu.cpu_s / max(cpu.wall_s, 1e-9), account
 
 
-def line(name: str, late: Array, cpu: float, account: str = "") -> str:
+def line(name: str, late: Lateness, cpu: float, account: str = "") -> str:
     """One printed row."""
-    numbers = "  ".join(f"{q * 1e6:8.1f}" for q in np.quantile(late, QUANTILES))
+    numbers = "  ".join(f"{late.quantile_s(q) * 1e6:8.1f}" for q in QUANTILES)
     return f"{name:6s} {numbers}   {100 * cpu:5.1f} %   {account}"
 
 
@@ -113,10 +112,10 @@ def main(given: Sequence[str] | None = None) -> None:
         with started(config) as emulators, tempfile.TemporaryDirectory() as folder:
             late, cpu = bare_loop(config, arguments.seconds)
             print(line("bare", late, cpu), flush=True)
-            bare = float(np.quantile(late, 0.999))
+            bare = late.quantile_s(P99_9)
             late, cpu, account = bench_loop(config, emulators, Path(folder) / "raw")
             print(line("bench", late, cpu, account), flush=True)
-            ratios.append(float(np.quantile(late, 0.999)) / bare)
+            ratios.append(late.quantile_s(P99_9) / bare)
             print(f"pair {number + 1}: p99.9 ratio {ratios[-1]:.2f}", flush=True)
     print(
         f"median of the p99.9 ratios over {len(ratios)} pairs: {statistics.median(ratios):.2f} "

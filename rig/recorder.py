@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from array import array
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from rig.excitation import PlannedSet
 from rig.guard import Tick
 from rig.interface import LowPass
+from rig.lateness import Lateness
 from rig.recording.journal import Journal
 from rig.recording.restamped import BEGUN_S, NO_RESTAMPS, Restamps, restamped
 from rig.recording.rows import increasing, on_samples
@@ -26,8 +26,8 @@ class SetStatistics:
 
     Parameters
     ----------
-    late_s
-        Shape (ticks,): how late each tick was played.
+    late
+        How late its ticks were played.
     missed_ticks
         Deadlines that passed without a tick.
     drops
@@ -37,7 +37,7 @@ class SetStatistics:
     """
 
     name: str
-    late_s: Array
+    late: Lateness
     missed_ticks: int
     drops: int
     peak_torque_nm: float
@@ -69,7 +69,7 @@ class SetRecorder:
         )
         self._open = False
         self._keep = keep or journal is None
-        self._late_s = array("d")
+        self._late = Lateness()
         self._samples: list[tuple[float, float, bool]] = []
         self._commands: list[tuple[float, float, float]] = []
         self._ticks: list[tuple[float, ...]] = []
@@ -77,7 +77,6 @@ class SetRecorder:
         self._written = [0, 0, 0]
         self._packed: tuple[Array, Array, Array] | None = None
         self._handed_s = start_s
-        self.late_max_s = 0.0
         self.missed_ticks = 0
         self.drops = 0
         self.peak_torque_nm = 0.0
@@ -96,19 +95,23 @@ class SetRecorder:
             if -EDGE_S <= at <= end:
                 self._commands.append((at, torque, tick.torque_nm))
                 self.peak_torque_nm = max(self.peak_torque_nm, abs(torque))
-        if not self._late_s and tick.channels:
+        if not self._late.ticks and tick.channels:
             self._channel_names = tuple(tick.channels)
         late = tick.late_s
         if tick.now_s - start <= end:
             readings = [tick.channels[name] for name in self._channel_names] if self._channel_names else ()
             self._ticks.append((tick.now_s - start, late, *readings))
-            self._late_s.append(late)
-            self.late_max_s = max(self.late_max_s, late)
+            self._late.add(late)
             if late >= tick.period_s:
                 self.missed_ticks += int(late / tick.period_s + 1e-9)
         if self._journal is not None and tick.now_s - self._handed_s >= HAND_OVER_S:
             self._handed_s = tick.now_s
             self.write()
+
+    @property
+    def late_max_s(self) -> float:
+        """How late the latest tick was."""
+        return self._late.max_s
 
     def write(self) -> None:
         """Hand what is new to the journal. Raises JournalError where that cannot be written."""
@@ -161,8 +164,9 @@ class SetRecorder:
 
     def statistics(self, complete: bool) -> SetStatistics:
         """How the set went."""
-        late = np.array(self._late_s)
-        return SetStatistics(self._planned.name, late, self.missed_ticks, self.drops, self.peak_torque_nm, complete)
+        return SetStatistics(
+            self._planned.name, self._late, self.missed_ticks, self.drops, self.peak_torque_nm, complete
+        )
 
     def run(self, better: Restamps = NO_RESTAMPS) -> Run | None:
         """The set as a Run, with what is known better of its times; None where fewer than two samples arrived.

@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from rig.cli.desk import Desk
 from rig.cli.parts import Part, Played
 from rig.cli.provenance import provenance
@@ -98,8 +96,7 @@ def export_earlier(
 def figures(s: SetStatistics) -> dict[str, Any]:
     """How a set went, in numbers."""
     late_ms = {
-        f"late_ms_p{q:g}": float(np.percentile(s.late_s, q) * 1e3) if len(s.late_s) else None
-        for q in (50, 99, 99.9, 100)
+        f"late_ms_p{q:g}": s.late.quantile_s(q / 100) * 1e3 if s.late.ticks else None for q in (50, 99, 99.9, 100)
     }
     return {
         "name": s.name,

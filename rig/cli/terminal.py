@@ -139,8 +139,7 @@ class SetBars(Observer):
     def set_ends(self, statistics: SetStatistics) -> None:
         """How it went."""
         s = statistics
-        late_max_s = float(s.late_s.max()) if len(s.late_s) else 0.0
-        told = _figures(late_max_s, s.missed_ticks, s.drops, s.peak_torque_nm)
+        told = _figures(s.late.max_s, s.missed_ticks, s.drops, s.peak_torque_nm)
         self._terminal.clear_line()
         self._terminal.tell(f"{self._head} {_bar(1.0) if s.complete else 'CUT SHORT'} {told}")
 

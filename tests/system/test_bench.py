@@ -76,7 +76,7 @@ def test_campaign_in_real_time_loses_no_datagram_accounts_for_every_tick_and_rep
     assert report.gyro.lost == 0
     assert report.gyro.dropped_bytes == 0
     for run, statistics in zip(campaign.recording.runs, campaign.statistics, strict=True):
-        assert len(statistics.late_s) + statistics.missed_ticks == pytest.approx(1001, abs=2)
+        assert statistics.late.ticks + statistics.missed_ticks == pytest.approx(1001, abs=2)
         assert len(run.time_s) == pytest.approx(2000, abs=20)
         assert np.all(np.diff(run.time_s) > 0)
         assert np.max(np.abs(run.torque_nm)) > 20.0

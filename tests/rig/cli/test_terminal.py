@@ -6,16 +6,15 @@ import io
 import threading
 import time
 
-import numpy as np
-
 from rig.cli.terminal import LOST, SetBars, Terminal, plain
 from rig.excitation import Sine, planned
+from rig.lateness import Lateness
 from rig.recorder import SetStatistics
 from rig.sequencer import Progress
 
 SET = planned((Sine(torque_nm=10, frequency_hz=5, duration_s=0.5),))[0]
 PROGRESS = Progress("5 Hz", 0.25, 0.5, 2e-4, 1, 3, 9.5)
-DONE = SetStatistics("5 Hz", np.array([1e-4, 4e-4]), 1, 3, 10.0, True)
+DONE = SetStatistics("5 Hz", Lateness([1e-4, 4e-4]), 1, 3, 10.0, True)
 
 
 class Screen(io.StringIO):
@@ -67,7 +66,7 @@ def test_a_set_that_was_cut_short_says_so() -> None:
     stream = io.StringIO()
     terminal = Terminal(stream)
     with terminal.writing():
-        SetBars(terminal).set_ends(SetStatistics("5 Hz", np.array([]), 0, 0, 0.0, False))
+        SetBars(terminal).set_ends(SetStatistics("5 Hz", Lateness(), 0, 0, 0.0, False))
     assert "CUT SHORT" in stream.getvalue()
 
 
