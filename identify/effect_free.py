@@ -11,7 +11,7 @@ from identify.parameters import equations_of
 from identify.shots import Shots, make_shots
 from identify.traces import Trace
 from rig.dynamics import TorqueSignal
-from rig.dynamics.simulate import MAX_SUBSTEPS
+from rig.dynamics.equations import MAX_SUBSTEPS
 
 FINER = 4  # times the simulator's steps: a jump's mean over its step must still ring the platform as the jump did
 

@@ -20,7 +20,7 @@ from identify.shots import RUNAWAY, Shots, make_shots
 from identify.traces import Trace
 from rig import effects
 from rig.dynamics import Equations
-from rig.dynamics.simulate import MAX_SUBSTEPS
+from rig.dynamics.equations import MAX_SUBSTEPS
 from rig.excitation import PlannedSet
 from rig.platform import Platform
 from rig.recording.run import Array

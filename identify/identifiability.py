@@ -22,7 +22,7 @@ from identify.shots import make_shots
 from identify.traces import Trace, prepare
 from rig import effects
 from rig.dynamics import Equations, TorqueSignal, simulate
-from rig.dynamics.simulate import MAX_SUBSTEPS
+from rig.dynamics.equations import MAX_SUBSTEPS
 from rig.excitation import PlannedSet
 from rig.platform import Platform
 from rig.recording.run import Array, Run

@@ -21,7 +21,7 @@ from identify.sensitivities import Reduced, at_residual, linearise
 from identify.shots import RUNAWAY, Shots, from_rest, losses_of, make_shots, moved, predict, residual_at
 from identify.traces import Trace
 from rig.dynamics import Equations
-from rig.dynamics.simulate import MAX_SUBSTEPS
+from rig.dynamics.equations import MAX_SUBSTEPS
 from rig.platform import Platform
 from rig.recording.run import Array
 

@@ -21,7 +21,7 @@ from identify.shots import RUNAWAY, Shots, from_rest, make_shots, motion, predic
 from identify.traces import UPSAMPLING, torque_along
 from rig import effects
 from rig.dynamics import Equations, Grid
-from rig.dynamics.simulate import MAX_SUBSTEPS
+from rig.dynamics.equations import MAX_SUBSTEPS
 from rig.effects.base import Effect, Place, Scale
 from rig.platform import Platform
 from rig.recording.run import Array

@@ -17,8 +17,8 @@ from identify.prefilter import held_pieces, linear_pieces, smooth_pieces
 from rig import effects
 from rig.channels import Channel
 from rig.dynamics import TorqueSignal
+from rig.dynamics.equations import MAX_SUBSTEPS, slots
 from rig.dynamics.integrator import _call, _pointer, addresses, run_filter
-from rig.dynamics.simulate import MAX_SUBSTEPS, slots
 from rig.effects.base import Effect, Place
 from rig.errors import RecordingError
 from rig.recording.run import Array, Run

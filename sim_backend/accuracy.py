@@ -24,8 +24,8 @@ def played_rate(platform: Platform, sine: Sine, parts: int, *, held: bool = Fals
         if held:
             rows = plant.hold(float(sine.torque(k * TICK_S)), parts)
         else:
-            half_steps = np.arange(1, 2 * parts + 1) / (2 * parts)
-            rows = plant.follow(sine.torque((k + half_steps) * TICK_S))
+            quarter_steps = np.arange(1, 4 * parts + 1) / (4 * parts)
+            rows = plant.follow(sine.torque((k + quarter_steps) * TICK_S))
         rate[k] = rows[parts - 1, RATE]
     return rate
 

@@ -19,7 +19,7 @@ from sim_backend.motor import motor_state
 if TYPE_CHECKING:
     from sim_backend.plant import Plant
 
-BLOCK = 1 << 14  # half steps of an excitation that are evaluated at a time
+BLOCK = 1 << 15  # quarter steps of an excitation that are evaluated at a time
 
 
 class Amplifier(ABC):
@@ -72,22 +72,22 @@ class Ideal(Amplifier):
         """Back to plain commands."""
         self._torque, self._following = None, False
 
-    def _half_steps(self, first: int, n: int) -> Array:
-        """Torque at the 2 n half steps that follow instant ``first``."""
-        at = 2 * (first - self._start) + 1  # counted in half steps since the start of the set
-        if not self._block_first <= at <= at + 2 * n <= self._block_first + len(self._block):
+    def _quarter_steps(self, first: int, n: int) -> Array:
+        """Torque at the 4 n quarter steps that follow instant ``first``."""
+        at = 4 * (first - self._start) + 1  # counted in quarter steps since the start of the set
+        if not self._block_first <= at <= at + 4 * n <= self._block_first + len(self._block):
             assert self._torque is not None
-            count = np.arange(at, at + max(BLOCK, 2 * n))
-            self._block = np.asarray(self._torque(0.5 * self._step_s * count), dtype=np.float64)
+            count = np.arange(at, at + max(BLOCK, 4 * n))
+            self._block = np.asarray(self._torque(0.25 * self._step_s * count), dtype=np.float64)
             self._block_first = at
         skip = at - self._block_first
-        return self._block[skip : skip + 2 * n]
+        return self._block[skip : skip + 4 * n]
 
     def advance(self, plant: Plant, first: int, n: int) -> tuple[Array, list[TorqueSample]]:
         """Along the excitation, or held where a command has left it."""
         if not self._following:
             return plant.hold(self._command_nm, n), []
-        rows = plant.follow(self._half_steps(first, n))
+        rows = plant.follow(self._quarter_steps(first, n))
         return rows, [TorqueSample((first + n) * self._step_s, float(rows[n - 1, 3]))]
 
     def command(self, torque_nm: float, at: int) -> list[TorqueSample]:

@@ -1,7 +1,7 @@
 """The simulated platform: the rig's own equation of motion, advanced one stretch of torque at a time.
 
 The integrator is that of ``rig.dynamics``: fourth-order Runge-Kutta on a fine step, stick and slip located
-as events. The torque enters on half steps, so that a continuous excitation is followed as a parabola and a
+as events. The torque enters on quarter steps, so that a continuous excitation is followed as a parabola and a
 held one is exact; drive and sensor effects of the hidden truth sit in between, as in ``rig.dynamics.Grid``.
 A call goes through bare addresses, as in ``rig.dynamics.Stepper``: passing the arrays would cost more than
 the steps themselves.
@@ -28,7 +28,7 @@ _DRIVE, _SENSOR = 14, 20  # where the filter chains begin in the table of addres
 def _fine_steps(table, values, torque, motor, n, mode, out):  # type: ignore[no-untyped-def]
     """n fine steps; ``values`` holds the fine step, the asked torque and the shaft torque that was reached.
 
-    ``torque`` has the half steps to follow, shape (2 n,). ``out`` takes rows of angle, rate, rate behind the
+    ``torque`` has the quarter steps to follow, shape (4 n,). ``out`` takes rows of angle, rate, rate behind the
     sensor and torque asked of the drive effects.
     """
     at, of = integrator._floats_at, integrator._offset
@@ -47,19 +47,22 @@ def _fine_steps(table, values, torque, motor, n, mode, out):  # type: ignore[no-
     saved, before = of(scratch, 6 * width), of(scratch, 7 * width)
     kinks, bends = table[12], at(table[13])
     h = values[0]
+    quarters = np.empty(4)
     for i in range(n):
         begin = values[2]
-        if mode == FOLLOW:
-            asked = torque[2 * i + 1]
-            middle = integrator._chain(torque[2 * i], 0.5 * h, table, _DRIVE)
-            end = integrator._chain(asked, 0.5 * h, table, _DRIVE)
-        else:
-            asked = values[1] if mode == HOLD else motor_torque(motor, values[1], motion[1], h)
-            first = integrator._chain(asked, 0.5 * h, table, _DRIVE)
-            begin = 0.5 * (first + integrator._chain(asked, 0.5 * h, table, _DRIVE))
-            middle = begin
-            end = begin
-        values[2] = end
+        asked = values[1] if mode != MOTOR else motor_torque(motor, values[1], motion[1], h)
+        for k in range(4):
+            if mode == FOLLOW:
+                asked = torque[4 * i + k]
+            quarters[k] = integrator._chain(asked, 0.25 * h, table, _DRIVE)
+        middle = quarters[1]
+        end = quarters[3]
+        if mode != FOLLOW:  # the line that pushes as much as the quarters, and as early or late (rig.dynamics.grid)
+            middle = 0.25 * (quarters[0] + quarters[1] + quarters[2] + quarters[3])
+            rise = 0.2 * (3.0 * (quarters[3] - quarters[0]) + quarters[2] - quarters[1])
+            begin = middle - rise
+            end = middle + rise
+        values[2] = quarters[3]
         integrator.step_over_kinks(
             motion, states, z, work, saved, h, begin, middle, end, jck, body, bends, kinks, before
         )
@@ -100,7 +103,7 @@ class Plant:
         self._values = np.array([self.step_s, 0.0, 0.0])
         self._out: Array = np.zeros((64, 4))
         motion, z, scratch = np.zeros(4), e.rest_states(0.0, 0.0), e.scratch()
-        drive, sensor = e.drive.arrays(0.5 * self.step_s), e.sensor.arrays(self.step_s)
+        drive, sensor = e.drive.arrays(0.25 * self.step_s), e.sensor.arrays(self.step_s)
         self._kept = (e, motion, z, scratch, drive, sensor)  # the table holds bare addresses of these
         table = e.table(motion, z, scratch)
         for chain in (drive, sensor):
@@ -114,12 +117,12 @@ class Plant:
         return self._out
 
     def follow(self, torque_nm: Array) -> Array:
-        """Advance under a smooth torque given at every half step after the present instant, shape (2 n,).
+        """Advance under a smooth torque given at every quarter step after the present instant, shape (4 n,).
 
         Returns rows of angle, rate, rate behind the sensor effects and torque asked for at the end of each
         fine step, shape (n or more, 4); valid until the next call.
         """
-        return self._advance(torque_nm, _NOTHING, len(torque_nm) // 2, FOLLOW)
+        return self._advance(torque_nm, _NOTHING, len(torque_nm) // 4, FOLLOW)
 
     def hold(self, torque_nm: float, n: int) -> Array:
         """Advance n fine steps under a constant torque; rows as from ``follow``."""

@@ -11,8 +11,9 @@ from sim_backend.plant import SENSED, Plant
 class World:
     """A plant on a fixed grid of host time, driven by a torque that is held between changes.
 
-    A change within a step counts by its share of the step, so that the impulse on the shaft is exact
-    wherever on the grid it falls.
+    A change within a step counts by its share of the step, and what that puts too early is taken over into the next
+    one: impulse and its moment are exact wherever on the grid the change falls. Impulse alone would act like a torque
+    that was smoothed over a step.
 
     Parameters
     ----------
@@ -30,7 +31,7 @@ class World:
         self._start_s = start_s
         self._step_s = step_s
         self._at = 0
-        self._torque_nm = 0.0
+        self._torque_nm = self._taken_over_nm = 0.0
         self._changes: deque[tuple[float, float]] = deque()
         self._plant.hold(0.0, self._parts)  # compiles, or loads what was compiled, before time counts
 
@@ -41,7 +42,8 @@ class World:
     def advance(self, steps: int) -> list[float]:
         """Advance by so many grid steps; the rates behind the sensor effects at their ends, in rad/s."""
         end_s = self._start_s + (self._at + steps) * self._step_s
-        if not self._changes or self._changes[0][0] >= end_s:
+        quiet = not self._changes or self._changes[0][0] >= end_s
+        if quiet and not self._taken_over_nm:
             return self._hold(self._torque_nm, steps)
         return [rate for _ in range(steps) for rate in self._hold(self._mean_torque_nm(), 1)]
 
@@ -49,13 +51,15 @@ class World:
         """Mean over the coming step, changes within it by their share; the torque at its end is kept."""
         begin_s = self._start_s + self._at * self._step_s
         end_s = begin_s + self._step_s
-        mean_nm = self._torque_nm
+        mean_nm = self._torque_nm + self._taken_over_nm
+        self._taken_over_nm = 0.0
         while self._changes and self._changes[0][0] < end_s:
             time_s, torque_nm = self._changes.popleft()
             share = (end_s - max(time_s, begin_s)) / self._step_s
             mean_nm += (torque_nm - self._torque_nm) * share
+            self._taken_over_nm += (torque_nm - self._torque_nm) * 0.5 * share * (1.0 - share)
             self._torque_nm = torque_nm
-        return mean_nm
+        return mean_nm - self._taken_over_nm
 
     def _hold(self, torque_nm: float, steps: int) -> list[float]:
         rows = self._plant.hold(torque_nm, steps * self._parts)

@@ -7,6 +7,7 @@ import pytest
 
 from rig.dynamics import Equations, Grid, Stepper, TorqueSignal, simulate
 from rig.platform import Platform
+from tests.rig.dynamics.exact import moved_by_a_held_torque
 
 TIME = np.arange(1001) * 1e-3
 SINE = TorqueSignal(TIME, 40.0 * np.sin(2 * np.pi * 9 * TIME))
@@ -98,3 +99,16 @@ def test_more_inertia_or_less_spring_asks_for_fewer_fine_steps() -> None:
 def test_an_unknown_effect_or_parameter_is_named(effects: dict[str, dict[str, float]], missing: str) -> None:
     with pytest.raises(KeyError, match=missing):
         simulate(Platform(effects=effects), TIME, SINE)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 3e-5, 1.25e-4, 2e-4, 3.1e-4])
+def test_a_held_torque_that_changes_between_fine_steps_moves_the_platform_by_what_it_should(late_s: float) -> None:
+    platform = Platform(inertia_kg_m2=0.0203, damping_nm_s_rad=0.0447, stiffness_nm_rad=681.2)
+    time = np.arange(1001) * 5e-4
+    changes = np.concatenate([[0.0], late_s + 1e-3 * np.arange(1, 501)])
+    torque = TorqueSignal(changes, 40.0 * np.sin(2 * np.pi * 9 * changes), "zero_order")
+    exact = moved_by_a_held_torque(platform, torque, time)
+    found = simulate(platform, time, torque, substeps=2).rate_rad_s
+    gain = float(found @ exact / (exact @ exact))
+    assert gain == pytest.approx(1.0, abs=2e-5)
+    assert np.sqrt(np.mean((found - exact) ** 2)) < 2e-5 * np.sqrt(np.mean(exact**2))

@@ -9,12 +9,14 @@ from drivers.codecs import cia402, odrive_cansimple, stim300
 from drivers.codecs.framing import StreamFramer
 from drivers.codecs.lawicel import CanFrame
 from drivers.codecs.odrive_cansimple import Command
+from rig.dynamics import TorqueSignal
 from rig.platform import Platform
 from sim_backend.emulators.adapter import LawicelAdapter
 from sim_backend.emulators.drive import Cia402Drive
 from sim_backend.emulators.gyro import GyroSettings, Stim300Emulator, flat_low_pass
 from sim_backend.emulators.odrive import OdriveAxis
 from sim_backend.emulators.world import World
+from tests.rig.dynamics.exact import moved_by_a_held_torque
 
 
 def settings(**changed):
@@ -71,6 +73,19 @@ def test_world_takes_a_torque_at_any_instant_with_its_exact_impulse():
     rates = world.advance(3) + world.advance(7)
     impulse = 4.0 * (0.00535 - 0.00025) - 1.0 * (0.010 - 0.00535)
     assert rates[-1] == pytest.approx(impulse / 0.5)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 1.3e-5, 5e-5, 8e-5])
+def test_world_rings_as_it_should_wherever_on_its_grid_the_torque_changes(late_s):
+    platform = Platform(inertia_kg_m2=0.0203, damping_nm_s_rad=0.0447, stiffness_nm_rad=681.2)
+    changes = np.concatenate([[0.0], late_s + 1e-3 * np.arange(1, 501)])
+    torque = TorqueSignal(changes, 40.0 * np.sin(2 * np.pi * 9 * changes), "zero_order")
+    world = World(platform, start_s=0.0, step_s=1e-4)
+    for time_s, torque_nm in zip(changes, torque.torque_nm, strict=True):
+        world.change_torque(time_s, torque_nm)
+    rates = np.array([world.advance(5)[-1] for _ in range(1000)])
+    exact = moved_by_a_held_torque(platform, torque, 5e-4 * np.arange(1001))[1:]
+    assert np.max(np.abs(rates - exact)) < 2e-6 * np.max(np.abs(exact))
 
 
 def test_adapter_answers_as_the_manual_says():
