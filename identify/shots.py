@@ -13,7 +13,7 @@ from identify.parameters import Name, equations_of
 from identify.regression import Structure
 from identify.traces import LEAD_S, Trace, clear_of_seam
 from rig.dynamics import Equations, Grid
-from rig.dynamics.low_pass import low_pass_kernel, smoothed
+from rig.dynamics.low_pass import low_pass_kernel, mean_rate, smoothed
 from rig.recording.run import Array
 
 SOON_S = 0.02  # a first stretch that begins by then
@@ -98,11 +98,15 @@ def predict(shots: Shots, equations: Equations, starts: Array, bias: float, push
     n = len(shots.trace.measured)
     if shots.trace.channel == "angle":
         return np.asarray(fine[: n * ratio : ratio, 0])
-    turned = fine[:, 1]
+    turned, step_s = fine[:, 1], grid.step_s
+    filtered = bool(run.rate_corner_hz and run.rate_delay_s)
+    if filtered:
+        turned = mean_rate(fine[:, 0], turned, step_s)
     if equations.sensor.names:
-        turned = _sensed(equations, turned, first, grid.step_s)
-    if run.rate_corner_hz and run.rate_delay_s:
-        turned = smoothed(turned, low_pass_kernel(run.rate_corner_hz, run.rate_delay_s, grid.step_s))
+        turned = _sensed(equations, turned, first, step_s)
+    if filtered:
+        corner_hz, delay_s = float(run.rate_corner_hz or 0.0), float(run.rate_delay_s or 0.0)
+        turned = smoothed(turned, low_pass_kernel(corner_hz, delay_s, step_s, 2.0 * step_s))
     return np.asarray(turned[: n * ratio : ratio] + bias)
 
 

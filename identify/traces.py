@@ -379,7 +379,7 @@ def clear_of_seam(trace: Trace, seam: int, keep: Any) -> None:
     """Take the samples in which the gyro's own average mixes both sides of a seam out of ``keep``, in place."""
     run = trace.run
     if trace.channel == "rate" and run.rate_corner_hz and run.rate_delay_s:
-        reach = int(np.ceil(run.rate_delay_s / trace.step_s))
+        reach = int(np.ceil(run.rate_delay_s / trace.step_s + 0.5))  # a model averages over two fine steps besides
         keep[max(0, seam - reach) : seam + reach] = False
 
 

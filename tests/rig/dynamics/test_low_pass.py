@@ -10,14 +10,16 @@ from rig.dynamics.low_pass import low_pass_kernel, smoothed
 
 @pytest.mark.parametrize(("corner_hz", "delay_s"), [(262.0, 2.2e-3), (131.0, 3.7e-3), (66.0, 6.7e-3)])
 @pytest.mark.parametrize("step_s", [1e-4, 2.5e-4])
+@pytest.mark.parametrize("averaged_steps", [0, 2])
 def test_the_corner_is_where_the_data_sheet_has_it_and_the_pass_band_is_flat(
-    corner_hz: float, delay_s: float, step_s: float
+    corner_hz: float, delay_s: float, step_s: float, averaged_steps: int
 ) -> None:
-    kernel = low_pass_kernel(corner_hz, delay_s, step_s)
+    averaged_s = averaged_steps * step_s
+    kernel = low_pass_kernel(corner_hz, delay_s, step_s, averaged_s)
     t = step_s * np.arange(-(len(kernel) // 2), len(kernel) // 2 + 1)
 
     def gain(frequency_hz: float) -> float:
-        return float(np.sum(kernel * np.cos(2 * np.pi * frequency_hz * t)))
+        return float(np.sum(kernel * np.cos(2 * np.pi * frequency_hz * t)) * np.sinc(frequency_hz * averaged_s))
 
     assert gain(0.0) == pytest.approx(1.0)
     assert gain(corner_hz) == pytest.approx(np.sqrt(0.5), rel=1e-6)
