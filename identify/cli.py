@@ -224,9 +224,12 @@ def _planned(
 
 def _conclude_aborted(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, played: Played) -> None:
     """Identify from the sets that came to their end, and mark it."""
+    from rig.cli.saving import where_it_is
+
     whole = played.fit_to_identify
     if not whole.runs:
-        desk.terminal.insist(f"No set was complete, so nothing is identified. What was recorded is in {folder.path}")
+        where = where_it_is(played, folder.path)
+        desk.terminal.insist(f"No set was complete, so nothing is identified. {where}")
         return
     desk.terminal.tell(f"Identifying from the {len(whole.runs)} complete set(s); the results are marked aborted.")
     found = dataclasses.replace(_identified(desk, loaded, whole), aborted=True)

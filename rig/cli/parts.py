@@ -31,6 +31,8 @@ class Played:
         The raw journals of its parts in the results folder, in the order they were played.
     rate_full_scale_rad_s
         The largest rate that the gyro reports, or None.
+    read_back
+        False where the journal could not be read when the campaign was over.
     """
 
     recording: Recording
@@ -38,6 +40,7 @@ class Played:
     cause: BaseException | None
     journals: tuple[str, ...] = (JOURNAL_FILE,)
     rate_full_scale_rad_s: float | None = None
+    read_back: bool = True
 
     @property
     def fit_to_identify(self) -> Recording:

@@ -7,6 +7,7 @@ import sys
 from rig.cli.desk import Desk
 from rig.cli.exits import code_of
 from rig.cli.resume import play_campaign
+from rig.cli.saving import where_it_is
 from rig.cli.terminal import plain
 from rig.config.load import LoadedConfig
 
@@ -17,5 +18,8 @@ def play_only(desk: Desk, loaded: LoadedConfig) -> int:
     played = play_campaign(desk, loaded, folder)
     desk.terminal.settle()
     if not desk.options.quiet:
-        sys.stdout.write(f"{len(played.whole)} complete set(s); the recording is in {plain(str(folder.path))}\n")
+        where = (
+            f"; the recording is in {folder.path}" if played.recording.runs else f". {where_it_is(played, folder.path)}"
+        )
+        sys.stdout.write(f"{len(played.whole)} complete set(s){plain(where)}\n")
     return 0 if played.cause is None else code_of(played.cause)

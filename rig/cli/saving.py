@@ -20,6 +20,8 @@ from rig.recording.journal_reader import JournalContents, read_journal, recordin
 from rig.recording.results import joined
 from rig.recording.run import Recording
 
+WIRE_LOGS = ("gyro.bin", "can.log")  # beside a raw capture; empty where no device could be reached
+
 
 def save(
     desk: Desk, path: Path, recording: Recording | None, info: Mapping[str, Any], played: Played, part: Part
@@ -42,7 +44,18 @@ def save(
             _write(path, recording, contents, anew=(path / RECORDING_FILE).exists())
         except RigError as problem:
             desk.say_error(problem)
-    return dataclasses.replace(played, recording=recording)
+    return dataclasses.replace(played, recording=recording, read_back=contents is not None)
+
+
+def where_it_is(played: Played, folder: Path) -> str:
+    """Where the samples of a campaign are, or that there are none and what its folder has instead."""
+    if played.recording.runs:
+        return f"What was recorded is in {folder}"
+    if not played.read_back:
+        return f"What was recorded could not be read back; what the disk took is in {folder}: try `rig recover` on it"
+    wire = any(path.stat().st_size for path in folder.glob("raw/**/*.*") if path.name in WIRE_LOGS)
+    kept = "the raw capture of what crossed the wire, and the journal" if wire else "the journal"
+    return f"Nothing was recorded, since it ended before the first sample of a set; {folder} has {kept}, which says why"
 
 
 def _write(path: Path, recording: Recording, contents: JournalContents | None, anew: bool) -> None:

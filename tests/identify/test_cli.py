@@ -199,7 +199,19 @@ def test_without_one_whole_set_nothing_is_identified(
     done = command(app, write_config(tmp_path), "--quiet", "--out", tmp_path / "out")
     assert done.exit_code == 3
     assert accepted.given == []
-    assert "No set was complete" in done.stderr
+    assert f"No set was complete, so nothing is identified. What was recorded is in {tmp_path / 'out'}" in done.stderr
+
+
+def test_where_a_fault_came_before_the_first_sample_nothing_is_said_to_be_recorded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, accepted: Identifier
+) -> None:
+    put_on_stage(monkeypatch, ScriptedRig(lambda now_s: (_ for _ in ()).throw(DeviceFault("dead"))))
+    done = command(app, write_config(tmp_path), "--quiet", "--out", tmp_path / "out")
+    assert done.exit_code == 3
+    assert "What was recorded is" not in done.stderr
+    assert (
+        f"Nothing was recorded, since it ended before the first sample of a set; {tmp_path / 'out'} has" in done.stderr
+    )
 
 
 def test_a_fault_of_the_identifier_ends_in_70_with_the_recording_kept(

@@ -13,10 +13,13 @@ import pytest
 
 from rig.cli.app import app
 from rig.cli.exits import TRACEBACK_FILE
+from rig.cli.parts import Played
+from rig.cli.saving import where_it_is
 from rig.errors import DeviceFault
 from rig.interface import Exchange, GyroSample, Statement, Torque, TorqueSample
 from rig.recording.hdf5 import read_recording_h5
 from rig.recording.journal import Journal, JournalError
+from rig.recording.run import Recording
 from tests.rig.cli.support import SECOND_SET_S, TWO_SETS, command, put_on_stage, write_config
 from tests.rig.scripted import ScriptedRig
 
@@ -112,6 +115,21 @@ def test_a_device_fault_ends_in_3_with_the_whole_set_and_the_part_of_the_next_ke
     info = read_recording_h5(tmp_path / "out" / "recording.h5").info
     assert [s["complete"] for s in info["sets"]] == [True, False]
     assert "fell silent" in info["aborted"]
+
+
+def test_a_fault_before_the_first_sample_says_that_nothing_was_recorded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put_on_stage(monkeypatch, ScriptedRig(after(0.0, breaking(DeviceFault("the drive fell silent")))))
+    done = command(app, "play", write_config(tmp_path), "--out", tmp_path / "out")
+    assert done.exit_code == 3
+    assert "Nothing was recorded" in done.stdout and "the recording is in" not in done.stdout
+    assert not (tmp_path / "out" / "recording.h5").exists()
+
+
+def test_where_the_journal_cannot_be_read_back_nobody_claims_that_it_is_empty(tmp_path: Path) -> None:
+    told = where_it_is(Played(Recording(()), frozenset(), None, read_back=False), tmp_path)
+    assert "could not be read back" in told and "rig recover" in told
 
 
 def test_a_trip_ends_in_4_and_names_the_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
