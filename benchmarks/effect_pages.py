@@ -13,7 +13,8 @@ import numpy as np
 from line_chart import Line, panel, svg
 
 from rig import effects
-from rig.dynamics.integrator import addresses, run_filter
+from rig.dynamics.filters import run_filter
+from rig.dynamics.native import addresses
 from rig.effects import Effect, Parameter, Place
 from rig.recording.run import Array
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from identify.spectra import Complex
 from rig import effects
-from rig.dynamics.integrator import addresses, run_filter
+from rig.dynamics.filters import run_filter
+from rig.dynamics.native import addresses
 from rig.effects.base import Effect, Place
 from rig.platform import Platform
 from rig.recording.run import Array

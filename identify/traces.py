@@ -18,7 +18,8 @@ from rig import effects
 from rig.channels import Channel
 from rig.dynamics import TorqueSignal
 from rig.dynamics.equations import MAX_SUBSTEPS, slots
-from rig.dynamics.integrator import _call, _pointer, addresses, run_filter
+from rig.dynamics.filters import run_filter
+from rig.dynamics.native import addresses, call, pointer
 from rig.effects.base import Effect, Place
 from rig.errors import RecordingError
 from rig.recording.run import Array, Run
@@ -69,15 +70,15 @@ def torque_along(kernel, angle, rate, time, torque, step, z, substeps, p, fricti
     dz, mid = np.zeros(max(1, states)), np.zeros(max(1, states))
     zz = np.zeros(max(1, states))
     zz[:states] = z
-    pz, pd, pm, pp = _pointer(zz), _pointer(dz), _pointer(mid), _pointer(p)
+    pz, pd, pm, pp = pointer(zz), pointer(dz), pointer(mid), pointer(p)
     h = step / substeps
     for i in range(n):
         w = rate[i]
         if friction:
             s = w / soft if abs(w) < soft else np.sign(w)
-            out[i] = s * _call(kernel, angle[i], abs(w), time[i], torque[i], pz, pd, pp)
+            out[i] = s * call(kernel, angle[i], abs(w), time[i], torque[i], pz, pd, pp)
         else:
-            out[i] = _call(kernel, angle[i], w, time[i], torque[i], pz, pd, pp)
+            out[i] = call(kernel, angle[i], w, time[i], torque[i], pz, pd, pp)
         if states > 0 and i < n - 1:
             for k in range(substeps):
                 u, v = k / substeps, (k + 0.5) / substeps
@@ -90,17 +91,17 @@ def torque_along(kernel, angle, rate, time, torque, step, z, substeps, p, fricti
                     z0 = zz[0]
                     delta = 1e-6 * (1.0 + abs(z0))
                     zz[0] = z0 + delta
-                    _call(kernel, a1, w1, t, torque[i], pz, pd, pp)
+                    call(kernel, a1, w1, t, torque[i], pz, pd, pp)
                     f1 = dz[0]
                     zz[0] = z0
-                    _call(kernel, a1, w1, t, torque[i], pz, pd, pp)
+                    call(kernel, a1, w1, t, torque[i], pz, pd, pp)
                     f0 = dz[0]
                     zz[0] = z0 + h * f0 / (1.0 - 0.5 * h * min((f1 - f0) / delta, 0.0))
                     continue
-                _call(kernel, a0, w0, t, torque[i], pz, pd, pp)
+                call(kernel, a0, w0, t, torque[i], pz, pd, pp)
                 for j in range(states):
                     mid[j] = zz[j] + 0.5 * h * dz[j]
-                _call(kernel, a1, w1, t, torque[i], pm, pd, pp)
+                call(kernel, a1, w1, t, torque[i], pm, pd, pp)
                 for j in range(states):
                     zz[j] += h * dz[j]
 

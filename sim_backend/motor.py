@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.dynamics import integrator
+from rig.dynamics import native
 from rig.recording.run import Array
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def motor_state(motor: MotorAmplifier) -> MotorState:
     )
 
 
-@integrator.jit
+@native.jit
 def _approach(i, goal, pole, h):  # type: ignore[no-untyped-def]
     """Current after h and its mean, on the way to a goal with one pole."""
     x = pole * h
@@ -51,7 +51,7 @@ def _approach(i, goal, pole, h):  # type: ignore[no-untyped-def]
     return goal + (i - goal) * left, goal + (i - goal) * (1.0 - left) / x
 
 
-@integrator.jit
+@native.jit
 def motor_torque(motor, torque, rate, h):  # type: ignore[no-untyped-def]
     """Mean shaft torque over h when asked for ``torque`` at shaft rate ``rate``; updates the current."""
     i, r, inductance, kt, limit = motor[0], motor[1], motor[2], motor[3], motor[4]

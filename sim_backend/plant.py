@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rig.dynamics import Equations, integrator
+from rig.dynamics import Equations, integrator, native
+from rig.dynamics.filters import through_filters
 from rig.errors import ConfigError
 from rig.platform import Platform
 from rig.recording.run import Array
@@ -24,19 +25,19 @@ FOLLOW, HOLD, MOTOR = range(3)
 _DRIVE, _SENSOR = 14, 20  # where the filter chains begin in the table of addresses
 
 
-@integrator.jit
+@native.jit
 def _fine_steps(table, values, torque, motor, n, mode, out):  # type: ignore[no-untyped-def]
     """n fine steps; ``values`` holds the fine step, the asked torque and the shaft torque that was reached.
 
     ``torque`` has the quarter steps to follow, shape (4 n,). ``out`` takes rows of angle, rate, rate behind the
     sensor and torque asked of the drive effects.
     """
-    at, of = integrator._floats_at, integrator._offset
+    at, of = native.floats_at, native.offset
     motion, states, z, scratch = at(table[0]), table[1], at(table[2]), at(table[3])
     width = max(4, states)
     body = (
-        table[4], table[5], integrator._integers_at(table[6]), integrator._integers_at(table[7]),
-        at(table[8]), integrator._integers_at(table[9]),
+        table[4], table[5], native.integers_at(table[6]), native.integers_at(table[7]),
+        at(table[8]), native.integers_at(table[9]),
     )  # fmt: skip
     constants = at(table[10])
     jck = (constants[0], constants[1], constants[2])
@@ -54,7 +55,7 @@ def _fine_steps(table, values, torque, motor, n, mode, out):  # type: ignore[no-
         for k in range(4):
             if mode == FOLLOW:
                 asked = torque[4 * i + k]
-            quarters[k] = integrator._chain(asked, 0.25 * h, table, _DRIVE)
+            quarters[k] = through_filters(asked, 0.25 * h, table, _DRIVE)
         middle = quarters[1]
         end = quarters[3]
         if mode != FOLLOW:  # the line that pushes as much as the quarters, and as early or late (rig.dynamics.grid)
@@ -68,7 +69,7 @@ def _fine_steps(table, values, torque, motor, n, mode, out):  # type: ignore[no-
         )
         out[i, 0] = motion[0]
         out[i, 1] = motion[1]
-        out[i, 2] = integrator._chain(motion[1], h, table, _SENSOR)
+        out[i, 2] = through_filters(motion[1], h, table, _SENSOR)
         out[i, 3] = asked
 
 

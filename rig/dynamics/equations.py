@@ -12,6 +12,8 @@ import numpy as np
 from rig import effects
 from rig.channels import Channel
 from rig.dynamics import integrator
+from rig.dynamics.filters import run_filter
+from rig.dynamics.native import addresses
 from rig.effects._channels import AT_REST, SLOTS
 from rig.effects.base import Effect, Place
 from rig.platform import Platform
@@ -50,9 +52,9 @@ def _kernels(
         by_place[effect.place].append(effect)
     body = by_place[Place.LOAD] + by_place[Place.FRICTION]
     return (
-        integrator.addresses([e.kernel for e in body]),
-        integrator.addresses([e.kernel for e in by_place[Place.DRIVE]]),
-        integrator.addresses([e.kernel for e in by_place[Place.SENSOR]]),
+        addresses([e.kernel for e in body]),
+        addresses([e.kernel for e in by_place[Place.DRIVE]]),
+        addresses([e.kernel for e in by_place[Place.SENSOR]]),
         len(by_place[Place.LOAD]),
         tuple(e.name for e in body),
         tuple(e.name for e in by_place[Place.DRIVE]),
@@ -86,7 +88,7 @@ class _Filters:
             return x
         kernels, s, s_at, p, p_at = self.arrays(step_s)
         out = np.array(x, dtype=float)
-        integrator.run_filter(kernels, out, step_s, s, s_at, p, p_at)
+        run_filter(kernels, out, step_s, s, s_at, p, p_at)
         return out
 
 

@@ -14,92 +14,12 @@ where each begins. LOAD kernels come first, FRICTION kernels from ``loads`` on.
 
 from __future__ import annotations
 
-from typing import Any
-
-import numba as nb
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
-from rig.effects.base import FILTER_SIGNATURE, KERNEL_SIGNATURE
+from rig.dynamics.filters import through_filters
+from rig.dynamics.native import call, floats_at, integers_at, jit, offset, pointer
 
 EVENTS_PER_STEP = 12  # more reversals than this in one fine step is chatter: the plant is held stuck
-
-jit = nb.njit(cache=True, error_model="numpy", nogil=True)
-
-
-def addresses(kernels: list[Any]) -> Any:
-    """Where compiled kernels live, as the compiled functions take them, shape (n,)."""
-    return np.array([k.address for k in kernels], dtype=np.int64)
-
-
-@intrinsic
-def _pointer(typingctx: Any, array: Any) -> Any:
-    """Pointer to an array's first element. Passing arrays costs a reference count a call; pointers are free."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return context.make_array(signature.args[0])(context, builder, args[0]).data
-
-    return types.CPointer(array.dtype)(array), codegen
-
-
-@intrinsic
-def _offset(typingctx: Any, pointer: Any, count: Any) -> Any:
-    """Pointer to the element ``count`` behind ``pointer``."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.gep(args[0], [args[1]])
-
-    return pointer(pointer, types.intp), codegen
-
-
-@intrinsic
-def _floats_at(typingctx: Any, address: Any) -> Any:
-    """Pointer to the float64 values at an address."""
-    signature = types.CPointer(types.float64)(types.int64)
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.inttoptr(args[0], ir.DoubleType().as_pointer())
-
-    return signature, codegen
-
-
-@intrinsic
-def _integers_at(typingctx: Any, address: Any) -> Any:
-    """Pointer to the int64 values at an address."""
-    signature = types.CPointer(types.int64)(types.int64)
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.inttoptr(args[0], ir.IntType(64).as_pointer())
-
-    return signature, codegen
-
-
-@intrinsic
-def _call(typingctx: Any, address: Any, th: Any, w: Any, t: Any, m: Any, z: Any, dz: Any, p: Any) -> Any:
-    """Call the kernel at an address."""
-    signature = types.float64(types.int64, *KERNEL_SIGNATURE.args)
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        double = ir.DoubleType()
-        kind = ir.FunctionType(double, [double] * 4 + [double.as_pointer()] * 3)
-        return builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
-
-    return signature, codegen
-
-
-@intrinsic
-def _call_filter(typingctx: Any, address: Any, x: Any, h: Any, s: Any, p: Any) -> Any:
-    """Call the filter kernel at an address."""
-    signature = types.float64(types.int64, *FILTER_SIGNATURE.args)
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        double = ir.DoubleType()
-        kind = ir.FunctionType(double, [double] * 2 + [double.as_pointer()] * 2)
-        return builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
-
-    return signature, codegen
 
 
 @jit
@@ -113,7 +33,7 @@ def _sum(first, last, th, w, t, m, z, dz, kernels, z_at, p, p_at):  # type: igno
     """Sum of the kernels first..last-1; writes their state derivatives."""
     total = 0.0
     for k in range(first, last):
-        total += _call(kernels[k], th, w, t, m, _offset(z, z_at[k]), _offset(dz, z_at[k]), _offset(p, p_at[k]))
+        total += call(kernels[k], th, w, t, m, offset(z, z_at[k]), offset(dz, z_at[k]), offset(p, p_at[k]))
     return total
 
 
@@ -284,7 +204,7 @@ def step_over_kinks(motion, n, z, work, saved, h, m0, m1, m2, jck, body, kinks, 
     if count == 0:
         step(motion, n, z, work, saved, h, m0, m1, m2, jck, body)
         return
-    kept = _offset(before, 4)
+    kept = offset(before, 4)
     _copy(motion, before, 4)
     _copy(z, kept, n)
     step(motion, n, z, work, saved, h, m0, m1, m2, jck, body)
@@ -305,8 +225,8 @@ def pull(angle, z, jck, kernels, loads, z_at, p, p_at):  # type: ignore[no-untyp
     held = np.zeros(max(1, len(z)))
     held[: len(z)] = z
     return jck[2] * angle + _sum(
-        0, loads, angle, 0.0, 0.0, 0.0, _pointer(held), _pointer(scratch), _pointer(kernels), _pointer(z_at),
-        _pointer(p), _pointer(p_at),
+        0, loads, angle, 0.0, 0.0, 0.0, pointer(held), pointer(scratch), pointer(kernels), pointer(z_at),
+        pointer(p), pointer(p_at),
     ) + 0.0 * scratch[0] * held[0]  # keeps both alive  # fmt: skip
 
 
@@ -320,13 +240,13 @@ def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, kinks, o
     n, states = torque.shape[0], len(z)
     room = np.zeros((10, max(4, states)))
     work = (
-        _pointer(room[0]), _pointer(room[1]), _pointer(room[2]),
-        _pointer(room[3]), _pointer(room[4]), _pointer(room[5]),
+        pointer(room[0]), pointer(room[1]), pointer(room[2]),
+        pointer(room[3]), pointer(room[4]), pointer(room[5]),
     )  # fmt: skip
-    saved, dz, before, bends = _pointer(room[6]), _pointer(room[7]), _pointer(room[8:]), _pointer(kinks)
-    mo, zp = _pointer(motion), _pointer(z)
+    saved, dz, before, bends = pointer(room[6]), pointer(room[7]), pointer(room[8:]), pointer(kinks)
+    mo, zp = pointer(motion), pointer(z)
     jck = (jck[0], jck[1], jck[2])
-    body = (loads, len(kernels), _pointer(kernels), _pointer(z_at), _pointer(p), _pointer(p_at))
+    body = (loads, len(kernels), pointer(kernels), pointer(z_at), pointer(p), pointer(p_at))
     t0 = motion[3]
     for i in range(n + 1):
         m = torque[i, 0] if i < n else torque[n - 1, 2]
@@ -363,32 +283,6 @@ def run_spans(starts, spans, offset_s, z, h, torque, jck, kernels, loads, z_at, 
 
 
 @jit
-def run_filter(kernels, x, h, s, s_at, p, p_at):  # type: ignore[no-untyped-def]
-    """Send the samples x (in place) through a chain of filter kernels, one after the other.
-
-    A filter with memory starts as if its first sample had stood there for ever.
-    """
-    for k in range(len(kernels)):
-        sk, pk = _offset(_pointer(s), s_at[k]), _offset(_pointer(p), p_at[k])
-        x0 = x[0] if s_at[k + 1] > s_at[k] else 0.0
-        for i in range(len(x)):
-            x[i] = x0 + _call_filter(kernels[k], x[i] - x0, h, sk, pk)
-    return len(s) + len(p)
-
-
-@jit
-def _chain(x, h, table, first):  # type: ignore[no-untyped-def]
-    """One sample through the chain of filters whose count and addresses stand from table[first] on."""
-    kernels, states, state_at = (
-        _integers_at(table[first + 1]), _floats_at(table[first + 2]), _integers_at(table[first + 3])
-    )  # fmt: skip
-    p, p_at = _floats_at(table[first + 4]), _integers_at(table[first + 5])
-    for k in range(table[first]):
-        x = _call_filter(kernels[k], x, h, _offset(states, state_at[k]), _offset(p, p_at[k]))
-    return x
-
-
-@jit
 def advance(table, values):  # type: ignore[no-untyped-def]
     """A few fine steps under a torque running linearly from one value to another, drive and sensor included.
 
@@ -396,23 +290,23 @@ def advance(table, values):  # type: ignore[no-untyped-def]
     microsecond instead of fifty. ``values`` holds the fine step and the torque at start and end; it takes
     angle, rate, sensed rate and shaft torque, and must hold the shaft torque of the previous call.
     """
-    motion, states, z, scratch = _floats_at(table[0]), table[1], _floats_at(table[2]), _floats_at(table[3])
+    motion, states, z, scratch = floats_at(table[0]), table[1], floats_at(table[2]), floats_at(table[3])
     width, loads, count = max(4, states), table[4], table[5]
     body = (
-        loads, count, _integers_at(table[6]), _integers_at(table[7]),
-        _floats_at(table[8]), _integers_at(table[9]),
+        loads, count, integers_at(table[6]), integers_at(table[7]),
+        floats_at(table[8]), integers_at(table[9]),
     )  # fmt: skip
-    constants = _floats_at(table[10])
+    constants = floats_at(table[10])
     jck = (constants[0], constants[1], constants[2])
     work = (
-        scratch, _offset(scratch, width), _offset(scratch, 2 * width),
-        _offset(scratch, 3 * width), _offset(scratch, 4 * width), _offset(scratch, 5 * width),
+        scratch, offset(scratch, width), offset(scratch, 2 * width),
+        offset(scratch, 3 * width), offset(scratch, 4 * width), offset(scratch, 5 * width),
     )  # fmt: skip
-    saved, before = _offset(scratch, 6 * width), _offset(scratch, 7 * width)
-    kinks, bends = table[12], _floats_at(table[13])
+    saved, before = offset(scratch, 6 * width), offset(scratch, 7 * width)
+    kinks, bends = table[12], floats_at(table[13])
     h, m_start, m_end, steps = values[0], values[1], values[2], table[11]
     for i in range(steps):
-        shaft = _chain(m_start + (m_end - m_start) * (i + 1) / steps, h, table, 14)
+        shaft = through_filters(m_start + (m_end - m_start) * (i + 1) / steps, h, table, 14)
         begin = values[6]
         if m_start == m_end and table[14] == 0:
             begin = m_start  # held: the torque jumps at the start of the step
@@ -420,4 +314,4 @@ def advance(table, values):  # type: ignore[no-untyped-def]
             motion, states, z, work, saved, h, begin, 0.5 * (begin + shaft), shaft, jck, body, bends, kinks, before
         )
         values[3], values[4], values[6] = motion[0], motion[1], shaft
-        values[5] = _chain(motion[1], h, table, 20)
+        values[5] = through_filters(motion[1], h, table, 20)

@@ -12,7 +12,8 @@ import pytest
 from scipy import signal
 
 from rig import effects
-from rig.dynamics.integrator import addresses, run_filter
+from rig.dynamics.filters import run_filter
+from rig.dynamics.native import addresses
 from rig.effects import Effect, Place
 from rig.recording.run import Array
 from tests.rig.effects.values import VALUES
