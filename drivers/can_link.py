@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 import can
 
-from drivers.codecs.lawicel import CanFrame
+from drivers.codecs.lawicel import BIT_RATE_CODES, CanFrame
 from drivers.listening import ListeningPort
 from drivers.slcan import SlcanBulkBus
 from drivers.socket_port import open_port
@@ -25,6 +26,8 @@ POLL_INTERVAL_S = 0.0005
 MOST_FRAMES_A_POLL = 10_000
 SEND_TIMEOUT_S = 0.005
 MOST_ERRORS, ERRORS_WITHIN_S = 20, 0.1
+OWN_INTERFACE = "slcan_bulk"
+OWN_OPTIONS = ("listen_only", "timestamps", "answer_timeout_s", "tty_baudrate")
 
 
 class Heard(NamedTuple):
@@ -177,6 +180,23 @@ def _frame(message: can.Message) -> CanFrame:
     )
 
 
+def bus_faults(config: CanConfig) -> Iterator[tuple[str, str]]:
+    """What is wrong with a `can` section and known before its adapter is opened: the key below it, and why."""
+    if config.interface != OWN_INTERFACE:
+        known = sorted(can.VALID_INTERFACES | {OWN_INTERFACE})
+        if config.interface not in known:
+            near = get_close_matches(config.interface, known, 1)
+            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
+            yield "interface", f"python-can has no interface {config.interface!r}; {hint}"
+        return
+    if config.bitrate not in BIT_RATE_CODES:
+        allowed = ", ".join(str(rate) for rate in sorted(BIT_RATE_CODES))
+        yield "bitrate", f"{config.bitrate} is none of a Lawicel adapter's: {allowed}"
+    for key in config.options:
+        if key not in OWN_OPTIONS:
+            yield f"options.{key}", f"unknown key; {OWN_INTERFACE} knows {', '.join(OWN_OPTIONS)}"
+
+
 def open_bus(config: CanConfig) -> can.BusABC:
     """The bus that the configuration names.
 
@@ -194,7 +214,7 @@ def open_bus(config: CanConfig) -> can.BusABC:
         )
     options: dict[str, Any] = {"bitrate": config.bitrate, **config.options}
     try:
-        if config.interface == "slcan_bulk":
+        if config.interface == OWN_INTERFACE:
             baud = options.pop("tty_baudrate", config.tty_baud)
             return SlcanBulkBus(ListeningPort(open_port(config.channel, baud)), **options)
         return can.Bus(channel=config.channel, interface=config.interface, **options)

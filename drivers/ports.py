@@ -178,6 +178,14 @@ class SerialPort:
                 return
 
 
+def is_same_port(one: str, other: str) -> bool:
+    """Whether two names mean one port: a link in /dev/serial/by-id leads to it, Windows takes com3 for COM3."""
+    try:
+        return os.path.normcase(os.path.realpath(one)) == os.path.normcase(os.path.realpath(other))
+    except (OSError, ValueError):  # no name of a file
+        return one == other
+
+
 def stalled(name: str, left: int, timeout_s: float) -> DeviceFault:
     """The fault of a port that accepts no more bytes."""
     return DeviceFault(

@@ -18,6 +18,10 @@ class Settings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+class SettingsError(ConfigError):
+    """Settings that are wrong by themselves, whatever stands beside them in the section."""
+
+
 S = TypeVar("S", bound=Settings)
 
 
@@ -31,14 +35,14 @@ def read_settings(model: type[S], given: Mapping[str, Setting], where: str) -> S
 
     Raises
     ------
-    ConfigError
+    SettingsError
         With every wrong key, its value and what is allowed.
     """
     try:
         return model.model_validate(dict(given))
     except ValidationError as wrong:
         lines = [_line(model, error, where) for error in wrong.errors(include_url=False)]
-        raise ConfigError("\n".join(lines)) from None
+        raise SettingsError("\n".join(lines)) from None
 
 
 def _line(model: type[Settings], error: object, where: str) -> str:

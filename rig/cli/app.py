@@ -120,7 +120,8 @@ def emulate(config: ConfigFile, overrides: Overrides = None) -> None:
         from sim_backend.emulators.process import run_emulators
 
         requests = sys.stdin.fileno() if sys.stdin is not None and not sys.stdin.closed else None
-        run_emulators(Options(config, overrides=tuple(overrides or ())).load().config, requests)
+        options = Options(config, emulate=True, overrides=tuple(overrides or ()))
+        run_emulators(options.load().config, requests)
         return 0
 
     raise typer.Exit(conclude(command))

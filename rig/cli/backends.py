@@ -64,12 +64,6 @@ def bench(loaded: LoadedConfig, raw_folder: Path) -> Iterator[Stage]:
     if section.replay is not None:
         yield _replayed(_capture_of(loaded.folder, section.replay))
         return
-    for key, value in (
-        ("gyroscope.port", section.gyroscope.port),
-        ("amplifier.can.channel", section.amplifier.can.channel),
-    ):
-        if value is None:
-            raise ConfigError(f"bench.{key} is empty: name the port (`rig devices` lists them) or run with --emulate")
     yield _bench_stage(section, Torque.REAL, raw_folder)
 
 

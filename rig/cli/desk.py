@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,8 +38,9 @@ class Options:
         from rig.cli.device_settings import device_faults
         from rig.config.load import load_config
 
+        on_ports = not (self.emulate or self.dry_run)
         seeds = [] if self.seed is None else [f"simulated.seed={self.seed}", f"identify.seed={self.seed}"]
-        return load_config(self.config, [*self.overrides, *seeds], device_faults)
+        return load_config(self.config, [*self.overrides, *seeds], partial(device_faults, on_ports=on_ports))
 
 
 @dataclass

@@ -7,15 +7,20 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from rig.config.bench import AmplifierConfig, GyroscopeConfig
+from rig.config.bench import AmplifierConfig, CanConfig, GyroscopeConfig
 from rig.config.yaml_text import KeyPath
 from rig.errors import ConfigError
 
+GYRO_PORT: KeyPath = ("bench", "gyroscope", "port")
+CAN: KeyPath = ("bench", "amplifier", "can")
+CAN_CHANNEL: KeyPath = (*CAN, "channel")
 
-def device_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+
+def device_faults(data: Mapping[str, Any], on_ports: bool = False) -> Iterator[tuple[KeyPath, str]]:
     """Path and text of everything that the drivers named by a configuration as read refuse.
 
-    A device whose own section is unsound apart from unknown keys is left out: that is told first.
+    ``on_ports``: the ports that it names will be opened, so they are looked at too.
+    Values that their own section refuses are left out: those are told elsewhere.
     """
     bench = data.get("bench")
     if data.get("backend") != "bench" or not isinstance(bench, dict):
@@ -25,25 +30,84 @@ def device_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
 
     yield from _refused("gyroscope", bench, GyroscopeConfig, make_gyroscope)
     yield from _refused("amplifier", bench, AmplifierConfig, make_amplifier)
+    yield from _bus_faults(data)
+    if on_ports and bench.get("replay") is None:
+        yield from _port_faults(data)
 
 
 def _refused(
     name: str, bench: Mapping[str, Any], section: type[BaseModel], make: Callable[[Any], object]
 ) -> Iterator[tuple[KeyPath, str]]:
+    from drivers.settings import SettingsError
+
     given = bench.get(name)
     if not isinstance(given, dict):
         return
-    try:
-        make(section.model_validate(_known(given, section)))
-    except ValidationError:
+    config, is_whole = _as_far_as_sound(given, section)
+    if config is None:
         return
+    try:
+        make(config)
     except ConfigError as error:
+        # With a default in the place of a value that was refused, only what stands by itself is surely wrong.
+        if not is_whole and not isinstance(error, SettingsError):
+            return
         for line in str(error).splitlines():
             key, colon, text = line.partition(": ")
             if colon and key.startswith(f"bench.{name}."):
                 yield tuple(key.split(".")), text
             else:
                 yield ("bench", name), line
+
+
+def _bus_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    from drivers.can_link import bus_faults
+
+    given = _at(data, CAN)
+    config, is_whole = _as_far_as_sound(given, CanConfig) if isinstance(given, dict) else (None, False)
+    if config is not None and is_whole:
+        for key, text in bus_faults(config):
+            yield (*CAN, *key.split(".")), text
+
+
+def _port_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    from drivers.ports import is_same_port
+
+    gyro, channel = _at(data, GYRO_PORT), _at(data, CAN_CHANNEL)
+    for path, value, section in ((GYRO_PORT, gyro, GyroscopeConfig), (CAN_CHANNEL, channel, CanConfig)):
+        around = _at(data, path[:-1])
+        misspelt = isinstance(around, dict) and not set(around) <= set(section.model_fields)
+        if value is None and not misspelt:
+            yield path, "is empty: name the port (`rig devices` lists them) or run with --emulate"
+    if isinstance(gyro, str) and isinstance(channel, str) and is_same_port(gyro, channel.partition("@")[0]):
+        yield (
+            CAN_CHANNEL,
+            f"{channel} is the port that {'.'.join(map(str, GYRO_PORT))} names too ({gyro}): gyroscope and CAN adapter "
+            "are on one port each; `rig devices` lists what is plugged in",
+        )
+
+
+def _at(data: Any, path: KeyPath) -> Any:
+    for part in path:
+        data = data.get(part) if isinstance(data, dict) else None
+    return data
+
+
+def _as_far_as_sound(given: Mapping[str, Any], section: type[BaseModel]) -> tuple[Any, bool]:
+    """The section without keys that it has not and values that it refuses, and whether there were none of the latter.
+
+    None where nothing sound is left.
+    """
+    known = _known(given, section)
+    try:
+        return section.model_validate(known), True
+    except ValidationError as wrong:
+        for error in wrong.errors(include_url=False, include_input=False):
+            known.pop(str(error["loc"][0]) if error["loc"] else "", None)
+    try:
+        return section.model_validate(known), False
+    except ValidationError:
+        return None, False
 
 
 def _known(given: Mapping[str, Any], section: type[BaseModel]) -> dict[str, Any]:

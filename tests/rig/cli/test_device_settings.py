@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -44,6 +45,86 @@ def test_a_device_that_there_is_not_is_told_at_its_line(tmp_path: Path) -> None:
     assert done.exit_code == 2
     assert "wrong.yaml:3: bench.amplifier.nod" in done.stderr
     assert "wrong.yaml:5: bench.gyroscope.device: no driver called 'stim3000'" in done.stderr
+
+
+ALL_KINDS = """backend: bench
+limits: {travel_deg: far}
+bench:
+  gyroscope:
+    port: /dev/ttyX9
+    baud: quick
+    settings: {filtr_hz: 3}
+  amplifier:
+    settings: {rated_torque: 3}
+    can:
+      channel: /dev/ttyX9
+      bitrate: 123456
+      options: {listen: true}
+"""
+
+
+def test_values_keys_settings_bit_rate_and_ports_are_told_in_one_round(tmp_path: Path) -> None:
+    path = tmp_path / "wrong.yaml"
+    path.write_text(ALL_KINDS)
+    done = command(app, "check", path)
+    assert done.exit_code == 2
+    expected = (
+        (2, "limits.travel_deg: 'far' is not allowed"),
+        (6, "bench.gyroscope.baud: 'quick' is not allowed"),
+        (7, "bench.gyroscope.settings.filtr_hz: unknown key; did you mean filter_hz?"),
+        (9, "bench.amplifier.settings.rated_torque: unknown key"),
+        (11, "bench.amplifier.can.channel: /dev/ttyX9 is the port that bench.gyroscope.port names too"),
+        (12, "bench.amplifier.can.bitrate: 123456 is none of a Lawicel adapter's: 10000, 20000"),
+        (13, "bench.amplifier.can.options.listen: unknown key; slcan_bulk knows listen_only"),
+    )
+    for (line, text), said in zip(expected, done.stderr.splitlines(), strict=True):
+        assert f"wrong.yaml:{line}: {text}" in said
+
+
+def test_a_default_in_the_place_of_a_refused_value_accuses_nobody() -> None:
+    # The default of 2000 samples a second would not fit this line; the one that was meant may well.
+    gyroscope = {"sample_rate_hz": "500 Hz", "baud": 115_200}
+    assert list(device_faults({"backend": "bench", "bench": {"gyroscope": gyroscope}})) == []
+
+
+def ports(gyro: object, channel: object, **more: object) -> dict[str, object]:
+    return {
+        "backend": "bench",
+        "bench": {"gyroscope": {"port": gyro}, "amplifier": {"can": {"channel": channel}}, **more},
+    }
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links there need rights of their own")
+def test_a_link_to_the_port_of_the_other_device_is_the_same_port(tmp_path: Path) -> None:
+    (tmp_path / "tty").touch()
+    (tmp_path / "by-id").symlink_to(tmp_path / "tty")
+    ((path, text),) = device_faults(ports(str(tmp_path / "by-id"), f"{tmp_path / 'tty'}@115200"), on_ports=True)
+    assert path == ("bench", "amplifier", "can", "channel")
+    assert "bench.gyroscope.port" in text
+
+
+@pytest.mark.parametrize(("gyro", "channel"), [("/dev/ttyX8", "/dev/ttyX9"), ("/dev/ttyX9", "can0"), ("a\0", "b")])
+def test_two_ports_are_no_fault(gyro: str, channel: str) -> None:
+    assert list(device_faults(ports(gyro, channel), on_ports=True)) == []
+
+
+def test_ports_that_nobody_opens_may_be_anything() -> None:
+    same = ports("/dev/ttyX9", "/dev/ttyX9")
+    assert list(device_faults(same, on_ports=False)) == []
+    assert list(device_faults(ports(None, None, replay="runs/earlier"), on_ports=True)) == []
+
+
+def test_both_empty_ports_are_told_at_once() -> None:
+    told = dict(device_faults({"backend": "bench", "bench": {}}, on_ports=True))
+    assert [".".join(map(str, path)) for path in told] == ["bench.gyroscope.port", "bench.amplifier.can.channel"]
+    assert all("is empty: name the port" in text for text in told.values())
+
+
+def test_a_misspelt_can_interface_is_told_with_the_one_that_may_be_meant() -> None:
+    can = {"interface": "socketcam", "bitrate": 123_456}
+    ((path, text),) = device_faults({"backend": "bench", "bench": {"amplifier": {"can": can}}})
+    assert path == ("bench", "amplifier", "can", "interface")
+    assert text == "python-can has no interface 'socketcam'; did you mean socketcan?"
 
 
 @pytest.mark.parametrize(

@@ -215,7 +215,8 @@ def test_a_bench_without_a_port_is_refused_before_anything_is_written(tmp_path: 
     text = TWO_SETS.replace("backend: simulated", "backend: bench") + "bench: {}\n"
     done = command(app, "play", write_config(tmp_path, text), "--yes", "--out", out)
     assert done.exit_code == 2
-    assert "bench.gyroscope.port is empty" in done.stderr
+    assert "bench.gyroscope.port: is empty" in done.stderr
+    assert "bench.amplifier.can.channel: is empty" in done.stderr
     assert not out.exists()
 
 
