@@ -29,25 +29,59 @@ def test_epos4_needs_its_peak_declared_and_then_runs_cyclic_synchronous_torque(n
         plan_drive(epos4, "profile_torque", peak_is_declared=True)
 
 
+TORQUE_OBJECTS = (cia402.TARGET_TORQUE, cia402.MAX_TORQUE, cia402.RATED_TORQUE, cia402.ACTUAL_TORQUE)
+
+
 @needs_captures
 @pytest.mark.parametrize(
-    "name",
-    ["e35_generic.eds", "ros2_fake_cia402.eds", "pilz_prbt_0_1.dcf"],
+    ("name", "modes", "torque_objects"),
+    [("ros2_fake_cia402.eds", 0xA5, ()), ("pilz_prbt_0_1.dcf", 0x43, (cia402.ACTUAL_TORQUE,))],
 )
-def test_other_files_give_a_plan_or_a_refusal_that_names_what_is_missing(name):
-    try:
-        plan = plan_drive(dictionary(name), "auto")
-    except ConfigError as refusal:
-        assert "0x60" in str(refusal) or "0x65" in str(refusal)
-    else:
-        assert plan.mode in cia402.MODE_NAMES
+@pytest.mark.parametrize("wish", ["auto", "cyclic_synchronous_torque", "profile_torque"])
+def test_position_drives_are_read_and_refused_for_what_they_lack(name, modes, torque_objects, wish):
+    drive = dictionary(name)
+    assert drive[cia402.SUPPORTED_MODES].default == modes
+    assert tuple(i for i in TORQUE_OBJECTS if i in drive) == torque_objects
+    lacks = r"its object dictionary lacks 0x6071 \(target torque\): take a drive with a torque mode"
+    with pytest.raises(ConfigError, match=lacks):
+        plan_drive(drive, wish, peak_is_declared=True, reference_is_declared=True)
+    drive[cia402.TARGET_TORQUE] = standard_dictionary(1)[cia402.TARGET_TORQUE]  # would not make it a torque drive
+    with pytest.raises(ConfigError, match=rf"0x6502 = 0x{modes:X}\); of the torque modes it has none"):
+        plan_drive(drive, wish, peak_is_declared=True, reference_is_declared=True)
 
 
 @needs_captures
-def test_generic_drive_has_everything():
-    plan = plan_drive(dictionary("e35_generic.eds"), "auto")
-    assert plan.has_max_torque
-    assert plan.has_actual_torque
+@pytest.mark.parametrize(
+    ("name", "controlword_at", "statusword_at"),
+    [
+        ("e35_generic.eds", (0x1600, 2), (0x1A00, 2)),
+        ("pilz_prbt_0_1.dcf", (0x1600, 1), (0x1A00, 1)),
+        ("ros2_fake_cia402.eds", (0x1600, 1), (0x1A00, 1)),
+    ],
+)
+def test_mappings_of_the_file_are_read_as_its_maker_wrote_them(name, controlword_at, statusword_at):
+    drive = dictionary(name)
+    assert drive[controlword_at[0]][controlword_at[1]].default == 0x60400010
+    assert drive[statusword_at[0]][statusword_at[1]].default == 0x60410010
+    assert (drive[0x1400][1].default & 0x7FF, drive[0x1800][1].default & 0x7FF) == (0x201, 0x181)  # of node 1
+
+
+@needs_captures
+@pytest.mark.parametrize(
+    ("wish", "mode"),
+    [
+        ("auto", cia402.CYCLIC_SYNCHRONOUS_TORQUE),
+        ("cyclic_synchronous_torque", cia402.CYCLIC_SYNCHRONOUS_TORQUE),
+        ("profile_torque", cia402.PROFILE_TORQUE),
+    ],
+)
+def test_generic_drive_has_both_torque_modes_and_every_torque_object_and_no_time_stamp(wish, mode):
+    drive = dictionary("e35_generic.eds")
+    assert all(i in drive for i in (*TORQUE_OBJECTS, cia402.TORQUE_SLOPE))
+    plan = plan_drive(drive, wish)
+    assert plan.mode == mode
+    assert (plan.has_max_torque, plan.has_rated_torque, plan.has_actual_torque, plan.has_torque_slope) == (True,) * 4
+    assert [text.partition(":")[0] for text in plan.fallbacks] == ["no 0x1013 (time stamp)"]
 
 
 def test_own_emulated_drive_has_everything():
