@@ -24,17 +24,24 @@ from drivers.restamping import Restamping, takes_reported
 from rig import realtime
 from rig.config.bench import BenchConfig, ProbeConfig
 from rig.errors import DeviceFault
-from rig.interface import Correction, Exchange, GyroSample, LowPass, Rig, Statement, Torque, TorqueOfTime, TorqueSample
+from rig.interface import (
+    Correction,
+    Exchange,
+    ExpectedDelay,
+    GyroSample,
+    LowPass,
+    Rig,
+    Statement,
+    Torque,
+    TorqueOfTime,
+    TorqueSample,
+)
 from rig.recording.run import TorqueHold
 
 
 @dataclass(frozen=True)
 class BenchReport:
-    """What the bench found out about itself, for `rig check`, the report and recording.h5.
-
-    ``delay_between_tick_and_torque`` is what the drivers expect of the torque path: nothing is known, so
-    the identifier's ``torque_delay`` is to be compared with zero.
-    """
+    """What the bench found out about itself, for `rig check`, the report and recording.h5."""
 
     gyro: GyroReport
     amplifier_notes: tuple[str, ...]
@@ -107,6 +114,11 @@ class BenchRig(Rig):
     def rate_low_pass(self) -> LowPass | None:
         """Of the gyroscope."""
         return self.gyroscope.low_pass
+
+    @property
+    def expected_delay(self) -> ExpectedDelay:
+        """Of both roads, as far as the drivers know them."""
+        return self._restamping.expected_delay()
 
     @property
     def rate_full_scale_rad_s(self) -> float | None:

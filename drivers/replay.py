@@ -26,6 +26,7 @@ from rig.errors import RecordingError
 from rig.interface import (
     Correction,
     Exchange,
+    ExpectedDelay,
     GyroSample,
     LowPass,
     Rig,
@@ -140,6 +141,11 @@ class ReplayRig(Rig):
     def rate_low_pass(self) -> LowPass | None:
         """Of the gyroscope."""
         return self.gyroscope.low_pass
+
+    @property
+    def expected_delay(self) -> ExpectedDelay:
+        """As on the bench."""
+        return self._restamping.expected_delay()
 
     @property
     def rate_full_scale_rad_s(self) -> float | None:

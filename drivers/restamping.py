@@ -6,7 +6,7 @@ from drivers.amplifiers.base import Amplifier
 from drivers.gyroscopes.base import Gyroscope
 from drivers.hindsight import Hindsight, Restamped
 from rig.config.bench import AmplifierConfig
-from rig.interface import Correction, StampPoints
+from rig.interface import Correction, ExpectedDelay, StampPoints
 
 NO_POINTS: StampPoints = ((), ())
 
@@ -51,6 +51,14 @@ class Restamping:
         """The set is over."""
         for clock in self._clocks():
             clock.end_set()
+
+    def expected_delay(self) -> ExpectedDelay:
+        """Zero: what a driver knows of its road it takes off, and says so here."""
+        torque = "torque from the instant at which it was sent"
+        if takes_reported(self._config, self._amplifier):
+            when = "stamped by its own clock" if self._amplifier.stamps_torque else "from the instant it came in"
+            torque = f"torque as the drive reports it, {when}"
+        return ExpectedDelay(0.0, (*self._gyroscope.delays_told(), torque))
 
     def corrections(self) -> tuple[Correction, ...]:
         """By set, in the order they were played; sets of which too little is known are left out.

@@ -257,7 +257,7 @@ def _conclude(
     if not desk.options.quiet:
         is_terminal = sys.stdout.isatty()
         width = shutil.get_terminal_size().columns if is_terminal else WIDTH
-        sys.stdout.write(summary(found, width, colour=is_terminal) + f"\nResults: {path}\n")
+        sys.stdout.write(summary(found, width, is_terminal, recording.info) + f"\nResults: {path}\n")
     if found.accepted:
         return OK
     if found.aborted:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from rich import box
 from rich.console import Console, Group, RenderableType
@@ -11,6 +12,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from identify.expected_delay import delay_lines
 from identify.follow_up_wording import lines as follow_up_lines
 from identify.next_steps import next_steps
 from identify.results import Identification, ParameterEstimate
@@ -38,8 +40,16 @@ WIDTH = 96
 RULES = box.Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
 
 
-def summary(identification: Identification, width: int = WIDTH, colour: bool = False) -> str:
-    """The whole summary as text of at most ``width`` columns; with ``colour`` in ANSI colours, for a terminal."""
+NO_INFO: Mapping[str, Any] = {}
+
+
+def summary(
+    identification: Identification, width: int = WIDTH, colour: bool = False, info: Mapping[str, Any] = NO_INFO
+) -> str:
+    """The whole summary as text of at most ``width`` columns; with ``colour`` in ANSI colours, for a terminal.
+
+    ``info`` is what the recording says of itself.
+    """
     console = Console(
         file=io.StringIO(),
         width=width,
@@ -51,11 +61,11 @@ def summary(identification: Identification, width: int = WIDTH, colour: bool = F
         legacy_windows=False,
     )
     with console.capture() as captured:
-        console.print(_whole(identification))
+        console.print(_whole(identification, info))
     return "\n".join(line.rstrip() for line in captured.get().splitlines()) + "\n"
 
 
-def _whole(identification: Identification) -> Group:
+def _whole(identification: Identification, info: Mapping[str, Any]) -> Group:
     final, verdict = identification.final, identification.verdict
     floor = identification.noise_floor
     note = printable(capital(identification.holdout_note))
@@ -66,6 +76,7 @@ def _whole(identification: Identification) -> Group:
         Text(),
         _errors(identification),
         Padding(Text(f"The noise floor is {floor.source}. {note}"), (0, 0, 0, 2)),
+        *_listed("Torque delay", delay_lines(identification, info), bullet=""),
         *_listed("What this did to the declared model", bent_sentences(identification)),
         *_listed("Dropped, since the data do not support it", not_reported(final.dropped)),
         *_listed("Not determined by these data", not_reported(final.not_determined)),

@@ -90,6 +90,16 @@ class LowPass(NamedTuple):
     delay_s: float
 
 
+class ExpectedDelay(NamedTuple):
+    """By how much torque is expected to act later than its stamp, with what was corrected on the way to that, in words.
+
+    What is fitted beyond it (``torque_delay``) lies where no driver can see.
+    """
+
+    delay_s: float
+    corrections: tuple[str, ...]
+
+
 class Exchange(NamedTuple):
     """What came back in one tick, oldest first; either may be empty.
 
@@ -122,6 +132,11 @@ class Rig(ABC):
     @property
     def rate_low_pass(self) -> LowPass | None:
         """The gyro's own low-pass where its data sheet gives it, else None."""
+        return None
+
+    @property
+    def expected_delay(self) -> ExpectedDelay | None:
+        """What is expected of the stamps of torque and rate; None where nobody can know. Asked for after playing."""
         return None
 
     @property

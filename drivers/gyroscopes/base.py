@@ -49,6 +49,7 @@ class Tally:
         self.invalid = 0
         self.repeated = 0
         self.last_reason = ""
+        self.latency_s = 0.0
         self.recent_rates: deque[float] = deque(maxlen=4000)
 
 
@@ -117,6 +118,16 @@ class Gyroscope(ABC):
     def delay_s(self) -> float:
         """From the motion to the instant that the clock gives a sample: group delay of the filter."""
 
+    def delays_told(self) -> tuple[str, ...]:
+        """What is taken off the time at which a sample was read, in words; the last as it was with the last sample."""
+        on_wire_s = self.packet_bytes * BITS_PER_BYTE / self.baud
+        steps = (
+            ("gyro group delay", self.delay_s),
+            ("gyro latency as its packets say", self.tally.latency_s),
+            ("gyro packet on the line", on_wire_s),
+        )
+        return tuple(f"{words} {1e3 * delay_s:.3g} ms" for words, delay_s in steps if delay_s > 0.0)
+
     @property
     def low_pass(self) -> LowPass | None:
         """Corner and group delay of the filter that rounds the rate, where the data sheet gives both."""
@@ -172,6 +183,7 @@ class Gyroscope(ABC):
                 self._replaced += self.answers_replace_samples
             else:
                 self.packet_bytes = len(packet)
+                self.tally.latency_s = reading.latency_s
                 readings.append((reading, read_at_s - on_wire_s - reading.latency_s))
         return self._stamp(readings[::-1])
 

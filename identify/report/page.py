@@ -11,6 +11,7 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs
 
+from identify.expected_delay import delay_lines
 from identify.follow_up_wording import lines as follow_up_lines
 from identify.hindsight import hindsight
 from identify.json_values import finite
@@ -63,7 +64,7 @@ def report_html(identification: Identification, recording: Recording, name: str)
     body = join(
         [
             _header(identification, name),
-            _verdict(identification, gallery),
+            _verdict(identification, recording, gallery),
             _errors(identification, gallery),
             _candidates(identification),
             _response(identification, recording, gallery),
@@ -113,7 +114,7 @@ def _header(identification: Identification, name: str) -> Markup:
     )
 
 
-def _verdict(identification: Identification, gallery: _Gallery) -> Markup:
+def _verdict(identification: Identification, recording: Recording, gallery: _Gallery) -> Markup:
     verdict, final = identification.verdict, identification.final
     steps = next_steps(identification)
     reasons = [
@@ -133,6 +134,7 @@ def _verdict(identification: Identification, gallery: _Gallery) -> Markup:
         *(reasons if identification.reasons or steps else []),
         _tiles(identification),
         parameter_table(identification),
+        _titled("Torque delay", delay_lines(identification, recording.info)),
         _titled("What this did to the declared model", bent_sentences(identification)),
         _titled("Dropped, since the data do not support it", missing[0]),
         _titled("Not determined by these data", missing[1]),

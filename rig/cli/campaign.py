@@ -169,6 +169,9 @@ def _record(
     info |= {"ended_utc": datetime.now(UTC).isoformat(), "aborted": str(cause) if cause else None}
     info |= {"verdict_time_s": recorder.verdict_s}
     info |= {"sets": [figures(s) for s in tally.statistics]} | stage.account()
+    expected = stage.rig.expected_delay
+    if expected is not None:
+        info["expected_torque_delay"] = expected._asdict()
     played = Played(Recording(()), tally.whole, cause, (part.journal,), stage.rig.rate_full_scale_rad_s)
     with desk.stops.saving():
         return save(desk, path, recorder.recording, info, played, part)

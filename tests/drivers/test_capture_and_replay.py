@@ -13,6 +13,7 @@ from drivers.capture import Capture, export, read_capture, unpack_frame
 from drivers.codecs import stim300
 from drivers.codecs.lawicel import CanFrame
 from drivers.replay import ReplayRig
+from drivers.restamping import Restamping
 from rig.config.bench import AmplifierConfig, BenchConfig, CanConfig, GyroscopeConfig, RealTimeConfig
 from rig.errors import Aborted, DeviceFault, RecordingError
 from rig.interface import Torque
@@ -94,6 +95,24 @@ def test_replay_gives_bit_identical_samples(bench, tmp_path):
         assert a.channels == b.channels
     with pytest.raises(RecordingError, match="was cut short"):
         replay.exchange(0.0, 0.0)
+    assert replay.expected_delay == bench.expected_delay
+
+
+@pytest.mark.parametrize(
+    ("source", "told"),
+    [
+        ("auto", "torque as the drive reports it, stamped by its own clock"),
+        ("sent", "torque from the instant at which it was sent"),
+    ],
+)
+def test_what_is_taken_off_both_roads_is_told_and_no_delay_expected(bench, source, told):
+    with bench.opened(), bench.armed():
+        play(bench, 50)
+        chosen = bench.amplifier.config.model_copy(update={"torque_source": source})
+        expected = Restamping(chosen, bench.gyroscope, bench.amplifier).expected_delay()
+    assert expected.delay_s == 0.0
+    assert expected.corrections[0] == "gyro group delay 2.2 ms"
+    assert expected.corrections[-1] == told
 
 
 def test_capture_holds_what_crossed_the_wire(bench, tmp_path):

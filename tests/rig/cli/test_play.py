@@ -16,7 +16,7 @@ from rig.cli.exits import TRACEBACK_FILE
 from rig.cli.parts import Played
 from rig.cli.saving import where_it_is
 from rig.errors import DeviceFault
-from rig.interface import Exchange, GyroSample, Statement, Torque, TorqueSample
+from rig.interface import Exchange, ExpectedDelay, GyroSample, Statement, Torque, TorqueSample
 from rig.recording.hdf5 import read_recording_h5
 from rig.recording.journal import Journal, JournalError
 from rig.recording.run import Recording
@@ -115,6 +115,20 @@ def test_a_device_fault_ends_in_3_with_the_whole_set_and_the_part_of_the_next_ke
     info = read_recording_h5(tmp_path / "out" / "recording.h5").info
     assert [s["complete"] for s in info["sets"]] == [True, False]
     assert "fell silent" in info["aborted"]
+
+
+def test_what_the_drivers_expect_of_the_delay_goes_into_the_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Expecting(ScriptedRig):
+        @property
+        def expected_delay(self) -> ExpectedDelay:
+            return ExpectedDelay(1e-4, ("gyro group delay 2.2 ms",))
+
+    put_on_stage(monkeypatch, Expecting())
+    assert command(app, "play", write_config(tmp_path), "--quiet", "--out", tmp_path / "out").exit_code == 0
+    told = read_recording_h5(tmp_path / "out" / "recording.h5").info["expected_torque_delay"]
+    assert told == {"delay_s": 1e-4, "corrections": ["gyro group delay 2.2 ms"]}
 
 
 def test_a_fault_before_the_first_sample_says_that_nothing_was_recorded(
