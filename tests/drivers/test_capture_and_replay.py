@@ -12,6 +12,7 @@ from drivers.bench import BenchRig
 from drivers.capture import Capture, export, read_capture, unpack_frame
 from drivers.codecs import stim300
 from drivers.codecs.lawicel import CanFrame
+from drivers.recall import recall
 from drivers.replay import ReplayRig
 from drivers.restamping import Restamping
 from rig.config.bench import AmplifierConfig, BenchConfig, CanConfig, GyroscopeConfig, RealTimeConfig
@@ -113,6 +114,57 @@ def test_what_is_taken_off_both_roads_is_told_and_no_delay_expected(bench, sourc
     assert expected.delay_s == 0.0
     assert expected.corrections[0] == "gyro group delay 2.2 ms"
     assert expected.corrections[-1] == told
+
+
+def played_in_two_sets(bench):
+    """A rest, a whole set, a rest, and a set that a kill cuts short; what came in during each set, and its start."""
+    found = []
+    with bench.opened(), bench.armed():
+        for ticks in (400, 300):
+            play(bench, 30, lambda k: 0.0)
+            start_s = bench.clock.now_s()
+            bench.begin_set(math.sin, start_s)
+            found.append((start_s, play(bench, ticks)))
+            if ticks == 400:
+                bench.end_set()
+    return found
+
+
+def test_a_capture_alone_gives_every_set_as_it_was_heard(bench, tmp_path):
+    live = played_in_two_sets(bench)
+    recording = recall(tmp_path / "raw" / "wire.cap")
+    assert [run.name for run in recording.runs] == ["set 1", "set 2"]
+    assert recording.info["expected_torque_delay"] == bench.expected_delay._asdict()
+    for run, (start_s, answers) in zip(recording.runs, live, strict=True):
+        gyro = [s for answer in answers for s in answer.gyro if s.time_s >= start_s]
+        torque = [s for answer in answers for s in answer.torque if s.time_s >= start_s]
+        assert run.rate_rad_s.tolist() == [s.rate_rad_s for s in gyro]
+        assert run.valid.tolist() == [s.valid for s in gyro]
+        assert run.torque_nm.tolist() == [s.torque_nm for s in torque]
+        assert run.torque_hold == "zero_order"
+        assert (run.rate_corner_hz, run.rate_delay_s) == bench.rate_low_pass
+        assert set(run.channels) == {"drive_torque_nm", "sent_torque_nm"}
+        # Stamped anew by all that was heard, which moves no stamp by more than the clocks were unsure of.
+        assert run.time_s == pytest.approx([s.time_s - start_s for s in gyro], abs=1e-3)
+
+
+def test_a_capture_without_a_set_or_with_records_of_no_kind_is_refused(bench, tmp_path):
+    with bench.opened(), bench.armed():
+        play(bench, 30)
+    path = tmp_path / "raw" / "wire.cap"
+    with pytest.raises(RecordingError, match="ends before the first set had a sample"):
+        recall(path)
+    path.write_bytes(path.read_bytes().replace(b'"opened"', b'"closed"'))
+    with pytest.raises(RecordingError, match="nothing was played"):
+        recall(path)
+
+
+def test_a_mark_that_says_nonsense_is_refused(bench, tmp_path):
+    played_in_two_sets(bench)
+    path = tmp_path / "raw" / "wire.cap"
+    path.write_bytes(path.read_bytes().replace(b'"start_s": 1', b'"start_x": 1'))
+    with pytest.raises(RecordingError, match="none that this version writes"):
+        recall(path)
 
 
 def test_capture_holds_what_crossed_the_wire(bench, tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rig.cli.recover import recover_folder
 from rig.recording.hdf5 import read_recording_h5
 
 ROOT = Path(__file__).parents[2]
@@ -73,6 +75,13 @@ def test_a_raw_capture_replays_to_the_same_samples_and_the_same_result(tmp_path:
     results = [json.loads((folder / "result.json").read_text()) for folder in (live, again)]
     assert timeless(results[0]) == timeless(results[1])
     assert results[0]["before"]["parameters"]
+    shutil.copytree(live / "raw", tmp_path / "alone" / "raw")
+    assert recover_folder(tmp_path / "alone") == 0
+    recalled = read_recording_h5(tmp_path / "alone" / "recording.h5")
+    for a, b in zip(one.runs, recalled.runs, strict=True):
+        for name in ("time_s", "rate_rad_s", "valid", "torque_time_s", "torque_nm"):
+            whole, longer = getattr(a, name), getattr(b, name)  # up to the mark behind the tail of the set
+            assert np.array_equal(whole, longer[: len(whole)], equal_nan=True), name
 
 
 @pytest.mark.slow
