@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify import persets
+from identify import persets, sampling
 from identify.channels import Offer
 from identify.finish import Fitted
 from identify.glitches import told
@@ -103,7 +103,8 @@ def conclude(
 def _note(case: Case) -> str:
     """What was held out, and what was left out."""
     torn = told([(t.run.name, t.glitches_s) for t in case.traces])
-    return f"{case.split.note}. {torn}" if torn else case.split.note
+    uneven = sampling.told([(t.run.name, *t.scatter) for t in case.traces])
+    return ". ".join(note for note in (case.split.note, torn, uneven) if note)
 
 
 def _ratio(case: Case, after: Fitted, search: Search) -> float:

@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline
 from identify.channel_readings import lost, table_of
 from identify.glitches import glitches
 from identify.prefilter import held_pieces, linear_pieces, smooth_pieces
+from identify.sampling import HOLE, beat_of, sampled
 from rig import effects
 from rig.channels import Channel
 from rig.dynamics import TorqueSignal
@@ -21,14 +22,12 @@ from rig.dynamics.equations import MAX_SUBSTEPS, slots
 from rig.dynamics.filters import run_filter
 from rig.dynamics.native import addresses, call, pointer
 from rig.effects.base import Effect, Place
-from rig.errors import RecordingError
 from rig.recording.run import Array, Run
 
 UPSAMPLING = 4  # nonlinear torques have corners between samples
 SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than it tells
 LEAD_S = 0.1
 LEAD_IN_S = 0.01  # at the start of a run that carry no weight
-MOST_HOLES = 20  # times as many missing samples as there are
 STRAIGHT = 0.1  # of the sensor's noise
 LONGEST_FILL = 25  # missing samples that a spline may bridge
 STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
@@ -134,6 +133,7 @@ class Trace:
     number: int = 0  # which run of the recording
     offset_s: float = 0.0  # of the first sample from the start of the run
     glitches_s: Array = field(default_factory=lambda: np.zeros(0))  # times of samples left out as such
+    scatter: tuple[float, bool] = (0.0, False)  # of the time stamps about an even beat in s; whether they are wrong
     motion: tuple[Array, Array, Array, Array, float] | None = None  # of a piece: cut out of the whole run's
     _series: dict[Any, Any] = field(default_factory=dict)
     _tables: dict[Channel, tuple[Array, float]] = field(default_factory=dict)  # shared by the pieces of a run
@@ -303,6 +303,23 @@ def _channel(run: Run) -> Literal["rate", "angle"]:
     return "rate" if noise_of(run.rate_rad_s[ok]) < as_rate else "angle"
 
 
+def bias_beside(run: Run, time: Array, values: Array, good: Any) -> float:
+    """What a gyro reads at rest, in rad/s: how fast its angle runs away from that of an encoder beside it.
+
+    Between holes in the record only: what was turned there the gyro has not seen.
+    """
+    assert run.angle_rad is not None
+    both = good & np.isfinite(run.angle_rad)
+    t, rate = time[both], values[both]
+    spacing = np.diff(t)
+    ahead = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * spacing)]) - run.angle_rad[both]
+    upper = lower = 0.0
+    for piece in np.split(np.arange(len(t)), 1 + np.flatnonzero(spacing > HOLE * np.median(spacing))):
+        x = t[piece] - np.mean(t[piece])
+        upper, lower = upper + float(x @ ahead[piece]), lower + float(x @ x)
+    return upper / lower if lower > 0.0 else 0.0
+
+
 def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: float = LEAD_IN_S) -> Trace:
     """Lay a run on a uniform grid and find its usable stretches.
 
@@ -320,23 +337,10 @@ def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: fl
     assert values is not None
     good = run.valid & np.isfinite(values) & ~lost(run)
     time = run.time_s - run.time_s[0]
-    spacing = np.diff(time)
-    step = float(np.median(spacing))
-    index = np.rint(time / step).astype(np.int64)
-    if np.max(np.abs(time / step - index)) < 0.02 * min(1.0, step / 1e-9):
-        step = float(time[-1] / index[-1])
-    n = int(index[-1]) + 1
-    if n > MOST_HOLES * len(time):
-        widest = int(np.argmax(spacing))
-        raise RecordingError(
-            f"{run.name}: {len(time)} samples {step:.3g} s apart span {time[-1]:.6g} s, with a hole of "
-            f"{spacing[widest]:.6g} s after {run.time_s[widest]:.6g} s: make two runs of it with from_s and to_s"
-        )
-    grid = step * np.arange(n)
-    filled = np.asarray(CubicSpline(time[good], values[good])(grid), dtype=float)
-    keep = np.zeros(n, dtype=bool)
-    on_grid = good & (np.abs(time - step * index) < 0.5 * step)
-    keep[index[on_grid]] = True
+    if channel == "rate" and run.angle_rad is not None:
+        values = values - bias_beside(run, time, values, good)
+    laid = sampled(beat_of(run.name, time), time, values, good, noise_of, bandwidth_of)
+    step, n, grid, filled, keep = laid.beat.step_s, laid.beat.count, laid.beat.instants, laid.values, laid.there
     gaps = _gaps(keep)
     broken = np.zeros(n, dtype=bool)
     for first, last in gaps:
@@ -355,7 +359,8 @@ def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: fl
         torque = TorqueSignal(run.torque_time_s, run.torque_nm, run.torque_hold)
     trace = Trace(
         run, channel, step, filled, keep, [], torque, noise if noise is not None else noise_of(whole),
-        bandwidth_of(whole, step), number, glitches_s=float(run.time_s[0]) + step * np.flatnonzero(torn),
+        bandwidth_of(whole, step), number, laid.beat.offset_s, float(run.time_s[0]) + grid[torn],
+        (laid.scatter_s, laid.stamps_wrong),
     )  # fmt: skip
     if run.min_rate_rad_s > 0.0:
         slow = np.abs(trace.fine[1][::UPSAMPLING]) <= run.min_rate_rad_s

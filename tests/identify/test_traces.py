@@ -45,7 +45,7 @@ def test_jittered_samples_are_laid_on_a_uniform_grid_without_an_error_that_shows
     time = TIME + np.random.default_rng(2).uniform(-2e-4, 2e-4, len(TIME))
     time[0] = 0.0
     trace = prepare(gyro(5.0 * np.sin(2 * np.pi * 29 * time), time))
-    grid = trace.step_s * np.arange(len(trace.measured))
+    grid = trace.start_s + trace.step_s * np.arange(len(trace.measured))
     inside = slice(20, -20)
     assert np.max(np.abs(trace.measured - 5.0 * np.sin(2 * np.pi * 29 * grid))[inside]) < NOISE_RAD_S
 
