@@ -55,6 +55,7 @@ class Cia402(Amplifier):
         node = config.node
         self.label = f"CiA 402 drive, node {node}"
         self._setup = Cia402Setup(self.settings, node, config.watchdog_ms, self.label)
+        self._setup.dictionary()  # a file that is not there, or says that the drive cannot do it, is refused at once
         self._status = DriveStatus(node, self.settings.drive_heartbeat_ms * 1e-3, self.label)
         self._clock = TorqueClock(STAMP_UNIT_S, STAMP_MODULUS)
         self._agreed: Agreed | None = None

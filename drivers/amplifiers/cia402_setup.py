@@ -15,7 +15,7 @@ from drivers.can_link import CanLink
 from drivers.codecs import cia402
 from drivers.codecs.lawicel import CanFrame
 from drivers.settings import Settings
-from rig.errors import DeviceFault
+from rig.errors import ConfigError, DeviceFault
 
 NMT_START, NMT_PRE_OPERATIONAL = 0x01, 0x80
 SYNCHRONOUS, EVENT_DRIVEN = 1, 255
@@ -81,12 +81,22 @@ class Cia402Setup:
     def __init__(self, settings: Cia402Settings, node: int, watchdog_ms: int, label: str) -> None:
         self._settings, self._node, self._watchdog_ms, self._label = settings, node, watchdog_ms, label
 
+    def dictionary(self) -> Any:
+        """The objects that the maker's file says the drive has. Raises ConfigError where they are too few."""
+        s = self._settings
+        if s.eds is None:
+            return standard_dictionary(self._node)
+        found = read_dictionary(Path(s.eds), self._node)
+        try:
+            self._plan(found, None)
+        except ConfigError as error:
+            raise ConfigError(f"bench.amplifier.settings.eds: {s.eds}: {error}") from None
+        return found
+
     def run(self, link: CanLink) -> Agreed:
         """All of it. Raises DeviceFault where the drive does not answer or cannot do what is needed."""
         s, node = self._settings, self._node
-        dictionary = read_dictionary(Path(s.eds), node) if s.eds else standard_dictionary(node)
-        # What the file says is checked first: a drive that cannot do it is refused before a frame is sent.
-        self._plan(dictionary, None)
+        dictionary = self.dictionary()
         objects = RemoteObjects(link, node, dictionary, s.sdo_timeout_ms * 1e-3, self._label)
         link.send([CanFrame(0, bytes([NMT_PRE_OPERATIONAL, node]))])
         profile = objects.read(0x1000) & 0xFFFF

@@ -35,12 +35,13 @@ class Options:
 
     def load(self) -> LoadedConfig:
         """The checked configuration, --set and --seed applied. Raises ConfigError."""
+        from rig.cli.backends import EMULATED, SIMULATED
         from rig.cli.device_settings import device_faults
         from rig.config.load import load_config
 
-        on_ports = not (self.emulate or self.dry_run)
+        played_on = SIMULATED if self.dry_run else EMULATED if self.emulate else "bench"
         seeds = [] if self.seed is None else [f"simulated.seed={self.seed}", f"identify.seed={self.seed}"]
-        return load_config(self.config, [*self.overrides, *seeds], partial(device_faults, on_ports=on_ports))
+        return load_config(self.config, [*self.overrides, *seeds], partial(device_faults, played_on=played_on))
 
 
 @dataclass

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from difflib import get_close_matches
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from rig.cli.backends import EMULATED, SIMULATED
 from rig.config.bench import AmplifierConfig, CanConfig, GyroscopeConfig
 from rig.config.yaml_text import KeyPath
 from rig.errors import ConfigError
@@ -14,16 +16,17 @@ from rig.errors import ConfigError
 GYRO_PORT: KeyPath = ("bench", "gyroscope", "port")
 CAN: KeyPath = ("bench", "amplifier", "can")
 CAN_CHANNEL: KeyPath = (*CAN, "channel")
+FAULTS: KeyPath = ("bench", "emulator", "faults")
 
 
-def device_faults(data: Mapping[str, Any], on_ports: bool = False) -> Iterator[tuple[KeyPath, str]]:
+def device_faults(data: Mapping[str, Any], played_on: str = SIMULATED) -> Iterator[tuple[KeyPath, str]]:
     """Path and text of everything that the drivers named by a configuration as read refuse.
 
-    ``on_ports``: the ports that it names will be opened, so they are looked at too.
-    Values that their own section refuses are left out: those are told elsewhere.
+    ``played_on`` is the backend: where that is the bench, the ports will be opened, so they are looked at too; where
+    it is emulated, there have to be emulators. Values that their own section refuses are told elsewhere.
     """
     bench = data.get("bench")
-    if data.get("backend") != "bench" or not isinstance(bench, dict):
+    if (data.get("backend") != "bench" and played_on != EMULATED) or not isinstance(bench, dict):
         return
     from drivers.amplifiers import make_amplifier
     from drivers.gyroscopes import make_gyroscope
@@ -31,7 +34,10 @@ def device_faults(data: Mapping[str, Any], on_ports: bool = False) -> Iterator[t
     yield from _refused("gyroscope", bench, GyroscopeConfig, make_gyroscope)
     yield from _refused("amplifier", bench, AmplifierConfig, make_amplifier)
     yield from _bus_faults(data)
-    if on_ports and bench.get("replay") is None:
+    yield from _injected_faults(data)
+    if played_on == EMULATED:
+        yield from _without_emulator(data)
+    elif played_on == "bench" and bench.get("replay") is None:
         yield from _port_faults(data)
 
 
@@ -85,6 +91,35 @@ def _port_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
             f"{channel} is the port that {'.'.join(map(str, GYRO_PORT))} names too ({gyro}): gyroscope and CAN adapter "
             "are on one port each; `rig devices` lists what is plugged in",
         )
+
+
+def _injected_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    """Names of injected faults that there are not."""
+    given = _at(data, FAULTS)
+    if not isinstance(given, list) or not given:
+        return
+    from sim_backend.emulators.faults import FAULTS as KNOWN
+
+    for n, one in enumerate(given):
+        name = one.get("fault") if isinstance(one, dict) else None
+        if isinstance(name, str) and name not in KNOWN:
+            near = get_close_matches(name, KNOWN, 1)
+            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(KNOWN)}"
+            yield (*FAULTS, n, "fault"), f"there is no fault {name!r}; {hint}"
+
+
+def _without_emulator(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    """Devices that have a driver and no emulator."""
+    from drivers.amplifiers import DRIVERS as AMPLIFIERS
+    from drivers.gyroscopes import DRIVERS as GYROSCOPES
+    from sim_backend.emulators.bench import DRIVES
+    from sim_backend.emulators.gyro import GYROS
+
+    for name, drivers, emulators in (("gyroscope", GYROSCOPES, GYROS), ("amplifier", AMPLIFIERS, DRIVES)):
+        path: KeyPath = ("bench", name, "device")
+        device = _at(data, path)
+        if isinstance(device, str) and device in drivers and device not in emulators:
+            yield path, f"{device!r} has no emulator; emulated are {', '.join(emulators)}"
 
 
 def _at(data: Any, path: KeyPath) -> Any:

@@ -221,15 +221,13 @@ def test_settings_that_cannot_work_are_refused(config, message):
         make_amplifier(AmplifierConfig(**config))
 
 
-def test_missing_eds_is_a_configuration_error(bench, tmp_path):
-    other = Bench({"eds": str(tmp_path / "none.eds")})
-    with pytest.raises(ConfigError, match="there is no file"):
-        other.amplifier.contact(other.link)
+def test_missing_eds_is_a_configuration_error_before_anything_is_opened(tmp_path):
+    with pytest.raises(ConfigError, match=r"bench.amplifier.settings.eds: there is no file"):
+        make_amplifier(AmplifierConfig(settings={"eds": str(tmp_path / "none.eds")}))
     broken = tmp_path / "broken.eds"
     broken.write_text("this is no EDS")
-    other = Bench({"eds": str(broken)})
     with pytest.raises(ConfigError, match="cannot be read as EDS"):
-        other.amplifier.contact(other.link)
+        make_amplifier(AmplifierConfig(settings={"eds": str(broken)}))
 
 
 def without(bench, *objects):

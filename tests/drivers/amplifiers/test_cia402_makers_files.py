@@ -62,8 +62,8 @@ def test_an_epos4_without_a_scale_is_not_guessed_at():
 
 @needs_captures
 @pytest.mark.parametrize("name", ["pilz_prbt_0_1.dcf", "ros2_fake_cia402.eds"])
-def test_a_position_drive_is_refused_before_a_frame_is_sent(name):
-    contact = Contact(name, peak_torque_nm=1.0, reference_torque_nm=1.0)
-    with pytest.raises(ConfigError, match=r"lacks 0x6071 \(target torque\)"):
-        contact.notes()
-    assert contact.bus.sent == []
+def test_a_position_drive_is_refused_by_its_file_before_anything_is_opened(name):
+    with pytest.raises(
+        ConfigError, match=rf"^bench.amplifier.settings.eds: .*{name}: .* lacks 0x6071 \(target torque\)"
+    ):
+        Contact(name, peak_torque_nm=1.0, reference_torque_nm=1.0)

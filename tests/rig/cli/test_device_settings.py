@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from rig.cli.app import app
+from rig.cli.backends import EMULATED
 from rig.cli.device_settings import device_faults
 from tests.rig.cli.support import command
 
@@ -98,24 +99,24 @@ def ports(gyro: object, channel: object, **more: object) -> dict[str, object]:
 def test_a_link_to_the_port_of_the_other_device_is_the_same_port(tmp_path: Path) -> None:
     (tmp_path / "tty").touch()
     (tmp_path / "by-id").symlink_to(tmp_path / "tty")
-    ((path, text),) = device_faults(ports(str(tmp_path / "by-id"), f"{tmp_path / 'tty'}@115200"), on_ports=True)
+    ((path, text),) = device_faults(ports(str(tmp_path / "by-id"), f"{tmp_path / 'tty'}@115200"), played_on="bench")
     assert path == ("bench", "amplifier", "can", "channel")
     assert "bench.gyroscope.port" in text
 
 
 @pytest.mark.parametrize(("gyro", "channel"), [("/dev/ttyX8", "/dev/ttyX9"), ("/dev/ttyX9", "can0"), ("a\0", "b")])
 def test_two_ports_are_no_fault(gyro: str, channel: str) -> None:
-    assert list(device_faults(ports(gyro, channel), on_ports=True)) == []
+    assert list(device_faults(ports(gyro, channel), played_on="bench")) == []
 
 
 def test_ports_that_nobody_opens_may_be_anything() -> None:
     same = ports("/dev/ttyX9", "/dev/ttyX9")
-    assert list(device_faults(same, on_ports=False)) == []
-    assert list(device_faults(ports(None, None, replay="runs/earlier"), on_ports=True)) == []
+    assert list(device_faults(same, played_on=EMULATED)) == []
+    assert list(device_faults(ports(None, None, replay="runs/earlier"), played_on="bench")) == []
 
 
 def test_both_empty_ports_are_told_at_once() -> None:
-    told = dict(device_faults({"backend": "bench", "bench": {}}, on_ports=True))
+    told = dict(device_faults({"backend": "bench", "bench": {}}, played_on="bench"))
     assert [".".join(map(str, path)) for path in told] == ["bench.gyroscope.port", "bench.amplifier.can.channel"]
     assert all("is empty: name the port" in text for text in told.values())
 
@@ -125,6 +126,29 @@ def test_a_misspelt_can_interface_is_told_with_the_one_that_may_be_meant() -> No
     ((path, text),) = device_faults({"backend": "bench", "bench": {"amplifier": {"can": can}}})
     assert path == ("bench", "amplifier", "can", "interface")
     assert text == "python-can has no interface 'socketcam'; did you mean socketcan?"
+
+
+def test_misspelt_injected_faults_are_told_all_at_once_with_their_lines(tmp_path: Path) -> None:
+    path = tmp_path / "faults.yaml"
+    path.write_text(
+        "backend: bench\nbench:\n  emulator:\n    faults:\n      - {fault: gyro_silnt}\n      - {fault: gyro_silent}\n"
+        "      - {fault: nothing_like_it}\n"
+    )
+    done = command(app, "check", path, "--emulate")
+    assert done.exit_code == 2
+    first, second = done.stderr.splitlines()
+    assert "faults.yaml:5: bench.emulator.faults.0.fault: there is no fault 'gyro_silnt'; did you mean" in first
+    assert "faults.yaml:7: bench.emulator.faults.2.fault: there is no fault 'nothing_like_it'; there are" in second
+
+
+@pytest.mark.parametrize("backend", ["bench", "simulated"])
+def test_a_device_without_an_emulator_is_told_only_where_it_is_emulated(backend: str) -> None:
+    amplifier = {"device": "moteus", "can": {"interface": "socketcan"}}
+    moteus = {"backend": backend, "bench": {"amplifier": amplifier}}
+    ((path, text),) = device_faults(moteus, EMULATED)
+    assert path == ("bench", "amplifier", "device")
+    assert text == "'moteus' has no emulator; emulated are cia402, odrive"
+    assert list(device_faults(moteus)) == []
 
 
 @pytest.mark.parametrize(
