@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,10 +11,11 @@ from identify.channels import simplicity
 from identify.holdout import Split
 from identify.lines import foreign_lines_hz
 from identify.output_error import refine, squares_at
+from identify.pairs import Pair, pairs
 from identify.parameters import Name
 from identify.regression import Structure
 from identify.scores import Scored, Scores
-from identify.screen import scale_of
+from identify.screen import first_guess, scale_of
 from identify.traces import Trace
 from identify.whole_runs import AT_FLOOR, CHANCE, ENDS_NEAR, NEAR_THEN, STEPS, TWICE, Whole, fit_whole
 from rig import effects
@@ -91,6 +93,19 @@ class Candidates:
             if best.level > AT_FLOOR and w.squares < NEAR_THEN * best.squares and not chosen_anyway:
                 tried[name] = self._on(w)
         return tried, looks
+
+    def pairs(self, now: Whole) -> list[Pair]:
+        """Two effects at once that may be worth a fit; none that follow anything, and no channels."""
+        traces = [self.traces[i] for i in self.fit]
+        names = [
+            n for n in self.allowed
+            if n not in now.structure.effects and not simplicity(n)
+            and effects.get(n).place is not Place.SENSOR and not effects.get(n).resembles_much
+        ]  # fmt: skip
+        values = now.values()
+        jck = (values.get(("inertia",), 1.0), values.get(("damping",), 0.0), values.get(("stiffness",), 0.0))
+        start = replace(first_guess(traces, now.structure), platform=jck)
+        return pairs(traces, now.structure, now.judged().shapes(), start, self._scale(now), names)
 
     def _on(self, fitted: Whole) -> Whole:
         """A fit that still goes down, taken on: a sharp resonance is found late, and then at once."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from identify.candidates import Candidates
 from identify.channels import simplicity
+from identify.pairs import Pair
 from identify.parameters import Name
 from identify.results import Candidate
 from identify.scores import Scored
@@ -64,12 +65,12 @@ class FineSearch:
             return False
         self.tried_at, self.attempts = begin.level, self.attempts + 1
         self.on_offer.horizon = found.horizon
-        trial = replace(
-            found, candidates=list(found.candidates), rivals=dict(found.rivals), dropped=list(found.dropped),
-            rival_models=dict(found.rival_models),
-        )  # fmt: skip
+        trial = _copy_of(found)
         if not self._rounds(trial, begin):
-            return False
+            trial = _copy_of(found)
+            pair = self._hidden_pair(trial, begin)
+            if pair is None or not self._rounds(trial, pair):
+                return False
         found.best, found.floor = trial.best, trial.floor
         found.candidates, found.rivals, found.dropped = trial.candidates, trial.rivals, trial.dropped
         found.rival_models = trial.rival_models
@@ -104,6 +105,29 @@ class FineSearch:
         now = self._asked_again(found, now)
         found.best, found.floor = now.judged(), self.noise
         return True
+
+    def _hidden_pair(self, found: Search, now: Whole) -> Whole | None:
+        """With two effects that no search for one at a time finds, where both bring the model near the data."""
+        fitted = [w for w in map(self._both(now), self.on_offer.pairs(now)) if w is not None]
+        best = min(fitted, key=lambda w: w.squares, default=None)
+        if best is None or best.level > ENDS_NEAR:
+            return None
+        new = sorted(best.structure.effects[-2:], key=best.judged().strength, reverse=True)
+        round_ = 1 + max((c.round for c in found.candidates), default=0)
+        held = float(np.sqrt(best.held / max(best.held_count, 1))) * self.noise
+        for name in new:
+            found.candidates.append(Candidate(name, round_, best.penalised - now.penalised, held, "added"))
+        self.say(
+            f"added {' and '.join(new)} at once: free-run error {now.estimate.sigma:.3g} -> {best.estimate.sigma:.3g}"
+        )
+        ordered = replace(best.structure, effects=(*best.structure.effects[:-2], *new))
+        return self.whole(ordered, best.values())
+
+    def _both(self, now: Whole) -> Callable[[Pair], Whole | None]:
+        """How a pair is fitted on top of a model."""
+        return lambda pair: self.on_offer.by_way_of_a_short_horizon(
+            now.structure.plus(pair.names[0]).plus(pair.names[1]), {**now.values(), **pair.start}
+        )
 
     @staticmethod
     def _astray(new: Whole, now: Whole) -> bool:
@@ -262,6 +286,14 @@ class FineSearch:
             if s.effect not in tried:
                 penalty = s.count * float(np.log(max(now.count, 2)))
                 found.candidates.append(Candidate(s.effect, round_, penalty - s.gain, None, "screened out"))
+
+
+def _copy_of(found: Search) -> Search:
+    """Of which nothing reaches the original."""
+    return replace(
+        found, candidates=list(found.candidates), rivals=dict(found.rivals), dropped=list(found.dropped),
+        rival_models=dict(found.rival_models),
+    )  # fmt: skip
 
 
 def _as_near(simple: Whole, rich: Whole) -> bool:

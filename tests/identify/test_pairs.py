@@ -1,0 +1,52 @@
+"""Two effects that hide each other are found at once, and nothing is paired where one effect says it all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identify.pairs import pairs
+from identify.regression import Structure
+from identify.screen import first_guess, scale_of
+from identify.traces import prepare
+from rig import effects
+from rig.dynamics import TorqueSignal, simulate
+from rig.effects.base import Place
+from rig.platform import Platform
+from rig.recording.run import Recording
+from tests.identify.simulated import NOISE_RAD_S, SETS, TRUTH, sine_run
+
+GAP_AND_DEAD_ZONE = {"torque_deadzone": {"width": 1.1}, "backlash": {"half_gap": 0.0016}}
+NAMES = [n for n in effects.known() if effects.get(n).place is not Place.SENSOR and not effects.get(n).resembles_much]
+
+
+def recording(given: dict[str, dict[str, float]]) -> Recording:
+    runs = []
+    for i, (torque_nm, frequency_hz) in enumerate(SETS):
+        run = sine_run(torque_nm, frequency_hz)
+        assert run.torque_nm is not None
+        torque = TorqueSignal(run.time_s, run.torque_nm)
+        rate = simulate(Platform(*TRUTH, given), run.time_s, torque, substeps=16).sensed_rate_rad_s
+        runs.append(replace(run, rate_rad_s=rate + NOISE_RAD_S * np.random.default_rng(i).standard_normal(len(rate))))
+    return Recording(tuple(runs))
+
+
+def test_a_gap_and_a_dead_zone_that_cancel_are_the_pair_that_takes_most_away() -> None:
+    traces = [prepare(run, i) for i, run in enumerate(recording(GAP_AND_DEAD_ZONE).runs)]
+    start = replace(first_guess(traces, Structure()), platform=TRUTH)
+    found = pairs(traces, Structure(), {}, start, scale_of(traces, TRUTH, ()), [n for n in NAMES if n != "rate_bias"])
+    assert {"torque_deadzone", "backlash"} in [set(pair.names) for pair in found]
+    [pair] = [p for p in found if set(p.names) == {"torque_deadzone", "backlash"}]
+    assert pair.start.keys() == {("torque_deadzone", "width"), ("backlash", "half_gap")}
+    assert 0.3 < pair.start[("torque_deadzone", "width")] / 1.1 < 3.0
+
+
+def test_values_to_begin_from_are_those_of_the_regression() -> None:
+    given = {"cubic_stiffness": {"factor": 300.0}, "quadratic_damping": {"factor": 0.05}}
+    traces = [prepare(run, i) for i, run in enumerate(recording(given).runs)]
+    start = replace(first_guess(traces, Structure()), platform=TRUTH)
+    found = pairs(traces, Structure(), {}, start, scale_of(traces, TRUTH, ()), ["cubic_stiffness", "quadratic_damping"])
+    assert found
+    assert abs(found[0].start[("cubic_stiffness", "factor")] / 300.0 - 1.0) < 0.05
+    assert abs(found[0].start[("quadratic_damping", "factor")] / 0.05 - 1.0) < 0.1
