@@ -20,23 +20,19 @@ from drivers.can_link import CanLink
 from drivers.capture import Capture, export
 from drivers.gyro_line import GyroReport
 from drivers.gyroscopes import make_gyroscope
+from drivers.on_devices import RigOnDevices
 from drivers.restamping import Restamping, takes_reported
 from rig import realtime
 from rig.config.bench import BenchConfig, ProbeConfig
 from rig.errors import DeviceFault
 from rig.interface import (
-    Correction,
     Exchange,
-    ExpectedDelay,
     GyroSample,
-    LowPass,
-    Rig,
     Statement,
     Torque,
     TorqueOfTime,
     TorqueSample,
 )
-from rig.recording.run import TorqueHold
 
 
 @dataclass(frozen=True)
@@ -49,7 +45,7 @@ class BenchReport:
     emergencies: tuple[str, ...] = ()
 
 
-class BenchRig(Rig):
+class BenchRig(RigOnDevices):
     """A rig made of devices.
 
     Parameters
@@ -99,36 +95,6 @@ class BenchRig(Rig):
                 f"{self.gyroscope.label} on {gyro.port}",
             ),
         )
-
-    @property
-    def torque_hold(self) -> TorqueHold:
-        """A set point is held until the next."""
-        return "zero_order"
-
-    @property
-    def noise_rad_s(self) -> float | None:
-        """As the gyro's data sheet has it."""
-        return self.gyroscope.noise_rad_s
-
-    @property
-    def rate_low_pass(self) -> LowPass | None:
-        """Of the gyroscope."""
-        return self.gyroscope.low_pass
-
-    @property
-    def expected_delay(self) -> ExpectedDelay:
-        """Of both roads, as far as the drivers know them."""
-        return self._restamping.expected_delay()
-
-    @property
-    def rate_full_scale_rad_s(self) -> float | None:
-        """Of the gyroscope."""
-        return self.gyroscope.full_scale_rad_s
-
-    @property
-    def rate_full_scale_key(self) -> str:
-        """The device decides, by its data sheet."""
-        return "bench.gyroscope.device"
 
     @property
     def probe(self) -> ProbeConfig | None:
@@ -246,10 +212,6 @@ class BenchRig(Rig):
         """Marks the capture."""
         self._mark("end_set")
         self._restamping.end_set()
-
-    def corrections(self) -> tuple[Correction, ...]:
-        """Of both clocks, by straight lines through all that was heard around a set."""
-        return self._restamping.corrections()
 
     # -- account ---------------------------------------------------------------------------------
 

@@ -20,22 +20,18 @@ from drivers.can_link import CanLink, Heard
 from drivers.capture import Entry, read_capture, unpack_frame, unpack_torque
 from drivers.codecs.lawicel import CanFrame
 from drivers.gyroscopes import make_gyroscope
+from drivers.on_devices import RigOnDevices
 from drivers.restamping import Restamping
 from rig.config.bench import BenchConfig, ProbeConfig
 from rig.errors import RecordingError
 from rig.interface import (
-    Correction,
     Exchange,
-    ExpectedDelay,
     GyroSample,
-    LowPass,
-    Rig,
     Statement,
     Torque,
     TorqueOfTime,
     TorqueSample,
 )
-from rig.recording.run import TorqueHold
 
 SAME_TORQUE_NM = 1e-6
 
@@ -93,7 +89,7 @@ class ReplayClock:
         return self.now_s()
 
 
-class ReplayRig(Rig):
+class ReplayRig(RigOnDevices):
     """A rig whose devices are a capture.
 
     Parameters
@@ -126,36 +122,6 @@ class ReplayRig(Rig):
     def statement(self) -> Statement:
         """Torque is SIMULATED: nothing moves."""
         return Statement(Torque.SIMULATED, (f"replay of {self._path}",))
-
-    @property
-    def torque_hold(self) -> TorqueHold:
-        """As on the bench."""
-        return "zero_order"
-
-    @property
-    def noise_rad_s(self) -> float | None:
-        """As on the bench."""
-        return self.gyroscope.noise_rad_s
-
-    @property
-    def rate_low_pass(self) -> LowPass | None:
-        """Of the gyroscope."""
-        return self.gyroscope.low_pass
-
-    @property
-    def expected_delay(self) -> ExpectedDelay:
-        """As on the bench."""
-        return self._restamping.expected_delay()
-
-    @property
-    def rate_full_scale_rad_s(self) -> float | None:
-        """As on the bench."""
-        return self.gyroscope.full_scale_rad_s
-
-    @property
-    def rate_full_scale_key(self) -> str:
-        """As on the bench."""
-        return "bench.gyroscope.device"
 
     @property
     def probe(self) -> ProbeConfig | None:
@@ -237,10 +203,6 @@ class ReplayRig(Rig):
     def end_set(self) -> None:
         """As on the bench."""
         self._restamping.end_set()
-
-    def corrections(self) -> tuple[Correction, ...]:
-        """As on the bench: the same bytes, so the same lines."""
-        return self._restamping.corrections()
 
     def torque_off(self) -> None:
         """There is no torque."""

@@ -32,21 +32,7 @@ def _fine_steps(table, values, torque, motor, n, mode, out):  # type: ignore[no-
     ``torque`` has the quarter steps to follow, shape (4 n,). ``out`` takes rows of angle, rate, rate behind the
     sensor and torque asked of the drive effects.
     """
-    at, of = native.floats_at, native.offset
-    motion, states, z, scratch = at(table[0]), table[1], at(table[2]), at(table[3])
-    width = max(4, states)
-    body = (
-        table[4], table[5], native.integers_at(table[6]), native.integers_at(table[7]),
-        at(table[8]), native.integers_at(table[9]),
-    )  # fmt: skip
-    constants = at(table[10])
-    jck = (constants[0], constants[1], constants[2])
-    work = (
-        scratch, of(scratch, width), of(scratch, 2 * width),
-        of(scratch, 3 * width), of(scratch, 4 * width), of(scratch, 5 * width),
-    )  # fmt: skip
-    saved, before = of(scratch, 6 * width), of(scratch, 7 * width)
-    kinks, bends = table[12], at(table[13])
+    motion, states, z, jck, body, work, saved, before, kinks, bends = integrator.laid_out(table)
     h = values[0]
     quarters = np.empty(4)
     for i in range(n):

@@ -283,18 +283,11 @@ def run_spans(starts, spans, offset_s, z, h, torque, jck, kernels, loads, z_at, 
 
 
 @jit
-def advance(table, values):  # type: ignore[no-untyped-def]
-    """A few fine steps under a torque running linearly from one value to another, drive and sensor included.
-
-    Everything that stays the same comes as addresses in ``table`` (see ``Stepper``): a call takes one
-    microsecond instead of fifty. ``values`` holds the fine step and the torque at start and end; it takes
-    angle, rate, sensed rate and shaft torque, and must hold the shaft torque of the previous call.
-    """
-    motion, states, z, scratch = floats_at(table[0]), table[1], floats_at(table[2]), floats_at(table[3])
-    width, loads, count = max(4, states), table[4], table[5]
+def laid_out(table):  # type: ignore[no-untyped-def]
+    """What stands behind the addresses of ``Equations.table``, as ``step_over_kinks`` takes it."""
+    scratch, width = floats_at(table[3]), max(4, table[1])
     body = (
-        loads, count, integers_at(table[6]), integers_at(table[7]),
-        floats_at(table[8]), integers_at(table[9]),
+        table[4], table[5], integers_at(table[6]), integers_at(table[7]), floats_at(table[8]), integers_at(table[9]),
     )  # fmt: skip
     constants = floats_at(table[10])
     jck = (constants[0], constants[1], constants[2])
@@ -303,7 +296,29 @@ def advance(table, values):  # type: ignore[no-untyped-def]
         offset(scratch, 3 * width), offset(scratch, 4 * width), offset(scratch, 5 * width),
     )  # fmt: skip
     saved, before = offset(scratch, 6 * width), offset(scratch, 7 * width)
-    kinks, bends = table[12], floats_at(table[13])
+    return (
+        floats_at(table[0]),
+        table[1],
+        floats_at(table[2]),
+        jck,
+        body,
+        work,
+        saved,
+        before,
+        table[12],
+        floats_at(table[13]),
+    )
+
+
+@jit
+def advance(table, values):  # type: ignore[no-untyped-def]
+    """A few fine steps under a torque running linearly from one value to another, drive and sensor included.
+
+    Everything that stays the same comes as addresses in ``table`` (see ``Stepper``): a call takes one
+    microsecond instead of fifty. ``values`` holds the fine step and the torque at start and end; it takes
+    angle, rate, sensed rate and shaft torque, and must hold the shaft torque of the previous call.
+    """
+    motion, states, z, jck, body, work, saved, before, kinks, bends = laid_out(table)
     h, m_start, m_end, steps = values[0], values[1], values[2], table[11]
     for i in range(steps):
         shaft = through_filters(m_start + (m_end - m_start) * (i + 1) / steps, h, table, 14)
