@@ -17,6 +17,7 @@ import can
 
 from drivers.codecs.lawicel import BIT_RATE_CODES, CanFrame
 from drivers.listening import ListeningPort
+from drivers.ports import url_fault
 from drivers.slcan import SlcanBulkBus
 from drivers.socket_port import open_port
 from rig.config.bench import CanConfig
@@ -27,6 +28,8 @@ MOST_FRAMES_A_POLL = 10_000
 SEND_TIMEOUT_S = 0.005
 MOST_ERRORS, ERRORS_WITHIN_S = 20, 0.1
 OWN_INTERFACE = "slcan_bulk"
+OWN_URLS = {"etas": "ETAS://"}  # what an interface calls its own channels; pyserial has no part in it
+CODE_OPTIONS = {"usb2can": ("dll",)}  # they name a library that python-can would load and run
 OWN_OPTIONS = ("listen_only", "timestamps", "answer_timeout_s", "tty_baudrate")
 
 
@@ -188,7 +191,9 @@ def bus_faults(config: CanConfig) -> Iterator[tuple[str, str]]:
             near = get_close_matches(config.interface, known, 1)
             hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
             yield "interface", f"python-can has no interface {config.interface!r}; {hint}"
+        yield from _harm(config)
         return
+    yield from _harm(config)
     if config.bitrate not in BIT_RATE_CODES:
         allowed = ", ".join(str(rate) for rate in sorted(BIT_RATE_CODES))
         yield "bitrate", f"{config.bitrate} is none of a Lawicel adapter's: {allowed}"
@@ -197,13 +202,24 @@ def bus_faults(config: CanConfig) -> Iterator[tuple[str, str]]:
             yield f"options.{key}", f"unknown key; {OWN_INTERFACE} knows {', '.join(OWN_OPTIONS)}"
 
 
+def _harm(config: CanConfig) -> Iterator[tuple[str, str]]:
+    """What would let python-can write files, reach other machines or run code: the key, and why it is refused."""
+    own = OWN_URLS.get(config.interface)
+    fault = url_fault(config.channel.removeprefix(own) if own else config.channel) if config.channel else None
+    if fault is not None:
+        yield "channel", fault
+    for key in CODE_OPTIONS.get(config.interface, ()):
+        if key in config.options:
+            yield f"options.{key}", f"is not allowed: {config.interface} would run the code in that file"
+
+
 def open_bus(config: CanConfig) -> can.BusABC:
     """The bus that the configuration names.
 
     Raises
     ------
     ConfigError
-        If python-can has no such interface or it does not take these options.
+        If python-can has no such interface, it does not take these options or the channel is a URL.
     DeviceFault
         If the adapter cannot be opened.
     """
@@ -212,6 +228,8 @@ def open_bus(config: CanConfig) -> can.BusABC:
             "bench.amplifier.can.channel is empty: name the adapter's port (`rig devices` lists them) "
             "or run with --emulate"
         )
+    for key, fault in _harm(config):
+        raise ConfigError(f"bench.amplifier.can.{key}: {fault}")
     options: dict[str, Any] = {"bitrate": config.bitrate, **config.options}
     try:
         if config.interface == OWN_INTERFACE:

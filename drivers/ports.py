@@ -18,6 +18,8 @@ import serial
 from rig.errors import DeviceFault
 
 POSIX = sys.platform != "win32"
+URL_SIGN = "://"  # anywhere: pyserial splits at the first one
+MOST_QUOTED = 200
 _BULK = 65_536
 _ONE_READ = 2048
 
@@ -176,6 +178,17 @@ class SerialPort:
                 switch(True)
             except (OSError, ValueError, NotImplementedError):
                 return
+
+
+def url_fault(port: str) -> str | None:
+    """Why ``port`` is no name of a port where it is a URL, else None.
+
+    pyserial and what is built on it open URLs too, and some of them write files or reach other machines
+    (spy://...?file=, socket://, rfc2217://): a configuration from elsewhere must not.
+    """
+    if URL_SIGN not in port:
+        return None
+    return f"{port[:MOST_QUOTED]!r} is a URL, and only plain names and paths of ports are taken: /dev/ttyUSB0, COM3"
 
 
 def is_same_port(one: str, other: str) -> bool:

@@ -10,8 +10,8 @@ import select
 import socket
 import time
 
-from drivers.ports import BytePort, SerialPort, gone, stalled
-from rig.errors import DeviceFault
+from drivers.ports import BytePort, SerialPort, gone, stalled, url_fault
+from rig.errors import ConfigError, DeviceFault
 
 SCHEME = "unix:"
 _BULK = 65_536
@@ -82,5 +82,16 @@ class SocketPort:
 
 
 def open_port(path: str, baud: int) -> BytePort:
-    """The port of that name: a serial one, or an emulator's socket. Raises DeviceFault where it cannot be opened."""
+    """The port of that name: a serial one, or an emulator's socket.
+
+    Raises
+    ------
+    ConfigError
+        If it is a URL.
+    DeviceFault
+        If it cannot be opened.
+    """
+    fault = url_fault(path)
+    if fault is not None:
+        raise ConfigError(f"port {fault}")
     return SocketPort(path) if path.startswith(SCHEME) else SerialPort(path, baud)

@@ -34,6 +34,7 @@ def device_faults(data: Mapping[str, Any], played_on: str = SIMULATED) -> Iterat
     yield from _refused("gyroscope", bench, GyroscopeConfig, make_gyroscope)
     yield from _refused("amplifier", bench, AmplifierConfig, make_amplifier)
     yield from _bus_faults(data)
+    yield from _url_faults(data)
     yield from _injected_faults(data)
     if played_on == EMULATED:
         yield from _without_emulator(data)
@@ -74,6 +75,16 @@ def _bus_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     if config is not None and is_whole:
         for key, text in bus_faults(config):
             yield (*CAN, *key.split(".")), text
+
+
+def _url_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    """A gyroscope's port that is a URL; the adapter's is told with its bus."""
+    from drivers.ports import url_fault
+
+    port = _at(data, GYRO_PORT)
+    fault = url_fault(port) if isinstance(port, str) else None
+    if fault is not None:
+        yield GYRO_PORT, fault
 
 
 def _port_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:

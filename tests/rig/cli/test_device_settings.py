@@ -115,6 +115,51 @@ def test_ports_that_nobody_opens_may_be_anything() -> None:
     assert list(device_faults(ports(None, None, replay="runs/earlier"), played_on="bench")) == []
 
 
+URLS = (
+    "spy:///dev/ttyX9?file={file}", "SPY://loop://?file={file}", "hwgrep://.*", "loop://", "socket://127.0.0.1:1",
+    "rfc2217://127.0.0.1:1",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("url", URLS)
+@pytest.mark.parametrize("interface", ["slcan", "robotell", "seeedstudio", "serial", "slcan_bulk", "socketcan"])
+def test_a_can_channel_that_is_a_url_is_refused_at_its_key_and_touches_no_file(
+    tmp_path: Path, interface: str, url: str
+) -> None:
+    precious = tmp_path / "precious.txt"
+    precious.write_text("three years of work")
+    channel = url.format(file=precious)
+    path = tmp_path / "rig.yaml"
+    path.write_text(
+        f"backend: bench\nbench:\n  gyroscope: {{port: /dev/ttyX8}}\n  amplifier:\n    can:\n"
+        f"      interface: {interface}\n      channel: '{channel}'\n"
+    )
+    done = command(app, "check", path)
+    assert done.exit_code == 2
+    assert "rig.yaml:7: bench.amplifier.can.channel: " in done.stderr and "is a URL" in done.stderr
+    assert precious.read_text() == "three years of work"
+
+
+@pytest.mark.parametrize("played_on", ["bench", EMULATED])
+def test_a_gyroscopes_port_that_is_a_url_is_refused_at_its_key(played_on: str) -> None:
+    told = dict(device_faults(ports("spy:///dev/ttyX9?file=/tmp/x", "/dev/ttyX8"), played_on=played_on))
+    assert list(told) == [("bench", "gyroscope", "port")]
+    assert "only plain names and paths" in told["bench", "gyroscope", "port"]
+
+
+def test_a_channel_that_an_interface_itself_calls_by_a_url_is_taken() -> None:
+    own = {"interface": "etas", "channel": "ETAS://ETH/ES910:abcd/CAN:1", "bitrate": 500_000}
+    data = {"backend": "bench", "bench": {"gyroscope": {"port": "/dev/ttyX8"}, "amplifier": {"can": own}}}
+    assert list(device_faults(data, played_on="bench")) == []
+
+
+def test_a_library_to_be_loaded_is_refused() -> None:
+    bus = {"interface": "usb2can", "channel": "ED000100", "options": {"dll": "evil.dll"}}
+    ((path, text),) = device_faults({"backend": "bench", "bench": {"amplifier": {"can": bus}}})
+    assert path == ("bench", "amplifier", "can", "options", "dll")
+    assert "would run the code" in text
+
+
 def test_both_empty_ports_are_told_at_once() -> None:
     told = dict(device_faults({"backend": "bench", "bench": {}}, played_on="bench"))
     assert [".".join(map(str, path)) for path in told] == ["bench.gyroscope.port", "bench.amplifier.can.channel"]
