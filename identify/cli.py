@@ -248,10 +248,13 @@ def _identified(desk: Desk, loaded: LoadedConfig, recording: Recording) -> Ident
 def _conclude(
     desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, recording: Recording, found: Identification
 ) -> int:
-    """Write the results and the summary; returns 0 or 1."""
+    """Write the results and the summary; returns 0, 1, or 130 where somebody asked to stop."""
     from identify.summary import WIDTH, summary
     from rig.cli.exits import NOT_ACCEPTED, OK, STOPPED
 
+    late = desk.stops.outstanding()  # asked for by what cannot raise: the loss of the terminal
+    if late is not None:
+        found = dataclasses.replace(found, aborted=True, accepted=False, reasons=(f"{late}.", *found.reasons))
     path = _write(desk, loaded, folder, recording, found)
     desk.terminal.settle()
     if not desk.options.quiet:

@@ -8,8 +8,10 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from rig.cli.backends import BACKENDS, EMULATED, Stage, backend_name
 from rig.cli.desk import Desk
@@ -22,7 +24,7 @@ from rig.cli.results_folder import ResultsFolder
 from rig.cli.saving import figures, save
 from rig.cli.terminal import SetBars, Terminal
 from rig.config.load import LoadedConfig
-from rig.errors import PreflightRefusal, RigError, UsageError
+from rig.errors import Aborted, PreflightRefusal, RigError, UsageError
 from rig.excitation import PlannedSet
 from rig.guard import Guard
 from rig.guard_motion import motion_checks
@@ -149,7 +151,10 @@ def _record(
     desk: Desk, stage: Stage, loaded: LoadedConfig, sets: Sequence[PlannedSet], folder: ResultsFolder, part: Part,
     every: Sequence[str],
 ) -> Played:  # fmt: skip
-    """Play, then export what the journal and the sequencer have; ``every`` names all sets of the campaign."""
+    """Play, then export what the journal and the sequencer have; ``every`` names all sets of the campaign.
+
+    A signal after the last tick counts too: all is saved, and the campaign ends as one that was stopped.
+    """
     path = folder.made()
     part.bring(path)
     played_on = backend_name(loaded.config, desk.options.dry_run, desk.options.emulate)
@@ -159,8 +164,17 @@ def _record(
         info["resumed_from"] = str(part.resumes)
     head = {"axis": "rotary", "noise": stage.rig.noise_rad_s, "planned": [s.name for s in sets]} | info
     head["planned_in_all"] = list(every)
-    recorder.run(Journal.create(path / part.journal, head))
-    cause, tally = recorder.cause, recorder.tally
+    with desk.stops.deferring():
+        recorder.run(Journal.create(path / part.journal, head))
+        played = _saved(desk, stage, recorder, info, folder, part)
+    return played if played.cause is not None else replace(played, cause=_stopped_late(desk))
+
+
+def _saved(
+    desk: Desk, stage: Stage, recorder: _Recorder, info: dict[str, Any], folder: ResultsFolder, part: Part
+) -> Played:
+    """What was played, written and told. Raises UsageError where it was refused before anything was."""
+    cause, tally = recorder.cause or _stopped_late(desk), recorder.tally
     if isinstance(cause, UsageError) and not tally.statistics:
         _take_back(folder, part)
         raise cause
@@ -173,8 +187,13 @@ def _record(
     if expected is not None:
         info["expected_torque_delay"] = expected._asdict()
     played = Played(Recording(()), tally.whole, cause, (part.journal,), stage.rig.rate_full_scale_rad_s)
-    with desk.stops.saving():
-        return save(desk, path, recorder.recording, info, played, part)
+    return save(desk, folder.path, recorder.recording, info, played, part)
+
+
+def _stopped_late(desk: Desk) -> Aborted | None:
+    """The request to stop that came after the last tick, when nobody polled any more."""
+    reason = desk.stops.outstanding()
+    return Aborted(f"{reason}: torque is off; what was recorded until then is kept.") if reason else None
 
 
 def _take_back(folder: ResultsFolder, part: Part) -> None:

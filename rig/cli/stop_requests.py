@@ -13,6 +13,7 @@ from rig.errors import Aborted
 # By name: not every system has all of them.
 SIGNALS = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "the loss of its terminal", "SIGBREAK": "Ctrl-Break"}
 STOPPING = "Stopping: torque to zero, then saving. Ctrl-C again cuts the torque at once."
+SAVING = "Stopping as soon as what is being saved is saved."
 
 
 class _Stage(Enum):
@@ -34,10 +35,19 @@ class StopRequests:
         self.tell: Callable[[str], None] = lambda text: None
         self._torque_off: Callable[[], None] | None = None
         self._stage = _Stage.IDLE
+        self._is_heeded = False  # whether somebody has acted on the reason
 
     def poll(self) -> str | None:
         """The reason to stop, or None. Asked by the sequencer at every tick."""
         self._stage = _Stage.TICKING
+        self._is_heeded = self.reason is not None
+        return self.reason
+
+    def outstanding(self) -> str | None:
+        """The reason to stop where nobody has acted on it yet, else None. Whoever asks has to act on it."""
+        if self._is_heeded or self.reason is None:
+            return None
+        self._is_heeded = True
         return self.reason
 
     def request(self, reason: str) -> None:
@@ -47,23 +57,31 @@ class StopRequests:
     @contextlib.contextmanager
     def playing(self, torque_off: Callable[[], None]) -> Iterator[None]:
         """While this holds there may be torque, and ``torque_off`` is the shortest road to none."""
+        earlier = self._stage
         self._torque_off, self._stage = torque_off, _Stage.IDLE
         try:
             yield
         finally:
-            self._torque_off, self._stage = None, _Stage.IDLE
+            self._torque_off, self._stage = None, earlier
 
     @contextlib.contextmanager
-    def saving(self) -> Iterator[None]:
-        """What is written in here is written whole. Raises Aborted at the end where somebody asked meanwhile."""
-        already = self.reason
+    def deferring(self) -> Iterator[None]:
+        """A signal in here raises nothing; whoever holds this asks ``outstanding`` before it goes on."""
+        earlier = self._stage
         self._stage = _Stage.SAVING
         try:
             yield
         finally:
-            self._stage = _Stage.IDLE
-        if self.reason is not None and already is None:
-            raise Aborted(f"{self.reason}.")
+            self._stage = earlier
+
+    @contextlib.contextmanager
+    def saving(self) -> Iterator[None]:
+        """What is written in here is written whole. Raises Aborted at the end where somebody has asked to stop."""
+        with self.deferring():
+            yield
+        reason = self.outstanding()
+        if reason is not None:
+            raise Aborted(f"{reason}.")
 
     @contextlib.contextmanager
     def heeded(self) -> Iterator[None]:
@@ -85,7 +103,10 @@ class StopRequests:
         self.request(f"Stopped by {SIGNALS[signal.Signals(number).name]}")
         if is_first and self._stage is _Stage.TICKING:
             self.tell(STOPPING)
+        elif is_first and self._stage is _Stage.SAVING:
+            self.tell(SAVING)
         elif is_first and self._stage is _Stage.IDLE:
+            self._is_heeded = True
             raise Aborted(f"{self.reason}.")
         elif number == signal.SIGINT and not is_first:
             if self._torque_off is not None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +17,8 @@ import pytest
 from identify.cli import app
 from identify.results import Identification
 from rig.cli.exits import TRACEBACK_FILE
+from rig.cli.saving import save
+from rig.cli.terminal import Terminal
 from rig.config.identify import IdentifyConfig
 from rig.errors import DeviceFault, RecordingError, RigError
 from rig.platform import Platform
@@ -233,6 +237,47 @@ def test_ctrl_c_during_the_identification_ends_in_130_with_the_recording_kept(
     out = tmp_path / "out"
     assert command(app, write_config(tmp_path), "--out", out).exit_code == 130
     assert len(read_recording_h5(out / "recording.h5").runs) == 2
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a process cannot signal itself gently there")
+def test_ctrl_c_just_after_the_last_set_ends_in_130_and_marks_the_results_aborted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, accepted: Identifier
+) -> None:
+    put_on_stage(monkeypatch, ScriptedRig(on_disarm=lambda: os.kill(os.getpid(), signal.SIGINT)))
+    out = tmp_path / "out"
+    done = command(app, write_config(tmp_path), "--out", out)
+    assert done.exit_code == 130
+    assert "Stopped by Ctrl-C" in done.stderr
+    assert json.loads((out / "result.json").read_text())["aborted"] is True
+    assert len(read_recording_h5(out / "recording.h5").runs) == 2
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a process cannot signal itself gently there")
+def test_ctrl_c_while_the_recording_is_saved_ends_in_130_with_results_marked_aborted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, accepted: Identifier
+) -> None:
+    def save_and_stop(*arguments: Any, **more: Any) -> Any:
+        os.kill(os.getpid(), signal.SIGINT)
+        return save(*arguments, **more)
+
+    monkeypatch.setattr("rig.cli.campaign.save", save_and_stop)
+    out = tmp_path / "out"
+    assert command(app, write_config(tmp_path), "--out", out).exit_code == 130
+    assert json.loads((out / "result.json").read_text())["aborted"] is True
+    assert len(read_recording_h5(out / "recording.h5").runs) == 2
+
+
+def test_a_terminal_lost_during_the_identification_ends_in_130_with_results_marked_aborted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, accepted: Identifier
+) -> None:
+    def note_and_lose(self: Terminal, text: str) -> None:
+        self.on_loss("Stopped because its terminal is gone")
+
+    monkeypatch.setattr(Terminal, "note", note_and_lose)
+    out = tmp_path / "out"
+    assert command(app, write_config(tmp_path), "--quiet", "--out", out).exit_code == 130
+    result = json.loads((out / "result.json").read_text())
+    assert result["aborted"] is True and "terminal is gone" in result["reasons"][0]
 
 
 def test_a_dry_run_simulates_whatever_the_file_says(tmp_path: Path, accepted: Identifier) -> None:

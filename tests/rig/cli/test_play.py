@@ -159,6 +159,20 @@ def test_a_trip_ends_in_4_and_names_the_limit(tmp_path: Path, monkeypatch: pytes
 
 @posix
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_just_after_the_last_set_ends_in_130_with_everything_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    rig = ScriptedRig(on_disarm=lambda: os.kill(os.getpid(), getattr(signal, name)))
+    put_on_stage(monkeypatch, rig)
+    done = command(app, "play", write_config(tmp_path), "--out", tmp_path / "out")
+    assert done.exit_code == 130
+    assert "Stopped by" in done.stderr and "2 complete set(s)" in done.stdout
+    assert run_names(tmp_path / "out") == ["5 Hz", "7 Hz"]
+    assert "Stopped by" in read_recording_h5(tmp_path / "out" / "recording.h5").info["aborted"]
+
+
+@posix
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_a_signal_ends_in_130_with_what_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     sent: list[float] = []
 

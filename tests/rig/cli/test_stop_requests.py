@@ -71,6 +71,35 @@ def test_what_is_being_saved_is_saved_whole_before_the_request_counts(stops: Sto
     assert saved
 
 
+def test_a_signal_after_the_last_tick_is_outstanding_until_somebody_asks(stops: StopRequests) -> None:
+    with stops.deferring():
+        with stops.playing(lambda: None):
+            stops.poll()
+            raise_signal(signal.SIGINT)
+        assert stops.outstanding() == "Stopped by Ctrl-C"
+        assert stops.outstanding() is None  # whoever asked acts on it
+
+
+def test_a_signal_after_the_last_tick_counts_at_the_end_of_the_saving(stops: StopRequests) -> None:
+    with stops.playing(lambda: None):
+        stops.poll()
+        raise_signal(signal.SIGINT)
+    with pytest.raises(Aborted, match="Ctrl-C"), stops.saving():
+        pass
+
+
+def test_what_a_tick_has_read_is_not_raised_a_second_time(stops: StopRequests) -> None:
+    with stops.deferring():
+        with stops.playing(lambda: None):
+            stops.poll()
+            raise_signal(signal.SIGTERM)
+            assert stops.poll() is not None
+        raise_signal(signal.SIGTERM)
+    with stops.saving():
+        pass
+    assert stops.outstanding() is None
+
+
 def test_handlers_from_before_are_put_back() -> None:
     before = signal.getsignal(signal.SIGTERM)
     with StopRequests().heeded():
