@@ -34,6 +34,7 @@ STRONG = 4.0  # standard errors by which every parameter of a new effect must di
 SHARE = 0.2  # of the excess over the noise that an effect has to take away
 FARTHEST = 3000.0  # times the noise: beyond, the sensor's noise is not what limits this record
 CLOSER = 0.5  # of the mean square at the last attempt
+FAR_CLOSER = 0.2  # the same where what was named since can follow anything, and brought it closer by that alone
 ATTEMPTS = 2
 STILL_FAR = 100.0  # mean square over the noise's variance
 VERY_FAR = 1e4
@@ -61,7 +62,8 @@ class FineSearch:
         and nothing found here is kept.
         """
         begin = self.whole(found.best.structure, found.best.values())
-        if begin is None or not self._near(begin):
+        pliant = any(effects.get(e).resembles_much for e in found.best.structure.effects)
+        if begin is None or not self._near(begin, FAR_CLOSER if pliant else CLOSER):
             return False
         self.tried_at, self.attempts = begin.level, self.attempts + 1
         self.on_offer.horizon = found.horizon
@@ -76,12 +78,12 @@ class FineSearch:
         found.rival_models = trial.rival_models
         return True
 
-    def _near(self, model: Whole) -> bool:
-        """Whether the free run stays close enough, and closer than where this was tried before."""
+    def _near(self, model: Whole, closer: float) -> bool:
+        """Whether the free run stays close enough, and by how much closer than where this was tried before."""
         if self.attempts >= ATTEMPTS and model.level > ENDS_NEAR:
             return False
         close = model.estimate.sigma < NEAR_SIGNAL * self.on_offer.moving and model.level < FARTHEST**2
-        return close and model.level < CLOSER * self.tried_at
+        return close and model.level < closer * self.tried_at
 
     def _rounds(self, found: Search, now: Whole) -> bool:
         """Rounds until nothing is worth adding; whether that ended near the sensor's noise."""
