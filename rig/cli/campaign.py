@@ -22,7 +22,7 @@ from rig.cli.places import with_places
 from rig.cli.provenance import provenance
 from rig.cli.results_folder import ResultsFolder
 from rig.cli.saving import figures, save
-from rig.cli.terminal import SetBars, Terminal
+from rig.cli.terminal import SetBars, Terminal, forget_typed_ahead
 from rig.config.load import LoadedConfig
 from rig.errors import Aborted, PreflightRefusal, RigError, UsageError
 from rig.excitation import PlannedSet
@@ -94,6 +94,8 @@ def _open(desk: Desk, stage: Stage, loaded: LoadedConfig, sets: Sequence[Planned
 
 
 def _ask(question: str) -> str:
+    """Put a question on stderr; returns the line that was typed after it. Raises EOFError where none comes."""
+    forget_typed_ahead(sys.stdin)
     sys.stderr.write(question)
     sys.stderr.flush()
     answer = sys.stdin.readline()

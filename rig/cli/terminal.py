@@ -6,6 +6,8 @@ thread writes, and the loop only hands over short lines. A terminal that is gone
 
 from __future__ import annotations
 
+import contextlib
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -25,6 +27,25 @@ LOST = "Stopped because its terminal is gone"
 def plain(text: str) -> str:
     """``text`` without what could steer a terminal: names come out of files."""
     return "".join(c if c.isprintable() else "?" for c in text)
+
+
+def forget_typed_ahead(stream: TextIO) -> None:
+    """Drop what was typed on a terminal and not read yet: it answers no question that was asked later.
+
+    Nothing is dropped where ``stream`` is no terminal.
+    """
+    if not stream.isatty():
+        return
+    if sys.platform == "win32":
+        import msvcrt
+
+        while msvcrt.kbhit():
+            msvcrt.getwch()
+        return
+    import termios
+
+    with contextlib.suppress(termios.error):
+        termios.tcflush(stream.fileno(), termios.TCIFLUSH)
 
 
 class Terminal:
