@@ -7,6 +7,8 @@ by the same frames as the torque, so a loop that hangs looks dead to the drive.
 
 from __future__ import annotations
 
+import contextlib
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,7 +26,7 @@ from drivers.on_devices import RigOnDevices
 from drivers.restamping import Restamping, takes_reported
 from rig import realtime
 from rig.config.bench import BenchConfig, ProbeConfig
-from rig.errors import DeviceFault
+from rig.errors import DeviceFault, RigError
 from rig.interface import (
     Exchange,
     GyroSample,
@@ -136,10 +138,12 @@ class BenchRig(RigOnDevices):
     # -- torque ----------------------------------------------------------------------------------
 
     def arm(self) -> None:
-        """The drive enabled at zero torque, its watchdog running."""
+        """The drive enabled at zero torque, its watchdog running. Raises Aborted where the disk is full already."""
         devices = self._devices
         if devices is None or devices.link is None:
             raise DeviceFault("the bench is armed before it is open: open it first")
+        if self._capture is not None:
+            self._capture.require_written()  # a disk that is full already is known before there is torque
         self._armed = True
         self.amplifier.arm(devices.link)
         devices.gather()
@@ -191,7 +195,12 @@ class BenchRig(RigOnDevices):
             ) from None
 
     def close(self) -> None:
-        """Let go of both ports and finish the capture; safe twice."""
+        """Let go of both ports and finish the capture; safe twice.
+
+        A capture that cannot be finished raises Aborted or OSError, but not on the way out of another error: what
+        ended the campaign decides.
+        """
+        under_way = sys.exception()
         try:
             if self._devices is not None:
                 self._devices.close()
@@ -199,9 +208,13 @@ class BenchRig(RigOnDevices):
             if self._grant is not None:
                 realtime.release()
             if self._capture is not None:
-                self._capture.close()
-                export(self._capture.path)
-                self._capture = None
+                self._finish_capture(self._capture, quietly=under_way is not None)
+
+    def _finish_capture(self, capture: Capture, quietly: bool) -> None:
+        self._capture = None
+        with contextlib.suppress(*((RigError, OSError) if quietly else ())):
+            capture.close()
+            export(capture.path)
 
     def begin_set(self, torque: TorqueOfTime, start_s: float) -> None:
         """Marks the capture; the clocks keep what is needed to stamp the set anew."""

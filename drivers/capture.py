@@ -148,14 +148,23 @@ class Capture:
 
     def flush_if_due(self, now_s: float) -> None:
         """Write what is pending if the last time was long enough ago and no thread does it."""
-        if self._failure is not None:
-            failure, self._failure = self._failure, None
-            raise failure
+        self._raise_failure()
         if self._threads:
             return
         if now_s - self._flushed_at_s >= WRITE_EVERY_S:
             self._flushed_at_s = now_s
             self.flush()
+
+    def _raise_failure(self) -> None:
+        """Raise what a thread could not write, once."""
+        failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
+
+    def require_written(self) -> None:
+        """Write what is pending and raise what went wrong until now: asked before there is torque."""
+        self.flush()
+        self._raise_failure()
 
     def flush(self) -> None:
         """Write what is pending."""
@@ -170,13 +179,17 @@ class Capture:
                 self._open = False  # once is enough: the way out must not stumble over it again
                 with contextlib.suppress(OSError):
                     self._file.close()
-                raise Aborted(f"the raw capture {self.path} cannot be written: {problem.strerror}") from None
+                raise Aborted(
+                    f"the raw capture {self.path} cannot be written: {problem.strerror}. What was written until then "
+                    "is kept; make room or choose another --out."
+                ) from None
 
     def close(self) -> None:
-        """Write the rest and close; safe twice."""
+        """Write the rest and close; safe twice. Raises Aborted where the disk did not take all and nobody was told."""
         for thread in self._threads:
             thread.stop()
         self._threads = ()
+        self._raise_failure()
         if self._open:
             self.flush()
             self._sync_quietly()

@@ -21,6 +21,7 @@ from rig.cli.parts import ALL_OF_IT, Part, Played
 from rig.cli.places import with_places
 from rig.cli.provenance import provenance
 from rig.cli.results_folder import ResultsFolder
+from rig.cli.room import bytes_needed, scarce_room
 from rig.cli.saving import figures, save
 from rig.cli.terminal import SetBars, Terminal, forget_typed_ahead
 from rig.config.load import LoadedConfig
@@ -89,6 +90,9 @@ def _open(desk: Desk, stage: Stage, loaded: LoadedConfig, sets: Sequence[Planned
     statement = stage.rig.statement()
     loudly = desk.terminal.insist if statement.torque is Torque.REAL else desk.terminal.tell
     loudly(opening(statement, loaded.config, sets, path))
+    scarce = scarce_room(path, bytes_needed(loaded.config, statement, sets, part))
+    if scarce:
+        desk.terminal.insist(scarce)
     desk.terminal.settle()
     part.consent(statement, desk.options.yes, sys.stdin is not None and sys.stdin.isatty(), _ask)
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
+from rig.cli.exits import as_known
 from rig.errors import UsageError
 
 RUNS = Path("runs")
 JOURNAL_FILE = "recording.journal"
 RECORDING_FILE = "recording.h5"
 RAW_FOLDER = "raw"
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 MOST_IN_A_SECOND = 1000
 
 
@@ -40,12 +43,17 @@ class ResultsFolder:
             raise UsageError(f"--out {self.path} exists and is never overwritten: choose another folder.")
 
     def made(self) -> Path:
-        """Make the folder, once, and return its path. Raises UsageError where it cannot be made."""
+        """Make the folder, once, and return its path.
+
+        Raises UsageError where it cannot be made, Aborted where that is because the disk is full.
+        """
         if not self.is_made:
             try:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
                 self.path.mkdir()
             except OSError as problem:
+                if problem.errno in NO_ROOM:
+                    raise as_known(problem) from None
                 raise self._cannot(problem) from None
             self.is_made = True
         return self.path

@@ -1,5 +1,6 @@
 """A bench without wires: an emulated gyro's bytes and an emulated drive, captured, then replayed."""
 
+import errno
 import math
 
 import numpy as np
@@ -18,6 +19,7 @@ from drivers.restamping import Restamping
 from rig.config.bench import AmplifierConfig, BenchConfig, CanConfig, GyroscopeConfig, RealTimeConfig
 from rig.errors import Aborted, DeviceFault, RecordingError
 from rig.interface import Torque
+from rig.recording.steady import SteadyFile
 from sim_backend.emulators.drive import Cia402Drive
 from tests.drivers.emulated_bus import EmulatedBus, FakeTime
 
@@ -239,6 +241,32 @@ def test_a_gyro_that_vanishes_while_it_is_contacted_is_told_once(bench, monkeypa
     with pytest.raises(DeviceFault) as caught, bench.opened():
         pass
     assert str(caught.value).count("wire has vanished") == 1
+
+
+def full_disk(monkeypatch):
+    def refuse(self, data):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(SteadyFile, "write", refuse)
+
+
+def test_a_disk_that_is_full_already_is_told_before_the_drive_is_armed(bench, monkeypatch):
+    full_disk(monkeypatch)
+    monkeypatch.setattr(bench.amplifier, "arm", lambda link: pytest.fail("the drive was enabled"))
+    with pytest.raises(Aborted, match="No space left on device"), bench.opened(), bench.armed():
+        pytest.fail("it was armed")
+
+
+def test_a_disk_that_is_full_at_the_end_is_told_as_such(bench, monkeypatch):
+    with pytest.raises(Aborted, match="No space left on device"), bench.opened(), bench.armed():
+        play(bench, 50)
+        full_disk(monkeypatch)
+
+
+def test_a_capture_that_cannot_be_finished_does_not_hide_what_ended_the_campaign(bench, monkeypatch):
+    with pytest.raises(DeviceFault, match="the drive fell silent"), bench.opened(), bench.armed():
+        full_disk(monkeypatch)
+        raise DeviceFault("the drive fell silent")
 
 
 def test_torque_is_refused_before_arming_and_off_is_safe_at_any_time(bench):
