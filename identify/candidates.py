@@ -104,7 +104,7 @@ class Candidates:
         ]  # fmt: skip
         values = now.values()
         jck = (values.get(("inertia",), 1.0), values.get(("damping",), 0.0), values.get(("stiffness",), 0.0))
-        start = replace(first_guess(traces, now.structure), platform=jck)
+        start = replace(first_guess(traces, Structure(now.structure.terms)), platform=jck)
         return pairs(traces, now.structure, now.judged().shapes(), start, self._scale(now), names)
 
     def _on(self, fitted: Whole) -> Whole:

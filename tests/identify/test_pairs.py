@@ -5,17 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from identify.loop import identify
 from identify.pairs import pairs
 from identify.regression import Structure
 from identify.screen import first_guess, scale_of
 from identify.traces import prepare
 from rig import effects
+from rig.config.identify import IdentifyConfig
 from rig.dynamics import TorqueSignal, simulate
 from rig.effects.base import Place
 from rig.platform import Platform
 from rig.recording.run import Recording
-from tests.identify.simulated import NOISE_RAD_S, SETS, TRUTH, sine_run
+from tests.identify.simulated import DECLARED, NOISE_RAD_S, SETS, TRUTH, sine_run
 
 GAP_AND_DEAD_ZONE = {"torque_deadzone": {"width": 1.1}, "backlash": {"half_gap": 0.0016}}
 NAMES = [n for n in effects.known() if effects.get(n).place is not Place.SENSOR and not effects.get(n).resembles_much]
@@ -50,3 +53,14 @@ def test_values_to_begin_from_are_those_of_the_regression() -> None:
     assert found
     assert abs(found[0].start[("cubic_stiffness", "factor")] / 300.0 - 1.0) < 0.05
     assert abs(found[0].start[("quadratic_damping", "factor")] / 0.05 - 1.0) < 0.1
+
+
+def test_a_model_that_has_effects_of_the_drive_already_is_looked_at_too() -> None:
+    given = {"torque_delay": {"delay": 3e-4}, **GAP_AND_DEAD_ZONE}
+    made = recording(given)
+    settings = IdentifyConfig.model_validate({"candidates": ["coulomb_friction", "torque_deadzone", "backlash"]})
+    declared = replace(DECLARED, effects={"torque_delay": {"delay": 0.0}})
+    found = identify(made, declared, settings)
+    assert set(found.verdict.effects) == {"torque_deadzone", "backlash"}
+    assert found.final.effect_parameters["torque_deadzone"]["width"].value == pytest.approx(1.1, rel=0.01)
+    assert found.final.effect_parameters["backlash"]["half_gap"].value == pytest.approx(0.0016, rel=0.01)
