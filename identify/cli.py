@@ -14,8 +14,6 @@ from rig.cli.exits import leave_warnings_to_developers
 from rig.cli.options import ConfigFile, DryRun, Emulate, Out, Overrides, Quiet, Resume, Seed, Version, Yes, new_app
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from identify.results import Identification
     from rig.cli.parts import Played
     from rig.cli.results_folder import ResultsFolder
@@ -255,12 +253,15 @@ def _conclude(
     late = desk.stops.outstanding()  # asked for by what cannot raise: the loss of the terminal
     if late is not None:
         found = dataclasses.replace(found, aborted=True, accepted=False, reasons=(f"{late}.", *found.reasons))
-    path = _write(desk, loaded, folder, recording, found)
-    desk.terminal.settle()
-    if not desk.options.quiet:
-        is_terminal = sys.stdout.isatty()
-        width = shutil.get_terminal_size().columns if is_terminal else WIDTH
-        sys.stdout.write(summary(found, width, is_terminal, recording.info) + f"\nResults: {path}\n")
+    try:
+        _write(desk, loaded, folder, recording, found)
+    finally:  # a disk that does not take the results is no reason to keep them back
+        desk.terminal.settle()
+        if not desk.options.quiet:
+            is_terminal = sys.stdout.isatty()
+            width = shutil.get_terminal_size().columns if is_terminal else WIDTH
+            where = f"\nResults: {folder.path}" if folder.evidence() else ""
+            sys.stdout.write(f"{summary(found, width, is_terminal, recording.info)}{where}\n")
     if found.accepted:
         return OK
     if found.aborted:
@@ -273,11 +274,10 @@ def _conclude(
 
 def _write(
     desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, recording: Recording, found: Identification
-) -> Path:
-    """Write the results; returns the folder."""
+) -> None:
+    """Write the results."""
     from identify.writing import write_results
 
     path = folder.made()
     with desk.stops.saving():
         write_results(path, found, recording, loaded.config.model.platform(), loaded.config.name)
-    return path

@@ -221,12 +221,12 @@ def write_results(
     name: str,
     journal: JournalContents | None = None,
 ) -> tuple[Path, ...]:
-    """Write recording.h5, model.yaml, follow_up.yaml, report.html and result.json into ``folder``, in that order.
+    """Write model.yaml, follow_up.yaml, result.json, recording.h5 and report.html into ``folder``, in that order.
 
     ``declared`` is the platform of the configuration, ``name`` the campaign's. A recording.h5 that stands
-    there already is left alone. Each file appears whole or not at all, and result.json last: where it
-    stands, the others do. Returns the paths written; model.yaml is left out where no valid model came out,
-    follow_up.yaml where nothing is planned.
+    there already is left alone. Each file appears whole or not at all, and what is small comes first: on a disk
+    that fills up, the numbers are there. Returns the paths written; model.yaml is left out where no valid model
+    came out, follow_up.yaml where nothing is planned.
 
     Raises
     ------
@@ -235,10 +235,6 @@ def write_results(
     JournalError
         The same, while writing recording.h5.
     """
-    written = []
-    if not (folder / "recording.h5").exists():
-        write_recording_h5(folder / "recording.h5", recording, journal)
-        written.append(folder / "recording.h5")
     try:
         texts = {"model.yaml": model_text(identification, declared)}
     except ValueError:
@@ -246,15 +242,16 @@ def write_results(
     follow_up = identification.follow_up
     if follow_up is not None and follow_up.plan is not None:
         texts[file_name(len(follow_up.rounds))] = follow_up_yaml(follow_up.plan)
-    texts["report.html"] = report_html(identification, recording, name)
     texts["result.json"] = json.dumps(result_json(identification), indent=1, allow_nan=False) + "\n"
-    for file, text in texts.items():
-        _replace(folder / file, text)
-        written.append(folder / file)
+    written = [_replace(folder / file, text) for file, text in texts.items()]
+    if not (folder / "recording.h5").exists():
+        write_recording_h5(folder / "recording.h5", recording, journal)
+        written.append(folder / "recording.h5")
+    written.append(_replace(folder / "report.html", report_html(identification, recording, name)))
     return tuple(written)
 
 
-def _replace(path: Path, text: str) -> None:
+def _replace(path: Path, text: str) -> Path:
     partial = path.with_name(path.name + ".part")
     try:
         partial.write_text(text, encoding="utf-8", newline="\n")
@@ -262,3 +259,4 @@ def _replace(path: Path, text: str) -> None:
     except OSError:
         partial.unlink(missing_ok=True)
         raise
+    return path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import json
 import os
 import signal
@@ -278,6 +279,23 @@ def test_a_terminal_lost_during_the_identification_ends_in_130_with_results_mark
     assert command(app, write_config(tmp_path), "--quiet", "--out", out).exit_code == 130
     result = json.loads((out / "result.json").read_text())
     assert result["aborted"] is True and "terminal is gone" in result["reasons"][0]
+
+
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT])
+def test_a_disk_that_does_not_take_the_report_ends_in_130_with_the_numbers_on_it_and_on_the_screen(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, accepted: Identifier, code: int
+) -> None:
+    def full(*arguments: object) -> str:
+        raise OSError(code, os.strerror(code), "report.html")
+
+    monkeypatch.setattr("identify.writing.report_html", full)
+    out = tmp_path / "out"
+    done = command(app, write_config(tmp_path), "--out", out)
+    assert done.exit_code == 130
+    assert os.strerror(code) in done.stderr
+    assert "Coulomb friction is missing" in done.stdout and str(out) in done.stdout
+    assert json.loads((out / "result.json").read_text())["accepted"] is True
+    assert files_in(out) >= ALL_FILES - {"report.html"}
 
 
 def test_a_dry_run_simulates_whatever_the_file_says(tmp_path: Path, accepted: Identifier) -> None:

@@ -176,7 +176,7 @@ def test_the_folder_gets_all_four_files_and_nothing_half_written(
     found: Identification, recording: Recording, tmp_path: Path
 ) -> None:
     written = write_results(tmp_path, found, recording, DECLARED, "default")
-    assert [path.name for path in written] == ["recording.h5", "model.yaml", "report.html", "result.json"]
+    assert [path.name for path in written] == ["model.yaml", "result.json", "recording.h5", "report.html"]
     assert {path.name for path in tmp_path.iterdir()} == {path.name for path in written}
     assert json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["accepted"] is True
 
@@ -194,14 +194,25 @@ def test_numbers_that_no_model_may_have_give_no_model_yaml(
 ) -> None:
     odd = without_platform(found, parameters={"inertia": estimate(-0.02, 1e-6)})
     written = write_results(tmp_path, odd, recording, DECLARED, "default")
-    assert [path.name for path in written] == ["recording.h5", "report.html", "result.json"]
+    assert [path.name for path in written] == ["result.json", "recording.h5", "report.html"]
 
 
-def test_a_folder_that_cannot_be_written_leaves_no_partial_file(
+def test_a_disk_that_has_no_room_for_the_report_has_the_numbers(
     found: Identification, recording: Recording, tmp_path: Path
 ) -> None:
     (tmp_path / "report.html").mkdir()
     with pytest.raises(OSError, match=r"report\.html"):
         write_results(tmp_path, found, recording, DECLARED, "default")
     assert not list(tmp_path.glob("*.part"))
-    assert not (tmp_path / "result.json").exists()
+    assert {path.name for path in tmp_path.iterdir()} == {"model.yaml", "result.json", "recording.h5", "report.html"}
+    assert json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["accepted"] is True
+
+
+def test_a_folder_that_cannot_be_written_leaves_no_partial_file(
+    found: Identification, recording: Recording, tmp_path: Path
+) -> None:
+    (tmp_path / "result.json").mkdir()
+    with pytest.raises(OSError, match=r"result\.json"):
+        write_results(tmp_path, found, recording, DECLARED, "default")
+    assert not list(tmp_path.glob("*.part"))
+    assert not (tmp_path / "report.html").exists()
