@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.cli.exits import conclude, report
+from rig.cli.exits import conclude, report, say
 from rig.cli.stop_requests import StopRequests
 
 if TYPE_CHECKING:
@@ -34,14 +34,15 @@ class Options:
     resume: Path | None = None
 
     def load(self) -> LoadedConfig:
-        """The checked configuration, --set and --seed applied. Raises ConfigError."""
+        """The checked configuration, --set and --seed applied; code that it runs is said first. Raises ConfigError."""
         from rig.cli.backends import EMULATED, SIMULATED
         from rig.cli.device_settings import device_faults
         from rig.config.load import load_config
 
         played_on = SIMULATED if self.dry_run else EMULATED if self.emulate else "bench"
         seeds = [] if self.seed is None else [f"simulated.seed={self.seed}", f"identify.seed={self.seed}"]
-        return load_config(self.config, [*self.overrides, *seeds], partial(device_faults, played_on=played_on))
+        also_wrong = partial(device_faults, played_on=played_on)
+        return load_config(self.config, [*self.overrides, *seeds], also_wrong, announce=say)
 
 
 @dataclass

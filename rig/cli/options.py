@@ -26,7 +26,9 @@ Overrides = Annotated[
     typer.Option("--set", metavar="A.B.C=VALUE", help="Override one key of CONFIG; may be repeated."),
 ]
 Seed = Annotated[int | None, typer.Option(metavar="N", min=0, max=2**32 - 1, help="Seed of simulation and search.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Say nothing but errors, and that torque is REAL.")]
+Quiet = Annotated[
+    bool, typer.Option("--quiet", help="Say only errors and what must be known: REAL torque, code run, little room.")
+]
 
 
 def new_app(help_text: str) -> typer.Typer:

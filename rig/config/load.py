@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from rig.config.messages import faults_of, place_of, shown
 from rig.config.overrides import apply_override
 from rig.config.root import BACKENDS, Config, name_from_stem
-from rig.config.yaml_text import Document, Fault, KeyPath, parse, read_text
+from rig.config.yaml_text import Document, Fault, KeyPath, dotted, parse, read_text
 from rig.errors import ConfigError
 
 MAX_FAULTS_SHOWN = 25
@@ -49,11 +49,15 @@ class LoadedConfig:
 
 
 def load_config(
-    path: str | Path, overrides: Sequence[str] = (), also_wrong: FurtherFaults = lambda data: ()
+    path: str | Path,
+    overrides: Sequence[str] = (),
+    also_wrong: FurtherFaults = lambda data: (),
+    announce: Callable[[str], None] = lambda text: None,
 ) -> LoadedConfig:
     """Read, override and check a configuration.
 
     ``also_wrong`` says what else is wrong with the mapping as read: paths and texts, told with all the rest.
+    ``announce`` is told of every file of effects before its code is run.
 
     Raises ConfigError whose message has one line a fault: file, line, key, value, what is allowed.
     """
@@ -69,7 +73,7 @@ def load_config(
     for override in overrides:
         apply_override(document, override)
         _include_files(document, path.parent, included)  # the next one may reach into it
-    _read_effects(document, path.parent, included)
+    _read_effects(document, path.parent, included, announce)
     config = _validate(document, name_from_stem(path.stem), also_wrong)
     return LoadedConfig(config, text, path, tuple(overrides), included)
 
@@ -117,7 +121,7 @@ def _count_from(model: dict[str, Any], folder: Path) -> None:
         model["effects_from"] = [str(folder / file) if isinstance(file, str) else file for file in files]
 
 
-def _read_effects(document: Document, folder: Path, included: dict[str, str]) -> None:
+def _read_effects(document: Document, folder: Path, included: dict[str, str], announce: Callable[[str], None]) -> None:
     """Run the files named under ``effects_from``: the names that they define may stand anywhere in the file."""
     for key in MODELS:
         section: Any = document.data
@@ -131,12 +135,29 @@ def _read_effects(document: Document, folder: Path, included: dict[str, str]) ->
                 continue  # said by the check of the whole
             from rig import effects  # noqa: PLC0415  compiled kernels: only where there is a file
 
-            path = folder / file
+            path, where = folder / file, (*key, "effects_from")
             try:
+                _require_within(path, folder)
+                announce(f"runs code: {path.resolve()} (named by {dotted(where)})")
                 included[str(path)] = effects.read_file(path)
             except ConfigError as error:
-                where = (*key, "effects_from")
                 document.faults.append(Fault(place_of(document, where), where, str(error)))
+
+
+def _require_within(path: Path, folder: Path) -> None:
+    """Raise ConfigError where code does not lie beside the configuration or below it, links followed.
+
+    A configuration that somebody sent must not run what happens to lie on this machine.
+    """
+    try:
+        is_within = path.resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError, RuntimeError):  # no name of a file
+        is_within = False
+    if not is_within:
+        raise ConfigError(
+            f"{str(path)[:200]} does not lie in the folder of this configuration ({folder.absolute()}) or below it, "
+            "and its code is not run: look at it, then copy it there"
+        )
 
 
 def _validate(document: Document, default_name: str, also_wrong: FurtherFaults) -> Config:

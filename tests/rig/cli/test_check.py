@@ -51,6 +51,16 @@ def test_a_wrong_file_is_refused_with_its_line(tmp_path: Path) -> None:
     assert "two.yaml:6" in done.stderr and "did you mean 'rest_s'" in done.stderr
 
 
+def test_code_that_a_file_brings_is_announced_before_it_runs(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("raise ValueError('it ran')")
+    text = TWO_SETS + "model: {effects_from: mine.py}\n"
+    done = command(app, "check", write_config(tmp_path, text))
+    assert done.exit_code == 2
+    notice, refusal = done.stderr.splitlines()
+    assert notice == f"runs code: {tmp_path / 'mine.py'} (named by model.effects_from)"
+    assert "it ran" in refusal
+
+
 def test_recordings_are_read_and_described(tmp_path: Path) -> None:
     rows = "\n".join(f"{i / 100},{i % 7 - 3},{(i % 5) / 10}" for i in range(400))
     (tmp_path / "a.csv").write_text(f"time_s,torque_nm,rate_rad_s\n{rows}\n")

@@ -112,6 +112,41 @@ def test_what_is_wrong_with_a_file_is_said_with_its_line(tmp_path: Path, change:
     assert "eddy_brake" not in effects.names()
 
 
+def test_code_is_announced_each_time_before_it_is_run(tmp_path: Path) -> None:
+    path = written(tmp_path, "raise ValueError('it ran')")
+    (tmp_path / "rig.yaml").write_text(RIG, encoding="utf-8")
+    for _ in range(2):
+        said: list[str] = []
+        with pytest.raises(ConfigError, match="it ran"):
+            load_config(tmp_path / "rig.yaml", announce=said.append)
+        assert said == [f"runs code: {path} (named by model.effects_from)"]
+
+
+@pytest.mark.parametrize("section", ["model", "simulated.platform"])
+@pytest.mark.parametrize("name", ["../evil.py", "{outside}/evil.py", "link.py", "below/../../evil.py"])
+@pytest.mark.parametrize("way", ["file", "set"])
+def test_code_outside_the_folder_of_the_yaml_is_refused_and_not_run(
+    tmp_path: Path, name: str, section: str, way: str
+) -> None:
+    folder, ran = tmp_path / "campaign", tmp_path / "ran"
+    (folder / "below").mkdir(parents=True)
+    evil = written(tmp_path, f"open({str(ran)!r}, 'w').close()", "evil.py")
+    try:
+        (folder / "link.py").symlink_to(evil)
+    except OSError:
+        pytest.skip("links need rights of their own here")
+    file, said = name.format(outside=tmp_path), []
+    key = f"{section}.effects_from"
+    text = "backend: simulated\nsimulated: {platform: {}}\nmodel: {}\n"
+    if way == "file":
+        old, new = ("model: {}", "model: {{{}}}") if section == "model" else ("platform: {}", "platform: {{{}}}")
+        text = text.replace(old, new.format(f"effects_from: '{file}'"))
+    (folder / "rig.yaml").write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError, match=rf"{key}: .*its code is not run: look at it, then copy it there"):
+        load_config(folder / "rig.yaml", [f"{key}={file}"] if way == "set" else [], announce=said.append)
+    assert not ran.exists() and said == []
+
+
 def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"model.effects_from: .*cannot be read"):
         load(tmp_path)
