@@ -108,39 +108,66 @@ class Rate(Check):
 
 
 class Travel(Check):
-    """Angle from rest: the rate less its resting bias, integrated, plus what the drift may amount to."""
+    """Angle from where the campaign began: the rate less its resting bias, integrated, plus what it may have drifted.
+
+    A platform without a spring stays where a set leaves it, so nothing is forgotten between sets. The bias is learnt
+    anew at each rest. What came since the last one is corrected as if the bias had gone straight from one value to the
+    other; a change beyond the noise of both may also be a platform that coasts, and counts as doubt in full.
+    """
+
+    def __init__(self, limits: LimitsConfig) -> None:
+        super().__init__(limits)
+        self.origin()
+
+    def origin(self) -> None:
+        """Angle zero; the bias is learnt at the next beginning."""
+        self._rest: Rest | None = None
+        self._angle_rad = self._doubt_rad = self._variance = 0.0
+        self._last: tuple[float, float] | None = None
 
     def begin(self, start_s: float, rest: Rest) -> None:
-        """From rest, at angle zero."""
+        """From where it stands, at rest."""
+        old, since_s = self._rest, start_s - self._start_s
         super().begin(start_s, rest)
         self._rest = rest
-        self._angle_rad = 0.0
-        self._last: tuple[float, float] | None = None
+        if old is None:
+            self._angle_rad, self._last = 0.0, None
+            return
+        change = rest.bias_rad_s - old.bias_rad_s
+        sigma = math.hypot(rest.bias_sigma_rad_s, old.bias_sigma_rad_s)
+        self._angle_rad -= 0.5 * change * since_s
+        self._doubt_rad += 0.5 * max(0.0, abs(change) - BOUND_SIGMAS * sigma) * since_s
+        self._variance += (0.5 * sigma * since_s) ** 2
 
     def look(self, tick: Tick) -> Trip | None:
         """Integrate this tick's valid samples (trapezoids, across gaps too) and compare."""
-        rest = self._rest
         for time_s, rate_rad_s, valid in tick.gyro:
             if not valid:
                 continue
-            rate = rate_rad_s - rest.bias_rad_s
-            if self._last is not None and time_s > self._last[0]:
-                step_s = time_s - self._last[0]
-                self._angle_rad += 0.5 * (rate + self._last[1]) * step_s
-                elapsed_s = time_s - self._start_s
-                drift = rest.bias_sigma_rad_s * elapsed_s
-                walk = rest.noise_rad_s * math.sqrt(max(0.0, step_s * elapsed_s))
-                bound_deg = BOUND_SIGMAS * math.degrees(math.hypot(drift, walk))
-                travel_deg = abs(math.degrees(self._angle_rad)) + bound_deg
-                if travel_deg > self._limits.travel_deg:
-                    return self._trip(
-                        f"travel (limits.travel_deg; {bound_deg:.2g} deg of it is what the gyro may have "
-                        "drifted)",
-                        travel_deg, self._limits.travel_deg, "deg", time_s,
-                        "Lower torque_nm or excitation.margin; the declared model may be too stiff.",
-                    )  # fmt: skip
-            self._last = (time_s, rate)
+            last, self._last = self._last, (time_s, rate_rad_s)
+            if last is not None and time_s > last[0]:
+                trip = self._turned(time_s, 0.5 * (rate_rad_s + last[1]), time_s - last[0])
+                if trip is not None:
+                    return trip
         return None
+
+    def _turned(self, time_s: float, rate_rad_s: float, step_s: float) -> Trip | None:
+        rest = self._rest or Rest()
+        self._angle_rad += (rate_rad_s - rest.bias_rad_s) * step_s
+        elapsed_s = time_s - self._start_s
+        drift = rest.bias_sigma_rad_s * elapsed_s
+        walk = rest.noise_rad_s * math.sqrt(max(0.0, step_s * elapsed_s))
+        sigma = math.sqrt(self._variance + drift * drift + walk * walk)
+        bound_deg = math.degrees(BOUND_SIGMAS * sigma + self._doubt_rad)
+        travel_deg = abs(math.degrees(self._angle_rad)) + bound_deg
+        if travel_deg <= self._limits.travel_deg:
+            return None
+        return self._trip(
+            f"travel (limits.travel_deg; {bound_deg:.2g} deg of it is what the gyro may have drifted)",
+            travel_deg, self._limits.travel_deg, "deg", time_s,
+            "Lower torque_nm or excitation.margin; the declared model may be too stiff. Travel counts from where the "
+            "campaign began: without a spring every set begins where the one before left the platform.",
+        )  # fmt: skip
 
 
 class MeasuredTorque(Check):
@@ -178,6 +205,12 @@ class Guard:
         self._checks = (*(check(limits) for check in CHECKS), *checks)
         self._start_s = 0.0
         self.begin(0.0, Rest())
+        self.origin()
+
+    def origin(self) -> None:
+        """The campaign begins: travel counts from where the platform stands now, whatever is played from here on."""
+        for check in self._checks:
+            check.origin()
 
     def begin(self, start_s: float, rest: Rest) -> None:
         """A set, or a rest, begins at ``start_s`` from standstill."""

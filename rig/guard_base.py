@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -49,12 +50,34 @@ class Tick(NamedTuple):
     channels: Mapping[str, float]
 
 
+class TorquePast:
+    """What was commanded, by time: a gyro's samples are milliseconds older than the tick that brings them."""
+
+    def __init__(self) -> None:
+        self._steps: deque[tuple[float, float]] = deque()
+        self._nm = 0.0
+
+    def add(self, time_s: float, torque_nm: float) -> None:
+        """Commanded from ``time_s`` on."""
+        self._steps.append((time_s, torque_nm))
+
+    def at(self, time_s: float) -> float:
+        """The torque at ``time_s``; calls come in the order of time."""
+        steps = self._steps
+        while steps and steps[0][0] <= time_s:
+            self._nm = steps.popleft()[1]
+        return self._nm
+
+
 class Check(ABC):
     """One limit. ``start_s`` is the instant that times of trips count from."""
 
     def __init__(self, limits: LimitsConfig) -> None:
         self._limits = limits
         self._start_s = 0.0
+
+    def origin(self) -> None:  # noqa: B027 (most checks remember nothing from one set to the next)
+        """A campaign begins, from rest: what counts from its beginning counts from here."""
 
     def begin(self, start_s: float, rest: Rest) -> None:
         """A set begins, from rest."""

@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from rig.config.limits import LimitsConfig
-from rig.guard_base import Check, Rest, Tick, Trip
+from rig.guard_base import Check, Rest, Tick, TorquePast, Trip
 from rig.platform import Platform
 
 NOISE_SIGMAS = 8.0
@@ -35,25 +35,6 @@ MOVES_RAD_S, MOVES_MOST_RAD_S = math.radians(0.5), math.radians(3.0)  # however 
 MOVES_SHARE = 0.01  # of the largest rate of the set
 STILL_FOR_S = 0.04  # beyond any delay between a torque and the sample that shows it
 STILL_PEAKS, STILL_LEAST, STILL_MOST = 1.3, 0.2, 0.4
-
-
-class TorquePast:
-    """What was commanded, by time: a gyro's samples are milliseconds older than the tick that brings them."""
-
-    def __init__(self) -> None:
-        self._steps: deque[tuple[float, float]] = deque()
-        self._nm = 0.0
-
-    def add(self, time_s: float, torque_nm: float) -> None:
-        """Commanded from ``time_s`` on."""
-        self._steps.append((time_s, torque_nm))
-
-    def at(self, time_s: float) -> float:
-        """The torque at ``time_s``; calls come in the order of time."""
-        steps = self._steps
-        while steps and steps[0][0] <= time_s:
-            self._nm = steps.popleft()[1]
-        return self._nm
 
 
 class Jump(Check):

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
-from rig.guard_base import Check, Rest, Tick, Trip
+from rig.config.limits import LimitsConfig
+from rig.guard_base import Check, Tick, Trip
+
+LONGEST_WITHOUT_S = 0.1  # an encoder may have no reading for so long
 
 
 class Reading(Check):
@@ -38,18 +41,25 @@ class DriveCurrent(Reading):
 
 
 class EncoderTravel(Check):
-    """Travel from an encoder, where there is one: an angle that does not drift."""
+    """Travel from an encoder, where there is one: an angle that does not drift, from where the campaign began."""
 
-    def begin(self, start_s: float, rest: Rest) -> None:
-        """The next reading is the angle of rest."""
-        super().begin(start_s, rest)
+    def __init__(self, limits: LimitsConfig) -> None:
+        super().__init__(limits)
+        self.origin()
+
+    def origin(self) -> None:
+        """The next reading is the angle of rest, for all sets to come."""
         self._rest_rad: float | None = None
+        self._heard_s: float | None = None
 
     def look(self, tick: Tick) -> Trip | None:
-        """The reading of this tick."""
+        """The reading of this tick. One that is no number says nothing, and that only for so long."""
         angle_rad = tick.channels.get("angle_rad")
-        if angle_rad is None or math.isnan(angle_rad):
+        if angle_rad is None:
             return None
+        if not math.isfinite(angle_rad):
+            return self._unheard(tick.now_s)
+        self._heard_s = tick.now_s
         if self._rest_rad is None:
             self._rest_rad = angle_rad
         travel_deg = abs(math.degrees(angle_rad - self._rest_rad))
@@ -58,6 +68,17 @@ class EncoderTravel(Check):
         return self._trip(
             "travel by the encoder (limits.travel_deg)", travel_deg, self._limits.travel_deg, "deg", tick.now_s,
             "Lower torque_nm or excitation.margin; the declared model may be too stiff.",
+        )  # fmt: skip
+
+    def _unheard(self, now_s: float) -> Trip | None:
+        if self._heard_s is None:
+            self._heard_s = now_s
+        silent_s = now_s - self._heard_s
+        if silent_s <= LONGEST_WITHOUT_S:
+            return None
+        return self._trip(
+            "no angle from the encoder", 1e3 * silent_s, 1e3 * LONGEST_WITHOUT_S, "ms", now_s,
+            "Its readings are not numbers: check its cable and supply.",
         )  # fmt: skip
 
 

@@ -119,6 +119,7 @@ class Sequencer:
             with _without_collector(), self._rig.opened(), self._rig.armed():
                 self._guard.begin(self._clock.now_s(), Rest())
                 self._zero(SETTLE_S, REST_PERIOD_S)
+                self._guard.origin()
                 self._probing()
                 for number, planned in enumerate(sets, 1):
                     if number > 1:

@@ -8,6 +8,7 @@ from drivers.codecs.cia402 import HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER, encode
 from drivers.codecs.lawicel import CanFrame
 from sim_backend.emulators.object_dictionary import (
     ABORT_STATE,
+    ABORT_VALUE,
     ObjectDictionary,
     SdoAbort,
     SdoServer,
@@ -16,6 +17,7 @@ from sim_backend.emulators.object_dictionary import (
 STOPPED, OPERATIONAL, PRE_OPERATIONAL = 4, 5, 127
 _NMT_STATES = {0x01: OPERATIONAL, 0x02: STOPPED, 0x80: PRE_OPERATIONAL}
 _NOT_VALID = 1 << 31
+_NO_REMOTE_REQUEST = 1 << 30
 _PDOS = 4
 
 
@@ -43,7 +45,16 @@ class CanopenNode:
         for k in range(_PDOS):
             for base in (0x1600, 0x1A00):
                 self.od.before_write[base + k] = self._mapping_guard(base + k)
+            self.od.before_write[0x1800 + k] = self._identifier_guard(0x1800 + k)
         self._send(0x700 + node, b"\0")
+
+    def _identifier_guard(self, index: int):  # type: ignore[no-untyped-def]
+        def guard(subindex: int, data: bytes) -> None:
+            never_asked = self.od.get(index, 1) & _NO_REMOTE_REQUEST
+            if subindex == 1 and never_asked and not int.from_bytes(data, "little") & _NO_REMOTE_REQUEST:
+                raise SdoAbort(ABORT_VALUE)  # it answers no remote requests, and says so
+
+        return guard
 
     def _mapping_guard(self, index: int):  # type: ignore[no-untyped-def]
         def guard(subindex: int, data: bytes) -> None:

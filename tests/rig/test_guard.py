@@ -49,6 +49,7 @@ def test_travel_is_integrated_from_the_rate_and_trips_where_it_is_reached() -> N
 def test_a_bias_known_from_the_rest_does_not_count_as_travel() -> None:
     biased = Guard(LIMITS)
     assert first_trip(biased, ticks(10.0, lambda t: 2.0 + 1e-9 * t)) is not None
+    biased.origin()
     biased.begin(0.0, Rest(bias_rad_s=math.radians(2.0)))
     assert first_trip(biased, ticks(10.0, lambda t: 2.0 + 1e-9 * t)) is None
 
@@ -66,6 +67,54 @@ def test_travel_goes_on_across_samples_that_were_lost() -> None:
     trip = first_trip(Guard(LIMITS), ticks(1.0, lambda t: 20.0 + 1e-6 * t, lambda t: round(t * 1e3) % 10 == 0))
     assert trip is not None
     assert trip.time_s == pytest.approx(0.5, abs=0.01)
+
+
+def walk(from_s: float, rate_deg_s: Callable[[float], float], guard: Guard, seconds: float = 1.0) -> Trip | None:
+    """The first trip over so many seconds of this rate, the samples with a little noise."""
+    run = ticks(seconds, lambda t: rate_deg_s(t) + 1e-3 * math.sin(1e4 * t))
+    moved = (
+        tick._replace(now_s=tick.now_s + from_s, gyro=[s._replace(time_s=s.time_s + from_s) for s in tick.gyro])
+        for tick in run
+    )
+    return first_trip(guard, moved)
+
+
+def test_what_every_set_leaves_behind_adds_up_to_the_travel() -> None:
+    guard = Guard(LIMITS)
+    guard.begin(0.0, Rest(noise_rad_s=1e-5))
+    assert walk(0.0, lambda t: 6.4, guard) is None
+    guard.begin(1.0, Rest(noise_rad_s=1e-5))
+    trip = walk(1.0, lambda t: 6.4, guard)
+    assert trip is not None
+    assert "where the campaign began" in str(trip)
+    assert trip.time_s == pytest.approx(3.6 / 6.4, abs=0.01)
+
+
+def test_a_new_campaign_counts_from_where_the_platform_stands() -> None:
+    guard = Guard(LIMITS)
+    guard.begin(0.0, Rest())
+    assert walk(0.0, lambda t: 6.4, guard) is None
+    guard.origin()
+    guard.begin(1.0, Rest())
+    assert walk(1.0, lambda t: 6.4, guard) is None
+
+
+def test_a_bias_that_creeps_from_rest_to_rest_is_no_travel() -> None:
+    guard = Guard(LIMITS)
+    for k in range(20):
+        creep = 0.004 * k
+        guard.begin(10.0 * k, Rest(math.radians(creep), math.radians(0.002), math.radians(0.05)))
+        assert walk(10.0 * k, lambda t, creep=creep: creep + 0.0004 * t, guard, 10.0) is None  # type: ignore[misc]
+
+
+def test_a_platform_that_coasts_through_the_rest_is_not_taken_for_a_bias_of_the_gyro() -> None:
+    guard = Guard(LIMITS)
+    guard.begin(0.0, Rest(noise_rad_s=1e-5))
+    assert walk(0.0, lambda t: 0.8, guard, 9.0) is None
+    guard.begin(9.0, Rest(bias_rad_s=math.radians(0.8), noise_rad_s=1e-5))
+    trip = walk(9.0, lambda t: 3.0, guard, 9.0)
+    assert trip is not None
+    assert trip.time_s == pytest.approx((10.0 - 9.0 * 0.8) / 2.2, abs=0.05)
 
 
 def test_a_rate_above_the_limit_trips_at_once() -> None:
@@ -187,3 +236,33 @@ def test_an_encoder_counts_travel_from_where_it_stood_at_rest() -> None:
     trip = guard.look(with_channels(angle_rad=1.0 - math.radians(10.1)))
     assert trip is not None
     assert trip.limit == "travel by the encoder (limits.travel_deg)"
+
+
+def test_an_encoders_angle_is_not_forgotten_between_sets() -> None:
+    guard = Guard(LIMITS)
+    for k in range(2):
+        guard.begin(0.49, Rest())
+        for step in range(7):
+            trip = guard.look(with_channels(angle_rad=1.0 + math.radians(6.0 * k + step)))
+    assert trip is not None
+    assert trip.limit == "travel by the encoder (limits.travel_deg)"
+    assert trip.value == pytest.approx(12.0)
+
+
+def encoder_says(angle_rad: Callable[[float], float], seconds: float = 1.0) -> Trip | None:
+    run = ticks(seconds, lambda t: 1e-3 * math.sin(1e4 * t))
+    return first_trip(Guard(LIMITS), (tick._replace(channels={"angle_rad": angle_rad(tick.now_s)}) for tick in run))
+
+
+def test_an_encoder_without_a_reading_now_and_then_is_read_on() -> None:
+    trip = encoder_says(lambda t: math.nan if t % 0.1 < 0.09 else math.radians(20.0 * t))
+    assert trip is not None
+    assert trip.limit.startswith("travel by the encoder")
+
+
+@pytest.mark.parametrize("from_s", [0.0, 0.3])
+def test_an_encoder_that_says_nothing_any_more_trips(from_s: float) -> None:
+    trip = encoder_says(lambda t: math.nan if t >= from_s else 0.1)
+    assert trip is not None
+    assert trip.limit == "no angle from the encoder"
+    assert trip.time_s == pytest.approx(from_s + 0.1, abs=0.003)

@@ -113,6 +113,45 @@ def test_with_declared_friction_the_largest_torque_is_found_by_bisection() -> No
     assert at_that_scale.travel_deg <= 10.0
 
 
+LOOSE = Platform(0.5, 0.0, 0.0, terms=("inertia",))
+# A sine from rest leaves A T^2 n / (2 pi J) behind: n = 3 periods T of 1 s.
+STEP_NM = 0.5 * 2 * math.pi * math.radians(4.0) / 3.0
+
+
+def walking(count: int, **more: object) -> ExcitationConfig:
+    sets = [{"torque_nm": STEP_NM, "frequency_hz": 1, "duration_s": 3}] * count
+    return ExcitationConfig.model_validate({"sets": sets, "rest_s": 2, **more})
+
+
+def test_what_sets_leave_behind_where_no_spring_pulls_back_adds_up() -> None:
+    found = predict_all(LOOSE, walking(4), WIDE)
+    assert [p.peaks.travel_deg for p in found] == pytest.approx([4, 8, 12, 16], rel=1e-3)
+    assert [p.starts_deg for p in found] == pytest.approx([0, 4, 8, 12], abs=0.01)
+    assert not any(p.passes for p in found)
+    assert all(p.passes for p in predict_all(LOOSE, walking(2), WIDE))
+
+
+@pytest.mark.parametrize("effects", [{}, {"coulomb_friction": {"level": 0.002}}])
+def test_the_torques_said_to_pass_pass_together(effects: dict[str, dict[str, float]]) -> None:
+    loose = Platform(0.5, 0.0, 0.0, effects, ("inertia",))
+    sentences = [p.sentence() for p in predict_all(loose, walking(4), WIDE)]
+    assert "what all sets together leave behind is not" in sentences[0]
+    assert "from where the campaign began: beyond the travel limit" in sentences[3]
+    said = [float(re.search(r"([0-9.]+) N m passes$", text)[1]) for text in sentences]  # type: ignore[index]
+    sets = [{"torque_nm": a, "frequency_hz": 1, "duration_s": 3} for a in said]
+    played = plan(loose, ExcitationConfig.model_validate({"sets": sets, "rest_s": 2}), WIDE)
+    assert [p.scale for p in played] == [1.0] * 4
+
+
+def test_sets_that_walk_are_scaled_alike_until_all_of_them_fit() -> None:
+    sets = plan(LOOSE, walking(5, scale_to_limits=True, margin=0.9), WIDE)
+    assert [s.scale for s in sets] == pytest.approx([9.0 / 20.0] * 5, rel=1e-3)
+
+
+def test_a_spring_that_pulls_back_within_the_rest_leaves_nothing_behind() -> None:
+    assert {p.starts_deg for p in predict_all(PAPER, ExcitationConfig(), WIDE)} == {0.0}
+
+
 @pytest.mark.parametrize(
     ("platform", "said"),
     [

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from rig.clock import VirtualClock
 from rig.config.bench import ProbeConfig
+from rig.config.limits import LimitsConfig
 from rig.config.root import Config
 from rig.errors import SafetyTrip
 from rig.excitation import Sine
 from rig.excitation.planned import planned
 from rig.guard import Guard
 from rig.guard_motion import motion_checks
-from rig.interface import Exchange
+from rig.interface import Exchange, GyroSample, TorqueSample
 from rig.platform import Platform
 from rig.probe import Probe
 from rig.sequencer import Campaign, Observer, Sequencer
 from sim_backend.simulated import SimulatedRig
+from tests.rig.scripted import ScriptedRig
 
 DECLARED = Platform(0.0185, 0.06, 650.0)
 SETS = planned([Sine(torque_nm=40.0, frequency_hz=3.0, duration_s=0.5)])
@@ -94,3 +98,18 @@ def test_what_the_probe_finds_wrong_ends_the_campaign_before_any_set() -> None:
     assert rig.begun_s == []
     assert campaign.verdict_s is not None
     assert campaign.verdict_s == pytest.approx(rig.sent[-1][0], abs=0.01)
+
+
+def test_sets_that_walk_away_from_where_the_campaign_began_end_at_the_travel_limit() -> None:
+    turning = math.radians(13.0)
+
+    def creeping(now_s: float) -> Exchange:
+        rate = (turning if rig.torque_nm else 0.0) + math.radians(2.0) + 1e-3 * math.sin(1e4 * now_s)
+        return Exchange((GyroSample(now_s, rate, True),), (TorqueSample(now_s, 0.0),))
+
+    rig = ScriptedRig(creeping)
+    sets = planned([Sine(torque_nm=10.0, frequency_hz=5.0, duration_s=0.5)] * 3)
+    campaign = Sequencer(rig, VirtualClock(), Guard(LimitsConfig()), sample_rate_hz=1000, rest_s=1.0).play(sets)
+    assert isinstance(campaign.cause, SafetyTrip)
+    assert "travel (limits.travel_deg" in str(campaign.cause)
+    assert [s.complete for s in campaign.statistics] == [True, False]
