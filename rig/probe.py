@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import nnls
@@ -37,6 +38,8 @@ LARGEST_TORQUE = 0.3  # of the campaign's
 CLEAR_SIGMAS, CLEAR_LEAST_RAD_S = 40.0, math.radians(5.0)
 MOST_LEVELS = 16
 DELAY_SHARE, DELAY_STEP_S = 0.6, 0.001  # of the pulse: how late the torque may act
+NEARLY = 1.5
+STIFFNESS_FACTOR = 3.0  # the declared one may be wrong by so much
 POOR_FIT = 0.3  # of the scatter of the impulse: beyond it a pulse does not count
 FEWEST_SAMPLES = 8
 STEPS = 400
@@ -89,6 +92,7 @@ class Probe:
         self._pulse_at_s = 0.0
         self._samples: list[tuple[float, float]] = []
         self._rest = Rest()
+        self._stiffest_nm_rad = STIFFNESS_FACTOR * k if k > 0.0 else math.inf
         self.over = False
 
     def begin(self, rest: Rest) -> None:
@@ -129,8 +133,11 @@ class Probe:
         # An answer that is larger than foreseen is clear too: the inertia may be the one that is wrong.
         if peak < clear or len(data) < FEWEST_SAMPLES:
             return Answer(self._torque_nm, peak, None)
-        inertia = inertia_of(data[:, 0] - self._pulse_at_s, data[:, 1], self._torque_nm, self.pulse_s)
-        return Answer(self._torque_nm, peak, inertia)
+        span = inertia_of(
+            data[:, 0] - self._pulse_at_s, data[:, 1], self._torque_nm, self.pulse_s, self._stiffest_nm_rad
+        )
+        self.span = span
+        return Answer(self._torque_nm, peak, None if span is None else span.best)
 
     def finding(self) -> str:
         """What came of it, in a sentence. Raises SafetyTrip where the campaign must not go on."""
@@ -164,13 +171,26 @@ class Probe:
         )
 
 
-def inertia_of(time_s: Array, rate_rad_s: Array, torque_nm: float, pulse_s: float) -> float | None:
-    """Inertia in kg m2 from the answer to half a sine of this height that began at time zero; None if none fits.
+class Span(NamedTuple):
+    """The inertia in kg m2 that fits best, and between which ones all lie that fit nearly as well."""
+
+    best: float
+    low: float
+    high: float
+
+
+def inertia_of(
+    time_s: Array, rate_rad_s: Array, torque_nm: float, pulse_s: float, stiffest_nm_rad: float = math.inf
+) -> Span | None:
+    """Inertia from the answer to half a sine of this height that began at time zero; None if none fits.
 
     Parameters
     ----------
     time_s, rate_rad_s
         Shape (n,), increasing; the rate less its bias.
+    stiffest_nm_rad
+        No spring is stiffer. A short stroke between two stops of friction tells a later torque on a stiffer spring
+        from an earlier one on a softer spring hardly at all, and the inertia with them.
     """
     moving = _while_it_moves(rate_rad_s)
     t, w = time_s[moving], rate_rad_s[moving]
@@ -182,19 +202,30 @@ def inertia_of(time_s: Array, rate_rad_s: Array, torque_nm: float, pulse_s: floa
     columns = np.column_stack([
         w - w[0], _integral(angle, step), _integral(np.tanh(w / slow), step), t - t[0], t[0] - t,
     ])  # fmt: skip
-    scale = np.maximum(np.max(np.abs(columns), axis=0), 1e-300)
-    x = columns / scale
     sign = _first_way(rate_rad_s) * math.copysign(1.0, torque_nm)
-    best = (POOR_FIT, math.nan)
+    found = []
     for delay_s in np.arange(0.0, DELAY_SHARE * pulse_s, DELAY_STEP_S):
         y = _impulse(t - delay_s, torque_nm, pulse_s)
         y = y - y[0]
         size = max(float(np.std(y)), 1e-300) * math.sqrt(len(y))
-        # Inertia, stiffness and friction of one sign: else half a period of delay would pass for the other sign.
-        solved, left = nnls(sign * x, y)
-        if left / size < best[0]:
-            best = (left / size, sign * float(solved[0] / scale[0]))
-    return None if math.isnan(best[1]) else best[1]
+        inertia, left = _solved(sign * columns, y, stiffest_nm_rad)
+        found.append((left / size, sign * inertia))
+    least = min(left for left, _ in found)
+    if least >= POOR_FIT:
+        return None
+    near = [inertia for left, inertia in found if left <= NEARLY * least]
+    return Span(min(found)[1], min(near), max(near))
+
+
+def _solved(columns: Array, y: Array, stiffest: float) -> tuple[float, float]:
+    """Inertia, stiffness and friction of one sign: else half a period of delay would pass for the other sign."""
+    scale = np.maximum(np.max(np.abs(columns), axis=0), 1e-300)
+    solved, left = nnls(columns / scale, y)
+    if solved[1] <= stiffest * scale[1]:
+        return float(solved[0] / scale[0]), float(left)
+    others = [0, 2, 3, 4]
+    solved, left = nnls(columns[:, others] / scale[others], y - stiffest * columns[:, 1])
+    return float(solved[0] / scale[0]), float(left)
 
 
 def _first_way(rate: Array) -> float:

@@ -11,6 +11,7 @@ from canopen.sdo import SdoAbortedError, SdoClient, SdoCommunicationError
 
 from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
+from drivers.ports import MOST_QUOTED
 from rig.errors import ConfigError, DeviceFault
 
 MAX_EDS_BYTES = 4 << 20  # the largest of the trade have one
@@ -79,7 +80,9 @@ def read_dictionary(path: Path, node: int) -> canopen.ObjectDictionary:
     except ConfigError:
         raise
     except Exception as problem:  # noqa: BLE001  the library lets parser errors of any kind through
-        raise ConfigError(f"bench.amplifier.settings.eds: {path} cannot be read as EDS: {problem}") from None
+        why = " ".join(str(problem).split())  # it quotes the line, and a file that is no EDS may be a single one
+        why = why if len(why) <= MOST_QUOTED else f"{why[:MOST_QUOTED]} ..."
+        raise ConfigError(f"bench.amplifier.settings.eds: {path} cannot be read as EDS: {why}") from None
 
 
 class RemoteObjects:

@@ -16,6 +16,7 @@ from drivers.codecs.checksums import crc16_xmodem, xor8
 from drivers.codecs.framing import BAD_CHECKSUM, NEED_MORE, NOT_A_HEAD, TOO_LONG
 
 _LONGEST_LINE = 256
+_HEX = frozenset(b"0123456789ABCDEFabcdef")
 _LONGEST_BINARY = 600
 
 # Sizes in bytes of the fields of each group, by bit; 0 marks a reserved bit.
@@ -73,11 +74,9 @@ def line_checksum_is_right(line: bytes) -> bool:
     body, star, digits = line.rstrip(b"\r\n").removeprefix(b"$").rpartition(b"*")
     if not star or len(digits) not in (2, 4):
         return False
-    try:
-        given = int(digits, 16)
-    except ValueError:
+    if not _HEX.issuperset(digits):  # int() also takes blanks and signs
         return False
-    return given == (xor8(body) if len(digits) == 2 else crc16_xmodem(body))
+    return int(digits, 16) == (xor8(body) if len(digits) == 2 else crc16_xmodem(body))
 
 
 def _binary_layout(packet: bytes) -> tuple[list[tuple[int, int]], int] | int | None:

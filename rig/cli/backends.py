@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -131,8 +131,9 @@ def _capture_of(folder: Path, named: str) -> Path:
 
     for base in (folder / named, Path(named)):
         for path in (base / "raw" / FILE_NAME, base / FILE_NAME, base):
-            if path.is_file():
-                return path
+            with suppress(OSError, ValueError):  # no name of a file
+                if path.is_file():
+                    return path
     raise ConfigError(
         f"bench.replay: there is no raw capture in {folder / named}: give the results folder of a bench run "
         f"(it holds raw/{FILE_NAME}), relative to the yaml or absolute"

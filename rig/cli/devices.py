@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
+from drivers.latency import latency_told
 from rig.cli.terminal import plain
 
 NO_ADAPTERS = ("virtual", "udp_multicast", "serial")  # offered by python-can everywhere; nothing is plugged in
@@ -53,7 +54,8 @@ def _listing(title: str, find: Lister, line: Callable[[Any], str], none: str) ->
 def _serial_line(port: Any) -> str:
     ids = f", USB {port.vid:04x}:{port.pid:04x}" if port.vid is not None and port.pid is not None else ""
     number = f", serial number {port.serial_number}" if port.serial_number else ""
-    return f"{port.device}  {port.description or 'no description'}{ids}{number}"
+    latency = latency_told(str(port.device))
+    return f"{port.device}  {port.description or 'no description'}{ids}{number}{', ' if latency else ''}{latency}"
 
 
 def _can_line(adapter: Any) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import sys
 import traceback
 import warnings
@@ -24,6 +25,8 @@ HEADINGS: tuple[tuple[type[BaseException], str], ...] = (
     (RigError, "Error"),
     (KeyboardInterrupt, "Stopped"),
 )
+LONGEST_WORD, LONGEST_LINE = 200, 2000  # of what is said; a file may hold a line of any length
+_LONG_WORD = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
 _NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EFBIG}
 Evidence = Callable[[], Path | None]  # the results folder as far as there is one
 
@@ -102,12 +105,19 @@ def leave_warnings_to_developers() -> None:
 def say(text: str) -> None:
     """Write to stderr; a terminal that is gone must not stop what remains to be done.
 
-    Messages quote names and paths from outside, which must not steer the terminal or turn its text around.
+    Messages quote names and paths from outside, which must not steer the terminal, turn its text around or fill it.
     """
-    shown = "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
+    lines = (_LONG_WORD.sub(lambda word: _cut(word.group(), LONGEST_WORD), line) for line in text.split("\n"))
+    short = "\n".join(_cut(line, LONGEST_LINE) for line in lines)
+    shown = "".join(c if c.isprintable() or c == "\n" else "?" for c in short)
     with contextlib.suppress(OSError, ValueError):
         sys.stderr.write(shown + "\n")
         sys.stderr.flush()
+
+
+def _cut(text: str, most: int) -> str:
+    """The beginning and the end, which may be the name of a file, of a text that is longer than ``most``."""
+    return text if len(text) <= most else f"{text[: most - 60]}... ({len(text)} characters) ...{text[-30:]}"
 
 
 def _flushed(code: int) -> int:

@@ -221,6 +221,15 @@ def test_settings_that_cannot_work_are_refused(config, message):
         make_amplifier(AmplifierConfig(**config))
 
 
+@pytest.mark.parametrize("text", ["x" * 100_000, "[FileInfo]\n" + "x" * 100_000, "[" + "x y " * 25_000])
+def test_of_an_eds_that_is_a_single_long_line_no_more_is_quoted_than_can_be_read(tmp_path, text):
+    path = tmp_path / "long.eds"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match="cannot be read as EDS") as caught:
+        make_amplifier(AmplifierConfig(settings={"eds": str(path)}))
+    assert len(str(caught.value)) < len(str(path)) + 300 and "\n" not in str(caught.value)
+
+
 def test_missing_eds_is_a_configuration_error_before_anything_is_opened(tmp_path):
     with pytest.raises(ConfigError, match=r"bench.amplifier.settings.eds: there is no file"):
         make_amplifier(AmplifierConfig(settings={"eds": str(tmp_path / "none.eds")}))

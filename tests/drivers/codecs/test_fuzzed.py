@@ -8,6 +8,7 @@ import pytest
 
 from drivers.amplifiers.moteus import decode_registers
 from drivers.codecs import lawicel, stim300, vectornav
+from drivers.codecs.checksums import xor8
 from drivers.codecs.lawicel import Answer, CanFrame, LawicelDecoder, decode_line
 from drivers.codecs.stim300_special import _with_crc
 from drivers.gyroscopes import make_gyroscope
@@ -69,3 +70,10 @@ def test_a_counter_that_leaps_is_a_new_start_and_no_thousand_lost_samples() -> N
     gyro.feed(vectornav.encode_binary_rate(10**9, (0.0, 0.0, 0.1)), 1.0)
     samples = gyro.feed(vectornav.encode_binary_rate(2**63, (0.0, 0.0, 0.1)), 1.01)
     assert len(samples) == 1 and math.isfinite(samples[0].time_s)
+
+
+@pytest.mark.parametrize("digits", [b"+5", b" 5", b"5 ", b"_5", b"-5"])
+def test_only_hexadecimal_digits_are_a_checksum(digits: bytes) -> None:
+    body = b"VNRRG" + bytes([5 ^ xor8(b"VNRRG")])
+    assert vectornav.line_checksum_is_right(b"$" + body + b"*05\r\n")
+    assert not vectornav.line_checksum_is_right(b"$" + body + b"*" + digits + b"\r\n")

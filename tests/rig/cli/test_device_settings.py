@@ -39,6 +39,14 @@ def test_unknown_keys_of_the_file_and_of_both_devices_are_told_at_once_with_thei
         assert f"wrong.yaml:{line}: " in text and key in text
 
 
+def test_a_replay_named_by_what_is_no_name_of_a_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "wrong.yaml"
+    path.write_text(f"backend: bench\nbench: {{replay: {'x' * 4000}}}\n")
+    done = command(app, "check", path)
+    assert done.exit_code == 2
+    assert "there is no raw capture" in done.stderr and len(done.stderr) < 1000
+
+
 def test_a_device_that_there_is_not_is_told_at_its_line(tmp_path: Path) -> None:
     path = tmp_path / "wrong.yaml"
     path.write_text("backend: bench\nbench:\n  amplifier: {nod: 1}\n  gyroscope:\n    device: stim3000\n")

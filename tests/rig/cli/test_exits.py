@@ -61,3 +61,18 @@ def test_a_full_disk_ends_as_ctrl_c_does(capsys: pytest.CaptureFixture[str]) -> 
     full = OSError(errno.ENOSPC, "No space left on device", "runs/a/result.json")
     assert conclude(lambda: raising(full)) == 130
     assert "runs/a/result.json" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("quoted", ["x" * 100_000, "word " * 20_000])
+def test_a_long_quote_is_cut_and_both_its_ends_stay(capsys: pytest.CaptureFixture[str], quoted: str) -> None:
+    text = f"begin {quoted} end.yaml:3\nthe cure"
+    assert conclude(lambda: raising(UsageError(text))) == 2
+    first, second = capsys.readouterr().err.splitlines()
+    assert first.startswith("Error: begin ") and first.endswith("end.yaml:3") and "characters) ..." in first
+    assert len(first) <= 2100 and second == "the cure"
+
+
+def test_a_name_of_two_hundred_characters_is_told_whole(capsys: pytest.CaptureFixture[str]) -> None:
+    name = "/a" * 100
+    conclude(lambda: raising(UsageError(f"there is no file {name}")))
+    assert capsys.readouterr().err == f"Error: there is no file {name}\n"
