@@ -8,7 +8,16 @@ from pathlib import Path
 import pytest
 
 from rig.cli.exits import TRACEBACK_FILE, conclude
-from rig.errors import Aborted, ConfigError, DeviceFault, PreflightRefusal, RecordingError, RigError, SafetyTrip
+from rig.errors import (
+    Aborted,
+    ConfigError,
+    DeviceFault,
+    PreflightRefusal,
+    RecordingError,
+    RigError,
+    SafetyTrip,
+    UsageError,
+)
 
 CODES = {
     ConfigError: 2,
