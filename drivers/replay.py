@@ -89,6 +89,12 @@ class ReplayClock:
         return self.now_s()
 
 
+def _by_key(section: Mapping[str, Any]) -> dict[str, Any]:
+    """A section with its driver's settings as keys of their own."""
+    settings = {f"settings.{key}": value for key, value in section["settings"].items()}
+    return {key: value for key, value in section.items() if key != "settings"} | settings
+
+
 class ReplayRig(RigOnDevices):
     """A rig whose devices are a capture.
 
@@ -118,6 +124,18 @@ class ReplayRig(RigOnDevices):
         self._time_s = self._entries[0].time_s
         self._path = path
         self._link = ReplayLink(self._next_frame, lambda: self._time_s)
+
+    def differences(self, given: BenchConfig) -> list[str]:
+        """What a file says of the devices otherwise than the capture, one text a key; ports aside, which may change."""
+        out = []
+        for part, aside in (("gyroscope", {"port"}), ("amplifier", {"can"})):
+            here = _by_key(getattr(given, part).model_dump(exclude=aside))
+            there = _by_key(getattr(self.config, part).model_dump(exclude=aside))
+            out += [
+                f"bench.{part}.{key}: {here.get(key)} (the capture has {there.get(key)})"
+                for key in sorted({*here, *there}) if here.get(key) != there.get(key)
+            ]  # fmt: skip
+        return out
 
     def statement(self) -> Statement:
         """Torque is SIMULATED: nothing moves."""

@@ -62,7 +62,7 @@ def bench(loaded: LoadedConfig, raw_folder: Path) -> Iterator[Stage]:
     section = _bench_section(loaded.config)
     _require_channels(loaded.config)
     if section.replay is not None:
-        yield _replayed(_capture_of(loaded.folder, section.replay))
+        yield _replayed(_capture_of(loaded.folder, section.replay), section)
         return
     yield _bench_stage(section, Torque.REAL, raw_folder)
 
@@ -140,10 +140,16 @@ def _capture_of(folder: Path, named: str) -> Path:
     )
 
 
-def _replayed(path: Path) -> Stage:
+def _replayed(path: Path, section: BenchConfig) -> Stage:
     from drivers.replay import ReplayRig
 
     rig = ReplayRig(path)
+    if otherwise := rig.differences(section):
+        raise ConfigError(
+            "bench.replay: a replay has the devices as they were, but the file says otherwise:\n  "
+            + "\n  ".join(otherwise)
+            + "\nTake these lines back to what the capture has; ports may differ."
+        )
     return Stage(rig, rig.clock, lambda: {"replay_of": str(path)})
 
 

@@ -84,6 +84,24 @@ def play(rig, ticks, torque=lambda k: 10 * math.sin(k / 20)):
     return [rig.exchange(rig.clock.now_s(), torque(k)) for k in range(ticks)]
 
 
+def test_a_file_that_says_the_devices_were_otherwise_is_told_key_by_key(bench, tmp_path):
+    with bench.opened(), bench.armed():
+        play(bench, 20)
+    replay = ReplayRig(tmp_path / "raw" / "wire.cap")
+    assert replay.differences(replay.config) == []
+    other = replay.config.model_copy(
+        update={
+            "gyroscope": replay.config.gyroscope.model_copy(
+                update={"port": "/dev/ttyS9", "invert": True, "settings": {"filter_hz": 131}}
+            )
+        }
+    )
+    told = replay.differences(other)
+    assert "bench.gyroscope.invert: True (the capture has False)" in told
+    assert any(text.startswith("bench.gyroscope.settings.filter_hz: 131 ") for text in told)
+    assert not any("port" in text for text in told)
+
+
 def test_replay_gives_bit_identical_samples(bench, tmp_path):
     with bench.opened(), bench.armed():
         live = play(bench, 400)
