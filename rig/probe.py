@@ -1,13 +1,14 @@
 """The probe: small pulses after arming, before any full torque, and what their answer says.
 
-Half a sine each, doubled until the platform answers clearly. From rest, and while it lasts,
+Half a sine each, one way and the other, doubled until the platform answers clearly. From rest, and while it lasts,
 
     J (w - w0) + K int(th - th0) + F int sgn(w) + c t = int M dt
 
 whatever J, K and the friction F are; c takes up where the spring stood. So the inertia follows from one pulse by
-least squares and nothing declared is needed for it, resonance and stiffness included. It has to lie within a factor
-of the declared one and to be positive: torque and rate then have one sign and the right scale. Where even the largest
-pulse moves nothing, that is said.
+least squares, for any delay of the torque; of what is declared only the stiffness is needed, and that within a factor
+of three. All inertias that fit nearly as well as the best have to lie within a factor of the declared one and to be
+positive: torque and rate then have one sign and the right scale. Where some do and some do not, a harder pulse the
+other way is asked; where even the largest moves nothing or leaves it open, that is said.
 """
 
 from __future__ import annotations
@@ -39,19 +40,29 @@ CLEAR_SIGMAS, CLEAR_LEAST_RAD_S = 40.0, math.radians(5.0)
 MOST_LEVELS = 16
 DELAY_SHARE, DELAY_STEP_S = 0.6, 0.001  # of the pulse: how late the torque may act
 NEARLY = 1.5
+EDGE = 0.9
+STILL_SHARE = 0.05
 STIFFNESS_FACTOR = 3.0  # the declared one may be wrong by so much
 POOR_FIT = 0.3  # of the scatter of the impulse: beyond it a pulse does not count
 FEWEST_SAMPLES = 8
 STEPS = 400
 
 
+class Span(NamedTuple):
+    """The inertia in kg m2 that fits best, and between which ones all lie that fit nearly as well."""
+
+    best: float
+    low: float
+    high: float
+
+
 @dataclass(frozen=True)
 class Answer:
-    """What one pulse told. ``inertia_kg_m2`` is None where it moved too little, or followed no law like that above."""
+    """What one pulse told. ``inertia`` is None where it moved too little, or followed no law like that above."""
 
     torque_nm: float
     peak_rad_s: float
-    inertia_kg_m2: float | None
+    inertia: Span | None
 
 
 class Probe:
@@ -87,6 +98,7 @@ class Probe:
         own_nm = max(LARGEST_TORQUE * campaign_nm, min(campaign_nm, GENTLE_STEPS * first_nm))
         self.largest_nm = min(own_nm if given is None else given, limits.torque_nm)
         self._torque_nm = min(first_nm, self.largest_nm)
+        self._way, self._sign = 1.0, 0.0
         self._clear_share = 0.25 * peak_rate
         self._answers: list[Answer] = []
         self._pulse_at_s = 0.0
@@ -102,7 +114,7 @@ class Probe:
     def torque(self, at_s: float) -> float:
         """Torque in N m at seconds since the probe began."""
         x = (at_s - self._pulse_at_s) / self.pulse_s
-        return self._torque_nm * math.sin(math.pi * x) if 0.0 <= x <= 1.0 and not self.over else 0.0
+        return self._way * self._torque_nm * math.sin(math.pi * x) if 0.0 <= x <= 1.0 and not self.over else 0.0
 
     def take(self, at_s: float, start_s: float, tick: Tick) -> None:
         """What a tick brought; ``start_s`` is when the probe began on the clock of the ticks."""
@@ -115,15 +127,23 @@ class Probe:
         room_nm = min((self._most_rad_s - answer.peak_rad_s) / self._rate_per_nm, self._step_nm, self._torque_nm)
         next_nm = min(self._torque_nm + room_nm, self.largest_nm)
         is_last = next_nm < LEAST_STEP * self._torque_nm or len(self._answers) >= MOST_LEVELS
-        if is_last and answer.inertia_kg_m2 is None:
+        if is_last and answer.inertia is None:
             answer = self._heard(0.0)  # what little there is has to do, friction being fitted too
         self._answers.append(answer)
-        if answer.inertia_kg_m2 is not None or is_last:
+        if is_last or (answer.inertia is not None and self._is_clear(answer.inertia)):
             self.over = True
             return
-        self._torque_nm = next_nm
+        self._torque_nm, self._way = next_nm, -self._way  # back again: friction may have left it beside its spring
         self._pulse_at_s = at_s
         self._samples.clear()
+
+    def _is_clear(self, found: Span) -> bool:
+        """Whether all that fits is allowed, give or take a tenth, or nothing of it."""
+        factor = self._config.inertia_factor
+        least, most = self._platform.inertia_kg_m2 / factor, self._platform.inertia_kg_m2 * factor
+        if least <= found.best <= most:
+            return EDGE * least <= found.low and EDGE * found.high <= most
+        return found.high < least or found.low > most
 
     def _heard(self, clear_share: float) -> Answer:
         data = np.array(self._samples, dtype=float).reshape(-1, 2)
@@ -133,11 +153,15 @@ class Probe:
         # An answer that is larger than foreseen is clear too: the inertia may be the one that is wrong.
         if peak < clear or len(data) < FEWEST_SAMPLES:
             return Answer(self._torque_nm, peak, None)
+        if self._sign == 0.0 or abs(data[0, 1]) < STILL_SHARE * peak:  # else it still rings from the pulse before
+            self._sign = self._way * _first_way(data[:, 1])
         span = inertia_of(
-            data[:, 0] - self._pulse_at_s, data[:, 1], self._torque_nm, self.pulse_s, self._stiffest_nm_rad
-        )
-        self.span = span
-        return Answer(self._torque_nm, peak, None if span is None else span.best)
+            data[:, 0] - self._pulse_at_s, self._sign * data[:, 1], self._way * self._torque_nm, self.pulse_s,
+            self._stiffest_nm_rad,
+        )  # fmt: skip
+        if span is not None and self._sign < 0.0:
+            span = Span(-span.best, -span.high, -span.low)
+        return Answer(self._torque_nm, peak, span)
 
     def finding(self) -> str:
         """What came of it, in a sentence. Raises SafetyTrip where the campaign must not go on."""
@@ -145,18 +169,26 @@ class Probe:
         declared, factor = self._platform.inertia_kg_m2, self._config.inertia_factor
         asked = f"{last.torque_nm:.3g} N m for {self.pulse_s * 1e3:.0f} ms"
         peak_deg_s = math.degrees(last.peak_rad_s)
-        found = last.inertia_kg_m2
-        if found is None:
+        if last.inertia is None:
             raise SafetyTrip(
                 f"Torque is off. The probe found no clear answer: {asked} made {peak_deg_s:.2g} deg/s at most. "
                 "Is a brake on, the platform stuck, the motor not connected, the gyro off its shaft? Where friction "
                 "holds it, raise bench.probe.torque_nm. Nothing was played."
             )
-        if found < 0.0:
+        found, low, high = last.inertia
+        if high < 0.0:
             raise SafetyTrip(
                 f"Torque is off. The probe found torque and rate with opposite signs: {asked} answered like an "
                 f"inertia of {found:.3g} kg m2. Turn one of bench.amplifier.invert and bench.gyroscope.invert. "
                 "Nothing was played."
+            )
+        if not self._is_clear(last.inertia):
+            raise SafetyTrip(
+                f"Torque is off. The probe found no clear answer: {asked} made {peak_deg_s:.3g} deg/s, as any inertia "
+                f"from {low:.3g} to {high:.3g} kg m2 might; declared are {declared:.3g}, allowed is "
+                f"{declared / factor:.3g} to {declared * factor:.3g}. Much friction hides the scale: raise "
+                "bench.probe.torque_nm, mend model.inertia_kg_m2, or widen bench.probe.inertia_factor. Nothing was "
+                "played."
             )
         if not 1.0 / factor <= found / declared <= factor:
             raise SafetyTrip(
@@ -171,14 +203,6 @@ class Probe:
         )
 
 
-class Span(NamedTuple):
-    """The inertia in kg m2 that fits best, and between which ones all lie that fit nearly as well."""
-
-    best: float
-    low: float
-    high: float
-
-
 def inertia_of(
     time_s: Array, rate_rad_s: Array, torque_nm: float, pulse_s: float, stiffest_nm_rad: float = math.inf
 ) -> Span | None:
@@ -187,7 +211,7 @@ def inertia_of(
     Parameters
     ----------
     time_s, rate_rad_s
-        Shape (n,), increasing; the rate less its bias.
+        Shape (n,), increasing; the rate less its bias, turned so that torque and rate have one sign.
     stiffest_nm_rad
         No spring is stiffer. A short stroke between two stops of friction tells a later torque on a stiffer spring
         from an earlier one on a softer spring hardly at all, and the inertia with them.
@@ -202,14 +226,13 @@ def inertia_of(
     columns = np.column_stack([
         w - w[0], _integral(angle, step), _integral(np.tanh(w / slow), step), t - t[0], t[0] - t,
     ])  # fmt: skip
-    sign = _first_way(rate_rad_s) * math.copysign(1.0, torque_nm)
     found = []
     for delay_s in np.arange(0.0, DELAY_SHARE * pulse_s, DELAY_STEP_S):
         y = _impulse(t - delay_s, torque_nm, pulse_s)
         y = y - y[0]
         size = max(float(np.std(y)), 1e-300) * math.sqrt(len(y))
-        inertia, left = _solved(sign * columns, y, stiffest_nm_rad)
-        found.append((left / size, sign * inertia))
+        inertia, left = _solved(columns, y, stiffest_nm_rad)
+        found.append((left / size, inertia))
     least = min(left for left, _ in found)
     if least >= POOR_FIT:
         return None

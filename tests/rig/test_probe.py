@@ -102,6 +102,78 @@ def test_a_scale_beyond_a_factor_of_two_is_refused(factor: float) -> None:
         probed(platform(), sign=1.0 / factor)
 
 
+def through_a_bench(
+    share: float, friction_nm: float, left_by_nm: float = 0.0, sign: float = 1.0, delay_s: float = 0.001
+) -> str:
+    """What is found with torque in steps and late, behind the gyro's low-pass; pushed off centre before, if asked."""
+    delay = {"delay_s": delay_s}
+    truth = platform(share * DECLARED.inertia_kg_m2, torque_delay=delay)
+    if friction_nm:
+        friction = {"level_nm": friction_nm}
+        truth = platform(share * DECLARED.inertia_kg_m2, torque_delay=delay, coulomb_friction=friction)
+    simulated = {
+        "platform": truth,
+        "gyro": {"sample_rate_hz": 2000, "bandwidth_hz": 262},
+        "amplifier": {"kind": "hold", "resolution_nm": 0.12},
+    }
+    whole = Config.model_validate({"name": "x", "backend": "simulated", "simulated": simulated})
+    rig = SimulatedRig(whole.simulated, 1000.0)
+    probe = Probe(USUAL, LIMITS, DECLARED, planned([Sine(torque_nm=60.0, frequency_hz=3.0)]))
+    probe.begin(Rest(noise_rad_s=NOISE))
+    with rig.opened(), rig.armed():
+        pushed = [left_by_nm * min(k, 500 - k, 200) / 200 for k in range(500)] + [0.0] * 100
+        for k, torque in enumerate(pushed if left_by_nm else []):
+            rig.exchange(1e-3 * k - 0.6, torque)
+        k = 0
+        while not probe.over:
+            torque = probe.torque(1e-3 * k)
+            reply = rig.exchange(1e-3 * k, torque)
+            gyro = [sample._replace(rate_rad_s=sign * sample.rate_rad_s) for sample in reply.gyro]
+            probe.take(1e-3 * k, 0.0, Tick(1e-3 * k, 0.0, 1e-3, torque, gyro, reply.torque, {}))
+            k += 1
+    return probe.finding()
+
+
+@pytest.mark.parametrize("friction_nm", [0.0, 1.0, 8.0, 11.0, 15.0])
+@pytest.mark.parametrize("share", [0.4, 3.0])
+def test_friction_does_not_hide_a_scale_that_is_wrong(share: float, friction_nm: float) -> None:
+    with pytest.raises(SafetyTrip, match=r"declared are 0\.0185, allowed is"):
+        through_a_bench(share, friction_nm)
+
+
+def test_a_scale_just_beyond_a_factor_of_two_is_refused_with_little_friction() -> None:
+    with pytest.raises(SafetyTrip, match=r"found an inertia of"):
+        through_a_bench(0.45, 1.0)
+
+
+@pytest.mark.parametrize("share", [0.6, 1.8])
+def test_a_second_pulse_that_meets_the_ring_of_the_first_still_finds_the_sign(share: float) -> None:
+    finding = through_a_bench(share, 0.0, delay_s=0.003)
+    assert inertia_in(finding) == pytest.approx(share * DECLARED.inertia_kg_m2, rel=0.3)
+
+
+@pytest.mark.parametrize("friction_nm", [8.0, 11.0])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_platform_that_friction_left_off_centre_is_probed_from_there(friction_nm: float, way: float) -> None:
+    left_by_nm = way * (12.0 + friction_nm)
+    assert "are right" in through_a_bench(1.1, friction_nm, left_by_nm)
+    with pytest.raises(SafetyTrip, match=r"declared are 0\.0185, allowed is"):
+        through_a_bench(0.4, friction_nm, left_by_nm)
+
+
+@pytest.mark.parametrize("friction_nm", [0.0, 1.0, 8.0, 11.0, 15.0])
+@pytest.mark.parametrize("delay_s", [0.001, 0.003])
+def test_friction_does_not_make_a_right_scale_look_wrong(friction_nm: float, delay_s: float) -> None:
+    finding = through_a_bench(1.1, friction_nm, delay_s=delay_s)
+    assert inertia_in(finding) == pytest.approx(1.1 * DECLARED.inertia_kg_m2, rel=0.3)
+
+
+@pytest.mark.parametrize("friction_nm", [0.0, 1.0, 8.0, 15.0])
+def test_a_wrong_sign_is_told_from_the_right_one_under_friction(friction_nm: float) -> None:
+    with pytest.raises(SafetyTrip, match="opposite signs"):
+        through_a_bench(1.1, friction_nm, sign=-1.0)
+
+
 def test_the_factor_can_be_widened() -> None:
     finding, _, _ = probed(platform(), sign=1.0 / 2.6, config=ProbeConfig(inertia_factor=4))
     assert "are right" in finding
