@@ -22,7 +22,7 @@ SYNCHRONOUS, EVENT_DRIVEN = 1, 255
 PER_MILLE = 1000
 ERROR_BEHAVIOUR, TO_PRE_OPERATIONAL, STAYS_OPERATIONAL = 0x1029, 0, 1
 COMMAND_LIMIT = 32_767
-RPDO, TPDO = 0x1400, 0x1800  # communication parameters of the first ones
+TPDO = 0x1800  # communication parameters of the first one
 NO_REMOTE_REQUEST = 1 << 30  # of a PDO's COB-ID (CiA 301, 7.5.2.37)
 OPTIONAL_OBJECTS = (
     cia402.MAX_TORQUE,
@@ -179,7 +179,7 @@ class Cia402Setup:
         sync = self._settings.sync
         kind = SYNCHRONOUS if sync else EVENT_DRIVEN
         rpdo = objects.remote.rpdo[1]
-        _remap(objects, rpdo, RPDO, 0x200 + self._node, kind, (cia402.CONTROLWORD, cia402.TARGET_TORQUE))
+        _remap(rpdo, 0x200 + self._node, kind, (cia402.CONTROLWORD, cia402.TARGET_TORQUE))
         objects.save_pdo(rpdo, "RPDO 1 (controlword, target torque)")
         reported = (cia402.STATUSWORD,) + ((cia402.ACTUAL_TORQUE,) if plan.has_actual_torque else ())
         stamped = plan.has_time_stamp and plan.has_actual_torque and sync
@@ -194,7 +194,9 @@ class Cia402Setup:
     def _map_status(self, objects: RemoteObjects, kind: int, indices: Sequence[int], may_refuse: bool = False) -> bool:
         """Map what the drive reports; False where it refuses and may (0x1013 need not be mappable)."""
         tpdo = objects.remote.tpdo[1]
-        _remap(objects, tpdo, TPDO, 0x180 + self._node, kind, indices)
+        # A drive that answers no remote requests refuses to have the bit cleared that says so.
+        answers_requests = not (objects.read_if_there(TPDO, 1) or 0) & NO_REMOTE_REQUEST
+        _remap(tpdo, 0x180 + self._node, kind, indices, answers_requests)
         try:
             objects.save_pdo(tpdo, "TPDO 1 (statusword, actual torque)")
         except DeviceFault:
@@ -204,16 +206,10 @@ class Cia402Setup:
         return True
 
 
-def _remap(
-    objects: RemoteObjects, pdo: Any, communication: int, cob_id: int, kind: int, indices: Sequence[int]
-) -> None:
-    """Lay a PDO out anew; ``communication`` is the object with its identifier."""
-    present = objects.read_if_there(communication, 1) or 0
+def _remap(pdo: Any, cob_id: int, kind: int, indices: Sequence[int], answers_requests: bool = True) -> None:
+    """Lay a PDO out anew."""
     pdo.clear()
     for index in indices:
         pdo.add_variable(index)
-    pdo.cob_id, pdo.trans_type, pdo.enabled = cob_id, kind, True
-    pdo.rtr_allowed = (
-        not present & NO_REMOTE_REQUEST
-    )  # a drive that answers no such requests refuses to have it cleared
+    pdo.cob_id, pdo.trans_type, pdo.enabled, pdo.rtr_allowed = cob_id, kind, True, answers_requests
     pdo.event_timer = pdo.inhibit_time = pdo.sync_start_value = None
