@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import os
 import stat
-import tempfile
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
@@ -49,6 +48,8 @@ def _can_write(folder: Path) -> bool:
 def _own_folder() -> Path:
     """A folder under the system's temporary one that nobody else can write."""
     user = os.getuid() if hasattr(os, "getuid") else "user"
+    import tempfile  # noqa: PLC0415  every command waits for this module, and hardly one needs that one
+
     folder = Path(tempfile.gettempdir()) / f"isp-rig-compiled-{user}"
     with contextlib.suppress(OSError):
         folder.mkdir(mode=0o700, exist_ok=True)

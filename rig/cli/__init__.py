@@ -9,6 +9,9 @@ from __future__ import annotations
 
 def main() -> None:
     """Entry point of `rig`."""
+    from rig.cli.early import end_quietly
+
+    end_quietly()
     from rig.cli.app import app
     from rig.cli.exits import leave_warnings_to_developers
 

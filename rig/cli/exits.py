@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
+from rig.cli.early import at_work, ends_in
 from rig.errors import Aborted, DeviceFault, RigError, SafetyTrip, UsageError
 
 OK, NOT_ACCEPTED, USAGE, INTERNAL, STOPPED = 0, 1, 2, 70, 130
@@ -39,10 +40,11 @@ def no_evidence() -> Path | None:
 def conclude(command: Callable[[], int], evidence: Evidence = no_evidence) -> int:
     """Run ``command``; whatever it raises becomes a message on stderr and an exit code. Never raises."""
     try:
-        code = command()
+        with at_work():
+            code = command()
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (this is the place where all of them end)
         code = report(error, evidence())
-    return _flushed(code)
+    return _flushed(ends_in(code))
 
 
 def report(error: BaseException, folder: Path | None) -> int:

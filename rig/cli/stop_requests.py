@@ -8,10 +8,9 @@ from collections.abc import Callable, Iterator
 from enum import Enum
 from types import FrameType
 
+from rig.cli.early import SIGNALS, heeded_signals
 from rig.errors import Aborted
 
-# By name: not every system has all of them.
-SIGNALS = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "the loss of its terminal", "SIGBREAK": "Ctrl-Break"}
 STOPPING = "Stopping: torque to zero, then saving. Ctrl-C again cuts the torque at once."
 SAVING = "Stopping as soon as what is being saved is saved."
 
@@ -86,12 +85,7 @@ class StopRequests:
     @contextlib.contextmanager
     def heeded(self) -> Iterator[None]:
         """Handlers in place; those from before are put back."""
-        earlier = {}
-        for name in SIGNALS:
-            number = getattr(signal, name, None)
-            ignored = number is not None and signal.getsignal(number) is signal.SIG_IGN
-            if number is not None and not (ignored and name == "SIGHUP"):  # nohup means what it says; a stop is a stop
-                earlier[number] = signal.signal(number, self._heard)
+        earlier = {number: signal.signal(number, self._heard) for number in heeded_signals()}
         try:
             yield
         finally:
@@ -106,7 +100,6 @@ class StopRequests:
         elif is_first and self._stage is _Stage.SAVING:
             self.tell(SAVING)
         elif is_first and self._stage is _Stage.IDLE:
-            self._is_heeded = True
             raise Aborted(f"{self.reason}.")
         elif number == signal.SIGINT and not is_first:
             if self._torque_off is not None:

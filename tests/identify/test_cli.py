@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from identify.cli import app
+from identify.app import app
 from identify.results import Identification
 from rig.cli.exits import TRACEBACK_FILE
 from rig.cli.saving import save

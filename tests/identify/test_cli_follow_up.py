@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from identify.cli import app
+from identify.app import app
 from identify.results import FollowUp, FollowUpPlan, Identification, Parting
 from rig.cli.app import app as rig_app
 from rig.config.identify import IdentifyConfig

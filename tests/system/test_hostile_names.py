@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identify.cli import app as identify_run
+from identify.app import app as identify_run
 from rig.cli.app import app
 from rig.config.load import load_config
 from rig.errors import ConfigError

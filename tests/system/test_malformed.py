@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import Result
 
-from identify.cli import app
+from identify.app import app
 from tests.rig.cli.support import command
 from tests.rig.config.test_malformed import CASES as CONFIGS
 from tests.rig.recording.test_malformed_files import TEXTS
