@@ -193,7 +193,7 @@ CASES: tuple[Case, ...] = (
     of_emulators("torque_stuck", {4}, 1.5),
     of_emulators("torque_saturates", {0, 4}, LATER),
     of_host("kill -9", signals(signal.SIGKILL), {-signal.SIGKILL}, path=Road.DEAD),
-    of_host("SIGSTOP for a second", stopped(1.0), {3, 4}, path=Road.DEAD),
+    of_host("SIGSTOP for a second", stopped(1.0), {4}, path=Road.DEAD),
     of_host("SIGSTOP for 60 ms", stopped(0.06), {4}, 0.1),
     of_host("loop hangs, threads alive", signals(signal.SIGUSR1), {3, 4}, path=Road.DEAD),
     of_host("exception in the loop", signals(signal.SIGUSR2), {70}),

@@ -243,9 +243,12 @@ class Sequencer:
             raise self._tripped(trip)
         try:
             reply = self._rig.exchange(now_s, torque_nm)
-        except BaseException:
+        except BaseException as error:
             self._note_verdict()
-            raise
+            stall = self._stall_behind(error, now_s, late_s)
+            if stall is None:
+                raise
+            raise stall from None
         tick = Tick(now_s, late_s, period_s, torque_nm, reply.gyro, reply.torque, reply.channels)
         if recorder is not None:
             recorder.take(tick)
@@ -253,6 +256,13 @@ class Sequencer:
         if trip is not None:
             raise self._tripped(trip)
         return tick
+
+    def _stall_behind(self, error: BaseException, now_s: float, late_s: float) -> SafetyTrip | None:
+        """The stall that a fault followed from: a drive that has heard nothing meanwhile complains of just that."""
+        if not isinstance(error, DeviceFault) or self._verdict_s is None:
+            return None
+        trip = self._guard.permit(0.0, now_s, late_s + self._verdict_s - now_s)
+        return None if trip is None else SafetyTrip(f"{self._tripped(trip)} What it led to: {error}")
 
     def _tripped(self, trip: Trip) -> SafetyTrip:
         self._note_verdict()
