@@ -1,9 +1,9 @@
-"""Is the motion one that the torque could have made? Three checks that need little of the declared model.
+"""Is the motion one that the torque could have made? Checks that need little of the declared model.
 
 What is declared may be wrong by a factor of two in inertia and stiffness, and may lack any friction, play or delay;
 a lightly damped resonance is no fault. So nothing here compares with a predicted rate. Held on to is only what holds
 for every platform that cannot make energy of its own: its rate does not step, the work done on it from rest is not
-negative, and it does not stand still under any torque.
+negative, and it does not stand still under any torque. What those leave open of the sign, ``guard_sign`` decides.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 from rig.config.limits import LimitsConfig
 from rig.guard_base import Check, Rest, Tick, TorquePast, Trip
+from rig.guard_sign import TurnedSign
 from rig.platform import Platform
 
 NOISE_SIGMAS = 8.0
@@ -227,4 +228,4 @@ def motion_checks(limits: LimitsConfig, platform: Platform) -> Sequence[Check]:
     """All of them, or none where ``limits.motion_check`` is off or no inertia is declared."""
     if not limits.motion_check or platform.inertia_kg_m2 <= 0.0:
         return ()
-    return (Jump(limits, platform), WrongSign(limits, platform), Standstill(limits, platform))
+    return tuple(check(limits, platform) for check in (Jump, WrongSign, TurnedSign, Standstill))
