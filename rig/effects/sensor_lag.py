@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rig.effects._first_order import lag, times
+from rig.effects._first_order import lag, remembers, times
 from rig.effects.base import Effect, Parameter, Place
 
 EFFECT = Effect(
@@ -25,7 +25,7 @@ EFFECT = Effect(
         ),
     ),
     kernel=lag,
-    filter_states=lambda step_s, values: 2,
+    filter_states=remembers,
     never_separable={
         "actuator_lag": "a lag in the gyro and a lag in the torque answer alike; "
         "measure the current, or use a second sensor"

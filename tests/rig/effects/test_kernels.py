@@ -153,12 +153,27 @@ def test_a_delay_of_whole_samples_moves_them_and_nothing_else() -> None:
 
 @pytest.mark.parametrize("name", ["actuator_lag", "sensor_lag"])
 @pytest.mark.parametrize("time_s", [1e-4, 3e-3, 0.1])
-def test_a_lag_is_the_exact_answer_to_straight_lines_between_samples(name: str, time_s: float) -> None:
-    time = STEP_S * np.arange(400)
+def test_a_lag_is_the_exact_answer_to_parabolas_through_three_samples(name: str, time_s: float) -> None:
     x = np.cumsum(np.random.default_rng(2).standard_normal(400))
     x -= x[0]
-    exact = signal.lsim(([1.0], [time_s, 1.0]), x, time, interp=True)[1]
-    np.testing.assert_allclose(filtered(name, x, (time_s,)), exact, atol=1e-9)
+    parts = 200
+    fine = STEP_S / parts * np.arange(399 * parts + 1)
+    before = np.concatenate([[0.0], x])
+    u = (np.arange(parts) + 1.0) / parts - 1.0  # of a step, from its begin at -1 to its end at 0
+    bend = 0.5 * (before[2:] - 2.0 * before[1:-1] + before[:-2])
+    pieces = x[1:, None] + (x[1:] - x[:-1])[:, None] * u + bend[:, None] * u * (u + 1.0)
+    curve = np.concatenate([[0.0], pieces.ravel()])
+    exact = signal.lsim(([1.0], [time_s, 1.0]), curve, fine, interp=True)[1][::parts]
+    np.testing.assert_allclose(filtered(name, x, (time_s,)), exact, atol=2e-5)
+
+
+@pytest.mark.parametrize("time_s", [1e-4, 3e-3, 0.1])
+def test_a_lag_of_a_sine_is_right_to_a_part_in_ten_thousand_at_forty_samples_a_period(time_s: float) -> None:
+    phase = 2 * np.pi / 40 * np.arange(8000)
+    w_t = 2 * np.pi / 40 / STEP_S * time_s
+    exact = (np.sin(phase) - w_t * np.cos(phase) + w_t * np.exp(-phase / w_t)) / (1 + w_t**2)
+    error = filtered("actuator_lag", np.sin(phase), (time_s,)) - exact
+    assert np.max(np.abs(error[2000:])) < 3e-4 * np.max(np.abs(exact[2000:]))
 
 
 @pytest.mark.parametrize("name", ["actuator_lag", "sensor_lag"])
