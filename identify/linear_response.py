@@ -60,6 +60,16 @@ def linear_response(platform: Platform, frequency_hz: Array, size: Size) -> tupl
     return through * s / stiff, tuple(left_out)
 
 
+def _joined(phase_rad: Array) -> Complex:
+    """What joining samples by a parabola through the last three makes of a sine that turns by a phase a sample."""
+    nodes, shares = np.polynomial.legendre.leggauss(6)
+    u, shares = 0.5 * (nodes - 1.0), 0.5 * shares  # of the step that ends at a sample, from -1 to 0
+    ends, lies_before, lies_two_before = 1.0 + 1.5 * u + 0.5 * u * u, -2.0 * u - u * u, 0.5 * (u + u * u)
+    turn = np.exp(-1j * np.outer(phase_rad, u))
+    parts = [turn @ (shares * part) for part in (ends, lies_before, lies_two_before)]
+    return np.asarray(sum(part * np.exp(-1j * k * phase_rad) for k, part in enumerate(parts)))
+
+
 def _filter_response(effect: Effect, values: tuple[float, ...], frequency_hz: Array, level: float) -> Complex | None:
     """Response of a drive or sensor filter from its answer to a short pulse; None where that is not in proportion."""
     step = 1.0 / (FINENESS * float(np.max(frequency_hz)))
@@ -82,8 +92,8 @@ def _filter_response(effect: Effect, values: tuple[float, ...], frequency_hz: Ar
         return None
     used = np.flatnonzero(np.abs(whole) > 1e-9 * np.max(np.abs(whole)))
     turn = np.exp(-2j * np.pi * np.outer(frequency_hz, step * (used - 1.0)))
-    smoothed = np.sinc(frequency_hz * step) ** 2 if states and len(used) > 8 else 1.0  # filters join samples by lines
-    return np.asarray(turn @ whole[used] / pulse[1] / smoothed)
+    joined = _joined(2.0 * np.pi * frequency_hz * step) if states and len(used) > 8 else 1.0
+    return np.asarray(turn @ whole[used] / pulse[1] / joined)
 
 
 def _load_response(effect: Effect, p: tuple[float, ...], s: Complex, size: Size) -> Complex | None:

@@ -14,7 +14,7 @@ from rig.recording.run import Recording, Run
 
 ROOT = Path(__file__).parents[2]
 # The command hands recordings over; it is no part of the identifier.
-MODULES = sorted(p for p in (ROOT / "identify").rglob("*.py") if p != ROOT / "identify" / "cli.py")
+MODULES = sorted(p for p in (ROOT / "identify").rglob("*.py") if p.name not in ("app.py", "cli.py"))
 MAKERS = {"drivers", "sim_backend"}
 
 
