@@ -6,6 +6,7 @@ when the torque was zero.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import queue
@@ -134,7 +135,8 @@ class Host:
         """Signals, one after the other; the moment of the first."""
         at_s = time.monotonic()
         for number in signals:
-            os.kill(self.process.pid, number)
+            with contextlib.suppress(ProcessLookupError):  # it ended before: what is measured then says so
+                os.kill(self.process.pid, number)
         return at_s
 
     def ended(self, timeout_s: float) -> int | None:
