@@ -20,6 +20,7 @@ RIG = (sys.executable, "-c", "from rig.cli import main; main()")
 IDENTIFY_RUN = (sys.executable, "-c", "from identify.cli import main; main()")
 posix = pytest.mark.skipif(sys.platform == "win32", reason="emulated devices need pseudo terminals")
 LONG_SET = "excitation.sets=[{torque_nm: 60, frequency_hz: 3, duration_s: 60}]"
+SAFETY_TRIP = 4
 
 
 def start(*arguments: object) -> subprocess.Popen[str]:
@@ -27,12 +28,15 @@ def start(*arguments: object) -> subprocess.Popen[str]:
     return subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True)
 
 
-def wait_until(happened: Callable[[], bool], process: subprocess.Popen[str], limit_s: float = 60.0) -> None:
+def in_time(happened: Callable[[], bool], process: subprocess.Popen[str], limit_s: float = 60.0) -> bool:
+    """Whether it happens before the process ends."""
     deadline_s = time.monotonic() + limit_s
     while not happened():
-        assert process.poll() is None, process.communicate()
+        if process.poll() is not None:
+            return False
         assert time.monotonic() < deadline_s, "it never happened"
         time.sleep(0.02)
+    return True
 
 
 def size_of(path: Path) -> int:
@@ -41,9 +45,13 @@ def size_of(path: Path) -> int:
 
 @posix
 def test_ctrl_c_on_the_bench_takes_the_torque_off_disables_the_drive_and_keeps_the_record(tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    process = start(*RIG, "play", ROOT / "examples" / "bench.yaml", "--emulate", "--out", out, "--set", LONG_SET)
-    wait_until(lambda: size_of(out / "recording.journal") > 100_000, process)
+    for attempt in range(3):  # a machine that others use may stall, and a stall before the set is rightly a trip
+        out = tmp_path / str(attempt)
+        process = start(*RIG, "play", ROOT / "examples" / "bench.yaml", "--emulate", "--out", out, "--set", LONG_SET)
+        if in_time(lambda file=out / "recording.journal": size_of(file) > 100_000, process):
+            break
+        said = process.communicate()[1]
+        assert process.returncode == SAFETY_TRIP and "stall or clock jump" in said, said
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130, said

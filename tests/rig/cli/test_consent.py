@@ -47,9 +47,12 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     os.close(keyboard)
 
 
-def asked(monkeypatch: pytest.MonkeyPatch, keyboard: int, answer: str) -> None:
-    monkeypatch.setattr(sys, "stderr", Answering(keyboard, answer))
+def asked(monkeypatch: pytest.MonkeyPatch, keyboard: int, answer: str) -> str:
+    """What stood on the screen, where the answer was a consent."""
+    screen = Answering(keyboard, answer)
+    monkeypatch.setattr(sys, "stderr", screen)
     ask_consent(REAL, False, sys.stdin.isatty(), campaign._ask)
+    return screen.getvalue()
 
 
 def test_a_yes_typed_before_the_question_is_no_consent(terminal: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -60,7 +63,7 @@ def test_a_yes_typed_before_the_question_is_no_consent(terminal: int, monkeypatc
 
 def test_a_yes_typed_after_the_question_is(terminal: int, monkeypatch: pytest.MonkeyPatch) -> None:
     os.write(terminal, b"half a line")
-    asked(monkeypatch, terminal, "yes\n")
+    assert asked(monkeypatch, terminal, "yes\n").count(QUESTION) == 1
 
 
 def test_what_is_no_terminal_keeps_what_it_has() -> None:

@@ -150,7 +150,7 @@ def test_a_can_channel_that_is_a_url_is_refused_at_its_key_and_touches_no_file(
 
 @pytest.mark.parametrize("played_on", ["bench", EMULATED])
 def test_a_gyroscopes_port_that_is_a_url_is_refused_at_its_key(played_on: str) -> None:
-    told = dict(device_faults(ports("spy:///dev/ttyX9?file=/tmp/x", "/dev/ttyX8"), played_on=played_on))
+    told = dict(device_faults(ports("spy:///dev/ttyX9?file=notes.txt", "/dev/ttyX8"), played_on=played_on))
     assert list(told) == [("bench", "gyroscope", "port")]
     assert "only plain names and paths" in told["bench", "gyroscope", "port"]
 
