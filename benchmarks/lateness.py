@@ -23,9 +23,11 @@ from rig.clock import MonotonicClock
 from rig.config.load import load_config
 from rig.config.root import Config
 from rig.guard import Guard
+from rig.guard_motion import motion_checks
 from rig.interface import Torque
 from rig.lateness import Lateness
 from rig.preflight import plan
+from rig.rehearsal import rehearse
 from rig.sequencer import Sequencer
 from sim_backend.emulators.launch import Emulators, on_emulated_ports, started
 
@@ -79,7 +81,10 @@ def bench_loop(config: Config, emulators: Emulators, raw: Path) -> tuple[Latenes
     rig = BenchRig(section, Torque.EMULATED, raw)
     cpu = SetCpu(rig)
     sets = plan(config.model.platform(), config.excitation, config.limits, rig.rate_full_scale_rad_s)
-    played = Sequencer(rig, rig.clock, Guard(config.limits), sample_rate_hz=1.0 / PERIOD_S, rest_s=0.0).play(sets)
+    platform = config.model.platform()
+    rehearse(Guard(config.limits, motion_checks(config.limits, platform)), platform, sets, 1.0 / PERIOD_S)
+    guard = Guard(config.limits, motion_checks(config.limits, platform))
+    played = Sequencer(rig, rig.clock, guard, sample_rate_hz=1.0 / PERIOD_S, rest_s=0.0).play(sets)
     gyro, one = rig.report().gyro, played.statistics[0]
     account = f"{one.missed_ticks} missed, {gyro.lost} of {gyro.received} datagrams lost"
     if played.cause is not None:

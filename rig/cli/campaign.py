@@ -35,6 +35,7 @@ from rig.probe import Probe
 from rig.recorder import SetStatistics
 from rig.recording.journal import Journal
 from rig.recording.run import Recording
+from rig.rehearsal import rehearse
 from rig.sequencer import Sequencer
 
 
@@ -127,14 +128,20 @@ class _Recorder:
         except RigError as error:
             self.cause = self.cause or error
 
+    def _guard(self) -> Guard:
+        limits = self._config.limits
+        return Guard(limits, motion_checks(limits, self._config.model.platform()))
+
     def _play(self, journal: Journal) -> None:
         stage, config = self._stage, self._config
         platform, asked = config.model.platform(), stage.rig.probe
         in_memory = stage.rig.statement().torque is Torque.SIMULATED  # the bench's are in the journal, however long
+        if not in_memory:
+            rehearse(self._guard(), platform, self._sets, config.excitation.sample_rate_hz)
         sequencer = Sequencer(
             stage.rig,
             stage.clock,
-            Guard(config.limits, motion_checks(config.limits, platform)),
+            self._guard(),
             sample_rate_hz=config.excitation.sample_rate_hz,
             rest_s=config.excitation.rest_s,
             journal=journal,
