@@ -23,8 +23,8 @@ def effect_free(trace: Trace, shots: Shots, estimate: Estimate) -> Trace:
     """
     equations = equations_of(estimate.structure, estimate.names, estimate.values, shots.number, shots.added)
     substeps = min(MAX_SUBSTEPS, FINER * equations.substeps(trace.step_s))
-    fine_shots = make_shots(trace, substeps, None)
-    if len(fine_shots.first) == len(shots.first):
+    fine_shots = make_shots(trace, substeps, None, None, equations)
+    if np.array_equal(fine_shots.first, shots.first):
         shots, fine_shots.starts = fine_shots, shots.starts
     grid = shots.grid
     ratio = round(trace.step_s / grid.step_s)

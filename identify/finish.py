@@ -16,7 +16,7 @@ from identify.parameters import Name
 from identify.regression import Regression, Solution, Structure, residuals
 from identify.screen import Start, best_rho
 from identify.sensitivities import jacobian
-from identify.shots import Shots
+from identify.sharpen import sharpened
 from identify.start_doubt import least_std_errors
 from identify.traces import Trace
 from rig.recording.run import Array
@@ -108,9 +108,11 @@ def by_output_error(
     straight = best.sigma <= NEAR_FLOOR * noise  # the search came close enough: no ladder of horizons needed
     if not straight:
         best = refine(traces, structure, start, horizon, 12, use, fixed=fixed)
+    whole_runs = [at_once]
     for longer in () if straight else (4.0 * horizon, None):
         values = dict(zip(best.names, best.values.tolist(), strict=True))
         trial = refine(traces, structure, values, longer, 12, use, fixed=fixed)
+        whole_runs += [trial] if longer is None else []
         if trial.sigma <= NEAR_FLOOR * noise:
             best = trial
     # Only the model itself leads a decay astray, and near the noise a few disturbed moments do: whole runs decide.
@@ -119,19 +121,17 @@ def by_output_error(
         if held is None or at_once.sigma < FREER * held.sigma:
             best = at_once
     values = dict(zip(best.names, best.values.tolist(), strict=True))
-    whole = best if len(best.shots[0].first) == len(make_whole(best.shots[0])) else None
+    whole = best if any(best is w for w in whole_runs) else None
+    free_names = tuple(n for n in best.names if n not in fixed)
+    covariance, determined = _output_covariance(best, free_names)
+    if whole is not None and whole.sigma <= NEAR_FLOOR * noise:
+        best = whole = sharpened(whole, traces, use, fixed)
+        values = dict(zip(best.names, best.values.tolist(), strict=True))
     same = all(np.array_equal(u, e) for u, e in zip(use, everything, strict=True))
     free = whole if whole is not None and same else _free_run(traces, structure, values, everything)
     limited = whole is not None and whole.sigma <= NEAR_FLOOR * noise
-    free_names = tuple(n for n in best.names if n not in fixed)
-    covariance, determined = _output_covariance(best, free_names)
     method = "output error over whole runs" if whole is not None else f"output error over {horizon:.3g} s"
     return Fitted(structure, values, covariance, free_names, best.sigma, free, limited, determined, method)
-
-
-def make_whole(shots: Shots) -> list[int]:
-    """First samples of the shots that a free run over each usable stretch would have."""
-    return sorted({0, *(a for a, _ in shots.trace.stretches)})
 
 
 def _inverse(information: Array) -> tuple[Array, tuple[bool, ...]]:

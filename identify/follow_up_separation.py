@@ -109,7 +109,8 @@ def measured(truth: Platform, planned: PlannedSet, sensor: Sensor) -> Trace:
 
 def shots_of(model: Platform, trace: Trace) -> Shots:
     """A set as the simulator sees it, from rest, on steps fine enough for a model."""
-    shots = make_shots(trace, min(MAX_SUBSTEPS, Equations(model).substeps(trace.step_s)), None)
+    equations = Equations(model)
+    shots = make_shots(trace, min(MAX_SUBSTEPS, equations.substeps(trace.step_s)), None, None, equations)
     shots.starts = np.zeros((len(shots.first), 2))
     return shots
 

@@ -212,7 +212,8 @@ def information_of(
         Angle in rad and rate in rad/s at the first sample; None takes them from the trace.
     """
     structure, names, values = vector_of(platform, runs)
-    shots = make_shots(trace, min(MAX_SUBSTEPS, Equations(platform).substeps(trace.step_s)), None)
+    equations = Equations(platform)
+    shots = make_shots(trace, min(MAX_SUBSTEPS, equations.substeps(trace.step_s)), None, None, equations)
     if start is not None:
         shots.starts = np.tile(np.array(start, dtype=float), (len(shots.first), 1))
     free = trace.torque is None or not np.any(trace.torque.torque_nm)

@@ -128,7 +128,7 @@ def refine(
     names = names_of(structure, 1 + max(t.number for t in traces))
     x = np.array([start.get(name, 0.0) if len(name) == 3 else start[name] for name in names])
     still = np.array([name in fixed for name in names])
-    shots = _shots_for(traces, structure, names, x, shot_s, use, carry, coarse)
+    shots = shots_for(traces, structure, names, x, shot_s, use, carry, coarse)
     workers = ThreadPoolExecutor(2)
     try:
         return _levenberg(_Descent(workers, shots, structure, names, x, still), iterations, tolerance, hopeless, coarse)
@@ -136,10 +136,11 @@ def refine(
         workers.shutdown()
 
 
-def _shots_for(
+def shots_for(
     traces: Sequence[Trace], structure: Structure, names: Sequence[Name], x: Array,
-    shot_s: float | None, use: Sequence[Any] | None, carry: Sequence[Shots] | None, coarse: bool,
+    shot_s: float | None, use: Sequence[Any] | None, carry: Sequence[Shots] | None, coarse: bool, finer: int = 1,
 ) -> list[Shots]:  # fmt: skip
+    """Every run cut into shots (see ``refine``), its steps as fine as the model needs, or ``finer`` times that."""
     out = []
     for i, trace in enumerate(traces):
         equations = Equations(platform_of(structure, names, x, trace.number, trace.run.added_inertia_kg_m2))
@@ -151,9 +152,11 @@ def _shots_for(
             # A step that spans several held values sees only their mean: that alone is a sigma or two.
             held = trace.step_s / trace.torque.shortest_s
             substeps = min(MAX_SUBSTEPS, max(substeps, round(held)))
+        substeps = min(MAX_SUBSTEPS, finer * substeps)
         length = None if shot_s is None else max(8, round(shot_s / trace.step_s))
-        shots = from_rest(make_shots(trace, substeps, length, None if use is None else use[i]), equations)
-        if carry is not None and len(carry[i].first) == len(shots.first):
+        counting = None if use is None else use[i]
+        shots = from_rest(make_shots(trace, substeps, length, counting, equations), equations)
+        if carry is not None and np.array_equal(carry[i].first, shots.first):
             shots.starts, shots.bias = carry[i].starts.copy(), carry[i].bias
         out.append(shots)
     return out
@@ -308,7 +311,7 @@ def squares_at(
         return min(float(np.sum(np.where(np.isfinite(each), each, np.inf))) for each in found)
 
     with ThreadPoolExecutor(2) as workers:
-        return sum(workers.map(of, _shots_for(traces, structure, names, x, None, use, None, coarse=True)))
+        return sum(workers.map(of, shots_for(traces, structure, names, x, None, use, None, coarse=True)))
 
 
 def evaluate(
@@ -320,7 +323,7 @@ def evaluate(
 ) -> Estimate:
     """The same parameters on other samples: only start states and biases are fitted there."""
     names, x, structure = estimate.names, estimate.values, estimate.structure
-    shots = _shots_for(traces, structure, names, x, shot_s, use, None, coarse)
+    shots = shots_for(traces, structure, names, x, shot_s, use, None, coarse)
     with ThreadPoolExecutor(2) as workers:
         settled = list(workers.map(lambda s: _settle(s, structure, names, x), shots))
     rss = sum(float(np.sum(losses)) for _, losses in settled)

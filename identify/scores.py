@@ -125,7 +125,7 @@ class Scores:
         if not trace.stretches or not np.any(weight):
             return shots
         ratio = round(whole.step_s / shots.grid.step_s)
-        cut = from_rest(make_shots(trace, ratio, None, weight), model)
+        cut = from_rest(make_shots(trace, ratio, None, weight, model), model)
         if begin == 0:
             cut.starts[: len(shots.first)] = shots.starts[: len(cut.first)]
         cut.bias = shots.bias

@@ -16,7 +16,7 @@ from rig.dynamics import Equations, Grid
 from rig.dynamics.low_pass import low_pass_kernel, mean_rate, smoothed
 from rig.recording.run import Array
 
-SOON_S = 0.02  # a first stretch that begins by then
+SOON_S = 0.02  # a first stretch that begins by then is simulated from the beginning of the run
 SENSOR_LEAD_S = 0.02  # longer than a gyro's filter remembers
 RUNAWAY = np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a simulation may; its error is then infinite
 
@@ -59,12 +59,20 @@ class Shots:
         return list(zip(self.first.tolist(), ends, strict=True))
 
 
-def make_shots(trace: Trace, substeps: int, length: int | None, use: Any = None) -> Shots:
-    """Cut a run into shots of ``length`` samples (None: one), started from the smoothed measurement."""
+def make_shots(
+    trace: Trace, substeps: int, length: int | None, use: Any = None, equations: Equations | None = None
+) -> Shots:
+    """Cut a run into shots of ``length`` samples (None: one), started from the smoothed measurement.
+
+    What has a memory begins at rest, and that is where the run begins: with such ``equations`` the first shot does too.
+    """
     n = len(trace.measured)
     time = trace.start_s + trace.step_s * np.arange(n)
     begins = [0]  # every usable stretch begins anew: what happened in between is not to be predicted
+    soon = equations is not None and _begins_with_the_run(equations)
     for a, b in trace.stretches:
+        if soon and a * trace.step_s <= SOON_S:
+            a = 0  # noqa: PLW2901
         inside = np.arange(a, b + 1, length) if length else np.array([a])
         if length and len(inside) > 1 and b + 1 - inside[-1] < length // 2:
             inside = inside[:-1]
@@ -77,6 +85,15 @@ def make_shots(trace: Trace, substeps: int, length: int | None, use: Any = None)
     for seam in (*first.tolist(), n):
         clear_of_seam(trace, seam, weight)
     return Shots(trace, Grid(time, trace.torque, substeps, min(LEAD_S, trace.offset_s)), first, starts, 0.0, weight)
+
+
+def _begins_with_the_run(equations: Equations) -> bool:
+    """Whether the start state belongs to the first sample of a run, though the first ones that count come later.
+
+    It takes up what a torque from before the run did, as a start at the first sample that counts would. Under dry
+    friction a run begins stuck, where no start rate leads anywhere.
+    """
+    return bool(equations.states or equations.sensor.names) and not equations.sticks
 
 
 def from_rest(shots: Shots, equations: Equations) -> Shots:

@@ -42,11 +42,15 @@ def _step(t, y, h, out, stages, work, jck, codes, zo, po, so, p, s, g, late, sli
 
 @jit
 def _room(t, y, dy, jck, codes, zo, po, so, p, s, g, late, slip, kind, a, tones, parts, rubs):  # type: ignore[no-untyped-def]
-    """How far the nearest switch is from changing its sign (negative: it has). Fills ``g`` and ``dy``."""
+    """How far the nearest switch is from changing its sign (negative: it has). Fills ``g`` and ``dy``.
+
+    Switches of the rate stand at zero all the while that friction holds: they have a say when it lets go.
+    """
     net, level, _ = rhs(t, y, dy, jck, codes, zo, po, so, p, s, g, late, slip, kind, a, tones, parts)
     room = np.inf
     for i in range(len(s)):
-        room = min(room, s[i] * g[i])
+        if slip != 0.0 or g[i] != 0.0:
+            room = min(room, s[i] * g[i])
     if rubs:
         room = min(room, slip * y[1] if slip != 0.0 else level - abs(net))
     return room
@@ -137,6 +141,9 @@ def advance(
         for i in range(len(y)):
             y[i] = end[i]
         x += hi
+    _step(t + x, y, h - x, end, stages, work, jck, codes, zo, po, so, p, s, g, late, slip, kind, a, tones, parts)
+    for i in range(len(y)):
+        y[i] = end[i]
     return slip
 
 

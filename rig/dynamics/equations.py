@@ -118,6 +118,11 @@ class Equations:
         """Number of internal states of all effects on the shaft."""
         return int(self.z_at[-1])
 
+    @property
+    def sticks(self) -> bool:
+        """Whether dry friction can hold the platform."""
+        return len(self.kernels) > self.loads
+
     def rest_states(self, angle_rad: float, rate_rad_s: float) -> Array:
         """Internal states of a platform that has stood at this angle and moves with this rate, shape (states,)."""
         z = np.zeros(self.states)

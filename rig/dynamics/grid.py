@@ -93,7 +93,7 @@ class Grid:
         self._held = torque.hold == "zero_order"
         self._plain: Array | None = None
         self._finer: Array | None
-        self._lead = int(lead_s / self.step_s)
+        self._lead = max(0, int(lead_s / self.step_s))  # jittered stamps may begin a little before the beat
         self._torque, self._factor, self._finer = torque, 1.0, None
         self._pieces = QUARTERS if self._held else 2
         self._given = self._torque_every(self.step_s / self._pieces)

@@ -289,3 +289,12 @@ def test_an_effect_far_below_the_noise_counts_as_undetectable() -> None:
     hidden = Hidden(*JCK, {"cubic_stiffness": {"factor": 1e-3}})
     sets: tuple[Excitation, ...] = SETS
     assert not cases.energies(hidden, sets, hidden.play(sets))["cubic_stiffness"].detectable
+
+
+def test_friction_that_lets_go_beside_another_switch_of_the_rate_lets_go_on_time() -> None:
+    hidden = {"directional_damping": {"step": 1.7}, "load_dependent_friction": {"factor": 0.05}}
+    platform = Hidden(0.026, 0.1, 445.0, hidden)
+    found = platform.play([sine(26.0, 6.0, 1.0)])[0]
+    asked = TorqueSignal(found.time_s, found.torque_nm)
+    ours = simulate(Platform(0.026, 0.1, 445.0, hidden), found.time_s, asked, substeps=32)
+    assert np.max(np.abs(found.rate_rad_s - ours.rate_rad_s)) < 1e-6
