@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -38,6 +39,7 @@ _PARTS = 8  # of a step, where the torque has corners
 _PROJECTION = _projection(_PARTS)
 
 
+KEPT = 3  # torques behind the drive: of all parameters only the drive's own change it
 QUARTERS = 4  # of a step, over each of which the mean of a held torque is known
 
 
@@ -91,7 +93,7 @@ class Grid:
         self.n = int(np.ceil(steps[-1] - 1e-4))
         torque = torque or NO_TORQUE
         self._held = torque.hold == "zero_order"
-        self._plain: Array | None = None
+        self._shaft: dict[Any, Array] = {}
         self._finer: Array | None
         self._lead = max(0, int(lead_s / self.step_s))  # jittered stamps may begin a little before the beat
         self._torque, self._factor, self._finer = torque, 1.0, None
@@ -101,7 +103,7 @@ class Grid:
     def scaled(self, factor: float) -> Grid:
         """The same grid with its torque multiplied: reading a smooth torque off its samples costs more than that."""
         other = copy(self)
-        other._given, other._plain, other._factor = factor * self._given, None, factor * self._factor
+        other._given, other._shaft, other._factor = factor * self._given, {}, factor * self._factor
         other._finer = None
         return other
 
@@ -113,15 +115,21 @@ class Grid:
 
     def shaft_torque(self, equations: Equations) -> Array:
         """Torque behind the drive effects at start, middle and end of each fine step, shape (n, 3)."""
-        if not equations.drive.names and self._plain is not None:
-            return self._plain
+        drive = equations.drive
+        key = (drive.names, drive.values)
+        found = self._shaft.get(key)
+        if found is None:
+            found = self._behind(equations)
+            while len(self._shaft) >= KEPT:  # simulations in other threads may be doing the same
+                self._shaft.pop(next(iter(self._shaft), None), None)
+            self._shaft[key] = found
+        return found
+
+    def _behind(self, equations: Equations) -> Array:
         if not self._held and any(effects.get(name).bends_torque for name in equations.drive.names):
             return self._bent(equations)
         given = equations.drive.apply(self._given, self.step_s / self._pieces)
-        steps = self._by_step(given[self._lead * self._pieces :])
-        if not equations.drive.names:
-            self._plain = steps
-        return steps
+        return self._by_step(given[self._lead * self._pieces :])
 
     def _bent(self, equations: Equations) -> Array:
         """Torque with corners inside of steps: the quadratics that push, twist and bend each step as it does."""

@@ -55,6 +55,7 @@ def test_values_to_begin_from_are_those_of_the_regression() -> None:
     assert abs(found[0].start[("quadratic_damping", "factor")] / 0.05 - 1.0) < 0.1
 
 
+@pytest.mark.slow
 def test_a_model_that_has_effects_of_the_drive_already_is_looked_at_too() -> None:
     given = {"torque_delay": {"delay": 3e-4}, **GAP_AND_DEAD_ZONE}
     made = recording(given)

@@ -38,7 +38,7 @@ def identified(text: str) -> tuple[Recording, Identification]:
         return recording, identify(recording, loaded.config.model.platform(), loaded.config.identify)
 
 
-def lorenz() -> tuple[Recording, Identification]:
+def lorenz(candidates: str = "") -> tuple[Recording, Identification]:
     """Runs 1 to 3 to fit, 4 and 5 to judge; the declared model is a guess, stiffness included."""
     runs = [
         LORENZ_RUN.format(file=DATA / "lorenz_servo" / f"run0{i}.npz", use="fit" if i < 4 else "holdout")
@@ -47,7 +47,7 @@ def lorenz() -> tuple[Recording, Identification]:
     return identified(
         "backend: recorded\n"
         "model: {inertia_kg_m2: 1.0e-3, damping_nm_s_rad: 1.0e-3, stiffness_nm_rad: 0.01}\n"
-        "identify: {lowpass_hz: 15}\n"
+        f"identify: {{lowpass_hz: 15{candidates}}}\n"
         f"recorded: {{runs: [{', '.join(runs)}]}}\n"
     )
 
@@ -72,12 +72,23 @@ def pendulum() -> tuple[Recording, Identification]:
 
 
 @needs("lorenz_servo")
+def test_among_a_few_candidates_the_servo_has_coulomb_friction_and_a_constant_torque() -> None:
+    few = ", candidates: [coulomb_friction, stribeck_friction, directional_damping, torque_offset, torque_delay]"
+    _, found = lorenz(few)
+    assert found.verdict.effects[:2] == ("coulomb_friction", "torque_offset")
+    assert found.final.error.holdout_torque_relative is not None
+    assert found.final.error.holdout_torque_relative <= 0.065
+
+
+@needs("lorenz_servo")
+@pytest.mark.slow
 def test_the_servo_has_coulomb_friction_first_and_then_a_constant_torque() -> None:
     _, found = lorenz()
     assert found.verdict.effects[:2] == ("coulomb_friction", "torque_offset")
 
 
 @needs("lorenz_servo")
+@pytest.mark.slow
 def test_the_servo_has_no_stiffness_and_none_is_claimed() -> None:
     _, found = lorenz()
     assert "stiffness" not in found.final.parameters
@@ -85,6 +96,7 @@ def test_the_servo_has_no_stiffness_and_none_is_claimed() -> None:
 
 
 @needs("lorenz_servo")
+@pytest.mark.slow
 def test_the_servos_held_out_error_falls_from_two_fifths_to_six_percent_of_the_torque() -> None:
     _, found = lorenz()
     assert found.before.error.lowpass_hz == 15.0
@@ -94,6 +106,7 @@ def test_the_servos_held_out_error_falls_from_two_fifths_to_six_percent_of_the_t
 
 
 @needs("lorenz_servo")
+@pytest.mark.slow
 def test_the_servos_figures_hold_when_they_are_computed_anew_outside_the_identifier() -> None:
     recording, found = lorenz()
     platform = found.final.platform
@@ -115,6 +128,7 @@ def test_the_servos_figures_hold_when_they_are_computed_anew_outside_the_identif
 
 
 @needs("lorenz_servo")
+@pytest.mark.slow
 def test_the_servos_parameters_are_near_those_of_its_own_document() -> None:
     _, found = lorenz()
     assert found.final.parameters["inertia"].value == pytest.approx(1.6846e-4, rel=0.05)
