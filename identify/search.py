@@ -152,6 +152,9 @@ class Loop:
         short = screen.shortlist(looks, SHORTLIST)
         # A delay lies in every record of torque and rate, and a microsecond of it bends C: tried always.
         always = {"torque_delay", *(low for s in short for low in effects.get(s.effect).lower_order)}
+        if any(effects.get(e).place is Place.FRICTION for e in now.structure.effects):
+            # Where dry friction holds the platform a regression along the measured rate cannot tell one from another.
+            always |= {n for n in names if effects.get(n).place is Place.FRICTION}
         short += [s for s in looks if s.effect in always and s.gain > 10.0 and s not in short]
         for look in short:
             best_yet = min((j.estimate.sigma for _, j in tried), default=now.estimate.sigma)
