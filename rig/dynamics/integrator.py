@@ -267,6 +267,41 @@ def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, kinks, o
 
 
 @jit
+def run_linear(motion, h, torque, jck, out):  # type: ignore[no-untyped-def]
+    """``run_steps`` of a platform with nothing on its shaft: the same Runge-Kutta step as the matrix that it is then."""
+    n = torque.shape[0]
+    body = (0, 0, integers_at(0), integers_at(0), floats_at(0), integers_at(0))  # no kernel is called
+    none = np.zeros(1)
+    unit, push = np.zeros(4), np.zeros(3)
+    z = pointer(none)
+    table = np.zeros((2, 5))  # angle and rate after a step from a unit of angle, rate, and torque at its three instants
+    for k in range(5):
+        unit[:], push[:] = 0.0, 0.0
+        if k < 2:
+            unit[k] = 1.0
+        else:
+            push[k - 2] = 1.0
+        _rk4(pointer(unit), 0.0, 1.0, h, push[0], push[1], push[2], 0, z, z, z, z, z, z, jck, body)
+        table[0, k], table[1, k] = unit[0], unit[1]
+    a00, a01, b00, b01, b02 = table[0, 0], table[0, 1], table[0, 2], table[0, 3], table[0, 4]
+    a10, a11, b10, b11, b12 = table[1, 0], table[1, 1], table[1, 2], table[1, 3], table[1, 4]
+    j, c, k_ = jck
+    th, w = motion[0], motion[1]
+    for i in range(n):
+        m0, m1, m2 = torque[i, 0], torque[i, 1], torque[i, 2]
+        out[i, 0], out[i, 1], out[i, 2] = th, w, (m0 - c * w - k_ * th) / j
+        th, w = (
+            a00 * th + a01 * w + (b00 * m0 + b01 * m1 + b02 * m2),
+            a10 * th + a11 * w + (b10 * m0 + b11 * m1 + b12 * m2),
+        )
+        if not abs(th) < 1e9:  # diverged
+            out[i + 1 :, :] = np.nan
+            return none[0]
+    out[n, 0], out[n, 1], out[n, 2] = th, w, (torque[n - 1, 2] - c * w - k_ * th) / j
+    return none[0]
+
+
+@jit
 def run_spans(starts, spans, offset_s, z, h, torque, jck, kernels, loads, z_at, p, p_at, kinks, out):  # type: ignore[no-untyped-def]
     """``run_steps`` over spans (first, last) of fine steps, each begun from its row of ``starts``.
 
@@ -277,6 +312,9 @@ def run_spans(starts, spans, offset_s, z, h, torque, jck, kernels, loads, z_at, 
         first, last = spans[k, 0], spans[k, 1]
         motion[0], motion[1] = starts[k, 0], starts[k, 1]
         motion[2], motion[3] = np.sign(starts[k, 1]), offset_s + first * h
+        if len(kernels) == 0:
+            run_linear(motion, h, torque[first:last], (jck[0], jck[1], jck[2]), out[first : last + 1])
+            continue
         run_steps(
             motion, z, h, torque[first:last], jck, kernels, loads, z_at, p, p_at, kinks, out[first : last + 1]
         )  # fmt: skip
