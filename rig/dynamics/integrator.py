@@ -268,7 +268,7 @@ def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, kinks, o
 
 @jit
 def run_linear(motion, h, torque, jck, out):  # type: ignore[no-untyped-def]
-    """``run_steps`` of a platform with nothing on its shaft: the same Runge-Kutta step as the matrix that it is then."""
+    """``run_steps`` of a platform with nothing on its shaft: the same Runge-Kutta step, as the matrix that it is."""
     n = torque.shape[0]
     body = (0, 0, integers_at(0), integers_at(0), floats_at(0), integers_at(0))  # no kernel is called
     none = np.zeros(1)
