@@ -25,7 +25,7 @@ from identify.results import (
 )
 from identify.screen import Start, first_guess
 from identify.search import Loop, Search
-from identify.traces import Trace, prepare
+from identify.traces import Trace, one_noise, prepare
 from rig import effects
 from rig.config.identify import IdentifyConfig
 from rig.errors import Aborted, RecordingError
@@ -81,7 +81,7 @@ class _Identifier:
         runs = with_causes(recording.runs, declared, settings.channels)
         runs = [replace(r, torque_nm=None, torque_time_s=None) if free else r for r in runs]
         traces = [prepare(r, i, recording.noise) for i, r in enumerate(runs)]
-        self.traces = _one_noise([t for t in traces if t.stretches and t.count > 40])
+        self.traces = one_noise([t for t in traces if t.stretches and t.count > 40], recording.noise is not None)
         if not self.traces:
             raise RecordingError(
                 "no run holds a usable stretch of 40 samples: look at valid, min_rate_rad_s, from_s and to_s"
@@ -144,7 +144,9 @@ class _Identifier:
         few = decay.thinned(runs, float(np.sqrt(max(k / j, 0.0)) / (2.0 * np.pi))) if self.torque_free else runs
         if all(a is b for a, b in zip(few, runs, strict=True)):
             return self.traces, self.split
-        traces = _one_noise([prepare(r, t.number, self.recording.noise) for r, t in zip(few, self.traces, strict=True)])
+        noise = self.recording.noise
+        prepared = [prepare(r, t.number, noise) for r, t in zip(few, self.traces, strict=True)]
+        traces = one_noise(prepared, noise is not None)
         return traces, split(traces)
 
     def _report(self, search: Search, before: Fitted, after: Fitted, in_full: bool = True) -> Identification:
@@ -262,12 +264,6 @@ def _refuse_the_idle(traces: list[Trace], free: bool) -> None:
             "the torque has the same value in every sample of every run: J, C and K need a torque that changes; "
             "check recorded.columns.torque, or leave the torque out for a free decay"
         )
-
-
-def _one_noise(traces: list[Trace]) -> list[Trace]:
-    """All runs were measured by one sensor; the quietest run shows its noise with the least of the motion in it."""
-    quietest = {c: min((t.noise for t in traces if t.channel == c), default=0.0) for c in ("rate", "angle")}
-    return [replace(t, noise=quietest[t.channel]) for t in traces]
 
 
 def _plain(declared: Platform, name: str) -> dict[str, float]:

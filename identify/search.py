@@ -23,6 +23,7 @@ SHORTLIST = 4
 WORTH = 0.2  # share of the excess error that an effect has to take away
 MISSED = 0.1  # share of the squared error by which nobody doubts that a term is needed
 BEGIN_AGAIN = 1.002  # times the floor above which the declared values are tried as a start as well
+FAR_OFF = 3.0  # times what is declared: the declared values are tried as a start then as well
 FAR = 10.0  # times the horizon
 AGAIN = 1  # candidates of a round that are tried from other shapes
 RESTARTS = 3
@@ -36,6 +37,12 @@ MOST_NAMED = 3  # effects; more of them together resemble anything
 LEFT = 1.2  # times the noise floor: below, nothing to speak of is left
 BULK = 0.95  # share of the excess that what is named explains at least, where something is left
 SUPPORT = 0.02  # share of the error by which a term must be missed to stay
+
+
+def _far_off(found: Sequence[float], declared: Sequence[float] | None) -> bool:
+    """Whether J or K came out far from what is declared: of two minima this may be the other."""
+    pairs = [] if declared is None else [(found[i], declared[i]) for i in (0, 2) if declared[i] > 0.0]
+    return any(not 1.0 / FAR_OFF < a / b < FAR_OFF for a, b in pairs)
 
 
 @dataclass
@@ -126,7 +133,8 @@ class Loop:
         length = horizon / self.fitting[0].step_s
         floor = self.noise * float(np.sqrt(max(1.0 - 2.0 / length, 0.25)))
         base = judge(self.fitting, self.judging, declared, start_values(solution, shapes, self.runs), horizon)
-        if nominal is not None and not self.torque_free and base.sigma > BEGIN_AGAIN * floor:
+        doubtful = base.sigma > BEGIN_AGAIN * floor or _far_off(solution.platform, nominal)
+        if nominal is not None and not self.torque_free and doubtful:
             start = start_values(replace(solution, platform=nominal), shapes, self.runs)
             other = judge(self.fitting, self.judging, declared, start, horizon)
             base = min((base, other), key=lambda j: j.estimate.sigma)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from statistics import NormalDist
 from typing import Any, Literal
 
 import numba as nb
@@ -33,11 +35,18 @@ LONGEST_FILL = 25  # missing samples that a spline may bridge
 STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
 
 
+LOWER = 0.8  # of the periodogram's values
+LOWER_MEAN = (1.0 - (1.0 - LOWER) * (1.0 - np.log(1.0 - LOWER))) / LOWER  # of an exponential distribution, its mean one
+
+
+SCATTER = 1.55  # of ``noise_of`` over the root of the number of samples, as a share of itself
+
+
 def noise_of(values: Array) -> float:
     """One standard deviation of the white part of a signal, from the upper half of its spectrum.
 
-    The median of the periodogram there, over ln 2, is blind to lines and to a signal below; a third
-    difference first takes away what a steep low-frequency signal would leak.
+    The mean of the lower four fifths of the periodogram there is blind to lines and to a signal below, and scatters
+    less than its median; a third difference first takes away what a steep low-frequency signal would leak.
     """
     if len(values) < 64:
         return float(np.std(np.diff(values, 3)) / np.sqrt(20.0))
@@ -46,7 +55,8 @@ def noise_of(values: Array) -> float:
     f = np.arange(len(spectrum)) / len(spectrum)  # of Nyquist
     gain = (2.0 * np.sin(0.5 * np.pi * f)) ** 6
     upper = (f > 0.5) & (f < 0.98)
-    level = np.median(spectrum[upper] / gain[upper]) / np.log(2.0)
+    power = np.sort(spectrum[upper] / gain[upper])
+    level = np.mean(power[: round(LOWER * len(power))]) / LOWER_MEAN
     return float(np.sqrt(level / (0.375 * len(d))))
 
 
@@ -379,6 +389,21 @@ def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: fl
     for seam in (0, *(a for a, _ in trace.stretches), n):
         clear_of_seam(trace, seam, trace.keep)
     return trace
+
+
+def one_noise(traces: Sequence[Trace], known: bool) -> list[Trace]:
+    """All runs were measured by one sensor; the quietest run shows its noise with the least of the motion in it.
+
+    The least of several equal readings lies below them by what chance makes of their scatter; that is added again.
+    """
+    quietest = {}
+    for channel in ("rate", "angle"):
+        found = [(t.noise, SCATTER / np.sqrt(len(t.measured))) for t in traces if t.channel == channel]
+        least, scatter = min(found, default=(0.0, 0.0))
+        alike = sum(noise < least * (1.0 + 3.0 * scatter) for noise, _ in found)
+        depth = 0.0 if known or alike < 2 else NormalDist().inv_cdf((alike - 0.375) / (alike + 0.25))
+        quietest[channel] = least * (1.0 + depth * scatter)
+    return [replace(t, noise=quietest[t.channel]) for t in traces]
 
 
 def clear_of_seam(trace: Trace, seam: int, keep: Any) -> None:

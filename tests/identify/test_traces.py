@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.traces import UPSAMPLING, bandwidth_of, noise_of, prepare
+from identify.traces import UPSAMPLING, bandwidth_of, noise_of, one_noise, prepare
 from rig import effects
 from rig.recording.run import Array, Run
 from tests.identify.simulated import NOISE_RAD_S, sine_run, white
@@ -196,3 +196,21 @@ def memory(name: str, given: dict[str, float], angle: Array, rate: Array, step_s
             q += h * out[i]
             z += h * q
     return np.append(out[::many], out[-1])
+
+
+def test_the_noise_of_several_runs_is_neither_the_least_nor_the_largest_that_chance_shows() -> None:
+    rng = np.random.default_rng(5)
+    found = []
+    for _ in range(20):
+        runs = [sine_run(42, 3, duration_s=2.0) for _ in range(5)]
+        noisy = [
+            replace(
+                run, rate_rad_s=0.3 * np.sin(19.0 * run.time_s) + NOISE_RAD_S * rng.standard_normal(len(run.time_s))
+            )
+            for run in runs
+        ]
+        one = one_noise([prepare(run, i) for i, run in enumerate(noisy)], known=False)
+        assert len({t.noise for t in one}) == 1
+        found.append(one[0].noise / NOISE_RAD_S)
+    assert np.mean(found) == pytest.approx(1.0, abs=0.015)
+    assert np.std(found) < 0.035
