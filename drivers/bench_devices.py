@@ -15,7 +15,7 @@ from drivers.gyroscopes.base import Gyroscope
 from drivers.listening import ListeningPort
 from drivers.socket_port import open_port
 from rig.config.bench import BenchConfig
-from rig.errors import ConfigError, DeviceFault, RigError
+from rig.errors import Aborted, ConfigError, DeviceFault, RigError
 from rig.interface import GyroSample
 
 CONTACT_TIME_S = 0.002
@@ -78,6 +78,8 @@ class BenchDevices:
             serial = ListeningPort(open_port(port, self.gyroscope.baud), self._time)
             self.line = GyroLine(self.gyroscope, serial, self.capture, self._time)
             self.line.greet()
+        except Aborted:
+            raise
         except RigError as fault:
             return fault
         return None
@@ -89,6 +91,8 @@ class BenchDevices:
             self.link.on_sent = self.amplifier.note_sent
             self.link.record = self.capture.can if self.capture is not None else None
             self.notes = self.amplifier.contact(self.link)
+        except Aborted:
+            raise
         except RigError as fault:
             return fault
         return None
@@ -100,6 +104,8 @@ class BenchDevices:
         try:
             self.amplifier.settle(self.link)
             self.link.poll()
+        except Aborted:
+            raise
         except RigError as fault:
             faults.append(fault)
 

@@ -30,6 +30,7 @@ MOST_ERRORS, ERRORS_WITHIN_S = 20, 0.1
 OWN_INTERFACE = "slcan_bulk"
 OWN_URLS = {"etas": "ETAS://"}  # what an interface calls its own channels; pyserial has no part in it
 CODE_OPTIONS = {"usb2can": ("dll",)}  # they name a library that python-can would load and run
+NETWORK_INTERFACES = ("socketcand", "udp_multicast")  # they reach whatever machine the file names
 OWN_OPTIONS = ("listen_only", "timestamps", "answer_timeout_s", "tty_baudrate")
 
 
@@ -204,6 +205,8 @@ def bus_faults(config: CanConfig) -> Iterator[tuple[str, str]]:
 
 def _harm(config: CanConfig) -> Iterator[tuple[str, str]]:
     """What would let python-can write files, reach other machines or run code: the key, and why it is refused."""
+    if config.interface in NETWORK_INTERFACES:
+        yield "interface", f"{config.interface} is not allowed: it reaches other machines; name an adapter of this one"
     own = OWN_URLS.get(config.interface)
     fault = url_fault(config.channel.removeprefix(own) if own else config.channel) if config.channel else None
     if fault is not None:

@@ -166,7 +166,8 @@ class Travel(Check):
             f"travel (limits.travel_deg; {bound_deg:.2g} deg of it is what the gyro may have drifted)",
             travel_deg, self._limits.travel_deg, "deg", time_s,
             "Lower torque_nm or excitation.margin; the declared model may be too stiff. Travel counts from where the "
-            "campaign began: without a spring every set begins where the one before left the platform.",
+            "campaign began: without a spring every set begins where the one before left the platform, and what "
+            "the gyro may have drifted is large where the rest was too short for it to stop (excitation.rest_s).",
         )  # fmt: skip
 
 

@@ -103,7 +103,10 @@ def _ask(question: str) -> str:
     forget_typed_ahead(sys.stdin)
     sys.stderr.write(question)
     sys.stderr.flush()
-    answer = sys.stdin.readline()
+    try:
+        answer = sys.stdin.readline()
+    except OSError:
+        raise Aborted("the terminal is gone; nothing was played.") from None
     if not answer:
         raise EOFError
     return answer

@@ -21,7 +21,7 @@ from rig.cli.exits import OK
 from rig.cli.places import with_places
 from rig.cli.terminal import plain
 from rig.config.load import LoadedConfig
-from rig.errors import PreflightRefusal, RecordingError, RigError
+from rig.errors import Aborted, PreflightRefusal, RecordingError, RigError
 from rig.interface import Torque
 from rig.preflight import Prediction, playable_of, predict_all
 
@@ -134,6 +134,8 @@ def run_checks(desk: Desk, loaded: LoadedConfig) -> int:
         for check in CHECKS:
             try:
                 lines = check(known)
+            except Aborted:
+                raise
             except RigError as error:
                 found = desk.say_error(error)
                 code = code or found

@@ -86,4 +86,4 @@ def at_desk(options: Options, command: Callable[[Desk], int]) -> int:
             with desk.terminal.writing():
                 return command(desk)
 
-    return conclude(work, lambda: desk.evidence() if desk is not None else None)
+    return conclude(work, lambda: desk.evidence() if desk is not None else None, lambda: stops.reason)

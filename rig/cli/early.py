@@ -5,6 +5,7 @@ Nothing heavy may be imported here: this comes before all that is slow to import
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import os
 import signal
@@ -30,6 +31,7 @@ def end_quietly() -> None:
     """From here on a signal ends the program without a traceback. Called once, by whatever is the program."""
     for number in heeded_signals():
         signal.signal(number, _heard)
+    atexit.register(_leave_undisturbed)
 
 
 @contextlib.contextmanager
@@ -48,6 +50,12 @@ def ends_in(code: int) -> int:
     global _ends_in  # noqa: PLW0603
     _ends_in = code
     return code
+
+
+def _leave_undisturbed() -> None:
+    """On its way out the interpreter puts back handlers that kill; by then all is written."""
+    for number in heeded_signals():
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _heard(number: int, _frame: FrameType | None) -> None:

@@ -37,12 +37,22 @@ def no_evidence() -> Path | None:
     return None
 
 
-def conclude(command: Callable[[], int], evidence: Evidence = no_evidence) -> int:
-    """Run ``command``; whatever it raises becomes a message on stderr and an exit code. Never raises."""
+def conclude(
+    command: Callable[[], int], evidence: Evidence = no_evidence, stopped: Callable[[], str | None] = lambda: None
+) -> int:
+    """Run ``command``; whatever it raises becomes a message on stderr and an exit code. Never raises.
+
+    ``stopped`` says why somebody asked to stop, if anybody did. A library that is interrupted halfway (a compiler, say)
+    may fail of it in any way: what comes then is the stop, not a fault of the program.
+    """
     try:
         with at_work():
             code = command()
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (this is the place where all of them end)
+        reason = stopped()
+        if reason is not None and code_of(as_known(error)) == INTERNAL:
+            _keep_traceback(error, evidence())
+            error = Aborted(f"{reason}.")
         code = report(error, evidence())
     return _flushed(ends_in(code))
 

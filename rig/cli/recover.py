@@ -12,7 +12,7 @@ import yaml
 
 from rig.cli.exits import OK
 from rig.cli.terminal import plain
-from rig.errors import RecordingError, RigError
+from rig.errors import Aborted, RecordingError, RigError
 
 if TYPE_CHECKING:
     from rig.recording.recover import Recovery
@@ -83,6 +83,8 @@ def _out_of_captures(folder: Path, without: RecordingError) -> Recovery:
                 recordings.append(recall(path))
             else:
                 lines.append(f"{name}: ends before anything was played")
+        except Aborted:
+            raise
         except RigError as error:
             lines.append(f"{name}: no set can be had from it: {str(error).removeprefix(f'{path} ')}")
     if not recordings:

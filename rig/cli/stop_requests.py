@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import signal
+import sys
+import threading
 from collections.abc import Callable, Iterator
 from enum import Enum
 from types import FrameType
@@ -12,6 +14,7 @@ from rig.cli.early import SIGNALS, heeded_signals
 from rig.errors import Aborted
 
 STOPPING = "Stopping: torque to zero, then saving. Ctrl-C again cuts the torque at once."
+AGAIN_S = 0.02
 SAVING = "Stopping as soon as what is being saved is saved."
 
 
@@ -35,6 +38,7 @@ class StopRequests:
         self._torque_off: Callable[[], None] | None = None
         self._stage = _Stage.IDLE
         self._is_heeded = False  # whether somebody has acted on the reason
+        self._lost: BaseException | None = None  # raised where nothing can be raised: it has to be raised again
 
     def poll(self) -> str | None:
         """The reason to stop, or None. Asked by the sequencer at every tick."""
@@ -86,13 +90,29 @@ class StopRequests:
     def heeded(self) -> Iterator[None]:
         """Handlers in place; those from before are put back."""
         earlier = {number: signal.signal(number, self._heard) for number in heeded_signals()}
+        hook = sys.unraisablehook
+        sys.unraisablehook = lambda lost: self._again(lost.exc_value) or hook(lost)
         try:
             yield
         finally:
+            sys.unraisablehook = hook
             for number, handler in earlier.items():
                 signal.signal(number, handler)
 
+    def _again(self, lost: BaseException | None) -> bool:
+        """A signal that struck in a callback of C, where what it raises is dropped, strikes once more."""
+        if not isinstance(lost, (Aborted, KeyboardInterrupt)):
+            return False
+        self._lost = lost
+        threading.Timer(AGAIN_S, signal.raise_signal, (signal.SIGINT,)).start()
+        return True
+
     def _heard(self, number: int, _frame: FrameType | None) -> None:
+        lost, self._lost = self._lost, None
+        if lost is not None:
+            if self._stage is not _Stage.SAVING:
+                raise lost
+            return
         is_first = self.reason is None
         self.request(f"Stopped by {SIGNALS[signal.Signals(number).name]}")
         if is_first and self._stage is _Stage.TICKING:

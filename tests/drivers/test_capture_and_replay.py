@@ -249,6 +249,16 @@ def test_all_that_is_wrong_is_listed_at_once(bench, monkeypatch):
         pass
 
 
+def test_who_stops_it_while_devices_are_contacted_is_no_fault_of_a_device(bench, monkeypatch):
+    def stopped(path, baud):
+        raise Aborted("Stopped by Ctrl-C.")
+
+    monkeypatch.setattr(drivers.bench_devices, "open_port", stopped)
+    bench.drive.receive = lambda frame, now_s: pytest.fail("it went on")
+    with pytest.raises(Aborted, match="Stopped by Ctrl-C"), bench.opened():
+        pass
+
+
 def test_a_gyro_that_vanishes_while_it_is_contacted_is_told_once(bench, monkeypatch):
     class Killed(GyroPort):
         def read(self):

@@ -31,3 +31,10 @@ def test_a_long_url_is_cut_where_it_is_quoted() -> None:
     with pytest.raises(ConfigError) as caught:
         open_port("socket://" + "x" * 10_000, 115_200)
     assert len(str(caught.value)) < 400
+
+
+@pytest.mark.parametrize("interface", ["socketcand", "udp_multicast"])
+def test_a_bus_that_reaches_other_machines_is_not_opened(interface: str) -> None:
+    config = CanConfig(interface=interface, channel="239.74.163.2", bitrate=500_000)
+    with pytest.raises(ConfigError, match=r"bench.amplifier.can.interface: .*reaches other machines"):
+        open_bus(config)

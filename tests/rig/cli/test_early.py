@@ -84,3 +84,23 @@ def test_a_command_that_listens_to_nothing_itself_is_stopped_with_a_message(
 
     assert conclude(command) == 130
     assert capsys.readouterr().err.startswith("Stopped by ")
+
+
+LEAVING = """
+import signal, sys, time
+from rig.cli.early import end_quietly
+end_quietly()
+class Last:
+    def __del__(self):
+        import os, signal
+        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGTERM)
+sys.last_of_all = Last()
+print("leaving", flush=True)
+sys.exit(4)
+"""
+
+
+def test_a_signal_while_the_interpreter_is_taken_down_does_not_change_how_it_ended() -> None:
+    done = subprocess.run([sys.executable, "-c", LEAVING], check=False, capture_output=True, text=True, timeout=20)
+    assert (done.returncode, done.stderr) == (4, "")

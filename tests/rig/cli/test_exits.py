@@ -85,3 +85,13 @@ def test_a_name_of_two_hundred_characters_is_told_whole(capsys: pytest.CaptureFi
     name = "/a" * 100
     conclude(lambda: raising(UsageError(f"there is no file {name}")))
     assert capsys.readouterr().err == f"Error: there is no file {name}\n"
+
+
+def test_what_breaks_of_being_stopped_halfway_is_the_stop_and_not_a_fault_of_the_program(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert conclude(lambda: 1 // 0, lambda: tmp_path, lambda: "Stopped by Ctrl-C") == 130
+    said = capsys.readouterr().err
+    assert said == "Stopped by Ctrl-C.\n"
+    assert "ZeroDivisionError" in (tmp_path / TRACEBACK_FILE).read_text()
+    assert conclude(lambda: raising(SafetyTrip("travel")), lambda: tmp_path, lambda: "Stopped by Ctrl-C") == 4

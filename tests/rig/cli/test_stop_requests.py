@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -105,3 +106,20 @@ def test_handlers_from_before_are_put_back() -> None:
     with StopRequests().heeded():
         assert signal.getsignal(signal.SIGTERM) is not before
     assert signal.getsignal(signal.SIGTERM) is before
+
+
+class Struck:
+    """Raises a signal where what is raised is dropped: while it is taken away."""
+
+    def __del__(self) -> None:
+        raise_signal(signal.SIGINT)
+
+
+def test_a_ctrl_c_that_strikes_where_nothing_can_be_raised_strikes_again(
+    stops: StopRequests, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(Aborted, match="Stopped by Ctrl-C"):
+        Struck()
+        time.sleep(5.0)
+    assert stops.outstanding() == "Stopped by Ctrl-C"
+    assert capsys.readouterr().err == ""
