@@ -90,8 +90,8 @@ class FineSearch:
         declared = found.base.structure
         first = 1 + max((c.round for c in found.candidates), default=0)
         for round_ in range(first, first + MOST_EFFECTS):
-            if round_ - first >= PATIENCE and now.level > ENDS_NEAR:
-                return False
+            if len(now.structure.effects) >= len(declared.effects) + PATIENCE and now.level > ENDS_NEAR:
+                return False  # more than that are not believed, and each round costs more than the one before
             chosen = self._round(found, now, round_)
             if chosen is None:
                 break
@@ -110,6 +110,8 @@ class FineSearch:
 
     def _hidden_pair(self, found: Search, now: Whole) -> Whole | None:
         """With two effects that no search for one at a time finds, where both bring the model near the data."""
+        if len(now.structure.effects) + 2 > len(found.base.structure.effects) + MOST_NAMED:
+            return None
         fitted = [w for w in map(self._both(now), self.on_offer.pairs(now)) if w is not None]
         best = min(fitted, key=lambda w: w.squares, default=None)
         if best is None or best.level > ENDS_NEAR:
