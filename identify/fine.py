@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -42,6 +43,7 @@ LEAP = 0.03  # of the squares that the right effect leaves where it is the only 
 LEAST = 0.4  # of the squares that the best candidate takes while the noise is still far
 CLEARLY_LEFT = 5.0  # standard deviations of chi square
 AT_NOISE = 1.05  # mean square over the noise's variance: the noise is known to a percent or two
+TOOK, LARGE = 0.9, 3  # of the squares that a candidate has to leave at most to be tried with another, and how many
 PATIENCE = 3  # effects after which the end must be near
 
 
@@ -54,6 +56,7 @@ class FineSearch:
         self.tried_at = np.inf
         self.attempts = 0
         self.came_near: dict[str, dict[str, Whole]] = {}
+        self.first_tried: dict[str, Whole] = {}  # of the first round of an attempt
 
     def take_over(self, found: Search) -> bool:
         """Go on from the model at hand, if it runs free near the data; ``found`` is brought up to date.
@@ -65,7 +68,7 @@ class FineSearch:
         pliant = any(effects.get(e).resembles_much for e in found.best.structure.effects)
         if begin is None or not self._near(begin, FAR_CLOSER if pliant else CLOSER):
             return False
-        self.tried_at, self.attempts = begin.level, self.attempts + 1
+        self.tried_at, self.attempts, self.first_tried = begin.level, self.attempts + 1, {}
         self.on_offer.horizon = found.horizon
         trial = _copy_of(found)
         if not self._rounds(trial, begin):
@@ -113,8 +116,12 @@ class FineSearch:
         if len(now.structure.effects) + 2 > len(found.base.structure.effects) + MOST_NAMED:
             return None
         fitted = [w for w in map(self._both(now), self.on_offer.pairs(now)) if w is not None]
+        if min((w.level for w in fitted), default=np.inf) > ENDS_NEAR:
+            fitted += self._both_large(now)
         best = min(fitted, key=lambda w: w.squares, default=None)
         if best is None or best.level > ENDS_NEAR:
+            return None
+        if best.level > AT_NOISE and any(effects.get(e).resembles_much for e in best.structure.effects[-2:]):
             return None
         new = sorted(best.structure.effects[-2:], key=best.judged().strength, reverse=True)
         round_ = 1 + max((c.round for c in found.candidates), default=0)
@@ -132,6 +139,22 @@ class FineSearch:
         return lambda pair: self.on_offer.by_way_of_a_short_horizon(
             now.structure.plus(pair.names[0]).plus(pair.names[1]), {**now.values(), **pair.start}
         )
+
+    def _both_large(self, now: Whole) -> list[Whole]:
+        """The candidates of the first round that took the most, two at a time: each hides how much the other takes."""
+        took = {n: w for n, w in self.first_tried.items() if w.squares < TOOK * now.squares}
+        out: list[Whole] = []
+        for a, b in combinations(sorted(took, key=lambda n: took[n].squares)[:LARGE], 2):
+            if b in (effects.get(a).never_separable or {}) or b in effects.get(a).nests or a in effects.get(b).nests:
+                continue
+            structure = now.structure.plus(a).plus(b)
+            for first, second in ((a, b), (b, a)):  # J, C and K of either
+                own = {k: v for k, v in took[second].values().items() if k[0] == second}
+                both = self.whole(structure, {**took[first].values(), **own})
+                out += [both] if both is not None else []
+                if both is not None and both.level < ENDS_NEAR:
+                    return out
+        return out
 
     @staticmethod
     def _astray(new: Whole, now: Whole) -> bool:
@@ -193,13 +216,15 @@ class FineSearch:
 
     def _round(self, found: Search, now: Whole, round_: int) -> Whole | None:
         tried, looks = self.on_offer.tried(now)
+        self.first_tried = self.first_tried or tried
         name = self._chosen(tried, now)
         self._keep_books(found, now, tried, looks, name, round_)
         if name is None:
             return None
         best = tried[name]
         self.came_near[name] = {
-            n: w for n, w in tried.items() if n != name and w.squares < NEAR_THEN * best.squares
+            n: w for n, w in tried.items()
+            if n != name and (w.squares < NEAR_THEN * best.squares or n in effects.get(name).nests)
         }  # fmt: skip
         if not best.estimate.converged:
             best = self.whole(best.structure, best.values()) or best

@@ -65,3 +65,14 @@ def test_a_model_that_has_effects_of_the_drive_already_is_looked_at_too() -> Non
     assert set(found.verdict.effects) == {"torque_deadzone", "backlash"}
     assert found.final.effect_parameters["torque_deadzone"]["width"].value == pytest.approx(1.1, rel=0.01)
     assert found.final.effect_parameters["backlash"]["half_gap"].value == pytest.approx(0.0016, rel=0.01)
+
+
+def test_two_large_effects_that_can_follow_anything_are_both_named() -> None:
+    given = {
+        "creep": {"stiffness": 110.0, "time": 0.02},
+        "periodic_disturbance": {"sine": 4.0, "cosine": 0.0, "frequency": 38.0},
+    }
+    settings = IdentifyConfig.model_validate({"candidates": ["creep", "periodic_disturbance", "actuator_lag"]})
+    found = identify(recording(given), DECLARED, settings)
+    assert set(found.verdict.effects) == {"creep", "periodic_disturbance"}
+    assert abs(found.final.effect_parameters["creep"]["time"].value / 0.02 - 1.0) < 0.01
