@@ -18,6 +18,14 @@ AGAIN_S = 0.02
 SAVING = "Stopping as soon as what is being saved is saved."
 
 
+def _strike() -> None:
+    """Ctrl-C, to the thread that handles signals: it wakes from whatever it waits for."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+    else:
+        signal.raise_signal(signal.SIGINT)
+
+
 class _Stage(Enum):
     IDLE = "a signal raises where it strikes"
     TICKING = "the sequencer asks at every tick"
@@ -104,7 +112,7 @@ class StopRequests:
         if not isinstance(lost, (Aborted, KeyboardInterrupt)):
             return False
         self._lost = lost
-        threading.Timer(AGAIN_S, signal.raise_signal, (signal.SIGINT,)).start()
+        threading.Timer(AGAIN_S, _strike).start()
         return True
 
     def _heard(self, number: int, _frame: FrameType | None) -> None:

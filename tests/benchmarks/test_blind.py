@@ -210,6 +210,7 @@ def test_the_truth_scores_as_right(case: cases.Case) -> None:
     assert s.covered == (True, True, True)
 
 
+@pytest.mark.slow
 def test_a_wrong_name_an_extra_name_silence_and_a_crash_score_as_wrong(case: cases.Case) -> None:
     truth = {k: dict(v) for k, v in case.hidden.effects.items()}
     cubic = {"cubic_stiffness": {"factor": 3.0}}

@@ -30,7 +30,8 @@ def disturbed(torque_nm: float, frequency_hz: float, late_s: float, seed: int) -
     return replace(run, rate_rad_s=rate + NOISE_RAD_S * rng.standard_normal(len(rate)))
 
 
-@pytest.mark.parametrize("late_s", [0.002, pytest.param(0.003, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("late_s", [0.002, 0.003])
+@pytest.mark.slow
 def test_the_fit_that_runs_free_closer_stands_and_is_not_accepted(late_s: float) -> None:
     recording = Recording(tuple(disturbed(*s, late_s, seed=10 + i) for i, s in enumerate(SETS)))
     found = identify(recording, DECLARED, IdentifyConfig.model_validate({"candidates": FEW}))

@@ -67,6 +67,7 @@ def test_a_model_that_has_effects_of_the_drive_already_is_looked_at_too() -> Non
     assert found.final.effect_parameters["backlash"]["half_gap"].value == pytest.approx(0.0016, rel=0.01)
 
 
+@pytest.mark.slow
 def test_two_large_effects_that_can_follow_anything_are_both_named() -> None:
     given = {
         "creep": {"stiffness": 110.0, "time": 0.02},

@@ -93,6 +93,7 @@ def test_a_capture_of_another_campaign_is_refused(tmp_path: Path) -> None:
     assert "holds another campaign" in (tmp_path / "other.log").read_text()
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_it_identifies_keeps_the_record_and_says_so(tmp_path: Path) -> None:
     def stop_when_fitting(process: subprocess.Popen[bytes], log: Path) -> int:
         while process.poll() is None and b"fitting the declared model" not in log.read_bytes():
