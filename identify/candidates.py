@@ -33,6 +33,7 @@ FEW_STEPS = 8  # of a fit that is only compared
 TAKEN_ON = 4  # times as many as a fit has, while each time the squares fall
 GOING = 0.95  # to less than this share
 FAR_BEHIND = 0.7  # of the best score: not fitted any more once another candidate is at the floor
+FAINT = 0.03  # of the best score: what promises so little beside another is not what the round is about
 HOPELESS = 3.0  # times the best error of the round after three steps
 
 
@@ -45,10 +46,14 @@ class Candidates:
         The runs, and which of their samples fit and judge.
     allowed
         Names of the effects that may be named at all.
+    declared
+        Those that the model has from the start.
     """
 
-    def __init__(self, traces: Sequence[Trace], split: Split, allowed: Sequence[str]) -> None:
-        self.traces, self.split = traces, split
+    def __init__(
+        self, traces: Sequence[Trace], split: Split, allowed: Sequence[str], declared: Sequence[str] = ()
+    ) -> None:
+        self.traces, self.split, self.declared = traces, split, tuple(declared)
         self.fit = [i for i, m in enumerate(split.fit) if np.any(m)]
         self.noise = float(np.sqrt(np.mean([t.noise**2 for t in traces])))
         self.torque_free = all(t.torque is None for t in traces)
@@ -83,7 +88,7 @@ class Candidates:
             best = min(tried.values(), key=lambda w: w.squares, default=now)
             if best.level < AT_FLOOR and look.gain < FAR_BEHIND * short[0].gain:
                 continue
-            fitted = self._from(now, look, HOPELESS * best.estimate.sigma)
+            fitted = self._from(now, look, best)
             if fitted is not None:
                 tried[look.effect] = fitted
         best = min(tried.values(), key=lambda w: w.squares, default=now)
@@ -132,13 +137,14 @@ class Candidates:
         whole = Scores(now.estimate, self.fixed, sigma, scale).all(shown) if shown else []
         return whole + [s for s in part if s.effect not in shown]
 
-    def _from(self, now: Whole, look: Scored, hopeless: float) -> Whole | None:
+    def _from(self, now: Whole, look: Scored, best: Whole) -> Whole | None:
         """A candidate fitted from where its score points, if need be by way of a short horizon.
 
-        Over whole runs friction has false minima: a standstill that comes too soon puts the rest of the run off. So
-        has whatever moves the resonance: a start that is worse than the model without the candidate has lost it.
+        ``best`` is the best fit of the round so far. Over whole runs friction has false minima: a standstill that
+        comes too soon puts the rest of the run off. So has whatever moves the resonance: a start that is worse than
+        the model without the candidate has lost it.
         """
-        structure = now.structure.plus(look.effect)
+        structure, hopeless = now.structure.plus(look.effect), HOPELESS * best.estimate.sigma
         traces, use = [self.traces[i] for i in self.fit], [self.split.fit[i] for i in self.fit]
         starts = [{**now.values(), **look.start}, {**now.values(), **look.besides, **look.start}]
         squares = [squares_at(traces, structure, start, use) / self.noise**2 for start in starts]
@@ -147,6 +153,8 @@ class Candidates:
             fitted = self.by_way_of_a_short_horizon(structure, start, hopeless, FEW_STEPS)
         else:
             fitted = self.whole(structure, start, hopeless, FEW_STEPS)
+        if best.level < ENDS_NEAR or set(now.structure.effects) > set(self.declared):
+            return fitted  # a second effect that is no small addition would have been the first
         return self._or_large(look.effect, now, fitted, hopeless)
 
     def by_way_of_a_short_horizon(
@@ -160,7 +168,7 @@ class Candidates:
         return self.whole(structure, start, hopeless, steps)
 
     def _or_large(self, name: str, now: Whole, small: Whole | None, hopeless: float) -> Whole | None:
-        """The same from where the effect is no small addition, while neither the fit nor another is near the noise."""
+        """The same from where the effect is no small addition, while the fit is not near the noise."""
         effect, best, values = effects.get(name), small, now.values()
         jck = tuple(values.get((t,), 0.0) for t in TERMS)
         for large in effect.large_starts(jck) if effect.large_starts else ():  # type: ignore[arg-type]
@@ -188,6 +196,7 @@ class Candidates:
             (s for s in looks if s.gain > max(WORTH_A_FIT, hope * (CHANCE + s.count * penalty))),
             key=lambda s: s.count * penalty - s.gain,
         )
+        worth = [s for s in worth if s.gain > FAINT * max(w.gain for w in worth)]
         gains = {s.effect: s.gain for s in worth}  # what contains another and promises less is not it
         worth = [s for s in worth if all(gains.get(n, 0.0) <= s.gain for n in effects.get(s.effect).nests)]
         short = [s for s in worth if not simplicity(s.effect)][:most]  # channels come beside, they displace nothing

@@ -39,11 +39,14 @@ FAR_CLOSER = 0.2  # the same where what was named since can follow anything, and
 ATTEMPTS = 2
 STILL_FAR = 100.0  # mean square over the noise's variance
 VERY_FAR = 1e4
+AS_FAR = 1.03  # times the squares of the best while the noise is still far: the simpler is as good
 LEAP = 0.03  # of the squares that the right effect leaves where it is the only one that is large
 LEAST = 0.4  # of the squares that the best candidate takes while the noise is still far
 CLEARLY_LEFT = 5.0  # standard deviations of chi square
 AT_NOISE = 1.05  # mean square over the noise's variance: the noise is known to a percent or two
 TOOK, LARGE = 0.9, 3  # of the squares that a candidate has to leave at most to be tried with another, and how many
+SAME = 0.9  # of the level of an earlier attempt with the same effects: not near enough to expect more of it
+NO_SWAP = 10.0  # mean square over the noise's variance that no other effect in the place of one takes away
 PATIENCE = 3  # effects after which the end must be near
 
 
@@ -56,6 +59,7 @@ class FineSearch:
         self.tried_at = np.inf
         self.attempts = 0
         self.came_near: dict[str, dict[str, Whole]] = {}
+        self.passed: dict[frozenset[str], float] = {}  # structures an attempt went on from, and how near they came
         self.first_tried: dict[str, Whole] = {}  # of the first round of an attempt
 
     def take_over(self, found: Search) -> bool:
@@ -85,15 +89,18 @@ class FineSearch:
         """Whether the free run stays close enough, and by how much closer than where this was tried before."""
         if self.attempts >= ATTEMPTS and model.level > ENDS_NEAR:
             return False
+        if model.level > SAME * self.passed.get(frozenset(model.structure.effects), np.inf):
+            return False  # where an attempt led nowhere from
         close = model.estimate.sigma < NEAR_SIGNAL * self.on_offer.moving and model.level < FARTHEST**2
         return close and model.level < closer * self.tried_at
 
     def _rounds(self, found: Search, now: Whole) -> bool:
         """Rounds until nothing is worth adding; whether that ended near the sensor's noise."""
         declared = found.base.structure
+        most = len(declared.effects) + PATIENCE
         first = 1 + max((c.round for c in found.candidates), default=0)
         for round_ in range(first, first + MOST_EFFECTS):
-            if len(now.structure.effects) >= len(declared.effects) + PATIENCE and now.level > ENDS_NEAR:
+            if len(now.structure.effects) >= most and now.level > ENDS_NEAR:
                 return False  # more than that are not believed, and each round costs more than the one before
             chosen = self._round(found, now, round_)
             if chosen is None:
@@ -101,6 +108,9 @@ class FineSearch:
             if self._astray(chosen, now):
                 return False
             now = self._pruned(found, chosen, chosen.structure.effects[:-1])
+            self.passed[frozenset(now.structure.effects)] = now.level
+            if len(now.structure.effects) >= most and now.level > NO_SWAP:
+                return False
             if now.level > AT_FLOOR:  # a lag in the sensor looks like one in the drive until the rest is there
                 now = self._asked_again(found, now)
         if now.level > ENDS_NEAR or len(now.structure.effects) > len(declared.effects) + MOST_NAMED:
@@ -250,7 +260,8 @@ class FineSearch:
         if nested:
             return min(nested, key=lambda n: good[n].squares)
         behind = {n: (good[n].penalised - good[best].penalised) / good[best].level for n in good}
-        alike = [n for n in good if behind[n] < RIVAL]
+        far = good[best].level > STILL_FAR  # from the noise, where what is left is no chance
+        alike = [n for n in good if behind[n] < RIVAL or (far and good[n].squares < AS_FAR * good[best].squares)]
         return min(alike, key=lambda n: (*_simplicity(n), behind[n] > EQUAL, effects.known().index(n)))
 
     def _worth(self, name: str, new: Whole, now: Whole) -> bool:

@@ -113,7 +113,7 @@ class _Identifier:
         try:
             self.say("fitting the declared model")
             nominal = (d.inertia_kg_m2, d.damping_nm_s_rad, d.stiffness_nm_rad)
-            on_offer = Candidates(traces, parts, allowed)
+            on_offer = Candidates(traces, parts, allowed, self.structure.effects)
             fine = FineSearch(on_offer, self.say)
 
             def take_over(found: Search) -> bool:

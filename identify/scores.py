@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from identify.neighbourhood import Neighbourhood, neighbourhood_of
 from identify.output_error import Estimate
 from identify.parameters import Name, bounds_of, platform_of
 from identify.screen import grid_of
@@ -71,6 +72,7 @@ class _Run:
     basis: Array
     columns: Array
     residual: Array
+    near: Neighbourhood | None
     along: tuple[Array, Array, Array, Array] | None = None
 
     def project(self, values: Array) -> Array:
@@ -134,9 +136,12 @@ class Scores:
     def _around(self, shots: Shots) -> _Run:
         e = self.estimate
         scale = np.where(np.abs(e.values) > 0, np.abs(e.values), 1.0)
-        columns, state, residual = sensitivities(shots, e.structure, e.names, e.values, scale, ~self.keep)
+        near = neighbourhood_of(
+            shots, Equations(platform_of(e.structure, e.names, e.values, shots.number, shots.added))
+        )
+        columns, state, residual = sensitivities(shots, e.structure, e.names, e.values, scale, ~self.keep, near)
         basis = nuisance_basis(shots, state)
-        run = _Run(shots, shots.trace.measured - residual, basis, np.zeros((0, 0)), np.zeros(0))
+        run = _Run(shots, shots.trace.measured - residual, basis, np.zeros((0, 0)), np.zeros(0), near)
         return replace(run, columns=run.project(columns[:, self.keep]), residual=run.project(residual))
 
     def all(self, names: Sequence[str]) -> list[Scored]:
@@ -292,7 +297,7 @@ class Scores:
             bare = platform_of(e.structure, e.names, e.values, run.shots.number, run.shots.added)
             platform = replace(bare, effects={**bare.effects, effect.name: held})
             if effect.place is Place.LOAD and not effect.reads:
-                moved = self._pushed(run, Equations(bare), effect, held) - run.base
+                moved = self._pushed(run, Equations(bare), effect, held)
             else:
                 equations = Equations(platform)
                 shots, base = self._finer(run, bare, equations)
@@ -303,14 +308,14 @@ class Scores:
         return out
 
     def _pushed(self, run: _Run, bare: Equations, effect: Effect, held: Mapping[str, float]) -> Array:
-        """The channel with the torque that a little of a candidate makes along the model's own motion.
+        """What the torque that a little of a candidate makes along the model's own motion adds to the channel.
 
         To first order that is the candidate, however fast its own states are.
         """
         values = effect.values(held)
         s = run.shots
         if run.along is None:
-            run.along = _half_steps(s, bare)
+            run.along = run.near.half if run.near else _half_steps(s, bare)
         angle, rate, time, torque = run.along
         step = 0.5 * s.grid.step_s
         substeps = 1
@@ -322,7 +327,8 @@ class Scores:
             effect.kernel.address, angle, rate, time, torque, step, z, substeps, np.array([*bare.jck, *values]),
             False, 1.0, out,
         )  # fmt: skip
-        return predict(s, bare, s.starts, s.bias, np.stack([out[:-1:2], out[1::2], out[2::2]], axis=1))
+        push = np.stack([out[:-1:2], out[1::2], out[2::2]], axis=1)
+        return run.near.resisted(push) if run.near else predict(s, bare, s.starts, s.bias, push) - run.base
 
     def _finer(self, run: _Run, bare: Platform, equations: Equations) -> tuple[Shots, Array]:
         """The same shots on a grid that a fast candidate needs, and the model's own motion there."""
@@ -360,8 +366,8 @@ class Scores:
 
 def _half_steps(s: Shots, equations: Equations) -> tuple[Array, Array, Array, Array]:
     """Angle, rate, time and torque of the model at start, middle and end of its fine steps, (2 m - 1,) each."""
-    fine, first = motion(s, equations, s.starts)
-    h, steps = s.grid.step_s, s.grid.shaft_torque(equations)
+    moving = motion(s, equations, s.starts)
+    fine, first, steps, h = moving.fine[:, :2], moving.first, moving.torque, s.grid.step_s
     out = np.empty((2 * len(fine) - 1, 2))
     out[::2] = fine
     slope = np.stack([fine[:, 1], np.gradient(fine[:, 1], h)], axis=1)

@@ -9,6 +9,7 @@ from typing import Any
 import numba as nb
 import numpy as np
 
+from identify.neighbourhood import Neighbourhood, neighbourhood_of
 from identify.parameters import Name, bounds_of, equations_of
 from identify.regression import Structure
 from identify.shots import RUNAWAY, Shots, losses_of, predict
@@ -84,14 +85,20 @@ def nuisance_basis(s: Shots, state: Array) -> Array:
 
 @RUNAWAY
 def sensitivities(
-    s: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any
-) -> tuple[Array, Array, Array]:
-    """Derivatives by the parameters (n, p) and by the shots' start states (n, 2), and the residual (n,)."""
+    s: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any,
+    near: Neighbourhood | None = None,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """Derivatives by the parameters (n, p) and by the shots' start states (n, 2), and the residual (n,).
+
+    ``near`` is the run's neighbourhood at ``x``, where somebody has it already.
+    """
 
     def run(values: Array, starts: Array) -> Array:
         return predict(s, equations_of(structure, names, values, s.number, s.added), starts, s.bias)
 
-    base = run(x, s.starts)
+    equations = equations_of(structure, names, x, s.number, s.added)
+    near = near or neighbourhood_of(s, equations)
+    base = run(x, s.starts) if near is None else near.channel
     residual = s.trace.measured - base
     columns = np.zeros((len(base), len(x)))
     for i in range(len(x)):
@@ -102,10 +109,14 @@ def sensitivities(
         h = -h if x[i] + h > high else h
         moved = x.copy()
         moved[i] += h
-        columns[:, i] = (run(moved, s.starts) - base) / h
+        other = None if near is None else near.changed(equations_of(structure, names, moved, s.number, s.added))
+        columns[:, i] = (run(moved, s.starts) - base if other is None else other) / h
     span = np.maximum(np.max(np.abs(s.trace.fine[0])), 1e-9), np.maximum(np.max(np.abs(s.trace.fine[1])), 1e-9)
     state = np.zeros((len(base), 2))
     for k in range(2):
+        if near is not None:
+            state[:, k] = near.begun(k)
+            continue
         moved = s.starts.copy()
         moved[:, k] += STEP * 10.0 * span[k]
         state[:, k] = (run(x, moved) - base) / (STEP * 10.0 * span[k])

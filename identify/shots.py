@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -109,7 +109,12 @@ def from_rest(shots: Shots, equations: Equations) -> Shots:
 
 def predict(shots: Shots, equations: Equations, starts: Array, bias: float, push: Array | None = None) -> Array:
     """The measured channel as the model gives it, shape (n,); ``push`` is a further resisting torque (see motion)."""
-    fine, first = motion(shots, equations, starts, push)
+    moving = motion(shots, equations, starts, push)
+    return read_off(shots, equations, moving.fine, moving.first, bias)
+
+
+def read_off(shots: Shots, equations: Equations, fine: Array, first: int, bias: float) -> Array:
+    """The measured channel of a motion, (m, 2) or (m, 3), that is simulated from one instant on, shape (n,)."""
     grid, run = shots.grid, shots.trace.run
     ratio = round(shots.trace.step_s / grid.step_s)
     n = len(shots.trace.measured)
@@ -127,8 +132,22 @@ def predict(shots: Shots, equations: Equations, starts: Array, bias: float, push
     return np.asarray(turned[: n * ratio : ratio] + bias)
 
 
-def motion(shots: Shots, equations: Equations, starts: Array, push: Array | None = None) -> tuple[Array, int]:
-    """Angle and rate at every fine instant, (m, 2), and the first one that is simulated.
+class Moving(NamedTuple):
+    """A simulated run: angle, rate and acceleration at every fine instant, (m, 3), and what they came from."""
+
+    fine: Array
+    torque: Array  # (m - 1, 3)
+    spans: list[tuple[int, int]]  # of fine steps that are simulated
+    starts: Array
+
+    @property
+    def first(self) -> int:
+        """The first instant that is simulated."""
+        return self.spans[0][0] if self.spans else 0
+
+
+def motion(shots: Shots, equations: Equations, starts: Array, push: Array | None = None) -> Moving:
+    """A run simulated from its start states.
 
     ``push``, (m - 1, 3), is a torque at start, middle and end of each fine step that resists besides.
     """
@@ -144,7 +163,7 @@ def motion(shots: Shots, equations: Equations, starts: Array, push: Array | None
         on = np.concatenate([[True], on[1:]])  # what remembers begins where the run does, not where samples count
     active = [(a * ratio, min(b, n - 1) * ratio) for (a, b), used in zip(shots.edges, on, strict=True) if used]
     fine = equations.integrate_shots(torque, grid.step_s, active, starts[on], shots.trace.offset_s, shots.trace)
-    return fine[:, :2], active[0][0] if active else 0
+    return Moving(fine, torque, active, starts[on])
 
 
 def _sensed(equations: Equations, rate: Array, first: int, step_s: float) -> Array:

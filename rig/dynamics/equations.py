@@ -108,7 +108,7 @@ class Equations:
         self.drive = _Filters(drive, drives, tuple(values[n] for n in drives))
         self.sensor = _Filters(sensor, sensors, tuple(values[n] for n in sensors))
         self._values = values
-        self._body = body
+        self.body = body
         bends = [effects.get(name).kinks for name in body]
         found = [at(values[name]) for name, at in zip(body, bends, strict=True) if at]
         self.kinks = np.unique(np.array([x for each in found for x in each], dtype=float))
@@ -128,7 +128,7 @@ class Equations:
         z = np.zeros(self.states)
         if not self.states:
             return z
-        for i, name in enumerate(self._body):
+        for i, name in enumerate(self.body):
             rest = effects.get(name).rest_state
             if rest:
                 z[self.z_at[i] : self.z_at[i + 1]] = rest(angle_rad, rate_rad_s)
@@ -183,7 +183,7 @@ class Equations:
         """Fine steps in one sample period: enough for the fastest motion, at least two."""
         return int(np.clip(np.ceil(sample_s * self.fastest_rad_s() / STEP_PHASE_RAD), 2, MAX_SUBSTEPS))
 
-    def _p(self, readings: Readings | None) -> tuple[Array, list[Array]]:
+    def parameters_with(self, readings: Readings | None) -> tuple[Array, list[Array]]:
         """Parameters with the channels of a run, and the tables that must stay as long as they are used."""
         if readings is None or not self._reading:
             return self.p, []
@@ -199,7 +199,7 @@ class Equations:
         self, torque: Array, step_s: float, start: tuple[float, float], readings: Readings | None = None
     ) -> Array:
         """Angle, rate and acceleration, shape (n + 1, 3), under a shaft torque of shape (n, 3)."""
-        p, _kept = self._p(readings)
+        p, _kept = self.parameters_with(readings)
         state = np.array([start[0], start[1], np.sign(start[1]), 0.0])
         out = np.empty((len(torque) + 1, 3))
         integrator.run_steps(
@@ -226,7 +226,7 @@ class Equations:
 
         Internal states go on from span to span. What lies between spans is zero.
         """
-        p, _kept = self._p(readings)
+        p, _kept = self.parameters_with(readings)
         out = np.zeros((len(torque) + 1, 3))
         if not spans:
             return out

@@ -29,7 +29,7 @@ def _quadratic(m0, m1, m2, x):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _sum(first, last, th, w, t, m, z, dz, kernels, z_at, p, p_at):  # type: ignore[no-untyped-def]
+def resisting(first, last, th, w, t, m, z, dz, kernels, z_at, p, p_at):  # type: ignore[no-untyped-def]
     """Sum of the kernels first..last-1; writes their state derivatives."""
     total = 0.0
     for k in range(first, last):
@@ -48,9 +48,9 @@ def _acceleration(th, w, t, m, slip, z, dz, jck, body):  # type: ignore[no-untyp
     loads, count = body[0], body[1]
     net = m - jck[1] * w - jck[2] * th
     if loads > 0:
-        net -= _sum(0, loads, th, w, t, m, z, dz, *body[2:])
+        net -= resisting(0, loads, th, w, t, m, z, dz, *body[2:])
     if slip != 0.0 and count > loads:
-        net -= slip * _sum(loads, count, th, abs(w), t, m, z, dz, *body[2:])
+        net -= slip * resisting(loads, count, th, abs(w), t, m, z, dz, *body[2:])
     return net / jck[0]
 
 
@@ -106,8 +106,8 @@ def _advance_to(motion, saved, zs, x0, x1, h, m0, m1, m2, n, z, w0, k1, k2, k3, 
 def _excess(motion, m, z, dz, jck, body):  # type: ignore[no-untyped-def]
     """Net torque on the platform at rate zero, and by how much it exceeds what friction holds."""
     loads, count = body[0], body[1]
-    net = m - jck[2] * motion[0] - _sum(0, loads, motion[0], 0.0, motion[3], m, z, dz, *body[2:])
-    return net, abs(net) - _sum(loads, count, motion[0], 0.0, motion[3], m, z, dz, *body[2:])
+    net = m - jck[2] * motion[0] - resisting(0, loads, motion[0], 0.0, motion[3], m, z, dz, *body[2:])
+    return net, abs(net) - resisting(loads, count, motion[0], 0.0, motion[3], m, z, dz, *body[2:])
 
 
 @jit
@@ -224,7 +224,7 @@ def pull(angle, z, jck, kernels, loads, z_at, p, p_at):  # type: ignore[no-untyp
     scratch = np.zeros(max(1, len(z)))
     held = np.zeros(max(1, len(z)))
     held[: len(z)] = z
-    return jck[2] * angle + _sum(
+    return jck[2] * angle + resisting(
         0, loads, angle, 0.0, 0.0, 0.0, pointer(held), pointer(scratch), pointer(kernels), pointer(z_at),
         pointer(p), pointer(p_at),
     ) + 0.0 * scratch[0] * held[0]  # keeps both alive  # fmt: skip
