@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from identify.channels import simplicity
+from identify.compare import Judged, start_values
 from identify.holdout import Split
 from identify.lines import foreign_lines_hz
 from identify.output_error import refine, squares_at
@@ -15,7 +16,7 @@ from identify.pairs import Pair, pairs
 from identify.parameters import Name
 from identify.regression import Structure
 from identify.scores import Scored, Scores
-from identify.screen import first_guess, scale_of
+from identify.screen import Screen, first_guess, scale_of
 from identify.traces import Trace
 from identify.whole_runs import AT_FLOOR, CHANCE, ENDS_NEAR, NEAR_THEN, STEPS, TWICE, Whole, fit_whole
 from rig import effects
@@ -98,6 +99,40 @@ class Candidates:
             if best.level > AT_FLOOR and w.squares < NEAR_THEN * best.squares and not chosen_anyway:
                 tried[name] = self._on(w)
         return tried, looks
+
+    def elsewhere(self, now: Whole, name: str) -> Whole:
+        """The same effects, one of them begun where its other minima may lie: the best of all fits."""
+        effect, values, best = effects.get(name), now.values(), now
+        jck = tuple(values.get((t,), 0.0) for t in TERMS)
+        own = tuple(values[(name, p.name)] for p in effect.parameters) if effect.other_minima else ()
+        for other in effect.other_minima(jck, own) if effect.other_minima else ():  # type: ignore[arg-type]
+            start: dict[Name, float] = dict(values)
+            start |= {(t,): v for t, v in other.terms.items()}
+            start |= {(name, p): v for p, v in other.own.items()}
+            fitted = self.whole(now.structure, start)
+            if fitted is not None and fitted.squares < best.squares:
+                best = self._on(fitted)
+        return best
+
+    def large(self, found: Judged) -> Whole | None:
+        """With an effect that is no small addition, begun where the regression along the measured motion sees it.
+
+        A second inertia as heavy as the first has two resonances: no model with one of them runs near the data.
+        """
+        traces, structure = [self.traces[i] for i in self.fit], found.structure
+        best: Whole | None = None
+        for name in self.allowed:
+            if effects.get(name).large_starts is None or name in structure.effects:
+                continue
+            screen = Screen(traces, structure, found.shapes(), first_guess(traces, Structure(structure.terms)))
+            look = screen.look(name)
+            if look is None or look.gain < WORTH_A_FIT:
+                continue
+            start = start_values(screen.solution(look), look.shapes, 1 + max(t.number for t in self.traces))
+            fitted = self.whole(structure.plus(name), {**found.values(), **start})
+            if fitted is not None and (best is None or fitted.squares < best.squares):
+                best = self._on(fitted)
+        return best
 
     def pairs(self, now: Whole) -> list[Pair]:
         """Two effects at once that may be worth a fit; none that follow anything, and no channels."""

@@ -30,6 +30,7 @@ NEAR_SIGNAL = 0.3  # of the signal that a free run may leave for this search to 
 HELD = 4.0  # the same on the held-out samples
 EQUAL = 4.0  # fall of chi square that says nothing: the library's order, simple before special, decides
 RIVAL = 10.0  # what parts two candidates for good
+WELL_KNOWN = 100.0  # standard errors beyond which a minimum is no false one
 CERTAIN = 30.0  # standard errors beyond which nobody asks whether a term is needed
 STRONG = 4.0  # standard errors by which every parameter of a new effect must differ from zero
 SHARE = 0.2  # of the excess over the noise that an effect has to take away
@@ -58,6 +59,7 @@ class FineSearch:
         self.whole, self.noise = candidates.whole, candidates.noise
         self.tried_at = np.inf
         self.attempts = 0
+        self.asked_for_large = False
         self.came_near: dict[str, dict[str, Whole]] = {}
         self.passed: dict[frozenset[str], float] = {}  # structures an attempt went on from, and how near they came
         self.first_tried: dict[str, Whole] = {}  # of the first round of an attempt
@@ -71,7 +73,9 @@ class FineSearch:
         begin = self.whole(found.best.structure, found.best.values())
         pliant = any(effects.get(e).resembles_much for e in found.best.structure.effects)
         if begin is None or not self._near(begin, FAR_CLOSER if pliant else CLOSER):
-            return False
+            begin = self._large(found)
+            if begin is None:
+                return False
         self.tried_at, self.attempts, self.first_tried = begin.level, self.attempts + 1, {}
         self.on_offer.horizon = found.horizon
         trial = _copy_of(found)
@@ -84,6 +88,21 @@ class FineSearch:
         found.candidates, found.rivals, found.dropped = trial.candidates, trial.rivals, trial.dropped
         found.rival_models = trial.rival_models
         return True
+
+    def _large(self, found: Search) -> Whole | None:
+        """Once, where the declared model runs astray: with an effect that changes all of the motion, if near."""
+        if self.attempts or self.asked_for_large:
+            return None
+        self.asked_for_large = True
+        large = self.on_offer.large(found.best)
+        if large is None or large.level > ENDS_NEAR * STILL_FAR:
+            return None
+        name = large.structure.effects[-1]
+        round_ = 1 + max((c.round for c in found.candidates), default=0)
+        held = float(np.sqrt(large.held / max(large.held_count, 1))) * self.noise
+        found.candidates.append(Candidate(name, round_, 0.0, held, "added"))
+        self.say(f"added {name}: free-run error {large.estimate.sigma:.3g}; without it the model runs astray")
+        return large
 
     def _near(self, model: Whole, closer: float) -> bool:
         """Whether the free run stays close enough, and by how much closer than where this was tried before."""
@@ -118,6 +137,9 @@ class FineSearch:
         now = self._restored(found, now, declared.terms)
         now = self._pruned(found, now, (*now.structure.terms, *now.structure.effects))
         now = self._asked_again(found, now)
+        for name in now.structure.effects[len(declared.effects) :]:
+            if now.judged().strength(name) < WELL_KNOWN:
+                now = self.on_offer.elsewhere(now, name)
         found.best, found.floor = now.judged(), self.noise
         return True
 

@@ -44,12 +44,13 @@ def _step(t, y, h, out, stages, work, jck, codes, zo, po, so, p, s, g, late, sli
 def _room(t, y, dy, jck, codes, zo, po, so, p, s, g, late, slip, kind, a, tones, parts, rubs):  # type: ignore[no-untyped-def]
     """How far the nearest switch is from changing its sign (negative: it has). Fills ``g`` and ``dy``.
 
-    Switches of the rate stand at zero all the while that friction holds: they have a say when it lets go.
+    A switch that stands at zero has no side: those of the rate all the while that friction holds, that of the
+    torque all the while that a dead zone keeps it from the shaft. They have a say when they leave it.
     """
     net, level, _ = rhs(t, y, dy, jck, codes, zo, po, so, p, s, g, late, slip, kind, a, tones, parts)
     room = np.inf
     for i in range(len(s)):
-        if slip != 0.0 or g[i] != 0.0:
+        if g[i] != 0.0:
             room = min(room, s[i] * g[i])
     if rubs:
         room = min(room, slip * y[1] if slip != 0.0 else level - abs(net))

@@ -89,7 +89,7 @@ class Parameter:
 
 
 class LargeStart(NamedTuple):
-    """Where the fit of an effect may begin that is no small addition: terms of the platform, own parameters."""
+    """Where the fit of an effect may begin: terms of the platform, own parameters."""
 
     terms: Mapping[str, float]
     own: Mapping[str, float]
@@ -126,6 +126,8 @@ class Effect:
     needs_added_inertia: bool = False  # shows only where runs carry a known inertia besides the platform's own
     # Of (J, C, K): terms of the platform and own parameters to begin from where the effect is large.
     large_starts: Callable[[tuple[float, float, float]], tuple[LargeStart, ...]] | None = None
+    # Of (J, C, K) and its own values where a fit has ended: where else its minimum may lie.
+    other_minima: Callable[[tuple[float, float, float], tuple[float, ...]], tuple[LargeStart, ...]] | None = None
     resembles_much: bool = False  # its shapes make it follow whatever else is missing
     separated_by: str = ""
     reads: Channel | None = None  # the measured channel that it is an effect of

@@ -33,6 +33,21 @@ def _large(jck: tuple[float, float, float]) -> tuple[LargeStart, ...]:
     return tuple(LargeStart({"inertia": 0.75 * inertia}, {**own, "frequency": n * natural_hz}) for n in (1.2, 1.8))
 
 
+def _others(jck: tuple[float, float, float], own: tuple[float, ...]) -> tuple[LargeStart, ...]:
+    """Other modes that slow torque hardly tells from this one: it sees the inertias' sum and inertia / frequency^2.
+
+    Which of them rings shows beside false minima.
+    """
+    inertia, frequency, ratio = own
+    out = []
+    for times in (0.6, 1.6, 2.5):
+        heavier = times**2 * inertia
+        if heavier - inertia < 0.5 * jck[0]:
+            mine = {"inertia": heavier, "frequency": times * frequency, "ratio": ratio}
+            out.append(LargeStart({"inertia": jck[0] + inertia - heavier}, mine))
+    return tuple(out)
+
+
 EFFECT = Effect(
     name="flexible_mode",
     family="structure",
@@ -60,5 +75,6 @@ EFFECT = Effect(
     fastest_rad_s=lambda values: 2.0 * math.pi * values[4] * (1.0 + values[3] / values[0]) ** 0.5,
     large_starts=_large,
     resembles_much=True,
+    other_minima=_others,
     separated_by="from inertia: frequencies on both sides of the mode; a multisine or chirp",
 )
