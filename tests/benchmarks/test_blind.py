@@ -292,6 +292,15 @@ def test_an_effect_far_below_the_noise_counts_as_undetectable() -> None:
     assert not cases.energies(hidden, sets, hidden.play(sets))["cubic_stiffness"].detectable
 
 
+def test_friction_that_the_torque_presses_turns_on_time_behind_a_dead_zone() -> None:
+    hidden = {"load_dependent_friction": {"factor": 0.057}, "torque_deadzone": {"width": 2.9}}
+    numbers = (0.044, 0.28, 641.0, hidden)
+    found = Hidden(*numbers).play([sine(26.0, 0.7, 3.0)])[0]
+    asked = TorqueSignal(found.time_s, found.torque_nm)
+    ours = simulate(Platform(*numbers), found.time_s, asked, substeps=32)
+    assert np.std(found.rate_rad_s - ours.rate_rad_s) < 0.3 * cases.NOISE[0]
+
+
 def test_friction_that_lets_go_beside_another_switch_of_the_rate_lets_go_on_time() -> None:
     hidden = {"directional_damping": {"step": 1.7}, "load_dependent_friction": {"factor": 0.05}}
     platform = Hidden(0.026, 0.1, 445.0, hidden)

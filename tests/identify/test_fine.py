@@ -15,7 +15,7 @@ from identify.regression import Structure
 from identify.search import Search
 from rig import effects
 from rig.recording.run import Recording
-from tests.identify.simulated import NOISE_RAD_S, campaign, traces_of
+from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
 
 START = {("inertia",): 0.0201, ("damping",): 0.05, ("stiffness",): 676.0}
 ALLOWED = (
@@ -73,6 +73,44 @@ def test_a_record_far_above_the_sensors_noise_is_left_to_others() -> None:
     found, took = searched(quiet)
     assert not took
     assert found.best.structure.effects == ()
+
+
+def test_a_second_inertia_as_heavy_as_the_platform_is_found_though_nothing_runs_near_without_it() -> None:
+    mode = {"inertia": 0.021, "frequency": 24.0, "ratio": 0.006}
+    recording = campaign({"flexible_mode": mode}, duration_s=4)
+    found, took = searched(recording, ("coulomb_friction", "torque_delay", "flexible_mode"))
+    assert found.base.sigma > 100.0 * NOISE_RAD_S
+    assert took
+    assert found.best.structure.effects == ("flexible_mode",)
+    assert found.best.sigma < 1.1 * NOISE_RAD_S
+    values = found.best.values()
+    assert [values["flexible_mode", n] for n in mode] == pytest.approx(list(mode.values()), rel=1e-3)
+    assert [values[n,] for n in ("inertia", "stiffness")] == pytest.approx([TRUTH[0], TRUTH[2]], rel=1e-3)
+
+
+def test_a_resonance_that_a_fit_has_missed_is_looked_for_elsewhere() -> None:
+    traces = traces_of(
+        campaign({"flexible_mode": {"inertia": 0.0012, "frequency": 58.0, "ratio": 0.038}}, duration_s=3)
+    )
+    on_offer = Candidates(traces, split(traces), ("flexible_mode",))
+    lost = {"inertia": 7.7e-5, "frequency": 21.0, "ratio": 0.05}
+    begin = START | {("flexible_mode", n): v for n, v in lost.items()}
+    missed = on_offer.whole(Structure(effects=("flexible_mode",)), begin)
+    assert missed is not None and missed.level > 2.0
+    found = on_offer.elsewhere(missed, "flexible_mode")
+    assert found.squares < 0.5 * missed.squares
+    assert found.values()["flexible_mode", "frequency"] == pytest.approx(58.0, rel=0.05)
+
+
+def test_a_search_that_led_nowhere_is_not_begun_again_from_where_it_passed() -> None:
+    traces = traces_of(campaign({"coulomb_friction": {"level": 0.5}}, duration_s=2))
+    fine = FineSearch(Candidates(traces, split(traces), ALLOWED), lambda text: None)
+    model = fine.whole(Structure(), START)
+    assert model is not None and fine._near(model, 0.5)
+    fine.passed[frozenset()] = model.level
+    assert not fine._near(model, 0.5)
+    fine.passed[frozenset()] = 2.0 * model.level
+    assert fine._near(model, 0.5)
 
 
 def test_held_out_runs_take_no_part_in_the_fit() -> None:
