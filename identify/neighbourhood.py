@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
+from identify.along import torque_along
 from identify.shots import Shots, motion, read_off
-from identify.traces import torque_along
 from rig import effects
 from rig.dynamics import Equations, Tangent, smooth
 from rig.recording.run import Array

@@ -8,7 +8,7 @@ Interpolating between the samples would average their noise, by more the farther
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 from scipy import signal
 from scipy.interpolate import CubicSpline, make_interp_spline
 
+from identify.noise import bandwidth_of, noise_of
 from rig.errors import RecordingError
 from rig.recording.run import Array
 
@@ -116,18 +117,13 @@ def _scattered(time_s: Array, step: float) -> Beat | None:
     return Beat(float(period), float(offset + period * counted[0]), counted - counted[0], scattered=True)
 
 
-def sampled(
-    beat: Beat, time_s: Array, values: Array, good: Any, noise_of: Callable[[Array], float],
-    cutoff_of: Callable[[Array, float], float],
-) -> Sampled:  # fmt: skip
+def sampled(beat: Beat, time_s: Array, values: Array, good: Any) -> Sampled:
     """A channel, shape (n,), laid on its beat.
 
     Parameters
     ----------
     good
         Shape (n,): samples that are valid.
-    noise_of, cutoff_of
-        Standard deviation of an even channel's white noise; the highest frequency in Hz at which it stands out of that.
     """
     grid, late_s = beat.instants, time_s - beat.offset_s - beat.step_s * beat.index
     there = np.zeros(beat.count, dtype=bool)
@@ -142,7 +138,7 @@ def sampled(
     even[on] = values[near]
     moved = even.copy()
     for _ in range(MOVES):
-        motion = _followed(moved, beat.step_s, cutoff_of(moved, beat.step_s))
+        motion = _followed(moved, beat.step_s, bandwidth_of(moved, beat.step_s))
         moved[on] = values[near] - (motion(time_s[near] - beat.offset_s) - motion(beat.step_s * on))
     wrong = noise_of(even) < noise_of(moved)
     return Sampled(beat, even if wrong else moved, there, scatter_s, wrong)

@@ -13,13 +13,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from identify.along import torque_along
 from identify.neighbourhood import Neighbourhood, neighbourhood_of
 from identify.output_error import Estimate
 from identify.parameters import Name, bounds_of, platform_of
 from identify.screen import grid_of
 from identify.sensitivities import nuisance_basis, sensitivities
 from identify.shots import RUNAWAY, Shots, from_rest, make_shots, motion, predict
-from identify.traces import UPSAMPLING, torque_along
+from identify.traces import UPSAMPLING
 from rig import effects
 from rig.dynamics import Equations, Grid
 from rig.dynamics.equations import MAX_SUBSTEPS

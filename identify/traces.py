@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from statistics import NormalDist
 from typing import Any, Literal
 
-import numba as nb
 import numpy as np
 from scipy import signal
 from scipy.interpolate import CubicSpline
 
+from identify.along import torque_along
 from identify.channel_readings import lost, table_of
 from identify.glitches import glitches
+from identify.noise import bandwidth_of, least_of, noise_of
 from identify.prefilter import held_pieces, linear_pieces, smooth_pieces
 from identify.sampling import HOLE, beat_of, sampled
 from rig import effects
@@ -22,7 +22,7 @@ from rig.channels import Channel
 from rig.dynamics import TorqueSignal
 from rig.dynamics.equations import MAX_SUBSTEPS, slots
 from rig.dynamics.filters import run_filter
-from rig.dynamics.native import addresses, call, pointer
+from rig.dynamics.native import addresses
 from rig.effects.base import Effect, Place
 from rig.recording.run import Array, Run
 
@@ -33,86 +33,6 @@ LEAD_IN_S = 0.01  # at the start of a run that carry no weight
 STRAIGHT = 0.1  # of the sensor's noise
 LONGEST_FILL = 25  # missing samples that a spline may bridge
 STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
-
-
-LOWER = 0.8  # of the periodogram's values
-LOWER_MEAN = (1.0 - (1.0 - LOWER) * (1.0 - np.log(1.0 - LOWER))) / LOWER  # of an exponential distribution, its mean one
-
-
-SCATTER = 1.55  # of ``noise_of`` over the root of the number of samples, as a share of itself
-
-
-def noise_of(values: Array) -> float:
-    """One standard deviation of the white part of a signal, from the upper half of its spectrum.
-
-    The mean of the lower four fifths of the periodogram there is blind to lines and to a signal below, and scatters
-    less than its median; a third difference first takes away what a steep low-frequency signal would leak.
-    """
-    if len(values) < 64:
-        return float(np.std(np.diff(values, 3)) / np.sqrt(20.0))
-    d = np.diff(values, 3)
-    spectrum = np.abs(np.fft.rfft(d * signal.windows.hann(len(d), sym=False))) ** 2
-    f = np.arange(len(spectrum)) / len(spectrum)  # of Nyquist
-    gain = (2.0 * np.sin(0.5 * np.pi * f)) ** 6
-    upper = (f > 0.5) & (f < 0.98)
-    power = np.sort(spectrum[upper] / gain[upper])
-    level = np.mean(power[: round(LOWER * len(power))]) / LOWER_MEAN
-    return float(np.sqrt(level / (0.375 * len(d))))
-
-
-def bandwidth_of(values: Array, step_s: float) -> float:
-    """Highest frequency in Hz at which a signal stands clearly above its noise."""
-    nyquist = 0.5 / step_s
-    detrend: Any = "linear"  # the stubs of some versions know no name for it
-    f, power = signal.welch(values, 1.0 / step_s, nperseg=min(len(values), 1024), detrend=detrend)
-    floor = 2.0 * noise_of(values) ** 2 * step_s + 1e-300
-    above = np.nonzero(power > 12.0 * floor)[0]
-    highest = f[above[-1]] if len(above) else 0.05 * nyquist
-    return float(np.clip(1.5 * highest, 0.02 * nyquist, 0.8 * nyquist))
-
-
-@nb.njit(cache=True, error_model="numpy", nogil=True)
-def torque_along(kernel, angle, rate, time, torque, step, z, substeps, p, friction, soft, out):  # type: ignore[no-untyped-def]
-    """An effect's torque along a given motion; its states by the midpoint rule, one state linearly implicit."""
-    n = len(angle)
-    states = len(z)
-    dz, mid = np.zeros(max(1, states)), np.zeros(max(1, states))
-    zz = np.zeros(max(1, states))
-    zz[:states] = z
-    pz, pd, pm, pp = pointer(zz), pointer(dz), pointer(mid), pointer(p)
-    h = step / substeps
-    for i in range(n):
-        w = rate[i]
-        if friction:
-            s = w / soft if abs(w) < soft else np.sign(w)
-            out[i] = s * call(kernel, angle[i], abs(w), time[i], torque[i], pz, pd, pp)
-        else:
-            out[i] = call(kernel, angle[i], w, time[i], torque[i], pz, pd, pp)
-        if states > 0 and i < n - 1:
-            for k in range(substeps):
-                u, v = k / substeps, (k + 0.5) / substeps
-                a0 = angle[i] + u * (angle[i + 1] - angle[i])
-                w0 = rate[i] + u * (rate[i + 1] - rate[i])
-                a1 = angle[i] + v * (angle[i + 1] - angle[i])
-                w1 = rate[i] + v * (rate[i + 1] - rate[i])
-                t = time[i] + u * step
-                if states == 1:  # linearly implicit: bristles and relaxations may be far faster than a step
-                    z0 = zz[0]
-                    delta = 1e-6 * (1.0 + abs(z0))
-                    zz[0] = z0 + delta
-                    call(kernel, a1, w1, t, torque[i], pz, pd, pp)
-                    f1 = dz[0]
-                    zz[0] = z0
-                    call(kernel, a1, w1, t, torque[i], pz, pd, pp)
-                    f0 = dz[0]
-                    zz[0] = z0 + h * f0 / (1.0 - 0.5 * h * min((f1 - f0) / delta, 0.0))
-                    continue
-                call(kernel, a0, w0, t, torque[i], pz, pd, pp)
-                for j in range(states):
-                    mid[j] = zz[j] + 0.5 * h * dz[j]
-                call(kernel, a1, w1, t, torque[i], pm, pd, pp)
-                for j in range(states):
-                    zz[j] += h * dz[j]
 
 
 @dataclass
@@ -349,7 +269,7 @@ def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: fl
     time = run.time_s - run.time_s[0]
     if channel == "rate" and run.angle_rad is not None:
         values = values - bias_beside(run, time, values, good)
-    laid = sampled(beat_of(run.name, time), time, values, good, noise_of, bandwidth_of)
+    laid = sampled(beat_of(run.name, time), time, values, good)
     step, n, grid, filled, keep = laid.beat.step_s, laid.beat.count, laid.beat.instants, laid.values, laid.there
     gaps = _gaps(keep)
     broken = np.zeros(n, dtype=bool)
@@ -392,17 +312,11 @@ def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: fl
 
 
 def one_noise(traces: Sequence[Trace], known: bool) -> list[Trace]:
-    """All runs were measured by one sensor; the quietest run shows its noise with the least of the motion in it.
-
-    The least of several equal readings lies below them by what chance makes of their scatter; that is added again.
-    """
+    """All runs were measured by one sensor; the quietest run shows its noise with the least of the motion in it."""
     quietest = {}
     for channel in ("rate", "angle"):
-        found = [(t.noise, SCATTER / np.sqrt(len(t.measured))) for t in traces if t.channel == channel]
-        least, scatter = min(found, default=(0.0, 0.0))
-        alike = sum(noise < least * (1.0 + 3.0 * scatter) for noise, _ in found)
-        depth = 0.0 if known or alike < 2 else NormalDist().inv_cdf((alike - 0.375) / (alike + 0.25))
-        quietest[channel] = least * (1.0 + depth * scatter)
+        found = [(t.noise, len(t.measured)) for t in traces if t.channel == channel]
+        quietest[channel] = min(found, default=(0.0, 0))[0] if known else least_of(found)
     return [replace(t, noise=quietest[t.channel]) for t in traces]
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from identify.noise import noise_of
 from identify.sampling import beat_of, sampled, told
-from identify.traces import bandwidth_of, noise_of, prepare
+from identify.traces import prepare
 from rig.errors import RecordingError
 from rig.recording.run import Array, Run
 from tests.identify.simulated import NOISE_RAD_S
@@ -31,9 +32,7 @@ def white(n: int, seed: int = 7) -> Array:
 @pytest.mark.parametrize("by_s", [1e-5, 5e-5, 1e-4, 2e-4])
 def test_scattered_samples_keep_their_noise_and_follow_the_motion(by_s: float) -> None:
     time = scattered(by_s)
-    found = sampled(
-        beat_of("x", time), time, ring(time) + white(len(time)), np.ones(len(time), bool), noise_of, bandwidth_of
-    )
+    found = sampled(beat_of("x", time), time, ring(time) + white(len(time)), np.ones(len(time), bool))
     error = (found.values - ring(found.beat.instants))[20:-20]
     assert found.scatter_s == pytest.approx(by_s, rel=0.1)
     assert not found.stamps_wrong
@@ -43,13 +42,13 @@ def test_scattered_samples_keep_their_noise_and_follow_the_motion(by_s: float) -
 
 def test_without_noise_they_follow_it_to_two_parts_in_a_million() -> None:
     time = scattered(1e-4)
-    found = sampled(beat_of("x", time), time, ring(time), np.ones(len(time), bool), noise_of, bandwidth_of)
+    found = sampled(beat_of("x", time), time, ring(time), np.ones(len(time), bool))
     assert np.max(np.abs(found.values - ring(found.beat.instants))[20:-20]) < 1.4e-5
 
 
 def test_where_only_the_stamps_scatter_the_samples_are_taken_as_even() -> None:
     time, values = scattered(5e-5), ring(EVEN) + white(len(EVEN))
-    found = sampled(beat_of("x", time), time, values, np.ones(len(time), bool), noise_of, bandwidth_of)
+    found = sampled(beat_of("x", time), time, values, np.ones(len(time), bool))
     assert found.stamps_wrong
     np.testing.assert_array_equal(found.values, values)
     assert "scatter by up to 49.9 us" in told([("x", found.scatter_s, True), ("y", 1.0, False)])
@@ -60,9 +59,7 @@ def test_samples_that_are_missing_among_scattered_ones_are_bridged_and_do_not_co
     time = scattered(1e-4)
     there = np.ones(len(time), bool)
     there[[100, 2000, 2001, 5000]] = False
-    found = sampled(
-        beat_of("x", time[there]), time[there], ring(time[there]), np.ones(there.sum(), bool), noise_of, bandwidth_of
-    )
+    found = sampled(beat_of("x", time[there]), time[there], ring(time[there]), np.ones(there.sum(), bool))
     assert found.beat.count == len(EVEN)
     assert not found.there[[100, 2000, 2001, 5000]].any()
     assert found.there.sum() == there.sum()

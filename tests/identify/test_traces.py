@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.traces import UPSAMPLING, bandwidth_of, noise_of, one_noise, prepare
+from identify.noise import bandwidth_of, noise_of
+from identify.traces import UPSAMPLING, one_noise, prepare
 from rig import effects
 from rig.recording.run import Array, Run
 from tests.identify.simulated import NOISE_RAD_S, sine_run, white

@@ -1,0 +1,57 @@
+"""How noisy a sampled channel is, and how far up it tells anything, read off its spectrum."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+from scipy import signal
+
+from rig.recording.run import Array
+
+LOWER = 0.8  # of the periodogram's values
+LOWER_MEAN = (1.0 - (1.0 - LOWER) * (1.0 - np.log(1.0 - LOWER))) / LOWER  # of an exponential distribution, its mean one
+SCATTER = 1.55  # of ``noise_of`` over the root of the number of samples, as a share of itself
+
+
+def noise_of(values: Array) -> float:
+    """One standard deviation of the white part of a signal, from the upper half of its spectrum.
+
+    The mean of the lower four fifths of the periodogram there is blind to lines and to a signal below, and scatters
+    less than its median; a third difference first takes away what a steep low-frequency signal would leak.
+    """
+    if len(values) < 64:
+        return float(np.std(np.diff(values, 3)) / np.sqrt(20.0))
+    d = np.diff(values, 3)
+    spectrum = np.abs(np.fft.rfft(d * signal.windows.hann(len(d), sym=False))) ** 2
+    f = np.arange(len(spectrum)) / len(spectrum)  # of Nyquist
+    gain = (2.0 * np.sin(0.5 * np.pi * f)) ** 6
+    upper = (f > 0.5) & (f < 0.98)
+    power = np.sort(spectrum[upper] / gain[upper])
+    level = np.mean(power[: round(LOWER * len(power))]) / LOWER_MEAN
+    return float(np.sqrt(level / (0.375 * len(d))))
+
+
+def bandwidth_of(values: Array, step_s: float) -> float:
+    """Highest frequency in Hz at which a signal stands clearly above its noise."""
+    nyquist = 0.5 / step_s
+    detrend: Any = "linear"  # the stubs of some versions know no name for it
+    f, power = signal.welch(values, 1.0 / step_s, nperseg=min(len(values), 1024), detrend=detrend)
+    floor = 2.0 * noise_of(values) ** 2 * step_s + 1e-300
+    above = np.nonzero(power > 12.0 * floor)[0]
+    highest = f[above[-1]] if len(above) else 0.05 * nyquist
+    return float(np.clip(1.5 * highest, 0.02 * nyquist, 0.8 * nyquist))
+
+
+def least_of(found: Sequence[tuple[float, int]]) -> float:
+    """The noise that several readings, each of so many samples, show at the least; zero where there is none.
+
+    The least of several equal readings lies below them by what chance makes of their scatter; that is added again.
+    """
+    readings = [(noise, SCATTER / np.sqrt(count)) for noise, count in found]
+    least, scatter = min(readings, default=(0.0, 0.0))
+    alike = sum(noise < least * (1.0 + 3.0 * scatter) for noise, _ in readings)
+    depth = NormalDist().inv_cdf((alike - 0.375) / (alike + 0.25)) if alike > 1 else 0.0
+    return float(least * (1.0 + depth * scatter))
