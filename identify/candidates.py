@@ -34,6 +34,7 @@ FEW_STEPS = 8  # of a fit that is only compared
 TAKEN_ON = 4  # times as many as a fit has, while each time the squares fall
 GOING = 0.95  # to less than this share
 FAR_BEHIND = 0.7  # of the best score: not fitted any more once another candidate is at the floor
+FINER, SHARPER = 3, 2  # times the steps, and how often they are made finer
 FAINT = 0.03  # of the best score: what promises so little beside another is not what the round is about
 HOPELESS = 3.0  # times the best error of the round after three steps
 
@@ -60,6 +61,7 @@ class Candidates:
         self.torque_free = all(t.torque is None for t in traces)
         self.fixed: list[Name] = [("inertia",)] if self.torque_free else []
         self.allowed = [n for n in allowed if self._possible(n)]
+        self.finer = 1  # times the fine steps that models are compared with
         self.horizon = 1.0  # of a first fit over short runs, in seconds
         self.moving = float(np.std(np.concatenate([traces[i].measured[split.fit[i]] for i in self.fit])))
 
@@ -75,7 +77,9 @@ class Candidates:
         self, structure: Structure, start: Mapping[Name, float], hopeless: float = np.inf, steps: int = STEPS
     ) -> Whole | None:
         """A structure fitted over whole runs; None where it runs away."""
-        return fit_whole(self.traces, self.split, structure, start, self.noise, self.fixed, hopeless, steps)
+        return fit_whole(
+            self.traces, self.split, structure, start, self.noise, self.fixed, hopeless, steps, self.finer
+        )  # fmt: skip
 
     def tried(self, now: Whole, most: int = TRIED, in_full: bool = False) -> tuple[dict[str, Whole], list[Scored]]:
         """The most promising candidates, fitted on top of a model, and all that were looked at.
@@ -96,9 +100,33 @@ class Candidates:
         for name, w in list(tried.items()):
             simpler = [tried[n] for n in effects.get(name).nests if n in tried]
             chosen_anyway = any(n.squares < TWICE * w.squares for n in simpler)
-            if best.level > AT_FLOOR and w.squares < NEAR_THEN * best.squares and not chosen_anyway:
+            if not best.at_noise and w.squares < NEAR_THEN * best.squares and not chosen_anyway:
                 tried[name] = self._on(w)
-        return tried, looks
+        return self._sharp(tried), looks
+
+    def sharp(self, now: Whole) -> Whole:
+        """A model near the noise, simulated as finely as it takes for its error not to be the simulation's."""
+        return self._sharp({"": now})[""]
+
+    def _sharp(self, tried: dict[str, Whole]) -> dict[str, Whole]:
+        """What would be nearer the noise in finer steps is fitted with finer ones, and all that follows is.
+
+        Beside a quiet gyro the error of a coarse simulation is thousands of chi square, which anything takes away.
+        """
+        near = {n: w for n, w in tried.items() if w.level < ENDS_NEAR and not w.at_noise}
+        traces, use = [self.traces[i] for i in self.fit], [self.split.fit[i] for i in self.fit]
+        for _ in range(SHARPER):
+            finer = FINER * self.finer
+            if not any(
+                w.squares - squares_at(traces, w.structure, w.values(), use, finer) / self.noise**2 > CHANCE
+                for w in near.values()
+            ):
+                break
+            self.finer = finer
+            fitted = {n: self.whole(w.structure, w.values()) for n, w in near.items()}
+            tried = tried | {n: w for n, w in fitted.items() if w is not None}
+            near = {n: w for n, w in tried.items() if n in near and not w.at_noise}
+        return tried
 
     def elsewhere(self, now: Whole, name: str) -> Whole:
         """The same effects, one of them begun where its other minima may lie: the best of all fits."""
@@ -150,7 +178,7 @@ class Candidates:
     def _on(self, fitted: Whole) -> Whole:
         """A fit that still goes down, taken on: a sharp resonance is found late, and then at once."""
         for _ in range(TAKEN_ON):
-            if fitted.estimate.converged or fitted.level < AT_FLOOR:
+            if fitted.estimate.converged or fitted.at_noise:
                 break
             further = self.whole(fitted.structure, fitted.values())
             if further is None or further.squares >= fitted.squares:
@@ -182,7 +210,7 @@ class Candidates:
         structure, hopeless = now.structure.plus(look.effect), HOPELESS * best.estimate.sigma
         traces, use = [self.traces[i] for i in self.fit], [self.split.fit[i] for i in self.fit]
         starts = [{**now.values(), **look.start}, {**now.values(), **look.besides, **look.start}]
-        squares = [squares_at(traces, structure, start, use) / self.noise**2 for start in starts]
+        squares = [squares_at(traces, structure, start, use, self.finer) / self.noise**2 for start in starts]
         start = starts[int(np.argmin(squares))]
         if effects.get(look.effect).place is Place.FRICTION or min(squares) > now.squares:
             fitted = self.by_way_of_a_short_horizon(structure, start, hopeless, FEW_STEPS)

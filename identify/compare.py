@@ -43,12 +43,14 @@ class Judged:
         """Parameter values by name."""
         return dict(zip(self.estimate.names, self.estimate.values.tolist(), strict=True))
 
+    @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def _covariance(self) -> Array | None:
         """Covariance of the parameters, errors taken as white; None where the fit ran away."""
         scale = np.sqrt(np.maximum(np.diag(self.estimate.information), 1e-300))
-        if not np.all(np.isfinite(scale)):
+        scaled = self.estimate.information / np.outer(scale, scale)
+        if not np.all(np.isfinite(scaled)):
             return None
-        inverse = np.linalg.pinv(_scaled(self.estimate.information), rcond=1e-12, hermitian=True)
+        inverse = np.linalg.pinv(scaled, rcond=1e-12, hermitian=True)
         return np.asarray(inverse / np.outer(scale, scale) * self.estimate.sigma**2)
 
     def std_errors(self) -> dict[Name, float]:
@@ -104,11 +106,6 @@ def _given(covariance: Array, known: Sequence[int]) -> Array:
     across = scaled[:, known]
     left = scaled - across @ np.linalg.pinv(scaled[np.ix_(known, known)], rcond=1e-12, hermitian=True) @ across.T
     return np.asarray(left * np.outer(size, size))
-
-
-def _scaled(a: Array) -> Array:
-    scale = np.sqrt(np.maximum(np.diag(a), 1e-300))
-    return np.asarray(a / np.outer(scale, scale))
 
 
 def horizon_s(platform: tuple[float, float, float], traces: Sequence[Trace]) -> float:

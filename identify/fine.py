@@ -41,7 +41,7 @@ ATTEMPTS = 2
 STILL_FAR = 100.0  # mean square over the noise's variance
 VERY_FAR = 1e4
 AS_FAR = 1.03  # times the squares of the best while the noise is still far: the simpler is as good
-LEAP = 0.03  # of the squares that the right effect leaves where it is the only one that is large
+LEAP = 0.4  # of the squares that the right effect leaves where it is the only one that is large
 LEAST = 0.4  # of the squares that the best candidate takes while the noise is still far
 CLEARLY_LEFT = 5.0  # standard deviations of chi square
 AT_NOISE = 1.05  # mean square over the noise's variance: the noise is known to a percent or two
@@ -136,7 +136,10 @@ class FineSearch:
             return False
         now = self._restored(found, now, declared.terms)
         now = self._pruned(found, now, (*now.structure.terms, *now.structure.effects))
-        now = self._asked_again(found, now)
+        swapped = self._asked_again(found, now)
+        if swapped.structure != now.structure:  # what another one's mistakes had called for is no longer needed
+            swapped = self._pruned(found, swapped, swapped.structure.effects)
+        now = swapped
         for name in now.structure.effects[len(declared.effects) :]:
             if now.judged().strength(name) < WELL_KNOWN:
                 now = self.on_offer.elsewhere(now, name)
@@ -247,6 +250,7 @@ class FineSearch:
         return now
 
     def _round(self, found: Search, now: Whole, round_: int) -> Whole | None:
+        now = self.on_offer.sharp(now)
         tried, looks = self.on_offer.tried(now)
         self.first_tried = self.first_tried or tried
         name = self._chosen(tried, now)

@@ -102,6 +102,7 @@ def refine(
     tolerance: float = 1e-4,
     coarse: bool = False,
     hopeless: float = np.inf,
+    finer: int = 1,
 ) -> Estimate:
     """Fit all parameters of a structure by output error.
 
@@ -124,11 +125,13 @@ def refine(
         Half the fine steps: a hundredth of the noise, enough while models are compared.
     hopeless
         Give up after three iterations where the root mean square is still above this.
+    finer
+        That many times the fine steps.
     """
     names = names_of(structure, 1 + max(t.number for t in traces))
     x = np.array([start.get(name, 0.0) if len(name) == 3 else start[name] for name in names])
     still = np.array([name in fixed for name in names])
-    shots = shots_for(traces, structure, names, x, shot_s, use, carry, coarse)
+    shots = shots_for(traces, structure, names, x, shot_s, use, carry, coarse, finer)
     workers = ThreadPoolExecutor(2)
     try:
         return _levenberg(_Descent(workers, shots, structure, names, x, still), iterations, tolerance, hopeless, coarse)
@@ -217,6 +220,7 @@ class _Descent:
         """Whether the simulation ran away."""
         return not (np.all(np.isfinite(self.losses)) and np.all(np.isfinite(self.a)) and np.all(np.isfinite(self.b)))
 
+    @RUNAWAY
     def step(self) -> _Step | None:
         """One step down; None where none leads there."""
         cost = self.cost
@@ -298,7 +302,7 @@ def _arrived(step: _Step, tolerance: float) -> bool:
 
 
 def squares_at(
-    traces: Sequence[Trace], structure: Structure, values: Mapping[Name, float], use: Sequence[Any]
+    traces: Sequence[Trace], structure: Structure, values: Mapping[Name, float], use: Sequence[Any], finer: int = 1
 ) -> float:  # fmt: skip
     """Sum of squares over whole runs at given parameters, start states and biases fitted by one step."""
     names = names_of(structure, 1 + max(t.number for t in traces))
@@ -311,7 +315,7 @@ def squares_at(
         return min(float(np.sum(np.where(np.isfinite(each), each, np.inf))) for each in found)
 
     with ThreadPoolExecutor(2) as workers:
-        return sum(workers.map(of, shots_for(traces, structure, names, x, None, use, None, coarse=True)))
+        return sum(workers.map(of, shots_for(traces, structure, names, x, None, use, None, True, finer)))
 
 
 def evaluate(
@@ -320,10 +324,11 @@ def evaluate(
     use: Sequence[Any] | None = None,
     shot_s: float | None = None,
     coarse: bool = False,
+    finer: int = 1,
 ) -> Estimate:
     """The same parameters on other samples: only start states and biases are fitted there."""
     names, x, structure = estimate.names, estimate.values, estimate.structure
-    shots = shots_for(traces, structure, names, x, shot_s, use, None, coarse)
+    shots = shots_for(traces, structure, names, x, shot_s, use, None, coarse, finer)
     with ThreadPoolExecutor(2) as workers:
         settled = list(workers.map(lambda s: _settle(s, structure, names, x), shots))
     rss = sum(float(np.sum(losses)) for _, losses in settled)

@@ -109,8 +109,10 @@ class Scores:
         self.largest_first = sorted(self.runs, key=lambda r: -float(np.std(r.base)))
         information = np.sum([r.columns.T @ r.columns for r in self.runs], axis=0)
         self.size = np.sqrt(np.maximum(np.diag(information), 1e-300))
-        self.inverse = np.linalg.pinv(information / np.outer(self.size, self.size), rcond=1e-12, hermitian=True)
         self.toward = np.sum([r.columns.T @ r.residual for r in self.runs], axis=0) / self.size
+        scaled = information / np.outer(self.size, self.size)
+        self.lost = not (np.all(np.isfinite(scaled)) and np.all(np.isfinite(self.toward)))  # the model runs away
+        self.inverse = np.linalg.pinv(np.zeros_like(scaled) if self.lost else scaled, rcond=1e-12, hermitian=True)
 
     def _cut(self, shots: Shots, share: float) -> Shots:
         """The part of a run in which most happens: a soft start shows neither saturation nor travel."""
@@ -146,7 +148,9 @@ class Scores:
         return replace(run, columns=run.project(columns[:, self.keep]), residual=run.project(residual))
 
     def all(self, names: Sequence[str]) -> list[Scored]:
-        """Every candidate at its best shapes, the largest gain first."""
+        """Every candidate at its best shapes, the largest gain first; none on a model that runs away."""
+        if self.lost:
+            return []
         tasks = [(effects.get(n), shape) for n in names for shape in grid_of(effects.get(n), self.scale)]
         with ThreadPoolExecutor(2) as workers:
             found = [s for s in workers.map(lambda t: self.score(*t), tasks) if s is not None]

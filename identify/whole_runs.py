@@ -16,6 +16,7 @@ from identify.traces import Trace
 from rig.recording.run import Array
 
 CHANCE = 20.0  # fall of chi square, beyond the penalty, that no chance among all candidates and shapes makes
+CHANCES = 5.0  # standard deviations of a mean square
 TWICE = 2.0  # times the squares of the best: a special case of it does as well while much is missing
 NEAR_THEN = 4.0  # times the best squares of its round: asked again in the finished model
 AT_FLOOR = 1.1  # mean square over the noise's variance: who is there has found what there is
@@ -47,6 +48,11 @@ class Whole:
         return max(1.0, self.squares / max(self.count, 1))
 
     @property
+    def at_noise(self) -> bool:
+        """Whether nothing is left but what chance makes of the noise."""
+        return self.level < 1.0 + CHANCES * float(np.sqrt(2.0 / max(self.count, 1)))
+
+    @property
     def penalised(self) -> float:
         """Chi square and the penalty for parameters (Schwarz 1978)."""
         return self.squares + len(self.estimate.names) * float(np.log(max(self.count, 2)))
@@ -62,7 +68,7 @@ class Whole:
 
 def fit_whole(
     traces: Sequence[Trace], split: Split, structure: Structure, start: Mapping[Name, float], noise: float,
-    fixed: Sequence[Name], hopeless: float = np.inf, steps: int = STEPS,
+    fixed: Sequence[Name], hopeless: float = np.inf, steps: int = STEPS, finer: int = 1,
 ) -> Whole | None:  # fmt: skip
     """A structure fitted to the samples that fit, measured on those that judge; None where it runs away.
 
@@ -72,17 +78,19 @@ def fit_whole(
         One standard deviation of the measured channel.
     hopeless
         Root mean square above which the fit is given up after three steps.
+    finer
+        How many times the fine steps that models are compared with.
     """
     fit = [i for i, m in enumerate(split.fit) if np.any(m)]
     estimate = refine(
         [traces[i] for i in fit], structure, start, None, steps, [split.fit[i] for i in fit], fixed=fixed,
-        coarse=True, tolerance=TOLERANCE, hopeless=hopeless,
+        coarse=True, tolerance=TOLERANCE, hopeless=hopeless, finer=finer,
     )  # fmt: skip
-    return _measured(traces, split, fit, estimate, noise) if np.isfinite(estimate.sigma) else None
+    return _measured(traces, split, fit, estimate, noise, finer) if np.isfinite(estimate.sigma) else None
 
 
 def _measured(
-    traces: Sequence[Trace], split: Split, fit: Sequence[int], estimate: Estimate, noise: float
+    traces: Sequence[Trace], split: Split, fit: Sequence[int], estimate: Estimate, noise: float, finer: int
 ) -> Whole | None:
     squares, count, losses, counts = 0.0, 0, [], []
     for i, r in zip(fit, estimate.residuals(), strict=True):
@@ -94,7 +102,7 @@ def _measured(
             counts.append(float(np.sum(judged)))
     apart = [i for i, m in enumerate(split.judge) if np.any(m) and i not in fit]
     if apart:
-        held = evaluate(estimate, [traces[i] for i in apart], [split.judge[i] for i in apart], coarse=True)
+        held = evaluate(estimate, [traces[i] for i in apart], [split.judge[i] for i in apart], None, True, finer)
         for i, r in zip(apart, held.residuals(), strict=True):
             m = split.judge[i]
             losses.append(float(r[m] @ r[m]))

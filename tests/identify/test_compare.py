@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -64,6 +65,15 @@ def test_the_bic_charges_the_logarithm_of_the_samples_for_a_parameter() -> None:
 def test_the_strength_of_an_effect_is_its_distance_from_zero_in_standard_errors() -> None:
     found = judged([1.0], ("coulomb_friction",), sigma=2.0, information=16.0, values=[1, 1, 1, 3])
     assert found.strength("coulomb_friction") == pytest.approx(3.0 / (2.0 / 4.0))
+
+
+def test_an_effect_of_a_model_that_runs_away_stands_nowhere() -> None:
+    found = judged([1.0], ("coulomb_friction",), information=16.0, values=[1, 1, 1, 3])
+    across = found.estimate.information.copy()
+    across[0, 1] = across[1, 0] = np.inf
+    lost = replace(found, estimate=replace(found.estimate, information=across))
+    assert lost.strength("coulomb_friction") == 0.0
+    assert all(np.isinf(e) for e in lost.std_errors().values())
 
 
 def test_the_horizon_is_three_periods_of_the_ring_or_the_time_constant_of_a_free_axis() -> None:
