@@ -83,6 +83,7 @@ class FineSearch:
             trial = _copy_of(found)
             pair = self._hidden_pair(trial, begin)
             if pair is None or not self._rounds(trial, pair):
+                self.say("taken back: what was added does not come down to the sensor's noise together")
                 return False
         found.best, found.floor = trial.best, trial.floor
         found.candidates, found.rivals, found.dropped = trial.candidates, trial.rivals, trial.dropped

@@ -123,7 +123,10 @@ class _Identifier:
                 return fine.take_over(found) or over
 
             search = loop.run(self.structure, shapes, nominal, take_over)
+            had = search.best.structure.effects
             search.drop_a_bad_lot()
+            if search.best.structure.effects != had:
+                self.say(f"not named: {', '.join(had)}; together they leave too much for any of them to be believed")
             before = self._before(search)
             after = self._after(search) if search.best.structure != self.structure else before
             return self._report(search, before, after)

@@ -41,6 +41,8 @@ class Neighbourhood:
         angle, rate, pushed = (np.empty(2 * len(torque) + 1) for _ in range(3))
         angle[::2], rate[::2], pushed[:-1:2], pushed[-1] = fine[:, 0], fine[:, 1], torque[:, 0], torque[-1, 2]
         angle[1::2], rate[1::2], pushed[1::2] = middle[:, 0], middle[:, 1], torque[:, 1]
+        begin = 2 * self._moving.first
+        angle[:begin], rate[:begin] = angle[begin], 0.0  # at rest where nothing was simulated
         time = self._shots.trace.offset_s + 0.5 * self._shots.grid.step_s * np.arange(len(angle))
         return angle, rate, time, pushed
 
@@ -105,6 +107,11 @@ class Neighbourhood:
 def neighbourhood_of(shots: Shots, equations: Equations) -> Neighbourhood | None:
     """Of a run whose simulation costs more than that, and whose motion has one."""
     size = 2 + equations.states
-    if not equations.loads or not smooth(equations) or size * (size + 3) * shots.grid.n > LARGEST:
+    if (
+        not np.any(shots.active)
+        or not equations.loads
+        or not smooth(equations)
+        or size * (size + 3) * shots.grid.n > LARGEST
+    ):
         return None
     return Neighbourhood(shots, equations)

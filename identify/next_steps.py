@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from identify.follow_up_wording import file_name
 from identify.residual import dependence
-from identify.results import GeneticRun, Identification, NotReported
+from identify.results import GeneticRun, Identification, NotReported, RunTraces
 from identify.sign_check import SENTENCE, signs
 from identify.wording import capital, joined, number, percent, plain
 
@@ -31,6 +33,13 @@ OTHERWISE = (
 )
 
 
+RELEASED = (
+    "The rest goes with neither rate nor angle nor time: release the platform from other angles, record each until it "
+    "rests, and play a campaign with torque: a decay shows ratios only, and few of its causes."
+)
+AT_ONCE, MOVING = 3, 0.1  # first samples of a run, and the share of its largest rate that they may have
+
+
 def next_steps(found: Identification) -> tuple[str, ...]:
     """One sentence a step, the most telling first; nothing where the identification was accepted."""
     if found.accepted:
@@ -39,7 +48,7 @@ def next_steps(found: Identification) -> tuple[str, ...]:
         return (f"{capital(SENTENCE)}, then identify again.",)
     steps = []
     if found.final.not_determined:
-        steps.append(_to_determine(found.final.not_determined))
+        steps.append(_to_determine(found.final.not_determined, _torque_free(found)))
     if found.verdict.unexplained:
         steps += _to_explain(found)
     failed = [one.genetic for one in found.per_set if one.genetic and not one.accepted]
@@ -78,8 +87,14 @@ def unexplained_reason(ratio: float, found: Identification) -> str:
     return f"the model leaves {told} unexplained: something acts that no effect of the library describes"
 
 
-def _to_determine(several: Sequence[NotReported]) -> str:
+def _torque_free(found: Identification) -> bool:
+    return bool(found.traces) and all(t.torque_nm is None for t in found.traces)
+
+
+def _to_determine(several: Sequence[NotReported], torque_free: bool) -> str:
     names = joined([plain(item.name.replace(".", " ")) for item in several])
+    if torque_free:
+        return f"To determine {names}: release the platform from a larger angle and record until it rests."
     return (
         f"To determine {names}: add a set at another frequency or a multisine (0.5 Hz to beyond the resonance), let it "
         "start at once (soft_start_s: 0) so that the platform rings, and raise the torque as far as the limits allow; "
@@ -90,13 +105,27 @@ def _to_determine(several: Sequence[NotReported]) -> str:
 def _to_explain(found: Identification) -> list[str]:
     shares = dependence(found.traces, found.final.error.lowpass_hz or USUAL_CUTOFF_HZ)
     name, share = next(iter(shares.items()), ("", 0.0))
+    late = _begun_in_motion(found.traces)
+    if late:
+        late = [f"{capital(joined(late))} {'begins' if len(late) == 1 else 'begin'} in motion: what remembers (creep, "
+                "hysteresis, a second mode) is known from rest only, and is not found there. Begin every recording "
+                "before the torque does."]  # fmt: skip
     if share < TELLING:
-        return [OTHERWISE]
+        return [*late, RELEASED if _torque_free(found) else OTHERWISE]
     told = f"{number(100.0 * share, 2)} % of the residual's power goes with the {name}. {RUN[name]}"
     if found.axis == "linear":
         for rotary, linear in LINEAR.items():
             told = told.replace(f" {rotary}", f" {linear}")
-    return [told]
+    return [*late, told]
+
+
+def _begun_in_motion(traces: Sequence[RunTraces]) -> list[str]:
+    """Runs under torque whose first samples move as fast as a good part of the rest."""
+    return [
+        t.name for t in traces
+        if t.torque_nm is not None
+        and float(np.median(np.abs(t.rate_rad_s[:AT_ONCE]))) > MOVING * float(np.max(np.abs(t.rate_rad_s)))
+    ]  # fmt: skip
 
 
 def _to_reach(runs: Sequence[GeneticRun]) -> str:

@@ -17,7 +17,7 @@ at 1 kHz is off by 0.3 % at 29 Hz.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numba as nb
@@ -35,15 +35,20 @@ class Denominator:
     inertia: float
     damping: float
     stiffness: float
+    of_platform: bool = False  # or a low-pass that knows none
 
     @classmethod
     def of(cls, inertia: float, damping: float, stiffness: float, rho: float, rate_measured: bool) -> Denominator:
         """Spectral factor for a platform and a ratio of torque disturbance to sensor noise; always stable."""
         j, c, k = max(inertia, 1e-12), abs(damping), max(stiffness, 0.0)
         if rate_measured:
-            return cls(j, float(np.hypot(c, rho)), k)
+            return cls(j, float(np.hypot(c, rho)), k, True)
         d0 = float(np.hypot(k, rho))
-        return cls(j, float(np.sqrt(max(c * c + 2.0 * j * (d0 - k), 0.0))), d0)
+        return cls(j, float(np.sqrt(max(c * c + 2.0 * j * (d0 - k), 0.0))), d0, True)
+
+    def loaded(self, added_kg_m2: float) -> Denominator:
+        """Of the same platform with a known inertia mounted: a run's residual is white behind its own factor only."""
+        return replace(self, inertia=self.inertia + added_kg_m2) if self.of_platform and added_kg_m2 else self
 
     def transition(self, step_s: float) -> tuple[Array, Array]:
         """State transition (2, 2) and the response (2, 4) to 1, t, t^2, t^3 over one step."""

@@ -109,10 +109,11 @@ class Regression:
 
     def blocks(self, denominator: Denominator, shapes: Shapes) -> list[Block]:
         """All stretches of all traces, prefiltered."""
-        filters: dict[float, Prefilter] = {}
+        filters: dict[tuple[float, Denominator], Prefilter] = {}
         out = []
         for i, trace in enumerate(self.traces):
-            pre = filters.setdefault(trace.step_s, Prefilter(denominator, trace.step_s))
+            own = denominator if self.torque_free else denominator.loaded(trace.run.added_inertia_kg_m2)
+            pre = filters.setdefault((trace.step_s, own), Prefilter(own, trace.step_s))
             for stretch in trace.stretches:
                 out.append(self._block(pre, i, trace, stretch, shapes))
         return out

@@ -215,4 +215,5 @@ def test_a_known_added_inertia_tells_the_torque_scale(scale: float, named: tuple
     assert found.torque_scale is not None
     assert abs(found.torque_scale.value - scale) < 4.5 * found.torque_scale.std_error
     assert found.torque_scale.std_error < 1e-3
+    assert found.accepted, found.reasons
     assert found.set_scatter["stiffness"] < 1.0

@@ -49,6 +49,25 @@ def test_the_step_follows_from_what_the_rest_goes_with(rest: str, words: str) ->
     assert words in step
 
 
+def test_a_run_that_begins_in_motion_is_said_to_hide_what_remembers() -> None:
+    found = with_rest(LOST, "rate")
+    first, *others = found.traces
+    late = replace(first, rate_rad_s=np.roll(first.rate_rad_s, -300))
+    steps = next_steps(replace(found, traces=(late, *others)))
+    assert len(steps) == 2
+    assert "begins in motion" in steps[0] and first.name in steps[0]
+
+
+def test_a_decay_is_not_told_to_raise_its_torque() -> None:
+    found = with_rest(LOST, "")
+    free = replace(found, traces=tuple(replace(t, torque_nm=None) for t in found.traces))
+    lost = replace(
+        free, before=replace(free.before, not_determined=(NotReported("damping", "too little"),)), after=None
+    )
+    steps = next_steps(lost)
+    assert len(steps) == 2 and all("release" in step and "soft_start" not in step for step in steps)
+
+
 def test_a_linear_axis_is_spoken_of_in_its_own_words() -> None:
     (step,) = next_steps(replace(with_rest(LOST, "rate"), axis="linear"))
     assert "goes with the speed" in step
