@@ -102,18 +102,18 @@ class Candidates:
             chosen_anyway = any(n.squares < TWICE * w.squares for n in simpler)
             if not best.at_noise and w.squares < NEAR_THEN * best.squares and not chosen_anyway:
                 tried[name] = self._on(w)
-        return self._sharp(tried), looks
+        return self._sharp({n: w for n, w in tried.items() if not w.at_noise}, tried), looks
 
     def sharp(self, now: Whole) -> Whole:
         """A model near the noise, simulated as finely as it takes for its error not to be the simulation's."""
-        return self._sharp({"": now})[""]
+        return self._sharp({"": now}, {"": now})[""]
 
-    def _sharp(self, tried: dict[str, Whole]) -> dict[str, Whole]:
+    def _sharp(self, asked: dict[str, Whole], tried: dict[str, Whole]) -> dict[str, Whole]:
         """What would be nearer the noise in finer steps is fitted with finer ones, and all that follows is.
 
         Beside a quiet gyro the error of a coarse simulation is thousands of chi square, which anything takes away.
         """
-        near = {n: w for n, w in tried.items() if w.level < ENDS_NEAR and not w.at_noise}
+        near = {n: w for n, w in asked.items() if w.level < ENDS_NEAR}
         traces, use = [self.traces[i] for i in self.fit], [self.split.fit[i] for i in self.fit]
         for _ in range(SHARPER):
             finer = FINER * self.finer
@@ -125,7 +125,7 @@ class Candidates:
             self.finer = finer
             fitted = {n: self.whole(w.structure, w.values()) for n, w in near.items()}
             tried = tried | {n: w for n, w in fitted.items() if w is not None}
-            near = {n: w for n, w in tried.items() if n in near and not w.at_noise}
+            near = {n: tried[n] for n in near}
         return tried
 
     def elsewhere(self, now: Whole, name: str) -> Whole:

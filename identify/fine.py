@@ -26,7 +26,8 @@ from rig import effects
 from rig.effects.base import Place
 from rig.platform import TERMS
 
-NEAR_SIGNAL = 0.3  # of the signal that a free run may leave for this search to begin
+ASTRAY = 0.3  # of the signal: a free run that leaves more may be of another structure
+NEAR_SIGNAL = 0.6  # of the signal that a free run may leave for this search to begin
 HELD = 4.0  # the same on the held-out samples
 EQUAL = 4.0  # fall of chi square that says nothing: the library's order, simple before special, decides
 RIVAL = 10.0  # what parts two candidates for good
@@ -79,12 +80,15 @@ class FineSearch:
         self.tried_at, self.attempts, self.first_tried = begin.level, self.attempts + 1, {}
         self.on_offer.horizon = found.horizon
         trial = _copy_of(found)
-        if not self._rounds(trial, begin):
-            trial = _copy_of(found)
-            pair = self._hidden_pair(trial, begin)
-            if pair is None or not self._rounds(trial, pair):
-                self.say("taken back: what was added does not come down to the sensor's noise together")
-                return False
+        through = self._rounds(trial, begin)
+        for other in (self._hidden_pair, self._large_beside):
+            if not through:
+                trial = _copy_of(found)
+                started = other(trial, begin)
+                through = started is not None and self._rounds(trial, started)
+        if not through:
+            self.say("taken back: what was added does not come down to the sensor's noise together")
+            return False
         found.best, found.floor = trial.best, trial.floor
         found.candidates, found.rivals, found.dropped = trial.candidates, trial.rivals, trial.dropped
         found.rival_models = trial.rival_models
@@ -92,7 +96,7 @@ class FineSearch:
 
     def _large(self, found: Search) -> Whole | None:
         """Once, where the declared model runs astray: with an effect that changes all of the motion, if near."""
-        if self.attempts or self.asked_for_large:
+        if self.asked_for_large:
             return None
         self.asked_for_large = True
         large = self.on_offer.large(found.best)
@@ -104,6 +108,10 @@ class FineSearch:
         found.candidates.append(Candidate(name, round_, 0.0, held, "added"))
         self.say(f"added {name}: free-run error {large.estimate.sigma:.3g}; without it the model runs astray")
         return large
+
+    def _large_beside(self, found: Search, now: Whole) -> Whole | None:
+        """The same where the model runs no better than half astray, and no effect after the other brought it near."""
+        return self._large(found) if now.estimate.sigma > ASTRAY * self.on_offer.moving else None
 
     def _near(self, model: Whole, closer: float) -> bool:
         """Whether the free run stays close enough, and by how much closer than where this was tried before."""
