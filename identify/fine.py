@@ -320,9 +320,10 @@ class FineSearch:
             wider = [e for e in now.structure.effects if name in effects.get(e).nests]
             if wider:
                 start = _taken_in(start, now.values(), name, wider[0])
-            elif now.judged().strength(name) > CERTAIN and not _own_in_each_run(name):
+            elif now.judged().strength(name) > CERTAIN and not (_own_in_each_run(name) or _tied(name, now)):
                 continue
-            without = self.whole(now.structure.minus(name), start)
+            fit = self.on_offer.by_way_of_a_short_horizon if _tied(name, now) else self.whole  # it moves K
+            without = fit(now.structure.minus(name), start)
             if without is None or without.penalised - now.penalised > RIVAL * now.level:
                 continue
             reason = f"free-run error {now.estimate.sigma:.4g} with it, {without.estimate.sigma:.4g} without it"
@@ -384,6 +385,13 @@ def _taken_in(start: Mapping[Name, float], values: Mapping[Name, float], name: s
     gain = next((values[(name, p.name)] for p in effects.get(name).parameters if p.linear), 0.0)
     linear = {p.name for p in effects.get(wider).parameters if p.linear}
     return {n: v + gain if n[0] == wider and n[1] in linear else v for n, v in start.items()}
+
+
+def _tied(name: str, now: Whole) -> bool:
+    """Whether the model has both of two effects that no record parts: their errors say nothing then."""
+    others = [e for e in now.structure.effects if e != name]
+    mine = effects.get(name).never_separable or {} if name not in TERMS else {}
+    return any(e in mine or name in (effects.get(e).never_separable or {}) for e in others)
 
 
 def _own_in_each_run(name: str) -> bool:

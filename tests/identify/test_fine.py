@@ -113,6 +113,20 @@ def test_a_search_that_led_nowhere_is_not_begun_again_from_where_it_passed() -> 
     assert fine._near(model, 0.5)
 
 
+def test_of_two_effects_that_no_record_parts_one_is_dropped_however_large_both_are() -> None:
+    traces = traces_of(campaign({"cubic_stiffness": {"factor": 3000.0}}, duration_s=3))
+    fine = FineSearch(Candidates(traces, split(traces), (*ALLOWED, "unbalance")), lambda text: None)
+    begin = dict(zip(START, TRUTH, strict=True)) | {("cubic_stiffness", "factor"): 2990.0}
+    begin |= {("unbalance", "sine"): -60.0, ("unbalance", "cosine"): 0.0, ("stiffness",): TRUTH[2] + 60.0}
+    both = fine.whole(Structure(effects=("unbalance", "cubic_stiffness")), begin)
+    assert both is not None and both.level < 1.1
+    found = Search(both.judged(), both.judged(), 0.1, fine.noise)
+    left = fine._pruned(found, both, both.structure.effects)
+    assert left.structure.effects == ("cubic_stiffness",)
+    assert left.level < 1.1
+    assert left.values()["stiffness",] == pytest.approx(TRUTH[2], rel=1e-3)
+
+
 def test_held_out_runs_take_no_part_in_the_fit() -> None:
     recording = campaign({"coulomb_friction": {"level": 0.1}}, duration_s=4)
     runs = [replace(r, use="holdout" if i == 4 else "fit") for i, r in enumerate(recording.runs)]
