@@ -88,7 +88,7 @@ class Candidates:
         """
         looks = self._looks(now, [n for n in self.allowed if n not in now.structure.effects], in_full)
         tried: dict[str, Whole] = {}
-        short = self._shortlist(looks, now, most)
+        short = self._shortlist(looks, now, most, 0.0 if in_full else FAINT)  # far off a decay's scores point anywhere
         for look in sorted(short, key=lambda s: (effects.get(s.effect).states > 0, s.count)):  # the cheap ones first
             best = min(tried.values(), key=lambda w: w.squares, default=now)
             if best.level < AT_FLOOR and look.gain < FAR_BEHIND * short[0].gain:
@@ -251,7 +251,7 @@ class Candidates:
         lines = foreign_lines_hz(traces, now.estimate.residuals(), self.noise, natural_hz)
         return scale_of(traces, (inertia, damping, stiffness), lines)
 
-    def _shortlist(self, looks: Sequence[Scored], now: Whole, most: int = TRIED) -> list[Scored]:
+    def _shortlist(self, looks: Sequence[Scored], now: Whole, most: int, faint: float) -> list[Scored]:
         """The largest gains beyond their penalty, and what comes first by order or simplicity."""
         penalty = float(np.log(max(now.count, 2)))
         hope = 0.5 if now.level < AT_FLOOR else 0.0  # there a score is nearly what a fit would bring
@@ -259,7 +259,7 @@ class Candidates:
             (s for s in looks if s.gain > max(WORTH_A_FIT, hope * (CHANCE + s.count * penalty))),
             key=lambda s: s.count * penalty - s.gain,
         )
-        worth = [s for s in worth if s.gain > FAINT * max(w.gain for w in worth)]
+        worth = [s for s in worth if s.gain > faint * max(w.gain for w in worth)]
         gains = {s.effect: s.gain for s in worth}  # what contains another and promises less is not it
         worth = [s for s in worth if all(gains.get(n, 0.0) <= s.gain for n in effects.get(s.effect).nests)]
         short = [s for s in worth if not simplicity(s.effect)][:most]  # channels come beside, they displace nothing

@@ -190,6 +190,8 @@ def _chosen(tried: Mapping[str, Whole]) -> str | None:
     """The closest, or the simplest of those that are as close."""
     if not tried:
         return None
+    # What can follow anything is believed only where it brings the model down to the noise.
+    tried = {n: w for n, w in tried.items() if w.at_noise or not effects.get(n).resembles_much} or tried
     best = min(tried, key=lambda n: tried[n].squares)
     alike = [n for n, w in tried.items() if w.squares < ALIKE * tried[best].squares]
     # The richer one may only soak up what is still missing.

@@ -119,7 +119,8 @@ class FineSearch:
             return False
         if model.level > SAME * self.passed.get(frozenset(model.structure.effects), np.inf):
             return False  # where an attempt led nowhere from
-        close = model.estimate.sigma < NEAR_SIGNAL * self.on_offer.moving and model.level < FARTHEST**2
+        share = ASTRAY if self.on_offer.torque_free else NEAR_SIGNAL  # a decay is searched by its own rules
+        close = model.estimate.sigma < share * self.on_offer.moving and model.level < FARTHEST**2
         return close and model.level < closer * self.tried_at
 
     def _rounds(self, found: Search, now: Whole) -> bool:
