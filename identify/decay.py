@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from identify.candidates import Candidates
-from identify.fine import STILL_FAR, STRONG
+from identify.choice import STILL_FAR, STRONG
 from identify.parameters import Name
 from identify.results import Candidate
 from identify.search import MOST_NAMED, Search

@@ -15,37 +15,27 @@ from itertools import combinations
 import numpy as np
 
 from identify.candidates import Candidates
-from identify.channels import simplicity
+from identify.choice import AT_NOISE, RIVAL, STILL_FAR, chosen_of, simplest, worth
 from identify.pairs import Pair
 from identify.parameters import Name
 from identify.results import Candidate
 from identify.scores import Scored
 from identify.search import MOST_EFFECTS, MOST_NAMED, Search
-from identify.whole_runs import AT_FLOOR, CHANCE, ENDS_NEAR, NEAR_THEN, TWICE, Whole
+from identify.whole_runs import AT_FLOOR, ENDS_NEAR, NEAR_THEN, Whole
 from rig import effects
-from rig.effects.base import Place
 from rig.platform import TERMS
 
 ASTRAY = 0.3  # of the signal: a free run that leaves more may be of another structure
 NEAR_SIGNAL = 0.6  # of the signal that a free run may leave for this search to begin
-HELD = 4.0  # the same on the held-out samples
-EQUAL = 4.0  # fall of chi square that says nothing: the library's order, simple before special, decides
-RIVAL = 10.0  # what parts two candidates for good
 WELL_KNOWN = 100.0  # standard errors beyond which a minimum is no false one
 CERTAIN = 30.0  # standard errors beyond which nobody asks whether a term is needed
-STRONG = 4.0  # standard errors by which every parameter of a new effect must differ from zero
-SHARE = 0.2  # of the excess over the noise that an effect has to take away
 FARTHEST = 3000.0  # times the noise: beyond, the sensor's noise is not what limits this record
 CLOSER = 0.5  # of the mean square at the last attempt
 FAR_CLOSER = 0.2  # the same where what was named since can follow anything, and brought it closer by that alone
 ATTEMPTS = 2
-STILL_FAR = 100.0  # mean square over the noise's variance
 VERY_FAR = 1e4
-AS_FAR = 1.03  # times the squares of the best while the noise is still far: the simpler is as good
 LEAP = 0.4  # of the squares that the right effect leaves where it is the only one that is large
 LEAST = 0.4  # of the squares that the best candidate takes while the noise is still far
-CLEARLY_LEFT = 5.0  # standard deviations of chi square
-AT_NOISE = 1.05  # mean square over the noise's variance: the noise is known to a percent or two
 TOOK, LARGE = 0.9, 3  # of the squares that a candidate has to leave at most to be tried with another, and how many
 SAME = 0.9  # of the level of an earlier attempt with the same effects: not near enough to expect more of it
 NO_SWAP = 10.0  # mean square over the noise's variance that no other effect in the place of one takes away
@@ -129,6 +119,7 @@ class FineSearch:
         most = len(declared.effects) + PATIENCE
         first = 1 + max((c.round for c in found.candidates), default=0)
         for round_ in range(first, first + MOST_EFFECTS):
+            now = self.on_offer.sharp(now)
             if len(now.structure.effects) >= most and now.level > ENDS_NEAR:
                 return False  # more than that are not believed, and each round costs more than the one before
             chosen = self._round(found, now, round_)
@@ -222,7 +213,7 @@ class FineSearch:
                 swapped = self.whole(replace(now.structure, effects=names), start)
                 if swapped is not None:
                     tried[other] = swapped
-            chosen = self._simplest(tried)
+            chosen = simplest(tried)
             if chosen != name and added[-1:] and added[-1] in now.structure.effects:
                 waiting += [n for n in added[-1:] if n != name and n not in waiting]  # chosen beside the one that goes
                 added.pop()
@@ -253,17 +244,16 @@ class FineSearch:
                 continue
             structure = replace(now.structure, terms=tuple(t for t in TERMS if t in (*now.structure.terms, name)))
             fuller = self.whole(structure, {**now.values(), (name,): 0.0})
-            if fuller is not None and self._worth(name, fuller, now):
+            if fuller is not None and worth(name, fuller, now):
                 found.dropped[:] = [d for d in found.dropped if d[0] != name]
                 self.say(f"took {name} back: free-run error {now.estimate.sigma:.4g} -> {fuller.estimate.sigma:.4g}")
                 now = fuller
         return now
 
     def _round(self, found: Search, now: Whole, round_: int) -> Whole | None:
-        now = self.on_offer.sharp(now)
         tried, looks = self.on_offer.tried(now)
         self.first_tried = self.first_tried or tried
-        name = self._chosen(tried, now)
+        name = chosen_of(tried, now)
         self._keep_books(found, now, tried, looks, name, round_)
         if name is None:
             return None
@@ -276,39 +266,6 @@ class FineSearch:
             best = self.whole(best.structure, best.values()) or best
         self.say(f"added {name}: free-run error {now.estimate.sigma:.3g} -> {best.estimate.sigma:.3g}")
         return best
-
-    def _chosen(self, tried: Mapping[str, Whole], now: Whole) -> str | None:
-        """The candidate to add: the likeliest, or the simplest of those that are as likely."""
-        good = {n: w for n, w in tried.items() if self._worth(n, w, now)}
-        if not good:
-            return None
-        best = self._simplest(good)
-        for first in effects.get(best).lower_order:
-            if first in good:
-                return first
-        return best
-
-    def _simplest(self, good: Mapping[str, Whole]) -> str:
-        """The likeliest, or the simplest of those that are as likely."""
-        best = min(good, key=lambda n: good[n].penalised)
-        # The richer one may only soak up what is still missing.
-        nested = [n for n in effects.get(best).nests if n in good and _as_near(good[n], good[best])]
-        if nested:
-            return min(nested, key=lambda n: good[n].squares)
-        behind = {n: (good[n].penalised - good[best].penalised) / good[best].level for n in good}
-        far = good[best].level > STILL_FAR  # from the noise, where what is left is no chance
-        alike = [n for n in good if behind[n] < RIVAL or (far and good[n].squares < AS_FAR * good[best].squares)]
-        return min(alike, key=lambda n: (*_simplicity(n), behind[n] > EQUAL, effects.known().index(n)))
-
-    def _worth(self, name: str, new: Whole, now: Whole) -> bool:
-        """Whether chi square falls beyond chance, also where nothing was fitted, with parameters that stand out."""
-        if effects.get(name).resembles_much and now.level < ENDS_NEAR and new.level > AT_NOISE:
-            return False  # near the noise it follows a few disturbed moments as gladly as anything
-        fall, held = (now.penalised - new.penalised) / new.level, (now.held - new.held) / new.level
-        excess = now.squares - now.count
-        large = excess > CLEARLY_LEFT * np.sqrt(2.0 * now.count)
-        enough = not large or now.squares - new.squares > SHARE * excess
-        return fall > CHANCE and held > HELD and enough and new.judged().strength(name) > STRONG
 
     def _pruned(self, found: Search, now: Whole, names: Sequence[str]) -> Whole:
         """Without every term or effect that the data do as well without."""
@@ -373,14 +330,6 @@ def _copy_of(found: Search) -> Search:
     )  # fmt: skip
 
 
-def _as_near(simple: Whole, rich: Whole) -> bool:
-    """Whether a special case leaves at most twice as much, where something is left that noise does not explain."""
-    if rich.level > AT_FLOOR:
-        return simple.squares < TWICE * rich.squares
-    excess, chance = rich.squares - rich.count, CLEARLY_LEFT * float(np.sqrt(2.0 * rich.count))
-    return excess > chance and simple.squares - simple.count < TWICE * excess
-
-
 def _taken_in(start: Mapping[Name, float], values: Mapping[Name, float], name: str, wider: str) -> dict[Name, float]:
     """Start values where an effect that contains another takes its gain over."""
     gain = next((values[(name, p.name)] for p in effects.get(name).parameters if p.linear), 0.0)
@@ -398,9 +347,3 @@ def _tied(name: str, now: Whole) -> bool:
 def _own_in_each_run(name: str) -> bool:
     """Whether an effect has gains of its own in every run, with which it soaks up much."""
     return name not in TERMS and any(p.per_run for p in effects.get(name).parameters)
-
-
-def _simplicity(name: str) -> tuple[int, int, bool]:
-    """What goes first among candidates that do as well: no channel, fewer parameters, the drive before the sensor."""
-    effect = effects.get(name)
-    return simplicity(name), len(effect.parameters), effect.place is Place.SENSOR
