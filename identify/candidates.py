@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from identify.channels import simplicity
+from identify.choice import STILL_FAR
 from identify.compare import Judged, start_values
 from identify.holdout import Split
-from identify.lines import foreign_lines_hz
+from identify.lines import foreign_lines_hz, ringing_hz
 from identify.output_error import refine, squares_at
 from identify.pairs import Pair, pairs
 from identify.parameters import Name
@@ -36,6 +37,7 @@ GOING = 0.95  # to less than this share
 FAR_BEHIND = 0.7  # of the best score: not fitted any more once another candidate is at the floor
 FINER, SHARPER = 3, 2  # times the steps, and how often they are made finer
 FAINT = 0.03  # of the best score: what promises so little beside another is not what the round is about
+VERY_FAR = 1e4  # mean square over the noise's variance: there whole runs have false minima on the way down
 HOPELESS = 3.0  # times the best error of the round after three steps
 
 
@@ -101,7 +103,7 @@ class Candidates:
             simpler = [tried[n] for n in effects.get(name).nests if n in tried]
             chosen_anyway = any(n.squares < TWICE * w.squares for n in simpler)
             if not best.at_noise and w.squares < NEAR_THEN * best.squares and not chosen_anyway:
-                tried[name] = self._on(w)
+                tried[name] = self.taken_on(w)
         return self._sharp({n: w for n, w in tried.items() if not w.at_noise}, tried), looks
 
     def sharp(self, now: Whole) -> Whole:
@@ -139,7 +141,7 @@ class Candidates:
             start |= {(name, p): v for p, v in other.own.items()}
             fitted = self.whole(now.structure, start)
             if fitted is not None and fitted.squares < best.squares:
-                best = self._on(fitted)
+                best = self.taken_on(fitted)
         return best
 
     def large(self, found: Judged) -> Whole | None:
@@ -159,7 +161,7 @@ class Candidates:
             start = start_values(screen.solution(look), look.shapes, 1 + max(t.number for t in self.traces))
             fitted = self.whole(structure.plus(name), {**found.values(), **start})
             if fitted is not None and (best is None or fitted.squares < best.squares):
-                best = self._on(fitted)
+                best = self.taken_on(fitted)
         return best
 
     def pairs(self, now: Whole) -> list[Pair]:
@@ -175,7 +177,7 @@ class Candidates:
         start = replace(first_guess(traces, Structure(now.structure.terms)), platform=jck)
         return pairs(traces, now.structure, now.judged().shapes(), start, self._scale(now), names)
 
-    def _on(self, fitted: Whole) -> Whole:
+    def taken_on(self, fitted: Whole) -> Whole:
         """A fit that still goes down, taken on: a sharp resonance is found late, and then at once."""
         for _ in range(TAKEN_ON):
             if fitted.estimate.converged or fitted.at_noise:
@@ -187,6 +189,14 @@ class Candidates:
             if slow:
                 break
         return fitted
+
+    def anew(self, fitted: Whole) -> Whole:
+        """A fit that is done; far from the noise begun anew by way of a short horizon, for it may creep in a valley."""
+        if fitted.level > STILL_FAR:
+            other = self.by_way_of_a_short_horizon(fitted.structure, fitted.values())
+            if other is not None and other.squares < fitted.squares:
+                fitted = other
+        return self.taken_on(fitted)
 
     def _looks(self, now: Whole, names: Sequence[str], in_full: bool = False) -> list[Scored]:
         """Scores of all candidates: of a long recording first on part of it, then on all for those that show there."""
@@ -212,12 +222,13 @@ class Candidates:
         starts = [{**now.values(), **look.start}, {**now.values(), **look.besides, **look.start}]
         squares = [squares_at(traces, structure, start, use, self.finer) / self.noise**2 for start in starts]
         start = starts[int(np.argmin(squares))]
-        if effects.get(look.effect).place is Place.FRICTION or min(squares) > now.squares:
+        lost = effects.get(look.effect).place is Place.FRICTION or min(squares) > now.squares
+        if lost or now.level > VERY_FAR:
             fitted = self.by_way_of_a_short_horizon(structure, start, hopeless, FEW_STEPS)
         else:
             fitted = self.whole(structure, start, hopeless, FEW_STEPS)
-        if best.level < ENDS_NEAR or set(now.structure.effects) > set(self.declared):
-            return fitted  # a second effect that is no small addition would have been the first
+        if best.level < ENDS_NEAR or len(now.structure.effects) > len(self.declared) + 1:
+            return fitted  # a third effect that is no small addition would have come before
         return self._or_large(look.effect, now, fitted, hopeless)
 
     def by_way_of_a_short_horizon(
@@ -234,7 +245,7 @@ class Candidates:
         """The same from where the effect is no small addition, while the fit is not near the noise."""
         effect, best, values = effects.get(name), small, now.values()
         jck = tuple(values.get((t,), 0.0) for t in TERMS)
-        for large in effect.large_starts(jck) if effect.large_starts else ():  # type: ignore[arg-type]
+        for large in effect.large_starts(jck, self._scale(now)) if effect.large_starts else ():  # type: ignore[arg-type]
             if best is not None and best.level < ENDS_NEAR:
                 break
             start: dict[Name, float] = dict(values)
@@ -249,7 +260,7 @@ class Candidates:
         inertia, damping, stiffness = (values.get((t,), 0.0) for t in TERMS)
         natural_hz = float(np.sqrt(max(stiffness, 0.0) / max(inertia, 1e-300)) / (2.0 * np.pi))
         lines = foreign_lines_hz(traces, now.estimate.residuals(), self.noise, natural_hz)
-        return scale_of(traces, (inertia, damping, stiffness), lines)
+        return scale_of(traces, (inertia, damping, stiffness), lines, ringing_hz(traces, natural_hz))
 
     def _shortlist(self, looks: Sequence[Scored], now: Whole, most: int, faint: float) -> list[Scored]:
         """The largest gains beyond their penalty, and what comes first by order or simplicity."""

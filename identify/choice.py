@@ -43,7 +43,10 @@ def simplest(good: Mapping[str, Whole]) -> str:
         return min(nested, key=lambda n: good[n].squares)
     behind = {n: (good[n].penalised - good[best].penalised) / good[best].level for n in good}
     far = good[best].level > STILL_FAR  # from the noise, where what is left is no chance
-    alike = [n for n in good if behind[n] < RIVAL or (far and good[n].squares < AS_FAR * good[best].squares)]
+    near = dict.fromkeys(good, AS_FAR)
+    if effects.get(best).resembles_much:  # it follows a part of what else is missing
+        near |= {n: TWICE for n in good if not effects.get(n).resembles_much}
+    alike = [n for n in good if behind[n] < RIVAL or (far and good[n].squares < near[n] * good[best].squares)]
     return min(alike, key=lambda n: (*_simplicity(n), behind[n] > EQUAL, effects.known().index(n)))
 
 

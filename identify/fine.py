@@ -14,7 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
-from identify.candidates import Candidates
+from identify.candidates import VERY_FAR, Candidates
 from identify.choice import AT_NOISE, RIVAL, STILL_FAR, chosen_of, simplest, worth
 from identify.pairs import Pair
 from identify.parameters import Name
@@ -33,11 +33,11 @@ FARTHEST = 3000.0  # times the noise: beyond, the sensor's noise is not what lim
 CLOSER = 0.5  # of the mean square at the last attempt
 FAR_CLOSER = 0.2  # the same where what was named since can follow anything, and brought it closer by that alone
 ATTEMPTS = 2
-VERY_FAR = 1e4
 LEAP = 0.4  # of the squares that the right effect leaves where it is the only one that is large
 LEAST = 0.4  # of the squares that the best candidate takes while the noise is still far
 TOOK, LARGE = 0.9, 3  # of the squares that a candidate has to leave at most to be tried with another, and how many
 SAME = 0.9  # of the level of an earlier attempt with the same effects: not near enough to expect more of it
+OUT_OF_SIGHT = 10.0  # times the error of the model, after three steps of a fit with another effect in one's place
 NO_SWAP = 10.0  # mean square over the noise's variance that no other effect in the place of one takes away
 PATIENCE = 3  # effects after which the end must be near
 
@@ -210,7 +210,8 @@ class FineSearch:
                     continue  # what contains the named one was asked in the last round, on top of it
                 start = {n: v for n, v in now.values().items() if n[0] != name} | own
                 names = tuple(other if e == name else e for e in now.structure.effects)
-                swapped = self.whole(replace(now.structure, effects=names), start)
+                fit = self.on_offer.by_way_of_a_short_horizon if now.level > STILL_FAR else self.whole
+                swapped = fit(replace(now.structure, effects=names), start, OUT_OF_SIGHT * now.estimate.sigma)
                 if swapped is not None:
                     tried[other] = swapped
             chosen = simplest(tried)
@@ -262,8 +263,7 @@ class FineSearch:
             n: w for n, w in tried.items()
             if n != name and (w.squares < NEAR_THEN * best.squares or n in effects.get(name).nests)
         }  # fmt: skip
-        if not best.estimate.converged:
-            best = self.whole(best.structure, best.values()) or best
+        best = self.on_offer.anew(best)
         self.say(f"added {name}: free-run error {now.estimate.sigma:.3g} -> {best.estimate.sigma:.3g}")
         return best
 

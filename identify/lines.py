@@ -49,6 +49,20 @@ def foreign_lines_hz(
     return tuple(f for _, f in found[:8])
 
 
+def ringing_hz(traces: Sequence[Trace], natural_hz: float) -> float:
+    """Frequency of the strongest line of the measured motion next to the natural frequency in Hz; zero without."""
+    found: list[tuple[float, float]] = []
+    for trace in traces:
+        x = np.where(trace.keep, trace.measured, 0.0)
+        size = np.abs(np.fft.rfft((x - np.mean(x)) * signal.windows.hann(len(x)), 8 * len(x)))
+        f = np.fft.rfftfreq(8 * len(x), trace.step_s)
+        near = np.flatnonzero(np.abs(f - natural_hz) < OWN * natural_hz)
+        if near.size:
+            k = near[np.argmax(size[near])]
+            found.append((float(size[k]), float(f[k])))
+    return max(found, default=(0.0, 0.0))[1]
+
+
 def played_hz(trace: Trace) -> float | None:
     """Frequency of a run's torque where that is one tone."""
     if trace.run.frequency_hz:

@@ -90,7 +90,9 @@ def best_rho(
     return min(solutions, key=lambda s: s.sigma)
 
 
-def scale_of(traces: Sequence[Trace], platform: tuple[float, float, float], lines_hz: tuple[float, ...]) -> Scale:
+def scale_of(
+    traces: Sequence[Trace], platform: tuple[float, float, float], lines_hz: tuple[float, ...], ringing_hz: float = 0.0
+) -> Scale:
     """How large the motion is."""
     fine = [t.fine for t in traces]
     j, _, k = platform
@@ -103,6 +105,7 @@ def scale_of(traces: Sequence[Trace], platform: tuple[float, float, float], line
         natural_frequency_hz=float(np.sqrt(max(k, 1e-12) / max(j, 1e-12)) / (2.0 * np.pi)),
         excitation_hz=tuple(t.run.frequency_hz for t in traces if t.run.frequency_hz),
         lines_hz=lines_hz,
+        ringing_hz=ringing_hz,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -10,6 +10,8 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from rig.recording.run import Array, TorqueHold
+
+KEPT = 6  # readings between the samples: every fit to a run asks for one of a few
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,7 @@ class TorqueSignal:
     time_s: Array
     torque_nm: Array
     hold: TorqueHold = "band_limited"
+    _read: dict[tuple[float, float, int], Array] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @cached_property
     def _spline(self) -> Any:
@@ -57,7 +60,20 @@ class TorqueSignal:
         return held + (t - inside) * np.where(t > inside, self.torque_nm[-1], self.torque_nm[0])
 
     def on_half_steps(self, start_s: float, half_step_s: float, n: int) -> Array:
-        """Torque at n instants half a fine step apart; a held torque as its mean over the half step ahead."""
+        """Torque at n instants half a fine step apart; a held torque as its mean over the half step ahead.
+
+        The array is given out again: nobody writes to it.
+        """
+        key = (start_s, half_step_s, n)
+        found = self._read.get(key)
+        if found is None:
+            found = self._between(start_s, half_step_s, n)
+            while len(self._read) >= KEPT:  # simulations in other threads may be doing the same
+                self._read.pop(next(iter(self._read), key), None)
+            self._read[key] = found
+        return found
+
+    def _between(self, start_s: float, half_step_s: float, n: int) -> Array:
         t: Array = start_s + half_step_s * np.arange(n + 1, dtype=np.float64)
         if self.hold == "zero_order":
             return np.diff(self._impulse(t)) / half_step_s

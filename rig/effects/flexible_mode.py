@@ -23,12 +23,12 @@ def _frequencies(scale: Scale) -> tuple[float, ...]:
     return tuple(lowest * (highest / lowest) ** (i / (count - 1)) for i in range(count))
 
 
-def _large(jck: tuple[float, float, float]) -> tuple[LargeStart, ...]:
+def _large(jck: tuple[float, float, float], scale: Scale) -> tuple[LargeStart, ...]:
     """A quarter of the inertia on a spring somewhat above the natural frequency: slow motion moves both as one."""
     inertia, _, stiffness = jck
-    natural_hz = math.sqrt(max(stiffness, 0.0) / inertia) / (2.0 * math.pi)
-    if natural_hz <= 0.0:
+    if stiffness <= 0.0:
         return ()
+    natural_hz = scale.natural_frequency_hz
     own = {"inertia": 0.25 * inertia, "ratio": 0.02}
     return tuple(LargeStart({"inertia": 0.75 * inertia}, {**own, "frequency": n * natural_hz}) for n in (1.2, 1.8))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rig.effects.base import Effect, Parameter, Place, Scale, kernel
+from rig.effects.base import Effect, LargeStart, Parameter, Place, Scale, kernel
 
 
 @kernel
@@ -15,6 +15,13 @@ def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-unt
 
 def _frequencies(scale: Scale) -> tuple[float, ...]:
     return scale.lines_hz
+
+
+def _large(jck: tuple[float, float, float], scale: Scale) -> tuple[LargeStart, ...]:
+    """A strong tone that the model without it has taken for the resonance, which lies elsewhere."""
+    if scale.ringing_hz <= 0.0:
+        return ()
+    return tuple(LargeStart({"inertia": n * jck[0]}, {"frequency": scale.ringing_hz}) for n in (0.4, 2.5))
 
 
 EFFECT = Effect(
@@ -32,6 +39,7 @@ EFFECT = Effect(
     ),
     kernel=_torque,
     fastest_rad_s=lambda values: 2.0 * math.pi * values[5],
+    large_starts=_large,
     resembles_much=True,
     separated_by="from harmonics of friction or stiffness: excite at other frequencies",
 )
