@@ -99,6 +99,11 @@ class Candidates:
             if fitted is not None:
                 tried[look.effect] = fitted
         best = min(tried.values(), key=lambda w: w.squares, default=now)
+        if best.level > STILL_FAR:  # a score along a motion that is far off does not see what changes all of it
+            for name in (n for n in self.allowed if n not in tried and n not in now.structure.effects):
+                large = self._or_large(name, now, None, HOPELESS * best.estimate.sigma)
+                tried |= {name: large} if large is not None and large.squares < best.squares else {}
+            best = min(tried.values(), key=lambda w: w.squares, default=now)
         for name, w in list(tried.items()):
             simpler = [tried[n] for n in effects.get(name).nests if n in tried]
             chosen_anyway = any(n.squares < TWICE * w.squares for n in simpler)
@@ -227,9 +232,7 @@ class Candidates:
             fitted = self.by_way_of_a_short_horizon(structure, start, hopeless, FEW_STEPS)
         else:
             fitted = self.whole(structure, start, hopeless, FEW_STEPS)
-        if best.level < ENDS_NEAR or len(now.structure.effects) > len(self.declared) + 1:
-            return fitted  # a third effect that is no small addition would have come before
-        return self._or_large(look.effect, now, fitted, hopeless)
+        return fitted if best.level < ENDS_NEAR else self._or_large(look.effect, now, fitted, hopeless)
 
     def by_way_of_a_short_horizon(
         self, structure: Structure, start: Mapping[Name, float], hopeless: float = np.inf, steps: int = STEPS
@@ -244,6 +247,8 @@ class Candidates:
     def _or_large(self, name: str, now: Whole, small: Whole | None, hopeless: float) -> Whole | None:
         """The same from where the effect is no small addition, while the fit is not near the noise."""
         effect, best, values = effects.get(name), small, now.values()
+        if self.torque_free or len(now.structure.effects) > len(self.declared) + 1:
+            return small  # a third effect that is no small addition would have come before
         jck = tuple(values.get((t,), 0.0) for t in TERMS)
         for large in effect.large_starts(jck, self._scale(now)) if effect.large_starts else ():  # type: ignore[arg-type]
             if best is not None and best.level < ENDS_NEAR:

@@ -19,6 +19,7 @@ SHARE = 0.2  # of the excess over the noise that an effect has to take away
 CLEARLY_LEFT = 5.0  # standard deviations of chi square
 AT_NOISE = 1.05  # mean square over the noise's variance: the noise is known to a percent or two
 STILL_FAR = 100.0  # mean square over the noise's variance
+THRICE = 3.0  # times the excess over the noise: what follows anything takes that much of what else is missing
 AS_FAR = 1.03  # times the squares of the best while the noise is still far: the simpler is as good
 
 
@@ -42,12 +43,20 @@ def simplest(good: Mapping[str, Whole]) -> str:
     if nested:
         return min(nested, key=lambda n: good[n].squares)
     behind = {n: (good[n].penalised - good[best].penalised) / good[best].level for n in good}
-    far = good[best].level > STILL_FAR  # from the noise, where what is left is no chance
-    near = dict.fromkeys(good, AS_FAR)
-    if effects.get(best).resembles_much:  # it follows a part of what else is missing
-        near |= {n: TWICE for n in good if not effects.get(n).resembles_much}
-    alike = [n for n in good if behind[n] < RIVAL or (far and good[n].squares < near[n] * good[best].squares)]
+    alike = [n for n in good if behind[n] < RIVAL or _as_far(n, good[n], best, good[best])]
     return min(alike, key=lambda n: (*_simplicity(n), behind[n] > EQUAL, effects.known().index(n)))
+
+
+def _as_far(name: str, model: Whole, best: str, nearest: Whole) -> bool:
+    """Whether a model is as good as the nearest where what is left is no chance.
+
+    The nearest then only takes what else is missing, and what can follow anything takes much of that.
+    """
+    if effects.get(best).resembles_much and not effects.get(name).resembles_much and nearest.level > AT_NOISE:
+        missing = max(nearest.squares - nearest.count, 0.0)
+        if model.squares < TWICE * nearest.squares and model.squares - model.count < THRICE * missing:
+            return True
+    return nearest.level > STILL_FAR and model.squares < AS_FAR * nearest.squares
 
 
 def worth(name: str, new: Whole, now: Whole) -> bool:

@@ -38,6 +38,7 @@ LEAST = 0.4  # of the squares that the best candidate takes while the noise is s
 TOOK, LARGE = 0.9, 3  # of the squares that a candidate has to leave at most to be tried with another, and how many
 SAME = 0.9  # of the level of an earlier attempt with the same effects: not near enough to expect more of it
 OUT_OF_SIGHT = 10.0  # times the error of the model, after three steps of a fit with another effect in one's place
+NEARLY_ALL = 0.02  # of the squares that two effects may leave together where they do not come near the noise
 NO_SWAP = 10.0  # mean square over the noise's variance that no other effect in the place of one takes away
 PATIENCE = 3  # effects after which the end must be near
 
@@ -152,11 +153,12 @@ class FineSearch:
         if len(now.structure.effects) + 2 > len(found.base.structure.effects) + MOST_NAMED:
             return None
         fitted = [w for w in map(self._both(now), self.on_offer.pairs(now)) if w is not None]
-        if min((w.level for w in fitted), default=np.inf) > ENDS_NEAR:
-            fitted += self._both_large(now)
         best = min(fitted, key=lambda w: w.squares, default=None)
-        if best is None or best.level > ENDS_NEAR:
+        if best is None or not self._brought_near(best, now):
+            best = min(self._both_large(now), key=lambda w: w.squares, default=None)
+        if best is None or not self._brought_near(best, now):
             return None
+        best = self._asked_again(found, best, 0)
         if best.level > AT_NOISE and any(effects.get(e).resembles_much for e in best.structure.effects[-2:]):
             return None
         new = sorted(best.structure.effects[-2:], key=best.judged().strength, reverse=True)
@@ -169,6 +171,11 @@ class FineSearch:
         )
         ordered = replace(best.structure, effects=(*best.structure.effects[:-2], *new))
         return self.whole(ordered, best.values())
+
+    @staticmethod
+    def _brought_near(pair: Whole, now: Whole) -> bool:
+        """Whether a pair is near the noise, or leaves so little that one of it may only be mistaken for its like."""
+        return pair.level < ENDS_NEAR or pair.squares < NEARLY_ALL * now.squares
 
     def _both(self, now: Whole) -> Callable[[Pair], Whole | None]:
         """How a pair is fitted on top of a model."""
@@ -198,10 +205,13 @@ class FineSearch:
         left = new.squares / max(now.squares, 1e-300)
         return (new.level > STILL_FAR and left > 1.0 - LEAST) or (new.level > VERY_FAR and left > LEAP)
 
-    def _asked_again(self, found: Search, now: Whole) -> Whole:
-        """Effects that were added while others were still missing, each against those that came near it then."""
+    def _asked_again(self, found: Search, now: Whole, newest: int = 1) -> Whole:
+        """Effects that were added while others were still missing, each against those that came near it then.
+
+        The ``newest`` of them were chosen beside all the others and are not asked.
+        """
         added = list(now.structure.effects[len(found.base.structure.effects) :])
-        waiting = added[:-1]
+        waiting = added[: len(added) - newest]
         while waiting:
             name = waiting.pop(0)
             tried = {name: now}

@@ -124,7 +124,8 @@ class Scores:
         e = self.estimate
         model = Equations(platform_of(e.structure, e.names, e.values, shots.number, shots.added))
         told = whole.measured if whole.torque is None else whole.fine[3][::UPSAMPLING]
-        begin = 0 if model.states else _busiest(told, length)  # what remembers is known only where the run begins
+        remembers = model.states or model.sensor.names  # that state is known only where the run begins
+        begin = 0 if remembers else _busiest(told, length)
         trace = whole.piece(begin, begin + length)
         weight = shots.weight[begin : begin + length + 1]
         if not trace.stretches or not np.any(weight):

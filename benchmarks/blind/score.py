@@ -194,5 +194,9 @@ def _replay(hidden: Hidden, truth: Mapping[str, Any], final: Mapping[str, Any]) 
         q, _ = np.linalg.qr(nuisances(model, excitation.times(model.step_s)))
         total += float(np.sum((part - q @ (q.T @ part)) ** 2))
         count += len(part)
-    (alike,) = left(model, scaled, [rest])
-    return math.sqrt(1.0 + total / count / hidden.noise**2), alike / hidden.noise**2
+    replayed = math.sqrt(1.0 + total / count / hidden.noise**2)
+    try:
+        (alike,) = left(model, scaled, [rest])
+    except Diverged:  # a model at the edge of running away imitates nothing
+        return replayed, None
+    return replayed, alike / hidden.noise**2

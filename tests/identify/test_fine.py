@@ -11,23 +11,26 @@ import pytest
 from identify.candidates import Candidates
 from identify.fine import FineSearch
 from identify.holdout import split
+from identify.parameters import Name
 from identify.regression import Structure
 from identify.search import Search
 from rig import effects
 from rig.recording.run import Recording
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
 
-START = {("inertia",): 0.0201, ("damping",): 0.05, ("stiffness",): 676.0}
+START: dict[Name, float] = {("inertia",): 0.0201, ("damping",): 0.05, ("stiffness",): 676.0}
 ALLOWED = (
     "coulomb_friction", "stribeck_friction", "cubic_stiffness", "quadratic_stiffness", "torque_delay",
     "actuator_lag", "sensor_lag", "creep", "torque_offset", "rate_bias", "directional_damping",
 )  # fmt: skip
 
 
-def searched(recording: Recording, allowed: tuple[str, ...] = ALLOWED) -> tuple[Search, bool]:
+def searched(
+    recording: Recording, allowed: tuple[str, ...] = ALLOWED, start: Mapping[Name, float] = START
+) -> tuple[Search, bool]:
     traces = traces_of(recording)
     fine = FineSearch(Candidates(traces, split(traces), allowed), lambda text: None)
-    begin = fine.whole(Structure(), START)
+    begin = fine.whole(Structure(), start)
     assert begin is not None
     found = Search(begin.judged(), begin.judged(), 0.1, fine.noise)
     return found, fine.take_over(found)
@@ -86,6 +89,20 @@ def test_a_second_inertia_as_heavy_as_the_platform_is_found_though_nothing_runs_
     values = found.best.values()
     assert [values["flexible_mode", n] for n in mode] == pytest.approx(list(mode.values()), rel=1e-3)
     assert [values[n,] for n in ("inertia", "stiffness")] == pytest.approx([TRUTH[0], TRUTH[2]], rel=1e-3)
+
+
+def test_a_tone_that_the_model_without_it_took_for_the_resonance_is_named_and_the_inertia_right() -> None:
+    tone = {"sine": 4.0, "cosine": 1.0, "frequency": 46.0}
+    recording = campaign({"periodic_disturbance": tone}, duration_s=3, sets=((111.0, 1.0), (104.0, 3.0), (67.0, 6.0)))
+    lost = START | {("inertia",): TRUTH[2] / (2.0 * np.pi * tone["frequency"]) ** 2}
+    found, took = searched(recording, ("coulomb_friction", "periodic_disturbance", "cubic_stiffness"), lost)
+    assert found.base.values()["inertia",] < 0.5 * TRUTH[0]
+    assert took
+    assert found.best.structure.effects == ("periodic_disturbance",)
+    assert found.best.sigma < 1.1 * NOISE_RAD_S
+    values = found.best.values()
+    assert values["periodic_disturbance", "frequency"] == pytest.approx(46.0, rel=1e-6)
+    assert [values[n,] for n in ("inertia", "damping", "stiffness")] == pytest.approx(TRUTH, rel=1e-4)
 
 
 def test_a_resonance_that_a_fit_has_missed_is_looked_for_elsewhere() -> None:

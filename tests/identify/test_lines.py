@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.lines import foreign_lines_hz, played_hz
+from identify.lines import foreign_lines_hz, played_hz, ringing_hz
 from identify.traces import Trace, prepare
 from rig.recording.run import Array
 from tests.identify.simulated import NOISE_RAD_S, sine_run, white
@@ -47,3 +47,9 @@ def test_the_frequency_of_a_torque_is_read_from_it_where_it_is_one_tone() -> Non
     nameless = replace(trace(), run=replace(trace().run, frequency_hz=None))
     assert played_hz(nameless) == pytest.approx(3.0, abs=0.05)
     assert played_hz(replace(nameless, torque=None)) is None
+
+
+def test_a_tone_that_passes_for_the_resonance_is_read_where_it_is() -> None:
+    loud = replace(trace(), measured=trace().measured + hum(45.3, 500.0))
+    assert ringing_hz([trace(), loud], 45.0) == pytest.approx(45.3, abs=0.02)
+    assert ringing_hz([trace()], 0.0) == 0.0

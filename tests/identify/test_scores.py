@@ -13,7 +13,10 @@ from identify.regression import Structure
 from identify.scores import Scores, _bounded
 from identify.screen import scale_of
 from rig import effects
-from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
+from rig.dynamics import TorqueSignal, simulate
+from rig.platform import Platform
+from rig.recording.run import Recording, Run
+from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of, white
 
 START = {("inertia",): 0.0201, ("damping",): 0.05, ("stiffness",): 676.0}
 CANDIDATES = [n for n in effects.names() if n not in ("rate_bias", "torque_offset", "periodic_disturbance")]
@@ -60,6 +63,20 @@ def test_a_fit_from_where_the_score_points_gains_what_it_promised(name: str) -> 
 def test_where_nothing_is_hidden_nothing_promises_more_than_chance() -> None:
     looks = scores_of("").all(CANDIDATES)
     assert max(s.gain for s in looks) < 20.0
+
+
+def test_a_part_from_the_middle_of_a_run_promises_nothing_where_the_gyros_lag_is_in_the_model() -> None:
+    time, quiet, lag = np.arange(6001) * 1e-3, np.radians(0.01), {"sensor_lag": {"time": 0.0025}}
+    torque = TorqueSignal(time, 60.0 * np.clip(time / 4.0, 0.0, 1.0) * np.sin(2 * np.pi * 6.0 * time))
+    rate = simulate(Platform(*TRUTH, lag), time, torque, substeps=16).sensed_rate_rad_s + white(len(time), quiet)
+    ones, asked = np.ones(len(time), bool), torque.torque_nm
+    run = Run("soft", time, ones, rate_rad_s=rate, torque_time_s=time, torque_nm=asked, frequency_hz=6.0)
+    start = dict(zip(START, TRUTH, strict=True)) | {("sensor_lag", "time"): 0.0025}
+    traces = traces_of(Recording((run,)))
+    estimate = refine(traces, Structure(effects=("sensor_lag",)), start, None, 15, coarse=True)
+    scores = Scores(estimate, (), quiet, scale_of(traces, TRUTH, ()), share=0.3)
+    assert len(scores.runs[0].base) < 0.4 * len(time)
+    assert max(s.gain for s in scores.all(["actuator_lag", "torque_delay", "creep", "cubic_stiffness"])) < 20.0
 
 
 def test_a_gain_that_may_not_turn_its_sign_promises_nothing_where_it_would_have_to() -> None:

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from rig.dynamics import TorqueSignal
+from rig.dynamics.torque import KEPT
+from rig.recording.run import TorqueHold
 
 TIME = np.arange(1001) * 1e-3
 BETWEEN = np.linspace(0.01, 0.99, 7777)
@@ -38,3 +40,16 @@ def test_outside_its_samples_a_torque_stays_at_its_last_value() -> None:
 def test_a_few_samples_are_enough_for_a_spline_of_lower_degree(count: int) -> None:
     time = np.arange(float(count))
     np.testing.assert_allclose(TorqueSignal(time, 2.0 * time).at(np.array([0.5])), [1.0])
+
+
+@pytest.mark.parametrize("hold", ["band_limited", "zero_order"])
+def test_a_torque_asked_for_again_is_the_same_and_of_many_askings_few_are_kept(hold: TorqueHold) -> None:
+    time = np.linspace(0.0, 1.0, 101)
+    torque = TorqueSignal(time, np.sin(20.0 * time), hold)
+    first = torque.on_half_steps(0.1, 1e-3, 500).copy()
+    assert torque.on_half_steps(0.1, 1e-3, 500) is torque.on_half_steps(0.1, 1e-3, 500)
+    for n in range(20):
+        torque.on_half_steps(0.1, 1e-3, 400 + n)
+    assert len(torque._read) <= KEPT
+    assert np.array_equal(torque.on_half_steps(0.1, 1e-3, 500), first)
+    assert not np.array_equal(torque.on_half_steps(0.2, 1e-3, 500), first)

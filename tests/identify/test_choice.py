@@ -1,0 +1,41 @@
+"""Which of several models is believed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identify.choice import simplest
+from identify.output_error import Estimate
+from identify.parameters import names_of
+from identify.regression import Structure
+from identify.whole_runs import Whole
+
+COUNT = 10_000
+
+
+def fitted(name: str, level: float) -> Whole:
+    """A model with one effect that leaves ``level`` times the noise's variance."""
+    structure = Structure(effects=(name,))
+    names = names_of(structure, 1)
+    estimate = Estimate(structure, names, np.ones(len(names)), 1.0, COUNT, np.eye(len(names)), (), True)
+    return Whole(estimate, level * COUNT, COUNT, level * COUNT, COUNT, np.ones(1), np.ones(1))
+
+
+@pytest.mark.parametrize(
+    ("levels", "chosen"),
+    [
+        ({"quadratic_stiffness": 2700.0, "cogging": 2400.0}, "quadratic_stiffness"),  # far off it follows what is left
+        ({"quadratic_stiffness": 2700.0, "cogging": 1200.0}, "cogging"),
+        ({"quadratic_stiffness": 1.3, "cogging": 1.0}, "cogging"),  # at the noise likelihood decides
+        ({"quadratic_stiffness": 1.0, "cogging": 1.0}, "quadratic_stiffness"),
+        ({"torque_delay": 1.7, "creep": 1.3}, "torque_delay"),  # something else is missing, and creep took a part of it
+        ({"torque_delay": 1.7, "creep": 1.04}, "creep"),
+        ({"quadratic_stiffness": 2700.0, "cubic_stiffness": 2400.0}, "cubic_stiffness"),
+        ({"actuator_lag": 1.0, "sensor_lag": 1.0}, "actuator_lag"),
+    ],
+)
+def test_what_can_follow_anything_displaces_a_plain_effect_only_where_it_explains_much_more(
+    levels: dict[str, float], chosen: str
+) -> None:
+    assert simplest({n: fitted(n, level) for n, level in levels.items()}) == chosen
