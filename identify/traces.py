@@ -169,7 +169,7 @@ class Trace:
         fine = self.step_s / upsampling
         count = (n - 1) * upsampling
         lead = int(min(LEAD_S, self.offset_s) / fine)  # a drive with memory has seen what came before a piece
-        x = self.torque.on_half_steps(start - lead * fine, fine, count + 1 + lead)
+        x = self.torque.on_half_steps(start - lead * fine, fine, count + 1 + lead).copy()  # the filters work in place
         for name, values in drive:
             effect = effects.get(name)
             size = effect.filter_states(fine, values) if effect.filter_states else 0

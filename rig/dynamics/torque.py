@@ -60,14 +60,12 @@ class TorqueSignal:
         return held + (t - inside) * np.where(t > inside, self.torque_nm[-1], self.torque_nm[0])
 
     def on_half_steps(self, start_s: float, half_step_s: float, n: int) -> Array:
-        """Torque at n instants half a fine step apart; a held torque as its mean over the half step ahead.
-
-        The array is given out again: nobody writes to it.
-        """
+        """Torque at n instants half a fine step apart (read-only); a held torque as its mean over the half step."""
         key = (start_s, half_step_s, n)
         found = self._read.get(key)
         if found is None:
             found = self._between(start_s, half_step_s, n)
+            found.flags.writeable = False  # it is given out again
             while len(self._read) >= KEPT:  # simulations in other threads may be doing the same
                 self._read.pop(next(iter(self._read), key), None)
             self._read[key] = found

@@ -52,4 +52,6 @@ def test_a_torque_asked_for_again_is_the_same_and_of_many_askings_few_are_kept(h
         torque.on_half_steps(0.1, 1e-3, 400 + n)
     assert len(torque._read) <= KEPT
     assert np.array_equal(torque.on_half_steps(0.1, 1e-3, 500), first)
+    with pytest.raises(ValueError, match="read-only"):
+        torque.on_half_steps(0.1, 1e-3, 500)[0] = 1.0
     assert not np.array_equal(torque.on_half_steps(0.2, 1e-3, 500), first)
