@@ -91,9 +91,9 @@ class Candidates:
         looks = self._looks(now, [n for n in self.allowed if n not in now.structure.effects], in_full)
         tried: dict[str, Whole] = {}
         short = self._shortlist(looks, now, most, 0.0 if in_full else FAINT)  # far off a decay's scores point anywhere
-        for look in sorted(short, key=lambda s: (effects.get(s.effect).states > 0, s.count)):  # the cheap ones first
+        for look in sorted(short, key=lambda s: -s.gain):  # where that is the one, the others need no fit
             best = min(tried.values(), key=lambda w: w.squares, default=now)
-            if best.level < AT_FLOOR and look.gain < FAR_BEHIND * short[0].gain:
+            if best.at_noise and look.gain < FAR_BEHIND * short[0].gain:
                 continue
             fitted = self._from(now, look, best)
             if fitted is not None:
