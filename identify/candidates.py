@@ -100,9 +100,7 @@ class Candidates:
                 tried[look.effect] = fitted
         best = min(tried.values(), key=lambda w: w.squares, default=now)
         if best.level > STILL_FAR:  # a score along a motion that is far off does not see what changes all of it
-            for name in (n for n in self.allowed if n not in tried and n not in now.structure.effects):
-                large = self._or_large(name, now, None, HOPELESS * best.estimate.sigma)
-                tried |= {name: large} if large is not None and large.squares < best.squares else {}
+            tried |= self._seen_otherwise(now, tried, best)
             best = min(tried.values(), key=lambda w: w.squares, default=now)
         for name, w in list(tried.items()):
             simpler = [tried[n] for n in effects.get(name).nests if n in tried]
@@ -160,14 +158,41 @@ class Candidates:
             if effects.get(name).large_starts is None or name in structure.effects:
                 continue
             screen = Screen(traces, structure, found.shapes(), first_guess(traces, Structure(structure.terms)))
-            look = screen.look(name)
-            if look is None or look.gain < WORTH_A_FIT:
-                continue
-            start = start_values(screen.solution(look), look.shapes, 1 + max(t.number for t in self.traces))
-            fitted = self.whole(structure.plus(name), {**found.values(), **start})
+            fitted = self._as_seen(screen, name, structure, found.values())
             if fitted is not None and (best is None or fitted.squares < best.squares):
                 best = self.taken_on(fitted)
         return best
+
+    def _as_seen(self, screen: Screen, name: str, structure: Structure, values: Mapping[Name, float]) -> Whole | None:
+        """A candidate fitted from where the regression along the measured motion sees it."""
+        look = screen.look(name)
+        if look is None or look.gain < WORTH_A_FIT:
+            return None
+        start = start_values(screen.solution(look), look.shapes, 1 + max(t.number for t in self.traces))
+        return self.whole(structure.plus(name), {**values, **start})
+
+    def _seen_otherwise(self, now: Whole, tried: Mapping[str, Whole], best: Whole) -> dict[str, Whole]:
+        """What no score along the model's own motion shows: large starts, shapes without a gain as the regression sees.
+
+        A drive that saturates at half its torque is scored best where it hardly does, if its motion is far off.
+        """
+        out: dict[str, Whole] = {}
+        traces, structure = [self.traces[i] for i in self.fit], now.structure
+        gainless = [n for n in tried if not any(p.linear for p in effects.get(n).parameters)]
+        if gainless and not self.torque_free:
+            start = first_guess(traces, Structure(structure.terms))
+            screen = Screen(traces, structure, now.judged().shapes(), start)
+            for name in gainless:
+                seen = self._as_seen(screen, name, structure, now.values())
+                if seen is not None and seen.squares < tried[name].squares:
+                    out[name] = seen
+        if min((w.level for w in out.values()), default=np.inf) < ENDS_NEAR:
+            return out
+        for name in (n for n in self.allowed if n not in tried and n not in structure.effects):
+            large = self._or_large(name, now, None, HOPELESS * best.estimate.sigma)
+            if large is not None and large.squares < best.squares:
+                out[name] = large
+        return out
 
     def pairs(self, now: Whole) -> list[Pair]:
         """Two effects at once that may be worth a fit; none that follow anything, and no channels."""
