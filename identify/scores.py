@@ -7,29 +7,25 @@ residual along what is left is the candidate's gain in chi square, without fitti
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from identify.along import torque_along
-from identify.neighbourhood import Neighbourhood, neighbourhood_of
+from identify.directions import Around, Directions, Push
+from identify.neighbourhood import neighbourhood_of
 from identify.output_error import Estimate
 from identify.parameters import Name, bounds_of, platform_of
 from identify.screen import grid_of
 from identify.sensitivities import nuisance_basis, sensitivities
-from identify.shots import RUNAWAY, Shots, from_rest, make_shots, motion, predict
+from identify.shots import RUNAWAY, Shots, from_rest, make_shots
 from identify.traces import UPSAMPLING
 from rig import effects
-from rig.dynamics import Equations, Grid
-from rig.dynamics.equations import MAX_SUBSTEPS
-from rig.effects.base import Effect, Place, Scale
-from rig.platform import Platform
+from rig.dynamics import Equations
+from rig.effects.base import Effect, Scale
 from rig.recording.run import Array
 
-LITTLE = 1e-4  # of the torque: more of a candidate would shift the ring beyond where sensitivities hold
-PHASE_RAD = 0.2  # of a candidate's own fastest motion in one of its steps
 SHARPENED = 6  # candidates whose shapes are looked at between the grid
 WORTH_SHARPENING = 10.0  # expected fall of chi square
 NEARLY = 0.97  # of the squares of the busiest part of a run
@@ -64,23 +60,6 @@ class Scored:
     besides: dict[Name, float] = field(default_factory=dict)
 
 
-@dataclass
-class _Run:
-    """One run around the model: projector, projected sensitivities and residual, and its motion once asked for."""
-
-    shots: Shots
-    base: Array
-    basis: Array
-    columns: Array
-    residual: Array
-    near: Neighbourhood | None
-    along: tuple[Array, Array, Array, Array] | None = None
-
-    def project(self, values: Array) -> Array:
-        used = values[self.shots.weight]
-        return np.asarray(used - self.basis @ (self.basis.T @ used))
-
-
 class Scores:
     """Gains of candidates on top of one model.
 
@@ -103,10 +82,9 @@ class Scores:
     ) -> None:
         self.estimate, self.sigma, self.scale = estimate, sigma, scale
         self.keep = np.array([n not in fixed for n in estimate.names])
-        self._finer_ones: dict[tuple[int, int], tuple[Shots, Array]] = {}
         with ThreadPoolExecutor(2) as workers:
             self.runs = list(workers.map(self._around, [self._cut(s, share) for s in estimate.shots]))
-        self.largest_first = sorted(self.runs, key=lambda r: -float(np.std(r.base)))
+        self.directions = Directions(estimate, self.runs, scale)
         information = np.sum([r.columns.T @ r.columns for r in self.runs], axis=0)
         self.size = np.sqrt(np.maximum(np.diag(information), 1e-300))
         self.toward = np.sum([r.columns.T @ r.residual for r in self.runs], axis=0) / self.size
@@ -137,7 +115,7 @@ class Scores:
         cut.bias = shots.bias
         return cut
 
-    def _around(self, shots: Shots) -> _Run:
+    def _around(self, shots: Shots) -> Around:
         e = self.estimate
         scale = np.where(np.abs(e.values) > 0, np.abs(e.values), 1.0)
         near = neighbourhood_of(
@@ -145,7 +123,7 @@ class Scores:
         )
         columns, state, residual = sensitivities(shots, e.structure, e.names, e.values, scale, ~self.keep, near)
         basis = nuisance_basis(shots, state)
-        run = _Run(shots, shots.trace.measured - residual, basis, np.zeros((0, 0)), np.zeros(0), near)
+        run = Around(shots, shots.trace.measured - residual, basis, np.zeros((0, 0)), np.zeros(0), near)
         return replace(run, columns=run.project(columns[:, self.keep]), residual=run.project(residual))
 
     def all(self, names: Sequence[str]) -> list[Scored]:
@@ -172,10 +150,10 @@ class Scores:
 
         ``as_it_is`` scores a candidate that has no gain at its own size, not at the best multiple of it.
         """
-        pushes = self._pushes(effect, shape)
+        pushes = self.directions.pushes(effect, shape)
         if not pushes:
             return None
-        columns = [self._direction(effect, push) for push in pushes]
+        columns = [self.directions.of(effect, push) for push in pushes]
         if any(c is None for c in columns):
             return None
         square = np.zeros((len(pushes),) * 2)
@@ -255,104 +233,8 @@ class Scores:
         shape[axis] = float(np.exp(logarithm))
         return self.score(effect, tuple(shape), as_it_is=not any(p.linear for p in effect.parameters))
 
-    def _pushes(self, effect: Effect, shape: tuple[float, ...]) -> list[tuple[dict[Name, float], bool]]:
-        """A little of the candidate, once for every gain: parameter values, and whether they may turn their sign."""
-        shapes = iter(shape)
-        held: dict[Name, float] = {(effect.name, p.name): next(shapes) for p in effect.parameters if not p.linear}
-        gains = [(i, p) for i, p in enumerate(effect.parameters) if p.linear]
-        if not gains:
-            return [(held, False)]
-        larger = dict(effect.ordered)
-        out = []
-        for i, p in gains:
-            unit = self._unit(effect, shape, i)
-            if unit == 0.0:
-                continue
-            little = LITTLE * self.scale.torque_nm / unit
-            rest: dict[Name, float] = {(effect.name, q.name): 0.0 for _, q in gains}
-            for run in self.runs if p.per_run else self.runs[:1]:
-                number = run.shots.number
-                push = dict(rest)
-                push[(effect.name, p.name)] = little
-                if p.name in larger:
-                    push[(effect.name, larger[p.name])] = little
-                named = {(*k, str(number)) if p.per_run and k in rest else k: v for k, v in {**held, **push}.items()}
-                out.append((named, p.low < 0.0))
-        return out
-
-    def _unit(self, effect: Effect, shape: tuple[float, ...], gain: int) -> float:
-        """Root mean square torque of a gain of one along the measured motion of the run that moves most."""
-        if effect.place in (Place.DRIVE, Place.SENSOR):
-            return 1.0
-        for run in self.largest_first:
-            pieces = run.shots.trace.effect_pieces(effect, shape, gain)
-            if pieces is not None:
-                return float(np.sqrt(np.mean(pieces[:, 0] ** 2)))
-        return 0.0
-
-    def _direction(self, effect: Effect, push: tuple[dict[Name, float], bool]) -> list[Array] | None:
-        """What the push adds to the simulated channel of every run, projected."""
-        out: list[Array] = []
-        for run in self.runs:
-            mine = [n for n in push[0] if len(n) < 3 or int(n[2]) == run.shots.number]
-            if not any(push[0][n] for n in mine if len(n) == 3) and any(len(n) == 3 for n in push[0]):
-                out.append(np.zeros(len(run.residual)))
-                continue
-            held = {n[1]: push[0][n] for n in mine}
-            e = self.estimate
-            bare = platform_of(e.structure, e.names, e.values, run.shots.number, run.shots.added)
-            platform = replace(bare, effects={**bare.effects, effect.name: held})
-            if effect.place is Place.LOAD and not effect.reads:
-                moved = self._pushed(run, Equations(bare), effect, held)
-            else:
-                equations = Equations(platform)
-                shots, base = self._finer(run, bare, equations)
-                moved = predict(shots, equations, shots.starts, shots.bias) - base
-            if not np.all(np.isfinite(moved[run.shots.weight])):
-                return None
-            out.append(run.project(moved))
-        return out
-
-    def _pushed(self, run: _Run, bare: Equations, effect: Effect, held: Mapping[str, float]) -> Array:
-        """What the torque that a little of a candidate makes along the model's own motion adds to the channel.
-
-        To first order that is the candidate, however fast its own states are.
-        """
-        values = effect.values(held)
-        s = run.shots
-        if run.along is None:
-            run.along = run.near.half if run.near else _half_steps(s, bare)
-        angle, rate, time, torque = run.along
-        step = 0.5 * s.grid.step_s
-        substeps = 1
-        if effect.states and effect.fastest_rad_s:
-            substeps = int(np.clip(np.ceil(step * effect.fastest_rad_s((*bare.jck, *values)) / PHASE_RAD), 1, 16))
-        z = np.array(effect.rest_state(angle[0], rate[0]) if effect.rest_state else [0.0] * effect.states, dtype=float)
-        out = np.empty_like(angle)
-        torque_along(
-            effect.kernel.address, angle, rate, time, torque, step, z, substeps, np.array([*bare.jck, *values]),
-            False, 1.0, out,
-        )  # fmt: skip
-        push = np.stack([out[:-1:2], out[1::2], out[2::2]], axis=1)
-        return run.near.resisted(push) if run.near else predict(s, bare, s.starts, s.bias, push) - run.base
-
-    def _finer(self, run: _Run, bare: Platform, equations: Equations) -> tuple[Shots, Array]:
-        """The same shots on a grid that a fast candidate needs, and the model's own motion there."""
-        trace = run.shots.trace
-        here = round(trace.step_s / run.shots.grid.step_s)
-        needed = int(np.clip(equations.substeps(trace.step_s) // 2, 2, MAX_SUBSTEPS))
-        if needed <= here:
-            return run.shots, run.base
-        needed = min(MAX_SUBSTEPS, 2 ** int(np.ceil(np.log2(needed))))
-        key = (run.shots.number, needed)
-        if key not in self._finer_ones:
-            time = trace.start_s + trace.step_s * np.arange(len(trace.measured))
-            shots = replace(run.shots, grid=Grid(time, trace.torque, needed, 0.0))
-            self._finer_ones[key] = shots, predict(shots, Equations(bare), shots.starts, shots.bias)
-        return self._finer_ones[key]
-
     def _start(
-        self, effect: Effect, shape: tuple[float, ...], pushes: Sequence[tuple[dict[Name, float], bool]], share: Array
+        self, effect: Effect, shape: tuple[float, ...], pushes: Sequence[Push], share: Array
     ) -> dict[Name, float]:
         out: dict[Name, float] = {}
         for (push, _), s in zip(pushes, share, strict=True):
@@ -368,21 +250,6 @@ class Scores:
             if p.linear and not p.per_run:
                 out.setdefault((effect.name, p.name), max(p.low, 0.0))
         return out
-
-
-def _half_steps(s: Shots, equations: Equations) -> tuple[Array, Array, Array, Array]:
-    """Angle, rate, time and torque of the model at start, middle and end of its fine steps, (2 m - 1,) each."""
-    moving = motion(s, equations, s.starts)
-    fine, first, steps, h = moving.fine[:, :2], moving.first, moving.torque, s.grid.step_s
-    out = np.empty((2 * len(fine) - 1, 2))
-    out[::2] = fine
-    slope = np.stack([fine[:, 1], np.gradient(fine[:, 1], h)], axis=1)
-    out[1::2] = 0.5 * (fine[1:] + fine[:-1]) + h / 8.0 * (slope[:-1] - slope[1:])
-    out[: 2 * first] = fine[first]  # at rest where nothing was simulated
-    out[: 2 * first, 1] = 0.0
-    torque = np.empty(len(out))
-    torque[::2], torque[1::2] = np.append(steps[:, 0], steps[-1, 2]), steps[:, 1]
-    return out[:, 0].copy(), out[:, 1].copy(), s.trace.offset_s + 0.5 * h * np.arange(len(out)), torque
 
 
 def _busiest(values: Array, length: int) -> int:
