@@ -140,6 +140,8 @@ class Candidates:
         own = tuple(values[(name, p.name)] for p in effect.parameters) if effect.other_minima else ()
         for other in effect.other_minima(jck, own) if effect.other_minima else ():  # type: ignore[arg-type]
             start: dict[Name, float] = dict(values)
+            if best.at_noise:
+                break
             start |= {(t,): v for t, v in other.terms.items()}
             start |= {(name, p): v for p, v in other.own.items()}
             fitted = self.whole(now.structure, start)

@@ -274,6 +274,8 @@ class FineSearch:
             if n != name and (w.squares < NEAR_THEN * best.squares or n in effects.get(name).nests)
         }  # fmt: skip
         best = self.on_offer.anew(best)
+        if best.level > AT_FLOOR:
+            best = self.on_offer.elsewhere(best, name)
         self.say(f"added {name}: free-run error {now.estimate.sigma:.3g} -> {best.estimate.sigma:.3g}")
         return best
 
