@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from identify.channels import simplicity
 from identify.choice import STILL_FAR
 from identify.compare import Judged, start_values
 from identify.holdout import Split
-from identify.lines import foreign_lines_hz, ringing_hz
+from identify.lines import foreign_lines_hz, ringing_hz, rings_hz
 from identify.output_error import refine, squares_at
 from identify.pairs import Pair, pairs
 from identify.parameters import Name
@@ -35,6 +35,7 @@ FEW_STEPS = 8  # of a fit that is only compared
 TAKEN_ON = 4  # times as many as a fit has, while each time the squares fall
 GOING = 0.95  # to less than this share
 FAR_BEHIND = 0.7  # of the best score: not fitted any more once another candidate is at the floor
+WALKED = 2  # times that other minima are looked for from the best so far
 FINER, SHARPER = 3, 2  # times the steps, and how often they are made finer
 FAINT = 0.03  # of the best score: what promises so little beside another is not what the round is about
 VERY_FAR = 1e4  # mean square over the noise's variance: there whole runs have false minima on the way down
@@ -93,7 +94,7 @@ class Candidates:
         short = self._shortlist(looks, now, most, 0.0 if in_full else FAINT)  # far off a decay's scores point anywhere
         for look in sorted(short, key=lambda s: -s.gain):  # where that is the one, the others need no fit
             best = min(tried.values(), key=lambda w: w.squares, default=now)
-            if best.at_noise and look.gain < FAR_BEHIND * short[0].gain:
+            if best.at_noise and look.gain < FAR_BEHIND * short[0].gain and not _is_like(look.effect, tried):
                 continue
             fitted = self._from(now, look, best)
             if fitted is not None:
@@ -106,7 +107,8 @@ class Candidates:
             simpler = [tried[n] for n in effects.get(name).nests if n in tried]
             chosen_anyway = any(n.squares < TWICE * w.squares for n in simpler)
             if not best.at_noise and w.squares < NEAR_THEN * best.squares and not chosen_anyway:
-                tried[name] = self.taken_on(w)
+                further = self.taken_on(w)
+                tried[name] = self.elsewhere(further, name) if further.level < STILL_FAR else further
         return self._sharp({n: w for n, w in tried.items() if not w.at_noise}, tried), looks
 
     def sharp(self, now: Whole) -> Whole:
@@ -134,19 +136,26 @@ class Candidates:
         return tried
 
     def elsewhere(self, now: Whole, name: str) -> Whole:
-        """The same effects, one of them begun where its other minima may lie: the best of all fits."""
-        effect, values, best = effects.get(name), now.values(), now
-        jck = tuple(values.get((t,), 0.0) for t in TERMS)
-        own = tuple(values[(name, p.name)] for p in effect.parameters) if effect.other_minima else ()
-        for other in effect.other_minima(jck, own) if effect.other_minima else ():  # type: ignore[arg-type]
-            start: dict[Name, float] = dict(values)
-            if best.at_noise:
+        """The same effects, one of them begun where its other minima may lie: the best of all fits.
+
+        From a better one it is looked for again: a mode that slow torque hardly tells from others is walked up to.
+        """
+        effect, best = effects.get(name), now
+        for _ in range(WALKED if effect.other_minima and not self.torque_free else 0):  # a decay tells no inertia
+            at, values = best, best.values()
+            jck = tuple(values.get((t,), 0.0) for t in TERMS)
+            own = tuple(values[(name, p.name)] for p in effect.parameters)
+            others = effect.other_minima(jck, own, self._scale(at)) if effect.other_minima else ()  # type: ignore[arg-type]
+            for other in others:
+                start: dict[Name, float] = dict(values)
+                start |= {(t,): v for t, v in other.terms.items()}
+                start |= {(name, p): v for p, v in other.own.items()}
+                there = best.at_noise and not now.at_noise
+                fitted = None if there else self.whole(now.structure, start)
+                if fitted is not None and fitted.squares < best.squares:
+                    best = self.taken_on(fitted)
+            if best.at_noise or best.squares > GOING * at.squares:  # at the noise once is enough
                 break
-            start |= {(t,): v for t, v in other.terms.items()}
-            start |= {(name, p): v for p, v in other.own.items()}
-            fitted = self.whole(now.structure, start)
-            if fitted is not None and fitted.squares < best.squares:
-                best = self.taken_on(fitted)
         return best
 
     def large(self, found: Judged) -> Whole | None:
@@ -292,7 +301,13 @@ class Candidates:
         inertia, damping, stiffness = (values.get((t,), 0.0) for t in TERMS)
         natural_hz = float(np.sqrt(max(stiffness, 0.0) / max(inertia, 1e-300)) / (2.0 * np.pi))
         lines = foreign_lines_hz(traces, now.estimate.residuals(), self.noise, natural_hz)
-        return scale_of(traces, (inertia, damping, stiffness), lines, ringing_hz(traces, natural_hz))
+        return scale_of(
+            traces,
+            (inertia, damping, stiffness),
+            lines,
+            ringing_hz(traces, natural_hz),
+            rings_hz(traces, now.estimate.residuals(), natural_hz),
+        )
 
     def _shortlist(self, looks: Sequence[Scored], now: Whole, most: int, faint: float) -> list[Scored]:
         """The largest gains beyond their penalty, and what comes first by order or simplicity."""
@@ -302,13 +317,23 @@ class Candidates:
             (s for s in looks if s.gain > max(WORTH_A_FIT, hope * (CHANCE + s.count * penalty))),
             key=lambda s: s.count * penalty - s.gain,
         )
+        promising = worth
         worth = [s for s in worth if s.gain > faint * max(w.gain for w in worth)]
         gains = {s.effect: s.gain for s in worth}  # what contains another and promises less is not it
         worth = [s for s in worth if all(gains.get(n, 0.0) <= s.gain for n in effects.get(s.effect).nests)]
         short = [s for s in worth if not simplicity(s.effect)][:most]  # channels come beside, they displace nothing
         short = sorted(short + [s for s in worth if simplicity(s.effect)][:CHANNELS_TRIED], key=worth.index)
         wanted = {n for s in short for n in (*effects.get(s.effect).nests, *effects.get(s.effect).lower_order)}
-        return short + [s for s in worth if s.effect in wanted and s not in short]
+        likes = [s for s in promising if _is_like(s.effect, [w.effect for w in short])]
+        return short + [s for s in (*worth, *likes) if (s.effect in wanted or s in likes) and s not in short]
+
+
+def _is_like(name: str, others: Iterable[str]) -> bool:
+    """Whether it is the simpler of two effects that no record parts: scores favour the richer."""
+    count = len(effects.get(name).parameters)
+    return any(
+        name in (effects.get(o).never_separable or {}) and count < len(effects.get(o).parameters) for o in others
+    )
 
 
 def _loads_differ(traces: Sequence[Trace]) -> bool:

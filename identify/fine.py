@@ -274,7 +274,7 @@ class FineSearch:
             if n != name and (w.squares < NEAR_THEN * best.squares or n in effects.get(name).nests)
         }  # fmt: skip
         best = self.on_offer.anew(best)
-        if best.level > AT_FLOOR:
+        if best.at_noise and best.judged().strength(name) < WELL_KNOWN:  # above it that was asked when it was tried
             best = self.on_offer.elsewhere(best, name)
         self.say(f"added {name}: free-run error {now.estimate.sigma:.3g} -> {best.estimate.sigma:.3g}")
         return best
@@ -292,8 +292,11 @@ class FineSearch:
                 start = _taken_in(start, now.values(), name, wider[0])
             elif now.judged().strength(name) > CERTAIN and not (_own_in_each_run(name) or _tied(name, now)):
                 continue
-            fit = self.on_offer.by_way_of_a_short_horizon if _tied(name, now) else self.whole  # it moves K
-            without = fit(now.structure.minus(name), start)
+            without = (
+                self._left(now, name, start, found.base.values())
+                if _tied(name, now)
+                else self.whole(now.structure.minus(name), start)
+            )
             if without is None or without.penalised - now.penalised > RIVAL * now.level:
                 continue
             reason = f"free-run error {now.estimate.sigma:.4g} with it, {without.estimate.sigma:.4g} without it"
@@ -302,6 +305,13 @@ class FineSearch:
             self.say(f"dropped {name}: {reason}")
             now = without
         return now
+
+    def _left(self, now: Whole, name: str, start: Mapping[Name, float], base: Mapping[Name, float]) -> Whole | None:
+        """The model without one of two effects that no record parts: K may lie anywhere, or near where it began."""
+        before: dict[Name, float] = {n: v for n, v in base.items() if len(n) == 1 and n in start}
+        starts = (start, {**start, **before})
+        fits = [self.on_offer.by_way_of_a_short_horizon(now.structure.minus(name), s) for s in starts]
+        return min((w for w in fits if w is not None), key=lambda w: w.squares, default=None)
 
     def _note_rivals(self, found: Search, name: str, tried: Mapping[str, Whole]) -> None:
         """Who did as well as the one named, and with which model."""

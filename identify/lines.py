@@ -12,6 +12,9 @@ from rig.recording.run import Array
 
 OWN = 0.03  # of the natural frequency: a line that near is the platform's own
 TONE = 0.8  # of the torque's power in one line
+START_S = 0.5  # in which a sharp mode that nothing excites later has rung
+STANDS_OUT = 5.0  # times the median power
+MOST_RINGS = 2
 LINE = 4.0  # times the noise at which a spectral line is one: e^-16 is the chance of a bin
 
 
@@ -47,6 +50,22 @@ def foreign_lines_hz(
         found += [(float(size[k]), float(f[k])) for k in peaks[np.argsort(size[peaks])[-3:]]]
     found.sort(reverse=True)
     return tuple(f for _, f in found[:8])
+
+
+def rings_hz(traces: Sequence[Trace], residuals: Sequence[Array], natural_hz: float) -> tuple[float, ...]:
+    """Frequencies in Hz at which most is left where runs begin, the strongest first; not the natural frequency."""
+    length = min(round(START_S / traces[0].step_s), *(len(r) for r in residuals))
+    window = 0.5 + 0.5 * np.cos(np.pi * np.arange(length) / length)  # all of the beginning
+    power = np.zeros(2 * length + 1)
+    for trace, r in zip(traces, residuals, strict=True):
+        first = trace.stretches[0][0] if trace.stretches else 0
+        x = np.where(trace.keep, r, 0.0)[first : first + length]
+        if len(x) == length:
+            power += np.abs(np.fft.rfft(x * window, 4 * length)) ** 2
+    f = np.fft.rfftfreq(4 * length, traces[0].step_s)
+    power[(np.abs(f - natural_hz) < 2.0 / START_S) | (f < 2.0 / START_S)] = 0.0
+    peaks = signal.find_peaks(power, height=STANDS_OUT * float(np.median(power)))[0]
+    return tuple(float(f[k]) for k in peaks[np.argsort(-power[peaks])][:MOST_RINGS])
 
 
 def ringing_hz(traces: Sequence[Trace], natural_hz: float) -> float:

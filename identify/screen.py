@@ -91,7 +91,11 @@ def best_rho(
 
 
 def scale_of(
-    traces: Sequence[Trace], platform: tuple[float, float, float], lines_hz: tuple[float, ...], ringing_hz: float = 0.0
+    traces: Sequence[Trace],
+    platform: tuple[float, float, float],
+    lines_hz: tuple[float, ...],
+    ringing_hz: float = 0.0,
+    rings_hz: tuple[float, ...] = (),
 ) -> Scale:
     """How large the motion is."""
     fine = [t.fine for t in traces]
@@ -106,6 +110,7 @@ def scale_of(
         excitation_hz=tuple(t.run.frequency_hz for t in traces if t.run.frequency_hz),
         lines_hz=lines_hz,
         ringing_hz=ringing_hz,
+        rings_hz=rings_hz,
     )
 
 

@@ -62,6 +62,7 @@ class Scale:
     natural_frequency_hz: float
     excitation_hz: tuple[float, ...] = ()
     lines_hz: tuple[float, ...] = ()  # spectral lines of the current residual
+    rings_hz: tuple[float, ...] = ()  # what of the current residual rings where runs begin
     ringing_hz: float = 0.0  # strongest spectral line of the measured motion next to the natural frequency
 
 
@@ -127,8 +128,8 @@ class Effect:
     needs_added_inertia: bool = False  # shows only where runs carry a known inertia besides the platform's own
     # Of (J, C, K) and the scale: terms of the platform and own parameters to begin from where the effect is large.
     large_starts: Callable[[tuple[float, float, float], Scale], tuple[LargeStart, ...]] | None = None
-    # Of (J, C, K) and its own values where a fit has ended: where else its minimum may lie.
-    other_minima: Callable[[tuple[float, float, float], tuple[float, ...]], tuple[LargeStart, ...]] | None = None
+    # Of (J, C, K), its own values where a fit has ended and the scale there: where else its minimum may lie.
+    other_minima: Callable[[tuple[float, float, float], tuple[float, ...], Scale], tuple[LargeStart, ...]] | None = None
     resembles_much: bool = False  # its shapes make it follow whatever else is missing
     separated_by: str = ""
     reads: Channel | None = None  # the measured channel that it is an effect of

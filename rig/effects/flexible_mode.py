@@ -6,6 +6,8 @@ import math
 
 from rig.effects.base import Effect, LargeStart, Parameter, Place, Scale, kernel
 
+LIGHT = 0.03  # of the inertia
+
 
 @kernel
 def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
@@ -33,18 +35,22 @@ def _large(jck: tuple[float, float, float], scale: Scale) -> tuple[LargeStart, .
     return tuple(LargeStart({"inertia": 0.75 * inertia}, {**own, "frequency": n * natural_hz}) for n in (1.2, 1.8))
 
 
-def _others(jck: tuple[float, float, float], own: tuple[float, ...]) -> tuple[LargeStart, ...]:
+def _others(jck: tuple[float, float, float], own: tuple[float, ...], scale: Scale) -> tuple[LargeStart, ...]:
     """Other modes that slow torque hardly tells from this one: it sees the inertias' sum and inertia / frequency^2.
 
-    Which of them rings shows beside false minima.
+    Which of them rings shows beside false minima. A sharp one above all torque rings where runs begin and is seen there
+    alone, at the frequency of the inertias against each other.
     """
     inertia, frequency, ratio = own
-    out = []
+    both, out = jck[0] + inertia, []
+    for ring in scale.rings_hz:
+        mine = {"inertia": LIGHT * both, "frequency": ring * math.sqrt(1.0 - LIGHT), "ratio": 0.02}
+        out.append(LargeStart({"inertia": (1.0 - LIGHT) * both}, mine))
     for times in (0.6, 1.6, 2.5):
         heavier = times**2 * inertia
         if heavier - inertia < 0.5 * jck[0]:
             mine = {"inertia": heavier, "frequency": times * frequency, "ratio": ratio}
-            out.append(LargeStart({"inertia": jck[0] + inertia - heavier}, mine))
+            out.append(LargeStart({"inertia": both - heavier}, mine))
     return tuple(out)
 
 

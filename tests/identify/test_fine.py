@@ -16,7 +16,7 @@ from identify.regression import Structure
 from identify.search import Search
 from rig import effects
 from rig.recording.run import Recording
-from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
+from tests.identify.simulated import NOISE_RAD_S, SETS, TRUTH, campaign, traces_of
 
 START: dict[Name, float] = {("inertia",): 0.0201, ("damping",): 0.05, ("stiffness",): 676.0}
 ALLOWED = (
@@ -142,6 +142,30 @@ def test_of_two_effects_that_no_record_parts_one_is_dropped_however_large_both_a
     assert left.structure.effects == ("cubic_stiffness",)
     assert left.level < 1.1
     assert left.values()["stiffness",] == pytest.approx(TRUTH[2], rel=1e-3)
+
+
+def test_gravity_is_not_kept_beside_the_softening_spring_that_it_was_taken_for() -> None:
+    traces = traces_of(campaign({"cubic_stiffness": {"factor": 2000.0}}, duration_s=3))
+    fine = FineSearch(Candidates(traces, split(traces), ("cubic_stiffness", "unbalance")), lambda text: None)
+    alone = fine.whole(Structure(), START)
+    begin = dict(zip(START, TRUTH, strict=True)) | {("cubic_stiffness", "factor"): 2010.0, ("stiffness",): 3077.3}
+    begin |= {("unbalance", "sine"): -2400.0, ("unbalance", "cosine"): 0.0}
+    both = fine.whole(Structure(effects=("unbalance", "cubic_stiffness")), begin)
+    assert alone is not None and both is not None and both.level < 1.1
+    assert both.values()["stiffness",] > 2.0 * TRUTH[2]
+    found = Search(alone.judged(), both.judged(), 0.1, fine.noise)
+    left = fine._pruned(found, both, both.structure.effects)
+    assert left.structure.effects == ("cubic_stiffness",)
+    assert left.values()["stiffness",] == pytest.approx(TRUTH[2], rel=1e-3)
+
+
+def test_a_light_sharp_mode_above_all_torque_is_found_by_its_ring_where_runs_begin() -> None:
+    mode = {"inertia": 0.0007, "frequency": 84.0, "ratio": 0.0076}
+    recording = campaign({"flexible_mode": mode}, duration_s=2, noise=np.radians(0.02), sets=SETS[2:])
+    found, took = searched(replace(recording, noise=None), ("coulomb_friction", "flexible_mode"))
+    assert took
+    assert found.best.structure.effects == ("flexible_mode",)
+    assert found.best.values()["flexible_mode", "frequency"] == pytest.approx(84.0, rel=0.02)
 
 
 def test_held_out_runs_take_no_part_in_the_fit() -> None:

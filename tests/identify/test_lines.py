@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.lines import foreign_lines_hz, played_hz, ringing_hz
+from identify.lines import foreign_lines_hz, played_hz, ringing_hz, rings_hz
 from identify.traces import Trace, prepare
 from rig.recording.run import Array
 from tests.identify.simulated import NOISE_RAD_S, sine_run, white
@@ -53,3 +53,12 @@ def test_a_tone_that_passes_for_the_resonance_is_read_where_it_is() -> None:
     loud = replace(trace(), measured=trace().measured + hum(45.3, 500.0))
     assert ringing_hz([trace(), loud], 45.0) == pytest.approx(45.3, abs=0.02)
     assert ringing_hz([trace()], 0.0) == 0.0
+
+
+def test_what_rings_where_a_run_begins_is_found_though_no_line_of_the_whole_run_shows_it() -> None:
+    time = np.arange(4001) * 1e-3
+    ring = 4.0 * NOISE_RAD_S * np.exp(-8.0 * time) * np.sin(2.0 * np.pi * 85.5 * time)
+    found = rings_hz([trace()], [ring + white(len(time), NOISE_RAD_S)], 29.3)
+    assert found[0] == pytest.approx(85.5, abs=0.7)
+    assert all(abs(f - 29.3) > 3.9 for f in rings_hz([trace()], [hum(29.3, 3.0)], 29.3))
+    assert all(abs(f - 29.3) < 3.9 for f in rings_hz([trace()], [hum(29.3, 3.0)], 60.0)[:1])
