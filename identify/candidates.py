@@ -255,7 +255,8 @@ class Candidates:
         """A candidate fitted from where its score points, if need be by way of a short horizon.
 
         ``best`` is the best fit of the round so far. Over whole runs friction has false minima: a standstill that
-        comes too soon puts the rest of the run off. So has whatever moves the resonance: a start that is worse than
+        comes too soon puts the rest of the run off; over a short one the speed at which it drops has others, so what
+        does not arrive by the one goes by the other. So has whatever moves the resonance: a start that is worse than
         the model without the candidate has lost it.
         """
         structure, hopeless = now.structure.plus(look.effect), HOPELESS * best.estimate.sigma
@@ -263,11 +264,13 @@ class Candidates:
         starts = [{**now.values(), **look.start}, {**now.values(), **look.besides, **look.start}]
         squares = [squares_at(traces, structure, start, use, self.finer) / self.noise**2 for start in starts]
         start = starts[int(np.argmin(squares))]
-        lost = effects.get(look.effect).place is Place.FRICTION or min(squares) > now.squares
-        if lost or now.level > VERY_FAR:
-            fitted = self.by_way_of_a_short_horizon(structure, start, hopeless, FEW_STEPS)
-        else:
+        friction, fitted = effects.get(look.effect).place is Place.FRICTION, None
+        lost = min(squares) > now.squares or now.level > VERY_FAR
+        if not lost:
             fitted = self.whole(structure, start, hopeless, FEW_STEPS)
+        if lost or (friction and (fitted is None or fitted.level > AT_FLOOR)):
+            near = self.by_way_of_a_short_horizon(structure, start, hopeless, FEW_STEPS)
+            fitted = min((w for w in (fitted, near) if w is not None), key=lambda w: w.squares, default=None)
         return fitted if best.level < ENDS_NEAR else self._or_large(look.effect, now, fitted, hopeless)
 
     def by_way_of_a_short_horizon(
