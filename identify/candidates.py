@@ -183,23 +183,27 @@ class Candidates:
         return self.whole(structure.plus(name), {**values, **start})
 
     def _seen_otherwise(self, now: Whole, tried: Mapping[str, Whole], best: Whole) -> dict[str, Whole]:
-        """What no score along the model's own motion shows: large starts, shapes without a gain as the regression sees.
+        """What no score along the model's own motion shows, as the regression along the measured motion sees it.
 
-        A drive that saturates at half its torque is scored best where it hardly does, if its motion is far off.
+        A drive that saturates at half its torque is scored best where it hardly does, if its motion is far off; a light
+        mode near a tone of the torque hides behind all that follows the resonance. Last come the large starts.
         """
         out: dict[str, Whole] = {}
         traces, structure = [self.traces[i] for i in self.fit], now.structure
         gainless = [n for n in tried if not any(p.linear for p in effects.get(n).parameters)]
-        if gainless and not self.torque_free:
-            start = first_guess(traces, Structure(structure.terms))
-            screen = Screen(traces, structure, now.judged().shapes(), start)
-            for name in gainless:
+        untried = [n for n in self.allowed if n not in tried and n not in structure.effects]
+        changing = [n for n in untried if effects.get(n).large_starts is not None]
+        if not self.torque_free and (gainless or changing):
+            screen = Screen(
+                traces, structure, now.judged().shapes(), first_guess(traces, Structure(structure.terms))
+            )  # fmt: skip
+            for name in (*gainless, *changing):
                 seen = self._as_seen(screen, name, structure, now.values())
-                if seen is not None and seen.squares < tried[name].squares:
+                if seen is not None and seen.squares < tried.get(name, best).squares:
                     out[name] = seen
         if min((w.level for w in out.values()), default=np.inf) < ENDS_NEAR:
             return out
-        for name in (n for n in self.allowed if n not in tried and n not in structure.effects):
+        for name in (n for n in changing if n not in out):
             large = self._or_large(name, now, None, HOPELESS * best.estimate.sigma)
             if large is not None and large.squares < best.squares:
                 out[name] = large
