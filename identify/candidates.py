@@ -39,6 +39,7 @@ WALKED = 2  # times that other minima are looked for from the best so far
 FINER, SHARPER = 3, 2  # times the steps, and how often they are made finer
 FAINT = 0.03  # of the best score: what promises so little beside another is not what the round is about
 VERY_FAR = 1e4  # mean square over the noise's variance: there whole runs have false minima on the way down
+MOST_OF_IT = 0.2  # of the squares: a candidate that leaves less is there, whatever else is missing
 HOPELESS = 3.0  # times the best error of the round after three steps
 
 
@@ -94,13 +95,15 @@ class Candidates:
         short = self._shortlist(looks, now, most, 0.0 if in_full else FAINT)  # far off a decay's scores point anywhere
         for look in sorted(short, key=lambda s: -s.gain):  # where that is the one, the others need no fit
             best = min(tried.values(), key=lambda w: w.squares, default=now)
-            if best.at_noise and look.gain < FAR_BEHIND * short[0].gain and not _is_like(look.effect, tried):
+            holds_it = best.at_noise and look.effect in effects.get(best.structure.effects[-1]).nests
+            behind = look.gain < FAR_BEHIND * short[0].gain and not _is_like(look.effect, tried)
+            if best.at_noise and behind and not holds_it:
                 continue
-            fitted = self._from(now, look, best)
+            fitted = self._within(now, look, best) if holds_it else self._from(now, look, best)
             if fitted is not None:
                 tried[look.effect] = fitted
         best = min(tried.values(), key=lambda w: w.squares, default=now)
-        if best.level > STILL_FAR:  # a score along a motion that is far off does not see what changes all of it
+        if best.level > STILL_FAR and best.squares > MOST_OF_IT * now.squares:
             tried |= self._seen_otherwise(now, tried, best)
             best = min(tried.values(), key=lambda w: w.squares, default=now)
         for name, w in list(tried.items()):
@@ -183,7 +186,7 @@ class Candidates:
         return self.whole(structure.plus(name), {**values, **start})
 
     def _seen_otherwise(self, now: Whole, tried: Mapping[str, Whole], best: Whole) -> dict[str, Whole]:
-        """What no score along the model's own motion shows, as the regression along the measured motion sees it.
+        """What no score along a motion that is far off shows, as the regression along the measured motion sees it.
 
         A drive that saturates at half its torque is scored best where it hardly does, if its motion is far off; a light
         mode near a tone of the torque hides behind all that follows the resonance. Last come the large starts.
@@ -276,6 +279,12 @@ class Candidates:
             near = self.by_way_of_a_short_horizon(structure, start, hopeless, FEW_STEPS)
             fitted = min((w for w in (fitted, near) if w is not None), key=lambda w: w.squares, default=None)
         return fitted if best.level < ENDS_NEAR else self._or_large(look.effect, now, fitted, hopeless)
+
+    def _within(self, now: Whole, look: Scored, best: Whole) -> Whole | None:
+        """The special case of what is at the noise, from its J, C, K: the richer one may have nothing of its own."""
+        begin = {**now.values(), **{n: v for n, v in best.values().items() if n in now.values()}}
+        fitted = self.whole(now.structure.plus(look.effect), {**begin, **look.start})
+        return fitted if fitted is not None and fitted.at_noise else self._from(now, look, best)
 
     def by_way_of_a_short_horizon(
         self, structure: Structure, start: Mapping[Name, float], hopeless: float = np.inf, steps: int = STEPS

@@ -14,17 +14,22 @@ def line(x: Array, y: Array, points: int) -> tuple[Array, Array]:
     """
     if len(y) <= points:
         return x, y
-    kept: list[int] = [0]
-    for stretch in np.array_split(np.arange(len(y)), max(1, points // 2 - 1)):
-        known = stretch[np.isfinite(y[stretch])]
-        if len(known) == 0:
-            kept.append(int(stretch[0]))
-            continue
-        ends = {int(known[np.argmin(y[known])]), int(known[np.argmax(y[known])])}
-        kept += sorted(ends)
-    kept.append(len(y) - 1)
+    first = np.linspace(0, len(y), max(1, points // 2 - 1), endpoint=False).astype(int)
+    stretch = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(y))))
+    known = np.isfinite(y)
+    rank = np.where(known, y, np.inf)
+    lowest = _first_of_each(stretch, rank == np.minimum.reduceat(rank, first)[stretch])
+    rank = np.where(known, y, -np.inf)
+    highest = _first_of_each(stretch, rank == np.maximum.reduceat(rank, first)[stretch])
+    kept = np.concatenate([[0, len(y) - 1], lowest, highest])
     at = np.unique(kept)
     return x[at], y[at]
+
+
+def _first_of_each(stretch: Array, chosen: Array) -> Array:
+    """Index of the first chosen sample of each stretch; where none has a number, all are chosen alike."""
+    at = np.flatnonzero(chosen)
+    return at[np.unique(stretch[at], return_index=True)[1]]
 
 
 def cloud(x: Array, y: Array, points: int) -> tuple[Array, Array]:
