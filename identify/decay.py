@@ -60,11 +60,11 @@ def take_over(offer: Candidates, found: Search, say: Callable[[str], None]) -> b
     """
     if found.best.structure == found.base.structure:
         return False
-    base = offer.whole(found.base.structure, found.base.values())
-    now = offer.whole(found.best.structure, found.best.values())
+    base = offer.fits.whole(found.base.structure, found.base.values())
+    now = offer.fits.whole(found.best.structure, found.best.values())
     if base is None or now is None or now.level < STILL_FAR:
         return False
-    offer.horizon = found.horizon
+    offer.fits.horizon = found.horizon
     decay = _Decay(offer, found, say)
     at_first, now = now, decay.asked_again(now)
     while len(now.structure.effects) < len(base.structure.effects) + MOST_NAMED:
@@ -97,7 +97,7 @@ class _Decay:
         name = _chosen(good)
         number = 1 + max((c.round for c in (*self.found.candidates, *self.candidates)), default=0)
         for other, w in bare.items():
-            held = float(np.sqrt(w.held / max(w.held_count, 1))) * self.offer.noise
+            held = float(np.sqrt(w.held / max(w.held_count, 1))) * self.offer.fits.noise
             status = "added" if other == name else "no better" if name else "not worth it"
             self.candidates.append(Candidate(other, number, w.penalised - now.penalised, held, status))
         if name is None:
@@ -119,7 +119,7 @@ class _Decay:
                 continue
             nothing: dict[Name, float] = {(name, p.name): 0.0 for p in effect.parameters}
             start = {**now.values(), **nothing}
-            fitted = self.offer.by_way_of_a_short_horizon(now.structure.plus(name), start)
+            fitted = self.offer.fits.by_way_of_a_short_horizon(now.structure.plus(name), start)
             if fitted is not None:
                 out[name] = fitted
         return out
@@ -140,7 +140,7 @@ class _Decay:
                 names = tuple(rival if e == name else e for e in now.structure.effects)
                 terms = self.found.base.structure.terms  # a rival may need a spring that the other made needless
                 start |= {(t,): 0.0 for t in terms if (t,) not in start}
-                swapped = self.offer.by_way_of_a_short_horizon(
+                swapped = self.offer.fits.by_way_of_a_short_horizon(
                     replace(now.structure, terms=terms, effects=names), start
                 )
                 if swapped is not None:
@@ -161,7 +161,7 @@ class _Decay:
                 continue
             allowance = PUSHES if now.values()[(term,)] <= 0.0 else NEEDLESS
             start = {n: v for n, v in now.values().items() if n != (term,)}
-            without = self.offer.whole(now.structure.minus(term), start)
+            without = self.offer.fits.whole(now.structure.minus(term), start)
             if without is not None and without.squares < allowance * now.squares:
                 now = without
         return now
@@ -177,7 +177,7 @@ class _Decay:
             gone = c.status == "added" and c.effect not in named
             self.candidates.append(replace(c, status="no better, now that others are there") if gone else c)
         found.candidates = sorted(self.candidates, key=lambda c: c.round)
-        found.base, found.best, found.floor = base.judged(), now.judged(), self.offer.noise
+        found.base, found.best, found.floor = base.judged(), now.judged(), self.offer.fits.noise
         found.rivals = {n: tuple(self.alike.get(n, {})) for n in named}
         found.rival_models = {n: {r: w.estimate.platform() for r, w in self.alike.get(n, {}).items()} for n in named}
         found.dropped = [

@@ -48,7 +48,7 @@ class FineSearch:
 
     def __init__(self, candidates: Candidates, say: Callable[[str], None]) -> None:
         self.on_offer, self.say = candidates, say
-        self.whole, self.noise = candidates.whole, candidates.noise
+        self.whole, self.noise = candidates.fits.whole, candidates.fits.noise
         self.tried_at = np.inf
         self.attempts = 0
         self.asked_for_large = False
@@ -69,7 +69,7 @@ class FineSearch:
             if begin is None:
                 return False
         self.tried_at, self.attempts, self.first_tried = begin.level, self.attempts + 1, {}
-        self.on_offer.horizon = found.horizon
+        self.on_offer.fits.horizon = found.horizon
         trial = _copy_of(found)
         through = self._rounds(trial, begin)
         for other in (self._hidden_pair, self._large_beside):
@@ -102,7 +102,7 @@ class FineSearch:
 
     def _large_beside(self, found: Search, now: Whole) -> Whole | None:
         """The same where the model runs no better than half astray, and no effect after the other brought it near."""
-        return self._large(found) if now.estimate.sigma > ASTRAY * self.on_offer.moving else None
+        return self._large(found) if now.estimate.sigma > ASTRAY * self.on_offer.fits.moving else None
 
     def _near(self, model: Whole, closer: float) -> bool:
         """Whether the free run stays close enough, and by how much closer than where this was tried before."""
@@ -110,8 +110,8 @@ class FineSearch:
             return False
         if model.level > SAME * self.passed.get(frozenset(model.structure.effects), np.inf):
             return False  # where an attempt led nowhere from
-        share = ASTRAY if self.on_offer.torque_free else NEAR_SIGNAL  # a decay is searched by its own rules
-        close = model.estimate.sigma < share * self.on_offer.moving and model.level < FARTHEST**2
+        share = ASTRAY if self.on_offer.fits.torque_free else NEAR_SIGNAL  # a decay is searched by its own rules
+        close = model.estimate.sigma < share * self.on_offer.fits.moving and model.level < FARTHEST**2
         return close and model.level < closer * self.tried_at
 
     def _rounds(self, found: Search, now: Whole) -> bool:
@@ -144,7 +144,7 @@ class FineSearch:
         now = swapped
         for name in now.structure.effects[len(declared.effects) :]:
             if now.judged().strength(name) < WELL_KNOWN:
-                now = self.on_offer.elsewhere(now, name)
+                now = self.on_offer.fits.elsewhere(now, name)
         found.best, found.floor = now.judged(), self.noise
         return True
 
@@ -179,7 +179,7 @@ class FineSearch:
 
     def _both(self, now: Whole) -> Callable[[Pair], Whole | None]:
         """How a pair is fitted on top of a model."""
-        return lambda pair: self.on_offer.by_way_of_a_short_horizon(
+        return lambda pair: self.on_offer.fits.by_way_of_a_short_horizon(
             now.structure.plus(pair.names[0]).plus(pair.names[1]), {**now.values(), **pair.start}
         )
 
@@ -220,7 +220,7 @@ class FineSearch:
                     continue  # what contains the named one was asked in the last round, on top of it
                 start = {n: v for n, v in now.values().items() if n[0] != name} | own
                 names = tuple(other if e == name else e for e in now.structure.effects)
-                fit = self.on_offer.by_way_of_a_short_horizon if now.level > STILL_FAR else self.whole
+                fit = self.on_offer.fits.by_way_of_a_short_horizon if now.level > STILL_FAR else self.whole
                 swapped = fit(replace(now.structure, effects=names), start, OUT_OF_SIGHT * now.estimate.sigma)
                 if swapped is not None:
                     tried[other] = swapped
@@ -273,9 +273,9 @@ class FineSearch:
             n: w for n, w in tried.items()
             if n != name and (w.squares < NEAR_THEN * best.squares or n in effects.get(name).nests)
         }  # fmt: skip
-        best = self.on_offer.anew(best)
+        best = self.on_offer.fits.anew(best)
         if best.at_noise and best.judged().strength(name) < WELL_KNOWN:  # above it that was asked when it was tried
-            best = self.on_offer.elsewhere(best, name)
+            best = self.on_offer.fits.elsewhere(best, name)
         self.say(f"added {name}: free-run error {now.estimate.sigma:.3g} -> {best.estimate.sigma:.3g}")
         return best
 
@@ -283,7 +283,7 @@ class FineSearch:
         """Without every term or effect that the data do as well without."""
         for name in names:
             kept_by = [e for e in now.structure.effects if name in effects.get(e).lower_order]
-            last = len(now.structure.terms) - len(self.on_offer.fixed) + len(now.structure.effects) <= 1
+            last = len(now.structure.terms) - len(self.on_offer.fits.fixed) + len(now.structure.effects) <= 1
             if name == "inertia" or kept_by or last:
                 continue
             start = {n: v for n, v in now.values().items() if n[0] != name}
@@ -310,7 +310,7 @@ class FineSearch:
         """The model without one of two effects that no record parts: K may lie anywhere, or near where it began."""
         before: dict[Name, float] = {n: v for n, v in base.items() if len(n) == 1 and n in start}
         starts = (start, {**start, **before})
-        fits = [self.on_offer.by_way_of_a_short_horizon(now.structure.minus(name), s) for s in starts]
+        fits = [self.on_offer.fits.by_way_of_a_short_horizon(now.structure.minus(name), s) for s in starts]
         return min((w for w in fits if w is not None), key=lambda w: w.squares, default=None)
 
     def _note_rivals(self, found: Search, name: str, tried: Mapping[str, Whole]) -> None:

@@ -118,7 +118,7 @@ class _Identifier:
 
             def take_over(found: Search) -> bool:
                 over = self.torque_free and decay.take_over(on_offer, found, self.say)
-                if over and found.best.sigma > decay.STILL_COARSE * on_offer.noise:
+                if over and found.best.sigma > decay.STILL_COARSE * on_offer.fits.noise:
                     return True  # whole runs have had their say, and the noise is not what is left
                 return fine.take_over(found) or over
 

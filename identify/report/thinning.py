@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.recording.run import Array
+
+Indices = NDArray[np.intp]
 
 
 def line(x: Array, y: Array, points: int) -> tuple[Array, Array]:
@@ -26,7 +29,7 @@ def line(x: Array, y: Array, points: int) -> tuple[Array, Array]:
     return x[at], y[at]
 
 
-def _first_of_each(stretch: Array, chosen: Array) -> Array:
+def _first_of_each(stretch: Indices, chosen: NDArray[np.bool_]) -> Indices:
     """Index of the first chosen sample of each stretch; where none has a number, all are chosen alike."""
     at = np.flatnonzero(chosen)
     return at[np.unique(stretch[at], return_index=True)[1]]

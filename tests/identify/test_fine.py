@@ -112,9 +112,9 @@ def test_a_resonance_that_a_fit_has_missed_is_looked_for_elsewhere() -> None:
     on_offer = Candidates(traces, split(traces), ("flexible_mode",))
     lost = {"inertia": 7.7e-5, "frequency": 21.0, "ratio": 0.05}
     begin = START | {("flexible_mode", n): v for n, v in lost.items()}
-    missed = on_offer.whole(Structure(effects=("flexible_mode",)), begin)
+    missed = on_offer.fits.whole(Structure(effects=("flexible_mode",)), begin)
     assert missed is not None and missed.level > 2.0
-    found = on_offer.elsewhere(missed, "flexible_mode")
+    found = on_offer.fits.elsewhere(missed, "flexible_mode")
     assert found.squares < 0.5 * missed.squares
     assert found.values()["flexible_mode", "frequency"] == pytest.approx(58.0, rel=0.05)
 
