@@ -82,12 +82,12 @@ class Candidates:
             if fitted is not None:
                 tried[look.effect] = fitted
         best = min(tried.values(), key=lambda w: w.squares, default=now)
-        if best.level > STILL_FAR and best.squares > MOST_OF_IT * now.squares:
+        if best.level > ENDS_NEAR and best.squares > MOST_OF_IT * now.squares:
             tried |= self._seen_otherwise(now, tried, best)
             best = min(tried.values(), key=lambda w: w.squares, default=now)
         for name, w in list(tried.items()):
             simpler = [tried[n] for n in effects.get(name).nests if n in tried]
-            chosen_anyway = any(n.squares < TWICE * w.squares for n in simpler)
+            chosen_anyway = w.estimate.converged and any(n.squares < TWICE * w.squares for n in simpler)
             if not best.at_noise and w.squares < NEAR_THEN * best.squares and not chosen_anyway:
                 further = self.fits.taken_on(w)
                 tried[name] = self.fits.elsewhere(further, name) if further.level < STILL_FAR else further
@@ -136,23 +136,24 @@ class Candidates:
         mode near a tone of the torque hides behind all that follows the resonance. Last come the large starts.
         """
         out: dict[str, Whole] = {}
-        traces, structure = self.fits.fitting, now.structure
-        gainless = [n for n in tried if not any(p.linear for p in effects.get(n).parameters)]
+        structure, far = now.structure, best.level > STILL_FAR
         untried = [n for n in self.allowed if n not in tried and n not in structure.effects]
-        changing = [n for n in untried if effects.get(n).large_starts is not None]
-        if not self.fits.torque_free and (gainless or changing):
-            screen = Screen(
-                traces, structure, now.judged().shapes(), first_guess(traces, Structure(structure.terms))
-            )  # fmt: skip
-            for name in (*gainless, *changing):
+        changing = [n for n in (*tried, *(untried if far else ())) if effects.get(n).large_starts is not None]
+        gainless = [n for n in tried if not any(p.linear for p in effects.get(n).parameters)]
+        seen_by_regression = [*gainless, *(n for n in changing if n not in gainless)] if far else []
+        if seen_by_regression and not self.fits.torque_free:
+            start = first_guess(self.fits.fitting, Structure(structure.terms))
+            screen = Screen(self.fits.fitting, structure, now.judged().shapes(), start)
+            for name in seen_by_regression:
                 seen = self.fits.as_seen(screen, name, structure, now.values())
                 if seen is not None and seen.squares < tried.get(name, best).squares:
                     out[name] = seen
-        if min((w.level for w in out.values()), default=np.inf) < ENDS_NEAR:
-            return out
-        for name in (n for n in changing if n not in out):
-            large = self.fits.or_large(name, now, None, HOPELESS * best.estimate.sigma)
-            if large is not None and large.squares < best.squares:
+        for name in changing:
+            if min((w.level for w in out.values()), default=np.inf) < ENDS_NEAR:
+                break
+            small = out.get(name, tried.get(name))
+            large = self.fits.or_large(name, now, small, best.estimate.sigma)
+            if large is not None and large is not small and (name in tried or large.squares < best.squares):
                 out[name] = large
         return out
 
@@ -200,7 +201,7 @@ class Candidates:
         if lost or (friction and (fitted is None or fitted.level > AT_FLOOR)):
             near = self.fits.by_way_of_a_short_horizon(structure, start, hopeless, FEW_STEPS)
             fitted = min((w for w in (fitted, near) if w is not None), key=lambda w: w.squares, default=None)
-        return fitted if best.level < ENDS_NEAR else self.fits.or_large(look.effect, now, fitted, hopeless)
+        return fitted
 
     def _within(self, now: Whole, look: Scored, best: Whole) -> Whole | None:
         """The special case of what is at the noise, from its J, C, K: the richer one may have nothing of its own."""
@@ -224,7 +225,9 @@ class Candidates:
         short = sorted(short + [s for s in worth if simplicity(s.effect)][:CHANNELS_TRIED], key=worth.index)
         wanted = {n for s in short for n in (*effects.get(s.effect).nests, *effects.get(s.effect).lower_order)}
         likes = [s for s in promising if _is_like(s.effect, [w.effect for w in short])]
-        return short + [s for s in (*worth, *likes) if (s.effect in wanted or s in likes) and s not in short]
+        special = looks if now.level > VERY_FAR else worth  # there the score of a special case points anywhere, too
+        besides = [s for s in special if s.effect in wanted] + likes
+        return short + [s for i, s in enumerate(besides) if s not in (*short, *besides[:i])]
 
 
 def _is_like(name: str, others: Iterable[str]) -> bool:

@@ -23,6 +23,7 @@ from rig.platform import TERMS
 TAKEN_ON = 4  # times as many as a fit has, while each time the squares fall
 GOING = 0.95  # to less than this share
 WALKED = 2  # times that other minima are looked for from the best so far
+WELL_BEHIND = 1.2  # times the best error of the round after three steps of a large start
 WORTH_A_FIT = 15.0  # expected fall of chi square
 
 
@@ -125,8 +126,11 @@ class Fits:
         start = start_values(screen.solution(look), look.shapes, 1 + max(t.number for t in self.traces))
         return self.whole(structure.plus(name), {**values, **start})
 
-    def or_large(self, name: str, now: Whole, small: Whole | None, hopeless: float) -> Whole | None:
-        """The same from where the effect is no small addition, while the fit is not near the noise."""
+    def or_large(self, name: str, now: Whole, small: Whole | None, best_error: float) -> Whole | None:
+        """The same from where the effect is no small addition, while the fit is not near the noise.
+
+        ``best_error`` is the best of the round: what is well behind it after three steps has begun in a wrong place.
+        """
         effect, best, values = effects.get(name), small, now.values()
         if self.torque_free or len(now.structure.effects) > self.already:
             return small  # a third effect that is no small addition would have come before
@@ -137,7 +141,7 @@ class Fits:
             start: dict[Name, float] = dict(values)
             start |= {(t,): v for t, v in large.terms.items()}
             start |= {(name, p): v for p, v in large.own.items()}
-            other = self.by_way_of_a_short_horizon(now.structure.plus(name), start, hopeless)
+            other = self.by_way_of_a_short_horizon(now.structure.plus(name), start, WELL_BEHIND * best_error)
             best = min((w for w in (best, other) if w is not None), key=lambda w: w.squares, default=None)
         return best
 

@@ -168,6 +168,20 @@ def test_a_light_sharp_mode_above_all_torque_is_found_by_its_ring_where_runs_beg
     assert found.best.values()["flexible_mode", "frequency"] == pytest.approx(84.0, rel=0.02)
 
 
+@pytest.mark.parametrize("level", [3.0, 8.0])
+def test_friction_that_holds_the_platform_is_coulombs_though_far_off_every_score_points_elsewhere(
+    level: float,
+) -> None:
+    """At 3 N m Stribeck's finds the noise first and has nothing of its own; at 8 only presliding scores at all."""
+    kinds = ("coulomb_friction", "stribeck_friction", "presliding_friction", "load_dependent_friction")
+    found, took = searched(campaign({"coulomb_friction": {"level": level}}, duration_s=2), kinds)
+    assert found.base.sigma > 400.0 * NOISE_RAD_S
+    assert took
+    assert found.best.structure.effects == ("coulomb_friction",)
+    assert found.best.sigma < 1.1 * NOISE_RAD_S
+    assert found.best.values()["coulomb_friction", "level"] == pytest.approx(level, rel=1e-3)
+
+
 def test_held_out_runs_take_no_part_in_the_fit() -> None:
     recording = campaign({"coulomb_friction": {"level": 0.1}}, duration_s=4)
     runs = [replace(r, use="holdout" if i == 4 else "fit") for i, r in enumerate(recording.runs)]
