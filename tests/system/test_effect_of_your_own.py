@@ -20,7 +20,9 @@ excitation:
     - {kind: sine, torque_nm: 40, frequency_hz: 9, duration_s: 4}
 simulated:
   platform: {effects: {eddy_brake: {level_nm: 1.5, speed_rad_s: 1.2}}}
-identify: {genetic: {population: 20, generations: 10}}
+identify:
+  genetic: {population: 20, generations: 10}
+  candidates: [coulomb_friction, quadratic_damping, eddy_brake]
 """
 
 
