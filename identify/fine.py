@@ -10,35 +10,31 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 
 from identify.candidates import VERY_FAR, Candidates
-from identify.choice import AT_NOISE, RIVAL, STILL_FAR, chosen_of, simplest, worth
-from identify.pairs import Pair
+from identify.choice import AT_NOISE, RIVAL, STILL_FAR, chosen_of, simplest
 from identify.parameters import Name
+from identify.pruning import Pruning
 from identify.results import Candidate
 from identify.scores import Scored
 from identify.search import MOST_EFFECTS, MOST_NAMED, Search
+from identify.two_at_once import two_at_once
 from identify.whole_runs import AT_FLOOR, ENDS_NEAR, NEAR_THEN, Whole
 from rig import effects
-from rig.platform import TERMS
 
 ASTRAY = 0.3  # of the signal: a free run that leaves more may be of another structure
 NEAR_SIGNAL = 0.6  # of the signal that a free run may leave for this search to begin
 WELL_KNOWN = 100.0  # standard errors beyond which a minimum is no false one
-CERTAIN = 30.0  # standard errors beyond which nobody asks whether a term is needed
 FARTHEST = 3000.0  # times the noise: beyond, the sensor's noise is not what limits this record
 CLOSER = 0.5  # of the mean square at the last attempt
 FAR_CLOSER = 0.2  # the same where what was named since can follow anything, and brought it closer by that alone
 ATTEMPTS = 2
 LEAP = 0.4  # of the squares that the right effect leaves where it is the only one that is large
 LEAST = 0.4  # of the squares that the best candidate takes while the noise is still far
-TOOK, LARGE = 0.9, 3  # of the squares that a candidate has to leave at most to be tried with another, and how many
 SAME = 0.9  # of the level of an earlier attempt with the same effects: not near enough to expect more of it
 OUT_OF_SIGHT = 10.0  # times the error of the model, after three steps of a fit with another effect in one's place
-NEARLY_ALL = 0.02  # of the squares that two effects may leave together where they do not come near the noise
 NO_SWAP = 10.0  # mean square over the noise's variance that no other effect in the place of one takes away
 PATIENCE = 3  # effects after which the end must be near
 
@@ -49,6 +45,7 @@ class FineSearch:
     def __init__(self, candidates: Candidates, say: Callable[[str], None]) -> None:
         self.on_offer, self.say = candidates, say
         self.whole, self.noise = candidates.fits.whole, candidates.fits.noise
+        self.pruning = Pruning(candidates.fits, say)
         self.tried_at = np.inf
         self.attempts = 0
         self.asked_for_large = False
@@ -128,7 +125,7 @@ class FineSearch:
                 break
             if self._astray(chosen, now):
                 return False
-            now = self._pruned(found, chosen, chosen.structure.effects[:-1])
+            now = self.pruning.pruned(found, chosen, chosen.structure.effects[:-1])
             self.passed[frozenset(now.structure.effects)] = now.level
             if len(now.structure.effects) >= most and now.level > NO_SWAP:
                 return False
@@ -136,11 +133,11 @@ class FineSearch:
                 now = self._asked_again(found, now)
         if now.level > ENDS_NEAR or len(now.structure.effects) > len(declared.effects) + MOST_NAMED:
             return False
-        now = self._restored(found, now, declared.terms)
-        now = self._pruned(found, now, (*now.structure.terms, *now.structure.effects))
+        now = self.pruning.restored(found, now, declared.terms)
+        now = self.pruning.pruned(found, now, (*now.structure.terms, *now.structure.effects))
         swapped = self._asked_again(found, now)
         if swapped.structure != now.structure:  # what another one's mistakes had called for is no longer needed
-            swapped = self._pruned(found, swapped, swapped.structure.effects)
+            swapped = self.pruning.pruned(found, swapped, swapped.structure.effects)
         now = swapped
         for name in now.structure.effects[len(declared.effects) :]:
             if now.judged().strength(name) < WELL_KNOWN:
@@ -152,11 +149,8 @@ class FineSearch:
         """With two effects that no search for one at a time finds, where both bring the model near the data."""
         if len(now.structure.effects) + 2 > len(found.base.structure.effects) + MOST_NAMED:
             return None
-        fitted = [w for w in map(self._both(now), self.on_offer.pairs(now)) if w is not None]
-        best = min(fitted, key=lambda w: w.squares, default=None)
-        if best is None or not self._brought_near(best, now):
-            best = min(self._both_large(now), key=lambda w: w.squares, default=None)
-        if best is None or not self._brought_near(best, now):
+        best = two_at_once(self.on_offer, now, self.first_tried)
+        if best is None:
             return None
         best = self._asked_again(found, best, 0)
         if best.level > AT_NOISE and any(effects.get(e).resembles_much for e in best.structure.effects[-2:]):
@@ -171,33 +165,6 @@ class FineSearch:
         )
         ordered = replace(best.structure, effects=(*best.structure.effects[:-2], *new))
         return self.whole(ordered, best.values())
-
-    @staticmethod
-    def _brought_near(pair: Whole, now: Whole) -> bool:
-        """Whether a pair is near the noise, or leaves so little that one of it may only be mistaken for its like."""
-        return pair.level < ENDS_NEAR or pair.squares < NEARLY_ALL * now.squares
-
-    def _both(self, now: Whole) -> Callable[[Pair], Whole | None]:
-        """How a pair is fitted on top of a model."""
-        return lambda pair: self.on_offer.fits.by_way_of_a_short_horizon(
-            now.structure.plus(pair.names[0]).plus(pair.names[1]), {**now.values(), **pair.start}
-        )
-
-    def _both_large(self, now: Whole) -> list[Whole]:
-        """The candidates of the first round that took the most, two at a time: each hides how much the other takes."""
-        took = {n: w for n, w in self.first_tried.items() if w.squares < TOOK * now.squares}
-        out: list[Whole] = []
-        for a, b in combinations(sorted(took, key=lambda n: took[n].squares)[:LARGE], 2):
-            if b in (effects.get(a).never_separable or {}) or b in effects.get(a).nests or a in effects.get(b).nests:
-                continue
-            structure = now.structure.plus(a).plus(b)
-            for first, second in ((a, b), (b, a)):  # J, C and K of either
-                own = {k: v for k, v in took[second].values().items() if k[0] == second}
-                both = self.whole(structure, {**took[first].values(), **own})
-                out += [both] if both is not None else []
-                if both is not None and both.level < ENDS_NEAR:
-                    return out
-        return out
 
     @staticmethod
     def _astray(new: Whole, now: Whole) -> bool:
@@ -248,19 +215,6 @@ class FineSearch:
                 out.setdefault(twin, {(twin, *k): v for k, v in mine.items()})
         return out
 
-    def _restored(self, found: Search, now: Whole, terms: Sequence[str]) -> Whole:
-        """With a declared term that was set aside, where it is missed now that the effects are there."""
-        for name in terms:
-            if name in now.structure.terms:
-                continue
-            structure = replace(now.structure, terms=tuple(t for t in TERMS if t in (*now.structure.terms, name)))
-            fuller = self.whole(structure, {**now.values(), (name,): 0.0})
-            if fuller is not None and worth(name, fuller, now):
-                found.dropped[:] = [d for d in found.dropped if d[0] != name]
-                self.say(f"took {name} back: free-run error {now.estimate.sigma:.4g} -> {fuller.estimate.sigma:.4g}")
-                now = fuller
-        return now
-
     def _round(self, found: Search, now: Whole, round_: int) -> Whole | None:
         tried, looks = self.on_offer.tried(now)
         self.first_tried = self.first_tried or tried
@@ -278,40 +232,6 @@ class FineSearch:
             best = self.on_offer.fits.elsewhere(best, name)
         self.say(f"added {name}: free-run error {now.estimate.sigma:.3g} -> {best.estimate.sigma:.3g}")
         return best
-
-    def _pruned(self, found: Search, now: Whole, names: Sequence[str]) -> Whole:
-        """Without every term or effect that the data do as well without."""
-        for name in names:
-            kept_by = [e for e in now.structure.effects if name in effects.get(e).lower_order]
-            last = len(now.structure.terms) - len(self.on_offer.fits.fixed) + len(now.structure.effects) <= 1
-            if name == "inertia" or kept_by or last:
-                continue
-            start = {n: v for n, v in now.values().items() if n[0] != name}
-            wider = [e for e in now.structure.effects if name in effects.get(e).nests]
-            if wider:
-                start = _taken_in(start, now.values(), name, wider[0])
-            elif now.judged().strength(name) > CERTAIN and not (_own_in_each_run(name) or _tied(name, now)):
-                continue
-            without = (
-                self._left(now, name, start, found.base.values())
-                if _tied(name, now)
-                else self.whole(now.structure.minus(name), start)
-            )
-            if without is None or without.penalised - now.penalised > RIVAL * now.level:
-                continue
-            reason = f"free-run error {now.estimate.sigma:.4g} with it, {without.estimate.sigma:.4g} without it"
-            found.dropped.append((name, reason))
-            found.rivals.pop(name, None)
-            self.say(f"dropped {name}: {reason}")
-            now = without
-        return now
-
-    def _left(self, now: Whole, name: str, start: Mapping[Name, float], base: Mapping[Name, float]) -> Whole | None:
-        """The model without one of two effects that no record parts: K may lie anywhere, or near where it began."""
-        before: dict[Name, float] = {n: v for n, v in base.items() if len(n) == 1 and n in start}
-        starts = (start, {**start, **before})
-        fits = [self.on_offer.fits.by_way_of_a_short_horizon(now.structure.minus(name), s) for s in starts]
-        return min((w for w in fits if w is not None), key=lambda w: w.squares, default=None)
 
     def _note_rivals(self, found: Search, name: str, tried: Mapping[str, Whole]) -> None:
         """Who did as well as the one named, and with which model."""
@@ -350,22 +270,3 @@ def _copy_of(found: Search) -> Search:
         found, candidates=list(found.candidates), rivals=dict(found.rivals), dropped=list(found.dropped),
         rival_models=dict(found.rival_models),
     )  # fmt: skip
-
-
-def _taken_in(start: Mapping[Name, float], values: Mapping[Name, float], name: str, wider: str) -> dict[Name, float]:
-    """Start values where an effect that contains another takes its gain over."""
-    gain = next((values[(name, p.name)] for p in effects.get(name).parameters if p.linear), 0.0)
-    linear = {p.name for p in effects.get(wider).parameters if p.linear}
-    return {n: v + gain if n[0] == wider and n[1] in linear else v for n, v in start.items()}
-
-
-def _tied(name: str, now: Whole) -> bool:
-    """Whether the model has both of two effects that no record parts: their errors say nothing then."""
-    others = [e for e in now.structure.effects if e != name]
-    mine = effects.get(name).never_separable or {} if name not in TERMS else {}
-    return any(e in mine or name in (effects.get(e).never_separable or {}) for e in others)
-
-
-def _own_in_each_run(name: str) -> bool:
-    """Whether an effect has gains of its own in every run, with which it soaks up much."""
-    return name not in TERMS and any(p.per_run for p in effects.get(name).parameters)

@@ -138,7 +138,7 @@ def test_of_two_effects_that_no_record_parts_one_is_dropped_however_large_both_a
     both = fine.whole(Structure(effects=("unbalance", "cubic_stiffness")), begin)
     assert both is not None and both.level < 1.1
     found = Search(both.judged(), both.judged(), 0.1, fine.noise)
-    left = fine._pruned(found, both, both.structure.effects)
+    left = fine.pruning.pruned(found, both, both.structure.effects)
     assert left.structure.effects == ("cubic_stiffness",)
     assert left.level < 1.1
     assert left.values()["stiffness",] == pytest.approx(TRUTH[2], rel=1e-3)
@@ -154,7 +154,7 @@ def test_gravity_is_not_kept_beside_the_softening_spring_that_it_was_taken_for()
     assert alone is not None and both is not None and both.level < 1.1
     assert both.values()["stiffness",] > 2.0 * TRUTH[2]
     found = Search(alone.judged(), both.judged(), 0.1, fine.noise)
-    left = fine._pruned(found, both, both.structure.effects)
+    left = fine.pruning.pruned(found, both, both.structure.effects)
     assert left.structure.effects == ("cubic_stiffness",)
     assert left.values()["stiffness",] == pytest.approx(TRUTH[2], rel=1e-3)
 

@@ -1,0 +1,66 @@
+"""Two effects fitted at once: of two large ones each hides how much the other takes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import combinations
+
+from identify.candidates import Candidates
+from identify.whole_runs import ENDS_NEAR, Whole
+from rig import effects
+
+TOOK, LARGE = 0.9, 3  # of the squares that a candidate has to leave at most to be tried with another, and how many
+NEARLY_ALL = 0.02  # of the squares that two effects may leave together where they do not come near the noise
+
+
+def two_at_once(offer: Candidates, now: Whole, first_tried: Mapping[str, Whole]) -> Whole | None:
+    """A model with two more effects that no search for one at a time finds; None where none comes near the data.
+
+    Parameters
+    ----------
+    now
+        The model that they are fitted on top of.
+    first_tried
+        What was fitted one at a time on top of it, by name.
+    """
+    best = _best(_as_seen(offer, now))
+    if best is None or not _brought_near(best, now):
+        best = _best(_both_large(offer, now, first_tried))
+    return best if best is not None and _brought_near(best, now) else None
+
+
+def _best(models: list[Whole]) -> Whole | None:
+    return min(models, key=lambda w: w.squares, default=None)
+
+
+def _brought_near(pair: Whole, now: Whole) -> bool:
+    """Whether a pair is near the noise, or leaves so little that one of it may only be mistaken for its like."""
+    return pair.level < ENDS_NEAR or pair.squares < NEARLY_ALL * now.squares
+
+
+def _as_seen(offer: Candidates, now: Whole) -> list[Whole]:
+    """Pairs fitted from where the regression along the measured motion sees them."""
+    fits = [
+        offer.fits.by_way_of_a_short_horizon(
+            now.structure.plus(pair.names[0]).plus(pair.names[1]), {**now.values(), **pair.start}
+        )
+        for pair in offer.pairs(now)
+    ]
+    return [w for w in fits if w is not None]
+
+
+def _both_large(offer: Candidates, now: Whole, first_tried: Mapping[str, Whole]) -> list[Whole]:
+    """The candidates of the first round that took the most, two at a time."""
+    took = {n: w for n, w in first_tried.items() if w.squares < TOOK * now.squares}
+    out: list[Whole] = []
+    for a, b in combinations(sorted(took, key=lambda n: took[n].squares)[:LARGE], 2):
+        if b in (effects.get(a).never_separable or {}) or b in effects.get(a).nests or a in effects.get(b).nests:
+            continue
+        structure = now.structure.plus(a).plus(b)
+        for first, second in ((a, b), (b, a)):  # J, C and K of either
+            own = {k: v for k, v in took[second].values().items() if k[0] == second}
+            both = offer.fits.whole(structure, {**took[first].values(), **own})
+            out += [both] if both is not None else []
+            if both is not None and both.level < ENDS_NEAR:
+                return out
+    return out
