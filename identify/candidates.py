@@ -85,12 +85,16 @@ class Candidates:
         if best.level > ENDS_NEAR and best.squares > MOST_OF_IT * now.squares:
             tried |= self._seen_otherwise(now, tried, best)
             best = min(tried.values(), key=lambda w: w.squares, default=now)
+        pliant = best is not now and effects.get(best.structure.effects[-1]).resembles_much
         for name, w in list(tried.items()):
+            plain = not effects.get(name).resembles_much
+            near = w.squares < NEAR_THEN * best.squares or (pliant and plain and w.squares < now.squares)
             simpler = [tried[n] for n in effects.get(name).nests if n in tried]
             chosen_anyway = w.estimate.converged and any(n.squares < TWICE * w.squares for n in simpler)
-            if not best.at_noise and w.squares < NEAR_THEN * best.squares and not chosen_anyway:
+            found_already = best.at_noise or (not plain and any(t.at_noise for t in tried.values()))
+            if near and not found_already and not chosen_anyway:
                 further = self.fits.taken_on(w)
-                tried[name] = self.fits.elsewhere(further, name) if further.level < STILL_FAR else further
+                tried[name] = self.fits.elsewhere(further, name)
         return self._sharp({n: w for n, w in tried.items() if not w.at_noise}, tried), looks
 
     def sharp(self, now: Whole) -> Whole:
@@ -158,17 +162,26 @@ class Candidates:
         return out
 
     def pairs(self, now: Whole) -> list[Pair]:
-        """Two effects at once that may be worth a fit; none that follow anything, and no channels."""
-        traces = self.fits.fitting
+        """Two effects at once that may be worth a fit; no channels, and no cogging, which has a shape for all."""
+        traces, structure, shapes = self.fits.fitting, now.structure, now.judged().shapes()
         names = [
             n for n in self.allowed
-            if n not in now.structure.effects and not simplicity(n)
-            and effects.get(n).place is not Place.SENSOR and not effects.get(n).resembles_much
+            if n not in structure.effects and not simplicity(n) and n != "cogging"
+            and effects.get(n).place is not Place.SENSOR
         ]  # fmt: skip
         values = now.values()
         jck = (values.get(("inertia",), 1.0), values.get(("damping",), 0.0), values.get(("stiffness",), 0.0))
-        start = replace(first_guess(traces, Structure(now.structure.terms)), platform=jck)
-        return pairs(traces, now.structure, now.judged().shapes(), start, self.fits.scale(now), names)
+        start = first_guess(traces, Structure(structure.terms))
+        screen = Screen(traces, structure, shapes, start)
+
+        def best_shape(name: str) -> tuple[float, ...] | None:
+            look = screen.look(name)
+            return None if look is None else look.shapes[name]
+
+        scale = self.fits.scale(now)
+        lines = (scale.ringing_hz,) if scale.ringing_hz > 0.0 else ()  # where a tone may pass for the resonance
+        scale = replace(scale, lines_hz=(*lines, *scale.lines_hz))
+        return pairs(traces, structure, shapes, replace(start, platform=jck), scale, names, best_shape)
 
     def _looks(self, now: Whole, names: Sequence[str], in_full: bool = False) -> list[Scored]:
         """Scores of all candidates: of a long recording first on part of it, then on all for those that show there."""

@@ -27,7 +27,7 @@ from rig import effects
 ASTRAY = 0.3  # of the signal: a free run that leaves more may be of another structure
 NEAR_SIGNAL = 0.6  # of the signal that a free run may leave for this search to begin
 WELL_KNOWN = 100.0  # standard errors beyond which a minimum is no false one
-FARTHEST = 3000.0  # times the noise: beyond, the sensor's noise is not what limits this record
+FARTHEST = 10_000.0  # times the noise: beyond, the sensor's noise is not what limits this record
 CLOSER = 0.5  # of the mean square at the last attempt
 FAR_CLOSER = 0.2  # the same where what was named since can follow anything, and brought it closer by that alone
 ATTEMPTS = 2

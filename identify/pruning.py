@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from identify.choice import RIVAL, worth
+from identify.choice import RIVAL, STILL_FAR, worth
 from identify.fits import Fits
 from identify.parameters import Name
 from identify.search import Search
@@ -35,11 +35,10 @@ class Pruning:
                 start = _taken_in(start, now.values(), name, wider[0])
             elif now.judged().strength(name) > CERTAIN and not (_own_in_each_run(name) or _tied(name, now)):
                 continue
-            without = (
-                self._left(now, name, start, found.base.values())
-                if _tied(name, now)
-                else self.fits.whole(now.structure.minus(name), start)
-            )
+            without = None if _tied(name, now) else self.fits.whole(now.structure.minus(name), start)
+            if without is None or (now.level > STILL_FAR and without.squares > now.squares):
+                fits = (without, self._left(now, name, start, found.base.values()))
+                without = min((w for w in fits if w is not None), key=lambda w: w.squares, default=None)
             if without is None or without.penalised - now.penalised > RIVAL * now.level:
                 continue
             reason = f"free-run error {now.estimate.sigma:.4g} with it, {without.estimate.sigma:.4g} without it"
@@ -50,7 +49,10 @@ class Pruning:
         return now
 
     def _left(self, now: Whole, name: str, start: Mapping[Name, float], base: Mapping[Name, float]) -> Whole | None:
-        """The model without one of two effects that no record parts: K may lie anywhere, or near where it began."""
+        """The model without an effect, anew: where no record parts two, or what is left begins in a wrong place.
+
+        J, C and K may lie anywhere then, or near where they began.
+        """
         before: dict[Name, float] = {n: v for n, v in base.items() if len(n) == 1 and n in start}
         starts = (start, {**start, **before})
         fits = [self.fits.by_way_of_a_short_horizon(now.structure.minus(name), s) for s in starts]

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import combinations
 
+import numpy as np
+
 from identify.candidates import Candidates
+from identify.choice import AT_NOISE
 from identify.whole_runs import ENDS_NEAR, Whole
 from rig import effects
 
@@ -39,14 +42,26 @@ def _brought_near(pair: Whole, now: Whole) -> bool:
 
 
 def _as_seen(offer: Candidates, now: Whole) -> list[Whole]:
-    """Pairs fitted from where the regression along the measured motion sees them."""
-    fits = [
-        offer.fits.by_way_of_a_short_horizon(
-            now.structure.plus(pair.names[0]).plus(pair.names[1]), {**now.values(), **pair.start}
-        )
-        for pair in offer.pairs(now)
-    ]
-    return [w for w in fits if w is not None]
+    """Pairs fitted from where the regression along the measured motion sees them, until one comes near."""
+    out: list[Whole] = []
+    for pair in offer.pairs(now):
+        structure = now.structure.plus(pair.names[0]).plus(pair.names[1])
+        own = {n: v for n, v in pair.start.items() if len(n) > 1}  # with J, C, K of the model, or of the regression
+        starts = ({**now.values(), **own}, {**now.values(), **pair.start})
+        squares = [offer.fits.squares(structure, start) for start in starts]
+        start = starts[int(np.argmin(np.nan_to_num(squares, nan=np.inf)))]
+        fitted = offer.fits.by_way_of_a_short_horizon(structure, start)
+        if fitted is None or (_pliant(fitted) and fitted.level > AT_NOISE):
+            continue
+        out.append(fitted)
+        if fitted.level < ENDS_NEAR:
+            break
+    return out
+
+
+def _pliant(model: Whole) -> bool:
+    """Whether one of the two can follow anything: such a pair counts at the noise only."""
+    return any(effects.get(e).resembles_much for e in model.structure.effects[-2:])
 
 
 def _both_large(offer: Candidates, now: Whole, first_tried: Mapping[str, Whole]) -> list[Whole]:

@@ -6,7 +6,7 @@ import math
 
 from rig.effects.base import Effect, LargeStart, Parameter, Place, Scale, kernel
 
-LIGHT = 0.03  # of the inertia
+LIGHT, HEAVY = 0.03, 0.5  # of the inertia
 
 
 @kernel
@@ -44,8 +44,9 @@ def _others(jck: tuple[float, float, float], own: tuple[float, ...], scale: Scal
     inertia, frequency, ratio = own
     both, out = jck[0] + inertia, []
     for ring in scale.rings_hz:
-        mine = {"inertia": LIGHT * both, "frequency": ring * math.sqrt(1.0 - LIGHT), "ratio": 0.02}
-        out.append(LargeStart({"inertia": (1.0 - LIGHT) * both}, mine))
+        for share in (LIGHT, HEAVY):
+            mine = {"inertia": share * both, "frequency": ring * math.sqrt(1.0 - share), "ratio": 0.02}
+            out.append(LargeStart({"inertia": (1.0 - share) * both}, mine))
     for times in (0.6, 1.6, 2.5):
         heavier = times**2 * inertia
         if heavier - inertia < 0.5 * jck[0]:

@@ -41,7 +41,8 @@ def test_a_gap_and_a_dead_zone_that_cancel_are_the_pair_that_takes_most_away() -
     found = pairs(traces, Structure(), {}, start, scale_of(traces, TRUTH, ()), [n for n in NAMES if n != "rate_bias"])
     assert {"torque_deadzone", "backlash"} in [set(pair.names) for pair in found]
     [pair] = [p for p in found if set(p.names) == {"torque_deadzone", "backlash"}]
-    assert pair.start.keys() == {("torque_deadzone", "width"), ("backlash", "half_gap")}
+    own = {(t,) for t in ("inertia", "damping", "stiffness")}
+    assert pair.start.keys() - own == {("torque_deadzone", "width"), ("backlash", "half_gap")}
     assert 0.3 < pair.start[("torque_deadzone", "width")] / 1.1 < 3.0
 
 
@@ -53,6 +54,38 @@ def test_values_to_begin_from_are_those_of_the_regression() -> None:
     assert found
     assert abs(found[0].start[("cubic_stiffness", "factor")] / 300.0 - 1.0) < 0.05
     assert abs(found[0].start[("quadratic_damping", "factor")] / 0.05 - 1.0) < 0.1
+    assert found[0].start[("stiffness",)] == pytest.approx(TRUTH[2], rel=1e-3)
+    assert found[0].start[("damping",)] == pytest.approx(TRUTH[1], rel=0.1)
+
+
+def test_a_tone_beside_a_spring_is_a_pair_of_those_that_can_follow_anything() -> None:
+    given = {
+        "periodic_disturbance": {"sine": 4.0, "cosine": 1.0, "frequency": 31.0}, "cubic_stiffness": {"factor": 900.0},
+    }  # fmt: skip
+    traces = [prepare(run, i) for i, run in enumerate(recording(given).runs)]
+    start = replace(first_guess(traces, Structure()), platform=TRUTH)
+    names = ["coulomb_friction", "cubic_stiffness", "quadratic_damping", "periodic_disturbance"]
+    found = pairs(traces, Structure(), {}, start, scale_of(traces, TRUTH, (31.0,)), names)
+    assert {"cubic_stiffness", "periodic_disturbance"} in [set(p.names) for p in found]
+    pliant = ["periodic_disturbance" in p.names for p in found]
+    assert pliant == sorted(pliant)  # plain pairs are tried first
+
+
+def test_a_gap_between_the_points_of_the_grid_is_put_beside_the_others_at_its_best_shape() -> None:
+    given = {"backlash": {"half_gap": 6e-4}, "quadratic_damping": {"factor": 0.1}}
+    traces = [prepare(run, i) for i, run in enumerate(recording(given).runs)]
+    start = replace(first_guess(traces, Structure()), platform=TRUTH)
+    asked: list[str] = []
+
+    def best_shape(name: str) -> tuple[float, ...]:
+        asked.append(name)
+        return (6e-4,)
+
+    names = ["backlash", "quadratic_damping"]
+    found = pairs(traces, Structure(), {}, start, scale_of(traces, TRUTH, ()), names, best_shape)
+    assert asked == ["backlash"]
+    assert found
+    assert found[0].start[("backlash", "half_gap")] == 6e-4
 
 
 @pytest.mark.slow
