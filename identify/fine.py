@@ -20,7 +20,7 @@ from identify.pruning import Pruning
 from identify.results import Candidate
 from identify.scores import Scored
 from identify.search import MOST_EFFECTS, MOST_NAMED, Search
-from identify.two_at_once import two_at_once
+from identify.two_at_once import can_follow_anything, two_at_once
 from identify.whole_runs import AT_FLOOR, ENDS_NEAR, NEAR_THEN, Whole
 from rig import effects
 
@@ -36,6 +36,7 @@ LEAST = 0.4  # of the squares that the best candidate takes while the noise is s
 SAME = 0.9  # of the level of an earlier attempt with the same effects: not near enough to expect more of it
 OUT_OF_SIGHT = 10.0  # times the error of the model, after three steps of a fit with another effect in one's place
 NO_SWAP = 10.0  # mean square over the noise's variance that no other effect in the place of one takes away
+MOST_PAIRS = 3  # that are asked again, each against its likes
 PATIENCE = 3  # effects after which the end must be near
 
 
@@ -149,11 +150,10 @@ class FineSearch:
         """With two effects that no search for one at a time finds, where both bring the model near the data."""
         if len(now.structure.effects) + 2 > len(found.base.structure.effects) + MOST_NAMED:
             return None
-        best = two_at_once(self.on_offer, now, self.first_tried)
+        pairs = two_at_once(self.on_offer, now, self.first_tried)
+        asked = (self._asked_again(found, pair, 0) for pair in pairs[:MOST_PAIRS])
+        best = next((w for w in asked if w.level < AT_NOISE or not can_follow_anything(w)), None)
         if best is None:
-            return None
-        best = self._asked_again(found, best, 0)
-        if best.level > AT_NOISE and any(effects.get(e).resembles_much for e in best.structure.effects[-2:]):
             return None
         new = sorted(best.structure.effects[-2:], key=best.judged().strength, reverse=True)
         round_ = 1 + max((c.round for c in found.candidates), default=0)

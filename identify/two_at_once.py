@@ -16,8 +16,8 @@ TOOK, LARGE = 0.9, 3  # of the squares that a candidate has to leave at most to 
 NEARLY_ALL = 0.02  # of the squares that two effects may leave together where they do not come near the noise
 
 
-def two_at_once(offer: Candidates, now: Whole, first_tried: Mapping[str, Whole]) -> Whole | None:
-    """A model with two more effects that no search for one at a time finds; None where none comes near the data.
+def two_at_once(offer: Candidates, now: Whole, first_tried: Mapping[str, Whole]) -> list[Whole]:
+    """Models with two more effects that no search for one at a time finds, and that come near the data; best first.
 
     Parameters
     ----------
@@ -26,14 +26,14 @@ def two_at_once(offer: Candidates, now: Whole, first_tried: Mapping[str, Whole])
     first_tried
         What was fitted one at a time on top of it, by name.
     """
-    best = _best(_as_seen(offer, now))
-    if best is None or not _brought_near(best, now):
-        best = _best(_both_large(offer, now, first_tried))
-    return best if best is not None and _brought_near(best, now) else None
+    near = [w for w in _as_seen(offer, now) if _brought_near(w, now)]
+    near = near or [w for w in _both_large(offer, now, first_tried) if _brought_near(w, now)]
+    return sorted(near, key=lambda w: w.squares)
 
 
-def _best(models: list[Whole]) -> Whole | None:
-    return min(models, key=lambda w: w.squares, default=None)
+def can_follow_anything(model: Whole) -> bool:
+    """Whether one of the two can: such a pair counts at the noise only."""
+    return any(effects.get(e).resembles_much for e in model.structure.effects[-2:])
 
 
 def _brought_near(pair: Whole, now: Whole) -> bool:
@@ -51,17 +51,12 @@ def _as_seen(offer: Candidates, now: Whole) -> list[Whole]:
         squares = [offer.fits.squares(structure, start) for start in starts]
         start = starts[int(np.argmin(np.nan_to_num(squares, nan=np.inf)))]
         fitted = offer.fits.by_way_of_a_short_horizon(structure, start)
-        if fitted is None or (_pliant(fitted) and fitted.level > AT_NOISE):
+        if fitted is None:
             continue
         out.append(fitted)
-        if fitted.level < ENDS_NEAR:
+        if fitted.level < (AT_NOISE if can_follow_anything(fitted) else ENDS_NEAR):
             break
     return out
-
-
-def _pliant(model: Whole) -> bool:
-    """Whether one of the two can follow anything: such a pair counts at the noise only."""
-    return any(effects.get(e).resembles_much for e in model.structure.effects[-2:])
 
 
 def _both_large(offer: Candidates, now: Whole, first_tried: Mapping[str, Whole]) -> list[Whole]:
