@@ -155,6 +155,9 @@ class FineSearch:
         best = next((w for w in asked if w.level < AT_NOISE or not can_follow_anything(w)), None)
         if best is None:
             return None
+        for gone in [n for n in found.rivals if n not in best.structure.effects]:  # of pairs that were refused
+            del found.rivals[gone]
+            found.rival_models.pop(gone, None)
         new = sorted(best.structure.effects[-2:], key=best.judged().strength, reverse=True)
         round_ = 1 + max((c.round for c in found.candidates), default=0)
         held = float(np.sqrt(best.held / max(best.held_count, 1))) * self.noise

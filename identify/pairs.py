@@ -183,7 +183,7 @@ def _best(columns: _Columns, pliant: bool) -> Pair | None:
     start: dict[Name, float] = dict(zip((*one.labels, *other.labels), _of(one, other, x), strict=True))
     own = columns.beside([one, other], x)
     if own.get(("inertia",), 1.0) > 0.0 and own.get(("stiffness",), 0.0) >= 0.0:
-        start = own | start
+        start = {n: v for n, v in own.items() if len(n) == 1} | start
     return Pair((one.name, other.name), {**start, **_shapes(one), **_shapes(other)}, gain)
 
 
