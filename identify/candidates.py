@@ -88,13 +88,13 @@ class Candidates:
         pliant = best is not now and effects.get(best.structure.effects[-1]).resembles_much
         for name, w in list(tried.items()):
             plain = not effects.get(name).resembles_much
-            near = w.squares < NEAR_THEN * best.squares or (pliant and plain and w.squares < now.squares)
+            falls = w.squares < now.squares  # what does not is in a wrong place, and no further steps mend that
+            near = w.squares < NEAR_THEN * best.squares or (pliant and plain and falls)
             simpler = [tried[n] for n in effects.get(name).nests if n in tried]
             chosen_anyway = w.estimate.converged and any(n.squares < TWICE * w.squares for n in simpler)
             found_already = best.at_noise or (not plain and any(t.at_noise for t in tried.values()))
             if near and not found_already and not chosen_anyway:
-                further = self.fits.taken_on(w)
-                tried[name] = self.fits.elsewhere(further, name)
+                tried[name] = self.fits.elsewhere(self.fits.taken_on(w) if falls else w, name)
         return self._sharp({n: w for n, w in tried.items() if not w.at_noise}, tried), looks
 
     def sharp(self, now: Whole) -> Whole:
@@ -149,7 +149,7 @@ class Candidates:
             start = first_guess(self.fits.fitting, Structure(structure.terms))
             screen = Screen(self.fits.fitting, structure, now.judged().shapes(), start)
             for name in seen_by_regression:
-                seen = self.fits.as_seen(screen, name, structure, now.values())
+                seen = self.fits.as_seen(screen, name, structure, now.values(), best.estimate.sigma)
                 if seen is not None and seen.squares < tried.get(name, best).squares:
                     out[name] = seen
         for name in changing:
@@ -162,11 +162,11 @@ class Candidates:
         return out
 
     def pairs(self, now: Whole) -> list[Pair]:
-        """Two effects at once that may be worth a fit; no channels, and no cogging, which has a shape for all."""
+        """Two effects at once that may be worth a fit; no channels, and none that has a shape for all."""
         traces, structure, shapes = self.fits.fitting, now.structure, now.judged().shapes()
         names = [
             n for n in self.allowed
-            if n not in structure.effects and not simplicity(n) and n != "cogging"
+            if n not in structure.effects and not simplicity(n) and not effects.get(n).sought_alone
             and effects.get(n).place is not Place.SENSOR
         ]  # fmt: skip
         values = now.values()

@@ -15,6 +15,7 @@ import numpy as np
 
 from identify.candidates import VERY_FAR, Candidates
 from identify.choice import AT_NOISE, RIVAL, STILL_FAR, chosen_of, simplest
+from identify.fits import OUT_OF_SIGHT
 from identify.parameters import Name
 from identify.pruning import Pruning
 from identify.results import Candidate
@@ -34,7 +35,6 @@ ATTEMPTS = 2
 LEAP = 0.4  # of the squares that the right effect leaves where it is the only one that is large
 LEAST = 0.4  # of the squares that the best candidate takes while the noise is still far
 SAME = 0.9  # of the level of an earlier attempt with the same effects: not near enough to expect more of it
-OUT_OF_SIGHT = 10.0  # times the error of the model, after three steps of a fit with another effect in one's place
 NO_SWAP = 10.0  # mean square over the noise's variance that no other effect in the place of one takes away
 MOST_PAIRS = 3  # that are asked again, each against its likes
 PATIENCE = 3  # effects after which the end must be near

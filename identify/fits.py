@@ -24,6 +24,7 @@ TAKEN_ON = 4  # times as many as a fit has, while each time the squares fall
 GOING = 0.95  # to less than this share
 WALKED = 2  # times that other minima are looked for from the best so far
 WELL_BEHIND = 1.2  # times the best error of the round after three steps of a large start
+OUT_OF_SIGHT = 10.0  # the same of any other: a sharp resonance is arrived at late, and then at once
 WORTH_A_FIT = 15.0  # expected fall of chi square
 
 
@@ -111,20 +112,25 @@ class Fits:
                 start |= {(t,): v for t, v in other.terms.items()}
                 start |= {(name, p): v for p, v in other.own.items()}
                 there = best.at_noise and not now.at_noise
-                fitted = None if there else self.whole(now.structure, start)
+                fitted = None if there else self.whole(now.structure, start, OUT_OF_SIGHT * best.estimate.sigma)
                 if fitted is not None and fitted.squares < best.squares:
                     best = self.taken_on(fitted)
             if best.at_noise or best.squares > GOING * at.squares:  # at the noise once is enough
                 break
         return best
 
-    def as_seen(self, screen: Screen, name: str, structure: Structure, values: Mapping[Name, float]) -> Whole | None:
-        """A candidate fitted from where the regression along the measured motion sees it."""
+    def as_seen(
+        self, screen: Screen, name: str, structure: Structure, values: Mapping[Name, float], best_error: float = np.inf
+    ) -> Whole | None:
+        """A candidate fitted from where the regression along the measured motion sees it.
+
+        ``best_error`` is the best of the round, if there is one: what is far behind it after three steps is given up.
+        """
         look = screen.look(name)
         if look is None or look.gain < WORTH_A_FIT:
             return None
         start = start_values(screen.solution(look), look.shapes, 1 + max(t.number for t in self.traces))
-        return self.whole(structure.plus(name), {**values, **start})
+        return self.whole(structure.plus(name), {**values, **start}, OUT_OF_SIGHT * best_error)
 
     def or_large(self, name: str, now: Whole, small: Whole | None, best_error: float) -> Whole | None:
         """The same from where the effect is no small addition, while the fit is not near the noise.

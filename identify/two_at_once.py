@@ -13,6 +13,8 @@ from identify.whole_runs import ENDS_NEAR, Whole
 from rig import effects
 
 TOOK, LARGE = 0.9, 3  # of the squares that a candidate has to leave at most to be tried with another, and how many
+HALF_OF_IT = 0.5  # of the squares that a pair has to take in a few steps to be taken on
+FEW_STEPS = 8
 NEARLY_ALL = 0.02  # of the squares that two effects may leave together where they do not come near the noise
 
 
@@ -50,9 +52,11 @@ def _as_seen(offer: Candidates, now: Whole) -> list[Whole]:
         starts = ({**now.values(), **own}, {**now.values(), **pair.start})
         squares = [offer.fits.squares(structure, start) for start in starts]
         start = starts[int(np.argmin(np.nan_to_num(squares, nan=np.inf)))]
-        fitted = offer.fits.by_way_of_a_short_horizon(structure, start)
+        fitted = offer.fits.by_way_of_a_short_horizon(structure, start, now.estimate.sigma, FEW_STEPS)
         if fitted is None:
             continue
+        if fitted.squares < HALF_OF_IT * now.squares:
+            fitted = offer.fits.taken_on(fitted)
         out.append(fitted)
         if fitted.level < (AT_NOISE if can_follow_anything(fitted) else ENDS_NEAR):
             break

@@ -131,6 +131,7 @@ class Effect:
     # Of (J, C, K), its own values where a fit has ended and the scale there: where else its minimum may lie.
     other_minima: Callable[[tuple[float, float, float], tuple[float, ...], Scale], tuple[LargeStart, ...]] | None = None
     resembles_much: bool = False  # its shapes make it follow whatever else is missing
+    sought_alone: bool = False  # beside any other one of its shapes takes what that one leaves: no half of a pair
     separated_by: str = ""
     reads: Channel | None = None  # the measured channel that it is an effect of
 

@@ -37,5 +37,6 @@ EFFECT = Effect(
     ),
     kernel=_torque,
     resembles_much=True,
+    sought_alone=True,
     separated_by="from backlash and cubic stiffness: several amplitudes, slow motion through the whole travel",
 )

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identify.candidates import Candidates
+from identify.holdout import split
 from identify.loop import identify
 from identify.pairs import pairs
 from identify.regression import Structure
@@ -69,6 +71,18 @@ def test_a_tone_beside_a_spring_is_a_pair_of_those_that_can_follow_anything() ->
     assert {"cubic_stiffness", "periodic_disturbance"} in [set(p.names) for p in found]
     pliant = ["periodic_disturbance" in p.names for p in found]
     assert pliant == sorted(pliant)  # plain pairs are tried first
+
+
+def test_what_has_a_shape_for_everything_is_sought_alone() -> None:
+    given = {"cubic_stiffness": {"factor": 900.0}, "quadratic_damping": {"factor": 0.2}}
+    traces = [prepare(run, i) for i, run in enumerate(recording(given).runs)]
+    offer = Candidates(traces, split(traces), ("cogging", "coulomb_friction", *given))
+    jck = dict(zip((("inertia",), ("damping",), ("stiffness",)), TRUTH, strict=True))
+    now = offer.fits.whole(Structure(), jck)
+    assert now is not None
+    found = [set(pair.names) for pair in offer.pairs(now)]
+    assert set(given) in found
+    assert not any("cogging" in names for names in found)
 
 
 def test_a_gap_between_the_points_of_the_grid_is_put_beside_the_others_at_its_best_shape() -> None:
