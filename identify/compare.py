@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -54,12 +55,17 @@ class Judged:
         return np.asarray(inverse / np.outer(scale, scale) * self.estimate.sigma**2)
 
     def std_errors(self) -> dict[Name, float]:
-        """Standard error of every parameter, errors taken as white; infinite where the fit ran away."""
+        """Standard error of every parameter, errors taken as white; infinite where the fit or the data say nothing."""
         covariance = self._covariance()
         size = np.full(len(self.estimate.names), np.inf) if covariance is None else np.sqrt(
             np.maximum(np.diag(covariance), 0.0)
         )  # fmt: skip
+        size[self._untold()] = np.inf
         return dict(zip(self.estimate.names, size.tolist(), strict=True))
+
+    def _untold(self) -> Any:
+        """Which parameters the data say nothing about, (p,): a limit that nothing reaches."""
+        return ~(np.diag(self.estimate.information) > 0.0)
 
     @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def strength(self, name: str) -> float:
@@ -81,7 +87,8 @@ class Judged:
         if gains and shapes and not effects.get(name).nests:
             covariance = _given(covariance, shapes)
         else:
-            out = [abs(x[i]) / float(np.sqrt(max(covariance[i, i], 1e-300))) for i in shapes]
+            untold = self._untold()
+            out = [0.0 if untold[i] else abs(x[i]) / float(np.sqrt(max(covariance[i, i], 1e-300))) for i in shapes]
         if gains:
             part = covariance[np.ix_(gains, gains)]
             size = np.sqrt(np.maximum(np.diag(part), 1e-300))

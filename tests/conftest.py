@@ -18,7 +18,8 @@ for _name in ("SIGHUP", "SIGTERM"):
 
 # Tests with deadlines of their own, by the beginning of their path: beside another one they would be late.
 WITH_DEADLINES = (
-    "drivers",
+    "drivers/amplifiers",
+    "drivers/test_",
     "rig/cli",
     "rig/recording/test_flushing",
     "rig/recording/test_journal",
@@ -33,6 +34,15 @@ WITH_DEADLINES = (
 HERE = Path(__file__).parent
 
 
+def _has_deadlines(path: Path) -> bool:
+    return path.relative_to(HERE).as_posix().startswith(WITH_DEADLINES)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Those that want the machine to themselves come last: every change from one kind to the other is a wait."""
+    items.sort(key=lambda item: _has_deadlines(item.path))
+
+
 @pytest.fixture(autouse=True)
 def _machine_to_itself(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Where several workers run tests, one with deadlines waits for the others' to end, and they wait for it."""
@@ -41,7 +51,7 @@ def _machine_to_itself(request: pytest.FixtureRequest, tmp_path_factory: pytest.
         return
     import fcntl  # noqa: PLC0415 (there is none on Windows)
 
-    alone = request.path.relative_to(HERE).as_posix().startswith(WITH_DEADLINES)
+    alone = _has_deadlines(request.path)
     shared = tmp_path_factory.getbasetemp().parent
     with (shared / "queue.lock").open("w") as queue, (shared / "machine.lock").open("w") as machine:
         fcntl.flock(queue, fcntl.LOCK_EX)  # who waits for the machine is not passed by

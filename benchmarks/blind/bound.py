@@ -10,6 +10,7 @@ dozen effects with shapes of their own; a Bayesian price of three numbers on 50,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -83,8 +84,7 @@ def left(hidden: Hidden, sets: Sequence[Excitation], differences: Sequence[Seque
 def refitted(hidden: Hidden, sets: Sequence[Excitation], full: Sequence[Any], start: Sequence[float]) -> float:
     """Sum of squares that the plain model leaves in ``full`` where the slopes at the truth are no guide.
 
-    ``start`` are inertia, damping and stiffness to begin from: a second inertia below its own resonance is just
-    more inertia, and the ring then has another frequency altogether.
+    ``start`` are inertia, damping and stiffness to begin from: those of a platform whose ring has another frequency.
     """
     plain = replace(hidden, effects={}, bias=0.0)
 
@@ -98,6 +98,20 @@ def refitted(hidden: Hidden, sets: Sequence[Excitation], full: Sequence[Any], st
         return np.concatenate(out)
 
     return float(2.0 * least_squares(rest, np.log(start), diff_step=1e-6, max_nfev=8).cost)
+
+
+def _much_alike(hidden: Hidden) -> tuple[float, float, float] | None:
+    """J, C, K of a plain platform that moves much like one with a large effect, where there is such a one.
+
+    A second inertia below its own resonance is just more inertia, and a mass off the axis just more stiffness.
+    """
+    j, c, k = hidden.inertia, hidden.damping, hidden.stiffness
+    if "flexible_mode" in hidden.effects:
+        return j + hidden.effects["flexible_mode"]["inertia"], c, k
+    if "unbalance" in hidden.effects:
+        at, of = hidden.rest_angle(), hidden.effects["unbalance"]
+        return j, c, k + of["sine"] * math.cos(at) - of["cosine"] * math.sin(at)
+    return None
 
 
 def energies(hidden: Hidden, sets: Sequence[Excitation], records: Sequence[Record]) -> dict[str, Energy]:
@@ -114,9 +128,9 @@ def energies(hidden: Hidden, sets: Sequence[Excitation], records: Sequence[Recor
     out = {}
     for name, linear in zip(hidden.effects, left(hidden, sets, without), strict=True):
         total = linear
-        if tuple(hidden.effects) == ("flexible_mode",):
-            whole = hidden.inertia + hidden.effects[name]["inertia"]
-            total = min(linear, refitted(hidden, sets, full, (whole, hidden.damping, hidden.stiffness)))
+        start = _much_alike(hidden) if len(hidden.effects) == 1 else None
+        if start:
+            total = min(linear, refitted(hidden, sets, full, start))
         scaled = total / hidden.noise**2
         out[name] = Energy(scaled, (scaled / count) ** 0.5)
     return out

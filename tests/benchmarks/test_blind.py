@@ -292,6 +292,12 @@ def test_an_effect_far_below_the_noise_counts_as_undetectable() -> None:
     assert not cases.energies(hidden, sets, hidden.play(sets))["cubic_stiffness"].detectable
 
 
+def test_a_mass_off_the_axis_counts_by_what_no_other_stiffness_imitates() -> None:
+    hidden = Hidden(*JCK, {"unbalance": {"sine": 0.05 * JCK[2], "cosine": 0.0}})
+    small = [sine(1.0, 1.0, 3.0), sine(1.0, 5.0, 3.0)]  # so little travel that a sine of the angle is the angle
+    assert cases.energies(hidden, small, hidden.play(small))["unbalance"].energy < 1.0
+
+
 def test_friction_that_the_torque_presses_turns_on_time_behind_a_dead_zone() -> None:
     hidden = {"load_dependent_friction": {"factor": 0.057}, "torque_deadzone": {"width": 2.9}}
     numbers = (0.044, 0.28, 641.0, hidden)

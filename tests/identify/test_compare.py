@@ -67,6 +67,17 @@ def test_the_strength_of_an_effect_is_its_distance_from_zero_in_standard_errors(
     assert found.strength("coulomb_friction") == pytest.approx(3.0 / (2.0 / 4.0))
 
 
+def test_a_limit_that_nothing_reaches_is_no_strong_effect() -> None:
+    seen = judged([100.0], ("torque_saturation",), values=[0.01, 0.05, 500.0, 90.0])
+    assert seen.strength("torque_saturation") == pytest.approx(90.0)
+    information = seen.estimate.information.copy()
+    information[3, 3] = 0.0
+    unreached = replace(seen, estimate=replace(seen.estimate, information=information))
+    assert unreached.strength("torque_saturation") == 0.0
+    assert unreached.std_errors()[("torque_saturation", "limit")] == np.inf
+    assert unreached.std_errors()[("stiffness",)] == pytest.approx(1.0)
+
+
 def test_an_effect_of_a_model_that_runs_away_stands_nowhere() -> None:
     found = judged([1.0], ("coulomb_friction",), information=16.0, values=[1, 1, 1, 3])
     across = found.estimate.information.copy()
