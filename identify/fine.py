@@ -38,6 +38,7 @@ SAME = 0.9  # of the level of an earlier attempt with the same effects: not near
 NO_SWAP = 10.0  # mean square over the noise's variance that no other effect in the place of one takes away
 MOST_PAIRS = 3  # that are asked again, each against its likes
 PATIENCE = 3  # effects after which the end must be near
+LEFT_OVER = 0.1  # of the declared model's excess over the noise that what is named may leave, where it is no chance
 
 
 class FineSearch:
@@ -53,6 +54,7 @@ class FineSearch:
         self.came_near: dict[str, dict[str, Whole]] = {}
         self.passed: dict[frozenset[str], float] = {}  # structures an attempt went on from, and how near they came
         self.first_tried: dict[str, Whole] = {}  # of the first round of an attempt
+        self.declared_level = np.inf  # of the declared model alone
 
     def take_over(self, found: Search) -> bool:
         """Go on from the model at hand, if it runs free near the data; ``found`` is brought up to date.
@@ -62,6 +64,8 @@ class FineSearch:
         """
         begin = self.whole(found.best.structure, found.best.values())
         pliant = any(effects.get(e).resembles_much for e in found.best.structure.effects)
+        if begin is not None and begin.structure.effects == found.base.structure.effects:
+            self.declared_level = begin.level
         if begin is None or not self._near(begin, FAR_CLOSER if pliant else CLOSER):
             begin = self._large(found)
             if begin is None:
@@ -78,7 +82,7 @@ class FineSearch:
         if not through:
             self.say("taken back: what was added does not come down to the sensor's noise together")
             return False
-        found.best, found.floor = trial.best, trial.floor
+        found.best, found.floor, found.free_running = trial.best, trial.floor, True
         found.candidates, found.rivals, found.dropped = trial.candidates, trial.rivals, trial.dropped
         found.rival_models = trial.rival_models
         return True
@@ -132,7 +136,7 @@ class FineSearch:
                 return False
             if now.level > AT_FLOOR:  # a lag in the sensor looks like one in the drive until the rest is there
                 now = self._asked_again(found, now)
-        if now.level > ENDS_NEAR or len(now.structure.effects) > len(declared.effects) + MOST_NAMED:
+        if not self._believed(now, declared.effects):
             return False
         now = self.pruning.restored(found, now, declared.terms)
         now = self.pruning.pruned(found, now, (*now.structure.terms, *now.structure.effects))
@@ -145,6 +149,17 @@ class FineSearch:
                 now = self.on_offer.fits.elsewhere(now, name)
         found.best, found.floor = now.judged(), self.noise
         return True
+
+    def _believed(self, now: Whole, declared: Sequence[str]) -> bool:
+        """Whether what was added ends near the noise, and leaves little of what it was to explain.
+
+        What is in no library is resembled by something that is: three effects took four fifths of a gain that warms.
+        """
+        added = len(now.structure.effects) - len(declared)
+        if now.level > ENDS_NEAR or added > MOST_NAMED:
+            return False
+        little = now.level - 1.0 < LEFT_OVER * (self.declared_level - 1.0)
+        return added <= 0 or now.level < AT_FLOOR or little
 
     def _hidden_pair(self, found: Search, now: Whole) -> Whole | None:
         """With two effects that no search for one at a time finds, where both bring the model near the data."""

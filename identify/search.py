@@ -35,6 +35,8 @@ STRONG = 4.0  # standard errors by which every parameter of a new effect must di
 CERTAIN = 100.0  # standard errors beyond which nobody asks whether a term is needed
 MOST_NAMED = 3  # effects; more of them together resemble anything
 LEFT = 1.2  # times the noise floor: below, nothing to speak of is left
+QUIET = 1.03  # times the noise floor, which is known to a percent or two
+MUCH = 0.8  # share of the excess that goes to be believed where hardly more than the noise was there in the first place
 BULK = 0.95  # share of the excess that what is named explains at least, where something is left
 SUPPORT = 0.02  # share of the error by which a term must be missed to stay
 
@@ -59,6 +61,8 @@ class Search:
         Effect -> rival -> the platform fitted with the rival in its place.
     dropped
         Terms of the declared model and effects that the data do not support, with the reason.
+    free_running
+        Whether ``best`` was judged over whole runs, ``base`` over the horizon.
     """
 
     base: Judged
@@ -69,6 +73,7 @@ class Search:
     rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
     rival_models: dict[str, dict[str, Platform]] = field(default_factory=dict)
     dropped: list[tuple[str, str]] = field(default_factory=list)
+    free_running: bool = False
 
     @property
     def share(self) -> float:
@@ -84,7 +89,8 @@ class Search:
         """
         kept = set(self.base.structure.effects)
         few = len(self.best.structure.effects) <= len(kept) + MOST_NAMED
-        nothing_left = self.best.sigma < LEFT * self.floor
+        explained = self.free_running or self.share > MUCH or self.best.sigma < QUIET * self.floor
+        nothing_left = explained and self.best.sigma < LEFT * self.floor
         pliant = any(effects.get(e).resembles_much for e in self.best.structure.effects if e not in kept)
         if few and (nothing_left or (self.share > BULK and not pliant)):
             return

@@ -11,6 +11,7 @@ import pytest
 from identify.compare import Judged, advantage, delta_bic, horizon_s, judge, share_explained
 from identify.output_error import Estimate, Name, names_of
 from identify.regression import Structure
+from identify.search import Search
 from identify.traces import prepare
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, sine_run
 
@@ -65,6 +66,26 @@ def test_the_bic_charges_the_logarithm_of_the_samples_for_a_parameter() -> None:
 def test_the_strength_of_an_effect_is_its_distance_from_zero_in_standard_errors() -> None:
     found = judged([1.0], ("coulomb_friction",), sigma=2.0, information=16.0, values=[1, 1, 1, 3])
     assert found.strength("coulomb_friction") == pytest.approx(3.0 / (2.0 / 4.0))
+
+
+@pytest.mark.parametrize(
+    ("base", "best", "effect", "free_running", "kept"),
+    [
+        (1.52, 1.18, "coulomb_friction", False, False),  # half of the excess: something else is there
+        (1.52, 1.06, "coulomb_friction", False, True),
+        (1.05, 1.02, "coulomb_friction", False, True),  # at the noise, which is known to a percent or two
+        (5.0, 1.3, "coulomb_friction", False, True),  # nearly all
+        (5.0, 1.3, "creep", False, False),  # nearly all, of what follows anything
+        (1.05, 1.10, "coulomb_friction", True, True),  # over whole runs, where the horizon's errors are no measure
+    ],
+)
+def test_what_is_named_has_to_explain_most_of_what_was_to_explain(
+    base: float, best: float, effect: str, free_running: bool, kept: bool
+) -> None:
+    alone, named = judged([100.0 * base**2]), judged([100.0 * best**2], (effect,))
+    search = Search(alone, named, 0.1, 1.0, free_running=free_running)
+    search.drop_a_bad_lot()
+    assert search.best is (named if kept else alone)
 
 
 def test_a_limit_that_nothing_reaches_is_no_strong_effect() -> None:

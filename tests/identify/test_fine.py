@@ -55,6 +55,16 @@ def test_small_effects_are_named_and_nothing_besides(
     assert found.best.sigma < 1.1 * NOISE_RAD_S
 
 
+def test_what_leaves_a_third_of_what_was_missing_is_not_believed_before_the_rest_is_there() -> None:
+    hidden = campaign({"quadratic_damping": {"factor": 1.4e-4}, "coulomb_friction": {"level": 0.0012}}, duration_s=4)
+    found, took = searched(hidden, ("coulomb_friction",))
+    assert not took
+    assert found.best.structure.effects == ()
+    found, took = searched(hidden, ("coulomb_friction", "quadratic_damping"))
+    assert took
+    assert set(found.best.structure.effects) == {"coulomb_friction", "quadratic_damping"}
+
+
 def test_a_lag_of_the_sensor_is_named_in_the_drive_which_no_record_tells_from_it() -> None:
     found, took = searched(campaign({"sensor_lag": {"time": 3e-4}}, duration_s=4))
     assert took
