@@ -55,8 +55,7 @@ def _as_seen(offer: Candidates, now: Whole) -> list[Whole]:
         fitted = offer.fits.by_way_of_a_short_horizon(structure, start, now.estimate.sigma, FEW_STEPS)
         if fitted is None:
             continue
-        if fitted.squares < HALF_OF_IT * now.squares:
-            fitted = offer.fits.taken_on(fitted)
+        fitted = _taken_on(offer, fitted, now)
         out.append(fitted)
         if fitted.level < (AT_NOISE if can_follow_anything(fitted) else ENDS_NEAR):
             break
@@ -74,7 +73,14 @@ def _both_large(offer: Candidates, now: Whole, first_tried: Mapping[str, Whole])
         for first, second in ((a, b), (b, a)):  # J, C and K of either
             own = {k: v for k, v in took[second].values().items() if k[0] == second}
             both = offer.fits.whole(structure, {**took[first].values(), **own})
-            out += [both] if both is not None else []
-            if both is not None and both.level < ENDS_NEAR:
+            if both is None:
+                continue
+            out.append(_taken_on(offer, both, now))
+            if out[-1].level < (AT_NOISE if can_follow_anything(both) else ENDS_NEAR):
                 return out
     return out
+
+
+def _taken_on(offer: Candidates, pair: Whole, now: Whole) -> Whole:
+    """A pair fitted to the end, where its first steps promise anything."""
+    return offer.fits.taken_on(pair) if pair.squares < HALF_OF_IT * now.squares else pair
