@@ -10,6 +10,7 @@ from identify.channels import simplicity
 from identify.whole_runs import AT_FLOOR, CHANCE, ENDS_NEAR, TWICE, Whole
 from rig import effects
 from rig.effects.base import Place
+from rig.platform import TERMS
 
 EQUAL = 4.0  # fall of chi square that says nothing: the library's order, simple before special, decides
 RIVAL = 10.0  # what parts two candidates for good
@@ -61,7 +62,8 @@ def _as_far(name: str, model: Whole, best: str, nearest: Whole) -> bool:
 
 def worth(name: str, new: Whole, now: Whole) -> bool:
     """Whether chi square falls beyond chance, also where nothing was fitted, with parameters that stand out."""
-    if effects.get(name).resembles_much and now.level < ENDS_NEAR and new.level > AT_NOISE:
+    follows = name not in TERMS and effects.get(name).resembles_much  # a term that was set aside is asked, too
+    if follows and now.level < ENDS_NEAR and new.level > AT_NOISE:
         return False  # near the noise it follows a few disturbed moments as gladly as anything
     fall, held = (now.penalised - new.penalised) / new.level, (now.held - new.held) / new.level
     excess = now.squares - now.count

@@ -18,6 +18,7 @@ from rig.platform import TERMS
 from rig.recording.run import Array
 
 ABOVE = 0.02  # of the noise's square: less than that above the floor is the floor
+NOTHING = 1e-290  # of information: what a parameter without any influence leaves of rounding
 CLEARLY = 2.5  # standard errors by which the held-out error must fall
 
 
@@ -65,7 +66,7 @@ class Judged:
 
     def _untold(self) -> Any:
         """Which parameters the data say nothing about, (p,): a limit that nothing reaches."""
-        return ~(np.diag(self.estimate.information) > 0.0)
+        return ~(np.diag(self.estimate.information) > NOTHING)
 
     @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def strength(self, name: str) -> float:

@@ -54,7 +54,7 @@ class FineSearch:
         self.came_near: dict[str, dict[str, Whole]] = {}
         self.passed: dict[frozenset[str], float] = {}  # structures an attempt went on from, and how near they came
         self.first_tried: dict[str, Whole] = {}  # of the first round of an attempt
-        self.declared_level = np.inf  # of the declared model alone
+        self.declared_level = np.inf  # of the model before anything is added
 
     def take_over(self, found: Search) -> bool:
         """Go on from the model at hand, if it runs free near the data; ``found`` is brought up to date.

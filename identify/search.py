@@ -62,7 +62,7 @@ class Search:
     dropped
         Terms of the declared model and effects that the data do not support, with the reason.
     free_running
-        Whether ``best`` was judged over whole runs, ``base`` over the horizon.
+        Whether ``best`` was judged over whole runs, by a search that believed it there.
     """
 
     base: Judged
@@ -88,6 +88,8 @@ class Search:
         any frequency, a memory of any length) is believed only where nothing is left.
         """
         kept = set(self.base.structure.effects)
+        if set(self.best.structure.effects) <= kept:
+            return  # nothing was added, and what the data have refused stays so
         few = len(self.best.structure.effects) <= len(kept) + MOST_NAMED
         explained = self.free_running or self.share > MUCH or self.best.sigma < QUIET * self.floor
         nothing_left = explained and self.best.sigma < LEFT * self.floor

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,21 +23,29 @@ WITH_DEADLINES = (
     "drivers/amplifiers",
     "drivers/test_",
     "rig/cli",
+    "rig/config/test_malformed",
     "rig/recording/test_flushing",
     "rig/recording/test_journal",
     "rig/recording/test_memory",
+    "rig/recording/test_readers",
+    "rig/recording/test_steady",
     "rig/test_re",
     "sim_backend/emulators",
     "system/test_bench",
     "system/test_commands",
     "system/test_full_disk",
+    "system/test_report_browser",
     "system/test_safety",
 )
 HERE = Path(__file__).parent
 
 
 def _has_deadlines(path: Path) -> bool:
-    return path.relative_to(HERE).as_posix().startswith(WITH_DEADLINES)
+    return path.is_relative_to(HERE) and path.relative_to(HERE).as_posix().startswith(WITH_DEADLINES)
+
+
+def _locks(controller: int) -> Path:
+    return Path(tempfile.gettempdir()) / f"isp-rig-tests-{controller}"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -43,18 +53,29 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: _has_deadlines(item.path))
 
 
-@pytest.fixture(autouse=True)
-def _machine_to_itself(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Where several workers run tests, one with deadlines waits for the others' to end, and they wait for it."""
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Where several workers run tests, one with deadlines waits for the others' to end, and they wait for it.
+
+    From before the first fixture of a module is made to after the last one is gone.
+    """
     if sys.platform == "win32" or "PYTEST_XDIST_WORKER" not in os.environ:
-        yield
-        return
+        return (yield)
     import fcntl  # noqa: PLC0415 (there is none on Windows)
 
-    alone = _has_deadlines(request.path)
-    shared = tmp_path_factory.getbasetemp().parent
-    with (shared / "queue.lock").open("w") as queue, (shared / "machine.lock").open("w") as machine:
+    shared = _locks(os.getppid())
+    shared.mkdir(exist_ok=True)
+    with (shared / "queue").open("w") as queue, (shared / "machine").open("w") as machine:
         fcntl.flock(queue, fcntl.LOCK_EX)  # who waits for the machine is not passed by
-        fcntl.flock(machine, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
+        fcntl.flock(machine, fcntl.LOCK_EX if _has_deadlines(item.path) else fcntl.LOCK_SH)
         fcntl.flock(queue, fcntl.LOCK_UN)
-        yield
+        try:
+            return (yield)
+        finally:
+            fcntl.flock(machine, fcntl.LOCK_UN)  # a process that a test has left must not keep it
+
+
+def pytest_sessionfinish() -> None:
+    """The one that started the workers takes the locks away."""
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        shutil.rmtree(_locks(os.getpid()), ignore_errors=True)

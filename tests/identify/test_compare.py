@@ -88,6 +88,14 @@ def test_what_is_named_has_to_explain_most_of_what_was_to_explain(
     assert search.best is (named if kept else alone)
 
 
+def test_what_the_data_refused_stays_refused_where_nothing_was_added() -> None:
+    declared, left = judged([1.21 * 100.0], ("coulomb_friction",)), judged([1.20 * 100.0])
+    search = Search(declared, left, 0.1, 1.0, dropped=[("coulomb_friction", "not needed")])
+    search.drop_a_bad_lot()
+    assert search.best is left
+    assert search.dropped == [("coulomb_friction", "not needed")]
+
+
 def test_a_limit_that_nothing_reaches_is_no_strong_effect() -> None:
     seen = judged([100.0], ("torque_saturation",), values=[0.01, 0.05, 500.0, 90.0])
     assert seen.strength("torque_saturation") == pytest.approx(90.0)

@@ -19,7 +19,7 @@ from rig.errors import Aborted, RecordingError
 from rig.excitation import Sine
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording, Run
-from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, decay_run, white
+from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, decay_run, sine_run, white
 
 FEW = ("coulomb_friction", "cubic_stiffness", "quadratic_damping", "torque_delay")
 SETTINGS = IdentifyConfig.model_validate({"candidates": FEW})
@@ -43,6 +43,17 @@ def test_the_identifier_is_handed_a_recording_a_declared_model_its_settings_and_
     assert hints["recording"] is Recording
     assert hints["declared"] is Platform
     assert hints["settings"] is IdentifyConfig
+
+
+def test_a_spring_that_is_declared_and_not_there_is_left_out_and_the_rest_is_right() -> None:
+    platform = (0.02, 0.3, 0.0)
+    runs = tuple(sine_run(m, f, jck=platform) for m, f in ((2.0, 0.7), (4.0, 2.0), (8.0, 5.0)))
+    found = identify(Recording(runs), Platform(0.02, 0.3, 5.0), SETTINGS)
+    assert found.verdict.effects == ()
+    assert "stiffness" in [left.name for left in (found.after or found.before).dropped]
+    parameters = (found.after or found.before).parameters
+    assert parameters["inertia"].value == pytest.approx(0.02, rel=1e-3)
+    assert parameters["damping"].value == pytest.approx(0.3, rel=1e-3)
 
 
 def test_the_hidden_friction_is_named_and_damping_comes_from_far_off_to_within_a_percent() -> None:
