@@ -7,14 +7,13 @@ from itertools import combinations
 
 import numpy as np
 
-from identify.candidates import Candidates
+from identify.candidates import FEW_STEPS, Candidates
 from identify.choice import AT_NOISE
 from identify.whole_runs import ENDS_NEAR, Whole
 from rig import effects
 
 TOOK, LARGE = 0.9, 3  # of the squares that a candidate has to leave at most to be tried with another, and how many
 HALF_OF_IT = 0.5  # of the squares that a pair has to take in a few steps to be taken on
-FEW_STEPS = 8
 NEARLY_ALL = 0.02  # of the squares that two effects may leave together where they do not come near the noise
 
 

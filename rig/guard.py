@@ -44,25 +44,35 @@ class MissedTicks(Check):
 
 
 class StaleGyro(Check):
-    """No valid sample for too long."""
+    """No valid sample for too long; a machine that was late meanwhile is a likelier cause than a cable."""
 
     def begin(self, start_s: float, rest: Rest) -> None:
         """The set begins with a fresh gyro."""
         super().begin(start_s, rest)
         self._last_s = start_s
+        self._late_s = 0.0
 
     def look(self, tick: Tick) -> Trip | None:
         """Age of the newest valid sample."""
+        self._late_s = max(self._late_s, tick.late_s)
         for time_s, _, valid in tick.gyro:
             if valid and time_s > self._last_s:
-                self._last_s = time_s
+                self._last_s, self._late_s = time_s, tick.late_s
         age_ms = (tick.now_s - self._last_s) * 1e3
         if age_ms <= self._limits.stale_gyro_ms + tick.period_s * 1e3:
             return None
         return self._trip(
             "gyro stale (limits.stale_gyro_ms)", age_ms, self._limits.stale_gyro_ms, "ms", tick.now_s,
-            "No valid gyro sample arrived: check the cable and supply, and whether the rate left the full scale.",
+            self._advice(tick.period_s),
         )  # fmt: skip
+
+    def _advice(self, period_s: float) -> str:
+        if self._late_s <= period_s:
+            return "No valid gyro sample arrived: check the cable and supply, and whether the rate left the full scale."
+        return (
+            f"This machine does not keep up: it was {self._late_s * 1e3:.1f} ms late since the last valid sample. "
+            "Free the processor; if it comes back on a machine in time, check the gyro's cable and supply."
+        )
 
 
 class FrozenGyro(Check):

@@ -37,11 +37,17 @@ WITH_DEADLINES = (
     "system/test_report_browser",
     "system/test_safety",
 )
+# So long that whoever comes last waits for them.
+LONGEST = ("system/test_identify_campaigns", "system/test_real_recordings")
 HERE = Path(__file__).parent
 
 
 def _has_deadlines(path: Path) -> bool:
-    return path.is_relative_to(HERE) and path.relative_to(HERE).as_posix().startswith(WITH_DEADLINES)
+    return _is_of(path, WITH_DEADLINES)
+
+
+def _is_of(path: Path, beginnings: tuple[str, ...]) -> bool:
+    return path.is_relative_to(HERE) and path.relative_to(HERE).as_posix().startswith(beginnings)
 
 
 def _locks(controller: int) -> Path:
@@ -49,8 +55,8 @@ def _locks(controller: int) -> Path:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Those that want the machine to themselves come last: every change from one kind to the other is a wait."""
-    items.sort(key=lambda item: _has_deadlines(item.path))
+    """The longest come first, and those that want the machine to themselves last: every change is a wait."""
+    items.sort(key=lambda item: (_has_deadlines(item.path), not _is_of(item.path, LONGEST)))
 
 
 @pytest.hookimpl(wrapper=True)

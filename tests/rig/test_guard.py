@@ -138,6 +138,28 @@ def test_a_gyro_that_falls_silent_is_stale() -> None:
     assert trip.time_s == pytest.approx(LIMITS.stale_gyro_ms / 1e3, abs=2.5e-3)
 
 
+def falls_silent(at_s: float, late: Callable[[float], bool]) -> Iterator[Tick]:
+    """Late by 12 ms at the instants asked for."""
+    for tick in ticks(0.1, ring(1.0, 2.0)):
+        heard = tick if tick.now_s < at_s else tick._replace(gyro=())
+        yield heard._replace(late_s=0.012) if late(tick.now_s) else heard
+
+
+def test_a_gyro_that_is_stale_on_a_late_machine_points_at_the_machine_first() -> None:
+    on_time = first_trip(Guard(LIMITS), falls_silent(0.02, lambda t: False))
+    late = first_trip(Guard(LIMITS), falls_silent(0.02, lambda t: 0.0245 < t < 0.0255))
+    assert on_time is not None and late is not None
+    assert on_time.limit == late.limit and late.limit.startswith("gyro stale")
+    assert on_time.what_to_do.startswith("No valid gyro sample arrived: check the cable and supply")
+    assert late.what_to_do.startswith("This machine does not keep up: it was 12.0 ms late")
+
+
+def test_lateness_before_the_last_valid_sample_does_not_count_against_the_machine() -> None:
+    trip = first_trip(Guard(LIMITS), falls_silent(0.02, lambda t: t < 0.0005))
+    assert trip is not None and trip.limit.startswith("gyro stale")
+    assert "This machine" not in trip.what_to_do
+
+
 def test_a_gyro_that_sends_only_invalid_samples_is_stale_too() -> None:
     trip = first_trip(Guard(LIMITS), ticks(1.0, lambda t: math.nan, lambda t: False))
     assert trip is not None
