@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify import persets, sampling
+from identify import clipping, glitches, persets, sampling
 from identify.channels import Offer
 from identify.finish import Fitted
-from identify.glitches import told
 from identify.holdout import Split
 from identify.measures import Measured
 from identify.next_steps import opposite_signs, unexplained_reason
@@ -102,9 +101,10 @@ def conclude(
 
 def _note(case: Case) -> str:
     """What was held out, and what was left out."""
-    torn = told([(t.run.name, t.glitches_s) for t in case.traces])
+    torn = glitches.told([(t.run.name, t.glitches_s) for t in case.traces])
+    beyond = clipping.told([(t.run.name, *t.clipped) for t in case.traces], case.recording.axis)
     uneven = sampling.told([(t.run.name, *t.scatter) for t in case.traces])
-    return ". ".join(note for note in (case.split.note, torn, uneven) if note)
+    return ". ".join(note for note in (case.split.note, torn, beyond, uneven) if note)
 
 
 def _ratio(case: Case, after: Fitted, search: Search) -> float:

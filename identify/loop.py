@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from identify import decay, persets
 from identify.candidates import Candidates
 from identify.channels import offer_of, with_causes
+from identify.clipping import full_scale_of
 from identify.compare import Judged, horizon_s
 from identify.conclude import Case, conclude
 from identify.fine import FineSearch
@@ -80,7 +81,10 @@ class _Identifier:
         free = all(r.torque_nm is None or not np.any(r.torque_nm) for r in recording.runs)
         runs = with_causes(recording.runs, declared, settings.channels)
         runs = [replace(r, torque_nm=None, torque_time_s=None) if free else r for r in runs]
-        traces = [prepare(r, i, recording.noise) for i, r in enumerate(runs)]
+        beyond = full_scale_of(
+            [r.rate_rad_s[r.valid & np.isfinite(r.rate_rad_s)] for r in runs if r.rate_rad_s is not None]
+        )
+        traces = [prepare(r, i, recording.noise, full_scale=beyond) for i, r in enumerate(runs)]
         self.traces = one_noise([t for t in traces if t.stretches and t.count > 40], recording.noise is not None)
         if not self.traces:
             raise RecordingError(

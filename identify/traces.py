@@ -63,6 +63,7 @@ class Trace:
     number: int = 0  # which run of the recording
     offset_s: float = 0.0  # of the first sample from the start of the run
     glitches_s: Array = field(default_factory=lambda: np.zeros(0))  # times of samples left out as such
+    clipped: tuple[int, float] = (0, 0.0)  # samples left out because the gyro stood at its largest rate, and that
     scatter: tuple[float, bool] = (0.0, False)  # of the time stamps about an even beat in s; whether they are wrong
     motion: tuple[Array, Array, Array, Array, float] | None = None  # of a piece: cut out of the whole run's
     _series: dict[Any, Any] = field(default_factory=dict)
@@ -250,7 +251,10 @@ def bias_beside(run: Run, time: Array, values: Array, good: Any) -> float:
     return upper / lower if lower > 0.0 else 0.0
 
 
-def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: float = LEAD_IN_S) -> Trace:
+def prepare(
+    run: Run, number: int = 0, noise: float | None = None, lead_in_s: float = LEAD_IN_S,
+    full_scale: tuple[float, float] = (-np.inf, np.inf),
+) -> Trace:  # fmt: skip
     """Lay a run on a uniform grid and find its usable stretches.
 
     Parameters
@@ -261,11 +265,18 @@ def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: fl
         One standard deviation of the measured channel; estimated where None.
     lead_in_s
         Samples at the start that carry no weight.
+    full_scale
+        The lowest and highest rate that the gyro can report: at these it may have turned faster.
     """
     channel = _channel(run)
     values = run.rate_rad_s if channel == "rate" else run.angle_rad
     assert values is not None
     good = run.valid & np.isfinite(values) & ~lost(run)
+    beyond = good & ((values <= full_scale[0]) | (values >= full_scale[1]))
+    if channel == "angle":
+        beyond[:] = False
+    clipped = int(beyond.sum()), float(np.max(np.abs(values[beyond]), initial=0.0))
+    good &= ~beyond
     time = run.time_s - run.time_s[0]
     if channel == "rate" and run.angle_rad is not None:
         values = values - bias_beside(run, time, values, good)
@@ -277,6 +288,7 @@ def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: fl
         if last - first + 1 > LONGEST_FILL:
             broken[first : last + 1] = True
     filled = np.where(broken, np.interp(grid, time[good], values[good]), filled)  # a spline would swing through a gap
+    broken[np.clip(np.rint((time[beyond] - grid[0]) / step).astype(int), 0, n - 1)] = True  # no spline knows that peak
     broken |= (grid < time[good][0] - 0.5 * step) | (grid > time[good][-1] + 0.5 * step)
     quiet = max(_gaps(broken), key=lambda ab: ab[1] - ab[0])  # a jump over a gap would pass for noise
     torn = glitches(filled, keep & ~broken, noise)
@@ -290,7 +302,7 @@ def prepare(run: Run, number: int = 0, noise: float | None = None, lead_in_s: fl
     trace = Trace(
         run, channel, step, filled, keep, [], torque, noise if noise is not None else noise_of(whole),
         bandwidth_of(whole, step), number, laid.beat.offset_s, float(run.time_s[0]) + grid[torn],
-        (laid.scatter_s, laid.stamps_wrong),
+        clipped, (laid.scatter_s, laid.stamps_wrong),
     )  # fmt: skip
     if run.min_rate_rad_s > 0.0:
         slow = np.abs(trace.fine[1][::UPSAMPLING]) <= run.min_rate_rad_s
