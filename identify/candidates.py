@@ -17,6 +17,7 @@ from identify.regression import Structure
 from identify.scores import Scored, Scores
 from identify.screen import Screen, first_guess
 from identify.traces import Trace
+from identify.unseen import why_unseen
 from identify.whole_runs import AT_FLOOR, CHANCE, ENDS_NEAR, NEAR_THEN, TWICE, Whole
 from rig import effects
 from rig.effects.base import Place
@@ -56,12 +57,9 @@ class Candidates:
         self.allowed = [n for n in allowed if self._possible(n)]
 
     def _possible(self, name: str) -> bool:
-        """A bias is a nuisance; a constant torque only shifts the unseen rest angle behind a gyro."""
-        if name == "rate_bias" or (self.fits.torque_free and effects.get(name).place is Place.DRIVE):
-            return False
         if effects.get(name).needs_added_inertia and not _loads_differ(self.fits.traces):
             return False
-        return not (name == "torque_offset" and all(t.biased for t in self.fits.traces))
+        return not why_unseen(name, self.fits.traces)
 
     def tried(self, now: Whole, most: int = TRIED, in_full: bool = False) -> tuple[dict[str, Whole], list[Scored]]:
         """The most promising candidates, fitted on top of a model, and all that were looked at.

@@ -35,7 +35,7 @@ class Offer:
     refused
         Those that may not, with the reason in their status.
     idle
-        Effects of the declared model whose channel does not move, with the reason.
+        Effects of the declared model that these runs do not show, with the reason: a channel that does not move.
     """
 
     candidates: tuple[str, ...] = ()

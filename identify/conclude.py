@@ -125,6 +125,7 @@ def _model(case: Case, fitted: Fitted, measured: Measured, dropped: tuple[NotRep
     of_effects: dict[str, dict[str, ParameterEstimate]] = {e: {} for e in fitted.structure.effects}
     missing: list[NotReported] = []
     per = "/(kg*m^2)" if case.torque_free else ""
+    runs = {t.number for t, m in zip(case.traces, case.split.final, strict=True) if np.any(m)}  # that a fit looked at
     for i, name in enumerate(fitted.names):
         value, error = fitted.values[name], fitted.std_error(name)
         label, unit = name[0], units.get(name[0], "")
@@ -135,6 +136,8 @@ def _model(case: Case, fitted: Fitted, measured: Measured, dropped: tuple[NotRep
                 unit = unit.replace("kg*m^2", "kg").replace("N*m", "N").replace("rad", "m")
         elif case.torque_free:
             label, unit = TORQUE_FREE[name[0]]
+        if len(name) == 3 and int(name[2]) not in runs:
+            continue
         tied = len(name) == 1 and _tied_to_nothing(fitted, i, len(case.traces) == 1)
         if tied:
             missing.append(NotReported(label, f"it is tied to {tied}, which the data do not determine"))
@@ -152,7 +155,7 @@ def _model(case: Case, fitted: Fitted, measured: Measured, dropped: tuple[NotRep
             key = name[1] if len(name) == 2 else f"{name[1]}_run_{int(name[2]) + 1}"
             of_effects[name[0]][key] = estimate
     names = tuple(fitted.values)
-    platform = platform_of(fitted.structure, names, np.array(list(fitted.values.values())))
+    platform = platform_of(fitted.structure, names, np.array(list(fitted.values.values())), min(runs, default=0))
     return ModelResult(parameters, of_effects, measured.errors, dropped, tuple(missing), _correlation(fitted), platform)
 
 

@@ -79,6 +79,7 @@ def by_regression(
     values = start_values(solution, shapes, runs)
     covariance, determined = _regression_covariance(traces, solution, use)
     free = _free_run(traces, structure, values, everything)
+    values = _own_gains_of(free, values)
     limited = free is not None and free.sigma < NEAR_FLOOR * noise_of_all(traces)
     found = [n for n in values if len(n) > 1 and n not in solution.labels and n in shape_errors]
     names = (*solution.labels, *found)
@@ -94,6 +95,13 @@ def _free_run(
     held = Estimate(structure, names, np.array(list(values.values())), np.inf, 0, np.zeros((0, 0)), (), True)
     free = evaluate(held, traces, use)
     return free if np.isfinite(free.sigma) else None
+
+
+def _own_gains_of(free: Estimate | None, values: Mapping[Name, float]) -> dict[Name, float]:
+    """Values with the gains that runs have of their own as the free run found them: no fit knew those held out."""
+    if free is None:
+        return dict(values)
+    return {**values, **{n: v for n, v in zip(free.names, free.values.tolist(), strict=True) if len(n) == 3}}
 
 
 def by_output_error(
@@ -129,6 +137,7 @@ def by_output_error(
         values = dict(zip(best.names, best.values.tolist(), strict=True))
     same = all(np.array_equal(u, e) for u, e in zip(use, everything, strict=True))
     free = whole if whole is not None and same else _free_run(traces, structure, values, everything)
+    values = _own_gains_of(free, values)
     limited = whole is not None and whole.sigma <= NEAR_FLOOR * noise
     method = "output error over whole runs" if whole is not None else f"output error over {horizon:.3g} s"
     return Fitted(structure, values, covariance, free_names, best.sigma, free, limited, determined, method)

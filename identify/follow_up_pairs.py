@@ -113,9 +113,6 @@ def _sigma(platform: Platform, traces: Sequence[Trace]) -> float:
 def free_run(platform: Platform, traces: Sequence[Trace]) -> Estimate:
     """A platform in free run over recorded runs: start states and bias fitted, and what belongs to single runs."""
     structure, names, values = vector_of(platform, 1 + max(t.number for t in traces))
-    held = Estimate(structure, names, values, np.inf, 0, np.zeros((0, 0)), (), True)
-    if any(len(n) == 3 for n in names):
-        start = dict(zip(names, values.tolist(), strict=True))
-        shared = [n for n in names if len(n) < 3]
-        held = refine(traces, structure, start, None, REFIT, fixed=shared, coarse=True)
-    return evaluate(held, traces)
+    shared = [i for i, n in enumerate(names) if len(n) < 3]
+    names, values = tuple(names[i] for i in shared), values[shared]
+    return evaluate(Estimate(structure, names, values, np.inf, 0, np.zeros((0, 0)), (), True), traces)

@@ -10,7 +10,7 @@ import numpy as np
 from identify.finish import NEAR_FLOOR, Fitted, noise_of_all
 from identify.follow_up_pairs import free_run
 from identify.hindsight import usable_traces
-from identify.holdout import split
+from identify.holdout import Split, split
 from identify.identifiability import vector_of
 from identify.measures import measure
 from identify.next_steps import USUAL_CUTOFF_HZ
@@ -71,7 +71,15 @@ def errors_on(platform: Platform, found: Identification, recording: Recording) -
         limited, (True,) * len(names), "as it stood",
     )  # fmt: skip
     cutoff = found.final.error.lowpass_hz or found.before.error.lowpass_hz or USUAL_CUTOFF_HZ
-    return measure(traces, split(traces), fitted, cutoff).errors
+    return measure(traces, _judged_as(found, split(traces)), fitted, cutoff).errors
+
+
+def _judged_as(found: Identification, parts: Split) -> Split:
+    """With the samples that judged then, where the runs are the same."""
+    judge = [t.holdout > 0.5 for t in found.traces]
+    if [len(m) for m in judge] != [len(m) for m in parts.judge]:
+        return parts
+    return replace(parts, judge=judge, fit=[f & ~m for f, m in zip(parts.everything, judge, strict=True)])
 
 
 def limits_of(found: Identification, limits: LimitsConfig, linear: bool) -> Peaks:

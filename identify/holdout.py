@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from identify.traces import SHORTEST_STRETCH, Trace
 
-BLOCKS = 10  # of a run that is split; blocks 3, 6 and 9 judge
+BLOCKS, JUDGING = 10, (3, 6, 9)  # of a run that is split; which judge, where nobody says how many
+FINE_BLOCKS = 20  # of a run of which a share that somebody asked for judges
 PIECES = 2  # of each of five runs while searching, where a run has more usable spans; more of fewer runs
 ENOUGH = 8_000  # samples that a search fits to; the final fit always takes all
 
@@ -30,8 +31,8 @@ class Split:
         return [f | j for f, j in zip(self.final, self.judge, strict=True)]
 
 
-def split(traces: Sequence[Trace]) -> Split:
-    """Declared hold-out runs judge where there are any; else every third block of each run does."""
+def split(traces: Sequence[Trace], share: float | Literal["auto"] = "auto") -> Split:
+    """Declared hold-out runs judge where there are any; else every third block of each run, or a share of blocks."""
     declared = [t.run.use == "holdout" for t in traces]
     if any(declared) and not all(declared):
         names = ", ".join(dict.fromkeys(t.run.name for t, d in zip(traces, declared, strict=True) if d))
@@ -39,23 +40,40 @@ def split(traces: Sequence[Trace]) -> Split:
         none = [np.zeros(len(k), dtype=bool) for k in keep]
         fit = [n if d else k for k, n, d in zip(keep, none, declared, strict=True)]
         judge = [k if d else n for k, n, d in zip(keep, none, declared, strict=True)]
-        return Split(fit, judge, fit, f"held out as declared: {names}; their start states are fitted, nothing else")
+        alone = "nothing is fitted there but start states, biases and the phase of disturbances"
+        return Split(fit, judge, fit, f"held out as declared: {names}; {alone}")
     fit, judge = [], []
     some_free = any(t.run.use == "auto" for t in traces)
+    blocks, chosen = _blocks(share)
     for trace in traces:
         if some_free and trace.run.use == "fit":
             fit.append(trace.keep.copy())
             judge.append(np.zeros(len(trace.keep), dtype=bool))
             continue
-        block = np.minimum(np.arange(len(trace.keep)) * BLOCKS // len(trace.keep), BLOCKS - 1)
-        judging = np.isin(block, (2, 5, 8))
+        block = 1 + np.minimum(np.arange(len(trace.keep)) * blocks // len(trace.keep), blocks - 1)
+        judging = np.isin(block, chosen)
         fit.append(trace.keep & ~judging)
         judge.append(trace.keep & judging)
+    who = "chosen here" if share == "auto" else f"as asked (identify.holdout: {share:g})"
     note = (
-        "chosen here: of each run cut in ten, blocks 3, 6 and 9 judge the candidates and the errors below; "
+        f"{who}: of each run cut in {blocks}, {_told(chosen)} the candidates and the errors below; "
         "their start states are fitted, and the final parameters are refitted on all samples"
     )
     return Split(fit, judge, [t.keep.copy() for t in traces], note)
+
+
+def _blocks(share: float | Literal["auto"]) -> tuple[int, tuple[int, ...]]:
+    """In how many blocks a run is cut, and which of them, counted from one, judge: never the first, a run's start."""
+    if share == "auto":
+        return BLOCKS, JUDGING
+    count = max(1, round(share * FINE_BLOCKS))
+    return FINE_BLOCKS, tuple(1 + int((i + 0.5) * FINE_BLOCKS / count) for i in range(count))
+
+
+def _told(blocks: Sequence[int]) -> str:
+    if len(blocks) == 1:
+        return f"block {blocks[0]} judges"
+    return f"blocks {', '.join(str(b) for b in blocks[:-1])} and {blocks[-1]} judge"
 
 
 def pieces(traces: Sequence[Trace], masks: Sequence[Any], shortest_s: float, enough: int = ENOUGH) -> list[Trace]:

@@ -74,7 +74,9 @@ class Information:
     def _axes(self) -> tuple[Array, Array, Array]:
         length = np.sqrt(np.maximum(np.diag(self.matrix), 0.0))
         length = np.where(length > 0.0, length, 1.0)
-        power, axes = np.linalg.eigh(self.matrix / np.outer(length, length))
+        scaled = self.matrix / np.outer(length, length)
+        # A model that runs away tells nothing of any parameter.
+        power, axes = np.linalg.eigh(scaled if np.all(np.isfinite(scaled)) else np.zeros_like(scaled))
         return length, power, axes
 
     @property

@@ -27,6 +27,7 @@ from identify.results import (
 from identify.screen import Start, first_guess
 from identify.search import Loop, Search
 from identify.traces import Trace, one_noise, prepare
+from identify.unseen import why_unseen
 from rig import effects
 from rig.config.identify import IdentifyConfig
 from rig.errors import Aborted, RecordingError
@@ -92,8 +93,10 @@ class _Identifier:
             )
         self.torque_free = free
         _refuse_the_idle(self.traces, free)
-        self.split: Split = split(self.traces)
-        self.offer = offer_of(self.traces, declared)
+        self.split: Split = split(self.traces, settings.holdout)
+        offer = offer_of(self.traces, declared)
+        unseen = tuple((n, why) for n in declared.effects if (why := why_unseen(n, self.traces)))
+        self.offer = replace(offer, idle=(*offer.idle, *unseen))
         still = {name for name, _ in self.offer.idle}
         names = tuple(n for n in declared.effects if n not in still)
         self.structure = Structure(declared.terms, names)
@@ -108,8 +111,9 @@ class _Identifier:
         traces, parts = self._searched()
         fitting = pieces(traces, parts.fit, 3.0 * horizon)
         judging = pieces(traces, parts.judge, 3.0 * horizon, 5_000)
+        asked = self.settings.candidates
         allowed = [
-            n for n in self.settings.candidates or effects.known()
+            n for n in (effects.known() if asked is None else asked)
             if effects.get(n).reads is None or n in self.offer.candidates
         ]  # fmt: skip
         loop = Loop(fitting, judging, self.start, allowed, self.say, traces)
@@ -154,7 +158,7 @@ class _Identifier:
         noise = self.recording.noise
         prepared = [prepare(r, t.number, noise) for r, t in zip(few, self.traces, strict=True)]
         traces = one_noise(prepared, noise is not None)
-        return traces, split(traces)
+        return traces, split(traces, self.settings.holdout)
 
     def _report(self, search: Search, before: Fitted, after: Fitted, in_full: bool = True) -> Identification:
         changed = after.structure != self.structure

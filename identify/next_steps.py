@@ -84,7 +84,7 @@ def unexplained_reason(ratio: float, found: Identification) -> str:
         share = f"{percent(100.0 - error.holdout_fit_percent).lstrip('+')} of the motion"
     size = f"{number(ratio, 3)} times the sensor's noise"
     told = f"{share} ({size})" if share else size
-    return f"the model leaves {told} unexplained: something acts that no effect of the library describes"
+    return f"the model leaves {told} unexplained: something acts that none of the effects tried describes"
 
 
 def _torque_free(found: Identification) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,6 +31,7 @@ OUTLIER = 4.0  # times the median error of a shot
 KEPT = 3  # steps with the same sensitivities
 FORETOLD = 0.1  # of the fall of the squares that sensitivities may miss to be kept
 SETTLE = 6  # rounds in which start states are fitted at fixed parameters
+OWN_STEPS = 6  # in which the gains that a run has of its own are fitted at fixed parameters
 
 
 @dataclass(frozen=True)
@@ -130,13 +131,19 @@ def refine(
     """
     names = names_of(structure, 1 + max(t.number for t in traces))
     x = np.array([start.get(name, 0.0) if len(name) == 3 else start[name] for name in names])
-    still = np.array([name in fixed for name in names])
+    still = held_still(names, traces, use, fixed)
     shots = shots_for(traces, structure, names, x, shot_s, use, carry, coarse, finer)
     workers = ThreadPoolExecutor(2)
     try:
         return _levenberg(_Descent(workers, shots, structure, names, x, still), iterations, tolerance, hopeless, coarse)
     finally:
         workers.shutdown()
+
+
+def held_still(names: Sequence[Name], traces: Sequence[Trace], use: Sequence[Any] | None, fixed: Sequence[Name]) -> Any:
+    """Which parameters keep their start value, (p,): those asked for, and what belongs to a run without a sample."""
+    seen = {str(t.number) for i, t in enumerate(traces) if use is None or np.any(use[i])}
+    return np.array([name in fixed or (len(name) == 3 and name[2] not in seen) for name in names])
 
 
 def shots_for(
@@ -326,7 +333,8 @@ def evaluate(
     coarse: bool = False,
     finer: int = 1,
 ) -> Estimate:
-    """The same parameters on other samples: only start states and biases are fitted there."""
+    """The same parameters on other samples: start states and biases are fitted there, and what a run has of its own."""
+    estimate = _with_own_gains(estimate, traces, use, shot_s, coarse, finer)
     names, x, structure = estimate.names, estimate.values, estimate.structure
     shots = shots_for(traces, structure, names, x, shot_s, use, None, coarse, finer)
     with ThreadPoolExecutor(2) as workers:
@@ -335,6 +343,32 @@ def evaluate(
     count = sum(int(np.sum(s.weight)) for s, _ in settled)
     sigma = float(np.sqrt(rss / max(count, 1)))
     return Estimate(structure, names, x, sigma, count, np.zeros((len(x),) * 2), tuple(s for s, _ in settled), True)
+
+
+def _with_own_gains(
+    estimate: Estimate, traces: Sequence[Trace], use: Sequence[Any] | None, shot_s: float | None, coarse: bool,
+    finer: int,
+) -> Estimate:  # fmt: skip
+    """The same, with the gains that runs have of their own (a disturbance's phase) fitted where no fit knew them.
+
+    A run that was held out has them as it has a start state: a model without them would be judged by its luck.
+    """
+    structure = estimate.structure
+    values = dict(zip(estimate.names, estimate.values.tolist(), strict=True))
+    runs = {str(t.number) for t in traces}
+    unknown = runs - {n[2] for n, v in values.items() if len(n) == 3 and v != 0.0}
+    names = names_of(structure, 1 + max(t.number for t in traces))
+    own = [n for n in names if len(n) == 3 and n[2] in unknown]
+    if not own:
+        return estimate
+    asked = [i for i, t in enumerate(traces) if str(t.number) in unknown]
+    fixed = [n for n in names if n not in own]
+    few = None if use is None else [use[i] for i in asked]
+    fitted = refine(
+        [traces[i] for i in asked], structure, values, shot_s, OWN_STEPS, few, fixed=fixed, coarse=coarse, finer=finer
+    )  # fmt: skip
+    values |= {n: v for n, v in zip(fitted.names, fitted.values.tolist(), strict=True) if n in own}
+    return replace(estimate, names=tuple(values), values=np.array(list(values.values())))
 
 
 @RUNAWAY

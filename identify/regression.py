@@ -163,7 +163,8 @@ class Regression:
             target = target - columns.pop(("inertia",))
         free = kept("free", lambda: pre.free(m))
         rows = np.nonzero(trace.keep[first : last + 1])[0]
-        matrix = np.column_stack([columns[x] for x in self.labels])
+        nothing = np.zeros(m)  # a gain in the sensor or the drive pushes nothing along the measured motion
+        matrix = np.column_stack([columns.get(x, nothing) for x in self.labels])
         return Block(matrix[rows], free[rows], trace.biased, target[rows], rows + first, number)
 
     def _add_effects(

@@ -14,6 +14,7 @@ from identify.regression import Shapes, Solution, Structure
 from identify.results import Candidate
 from identify.screen import Screen, Screened, Start, best_rho, grid_of
 from identify.traces import Trace
+from identify.unseen import why_unseen
 from rig import effects
 from rig.effects.base import Place
 from rig.platform import TERMS, Platform
@@ -162,7 +163,7 @@ class Loop:
         """One more effect, if one is worth it."""
         now = found.best
         screen = self._screen(found, now)
-        names = [n for n in self.allowed if n not in now.structure.effects and self._possible(n)]
+        names = [n for n in self.allowed if n not in now.structure.effects and not why_unseen(n, self.fitting)]
         looks = screen.all(names)
         tried: list[tuple[str, Judged]] = []
         short = screen.shortlist(looks, SHORTLIST)
@@ -330,12 +331,6 @@ class Loop:
 
     def _status(self, best: Judged, other: Judged) -> str:
         return "rival" if advantage(other, best) < CLEARLY and other.sigma < 1.05 * best.sigma else "no better"
-
-    def _possible(self, name: str) -> bool:
-        """A constant torque only shifts the unseen rest angle of a gyro-only platform with a spring."""
-        if self.torque_free and effects.get(name).place is Place.DRIVE:
-            return False
-        return not (name == "torque_offset" and all(t.biased for t in self.fitting))
 
     def _lines(self, judged: Judged) -> tuple[float, ...]:
         """Frequencies of the strongest lines in the equation-error residual."""

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from identify.output_error import Estimate, shots_for
+from identify.output_error import Estimate, held_still, shots_for
 from identify.parameters import Name, bounds_of, ordered
 from identify.sensitivities import at_residual, linearise
 from identify.shots import RUNAWAY, Shots, moved, residual_at
@@ -41,7 +41,7 @@ def sharpened(estimate: Estimate, traces: Sequence[Trace], use: Sequence[Any], f
     no better after the step.
     """
     structure, names = estimate.structure, estimate.names
-    still = np.array([n in fixed for n in names])
+    still = held_still(names, traces, use, fixed)
     low, high = (np.array([bounds_of(n)[i] for n in names]) for i in (0, 1))
     with ThreadPoolExecutor(2) as workers:
 

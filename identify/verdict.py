@@ -20,7 +20,7 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
     if not found.verdict.effects:
         out.append(
             "No effect is named: "
-            + ("none of those known explains the residual." if found.verdict.unexplained
+            + ("none of those tried explains the residual." if found.verdict.unexplained
                else "the declared model reaches the noise floor.")
         )  # fmt: skip
     out += _bent(found)

@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from identify.holdout import pieces, split
+from identify.loop import identify
 from identify.traces import SHORTEST_STRETCH, Trace, prepare
-from rig.recording.run import Use
-from tests.identify.simulated import sine_run
+from rig.config.identify import IdentifyConfig
+from rig.platform import Platform
+from rig.recording.run import Recording, Use
+from tests.identify.simulated import TRUTH, sine_run
 
 
 def traces(*uses: Use, duration_s: float = 4.0) -> list[Trace]:
@@ -68,3 +72,28 @@ def test_no_piece_that_fits_holds_a_sample_that_judges() -> None:
     for piece in pieces([trace], found.fit, 0.3):
         first = round(piece.offset_s / piece.step_s)
         assert not found.judge[0][first : first + len(piece.measured)].any()
+
+
+@pytest.mark.parametrize("share", [0.05, 0.1, 0.25, 0.5])
+def test_the_share_that_somebody_asks_for_judges_and_never_a_runs_start(share: float) -> None:
+    (trace,) = traces("auto")
+    found = split([trace], share)
+    assert found.judge[0].mean() == pytest.approx(share, abs=0.01)
+    assert not found.judge[0][:150].any()
+    assert f"identify.holdout: {share:g}" in found.note
+
+
+def test_a_disturbance_is_named_where_whole_runs_are_held_out_whose_phase_no_fit_knows() -> None:
+    tone = [{"sine": 0.3 * np.cos(k), "cosine": 0.3 * np.sin(k), "frequency": 3.37} for k in range(3)]
+    sets = ((67.0, 6.0), (111.0, 1.0), (104.0, 3.0))
+    runs = [
+        sine_run(*one, effects={"periodic_disturbance": t}, duration_s=3.0, seed=k)
+        for k, (one, t) in enumerate(zip(sets, tone, strict=True))
+    ]
+    runs[2] = replace(runs[2], use="holdout")
+    settings = IdentifyConfig.model_validate({"candidates": ["periodic_disturbance"]})
+    found = identify(Recording(tuple(runs)), Platform(*TRUTH), settings)
+    assert found.verdict.effects == ("periodic_disturbance",)
+    assert found.accepted, found.reasons
+    assert {"sine_run_1", "sine_run_2"} <= set(found.final.effect_parameters["periodic_disturbance"])
+    assert "sine_run_3" not in found.final.effect_parameters["periodic_disturbance"], "nothing was fitted there"

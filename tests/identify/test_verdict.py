@@ -51,7 +51,7 @@ def test_nothing_found_is_said_as_plainly_whether_the_floor_is_reached_or_not() 
     assert "reaches the noise floor" in sentences_of(replace(FOUND, verdict=empty, after=None))[0]
     lost = replace(empty, unexplained=True, unexplained_fraction=0.42)
     said = sentences_of(replace(FOUND, verdict=lost, after=None))
-    assert "none of those known" in said[0]
+    assert "none of those tried" in said[0]
     assert any("42 %" in s for s in said)
 
 
