@@ -18,7 +18,7 @@ from identify.effect_free import effect_free
 from identify.finish import Fitted, _regression_covariance
 from identify.genetic import QuadraticObjective, search
 from identify.identifiability import information_of
-from identify.output_error import Estimate, evaluate
+from identify.output_error import refine
 from identify.parameters import Name, platform_of
 from identify.prefilter import Denominator
 from identify.regression import Regression, Structure, fit, normal
@@ -35,6 +35,8 @@ from rig.platform import TERMS
 from rig.recording.run import Array
 
 ALLOWANCE = 1.2  # J_dec over the objective that the sensor's noise alone makes
+SIMULATED = 8  # iterations of the fit that a set's values are held against
+APART = 3.0  # standard errors from it: further off, the distance is the error
 WELL_KNOWN = 0.05  # relative standard error up to which a set alone determines a parameter
 KEYS = {"inertia": "inertia_kg_m2", "damping": "damping_nm_s_rad", "stiffness": "stiffness_nm_rad"}
 
@@ -203,18 +205,50 @@ def each_set(
     return results, genetic("all sets", whole, terms, begin, centre, settings, settings.seed, rho, True)
 
 
-def _least_errors(trace: Trace, values: Mapping[str, float], labels: Sequence[Name]) -> Array:
-    """What the motion itself allows, (p,): the sensor's noise in the regression's columns passes for motion."""
+def _by_motion(trace: Trace, values: Mapping[str, float], labels: Sequence[Name]) -> tuple[Array, Array]:
+    """What whole-run simulation makes of a set's values, (p,), and the errors that its noise allows, (p,).
+
+    The sensor's noise in the regression's columns passes for motion: its own errors are too small, and where little
+    tells two terms apart its values are off as well.
+    """
+    at = np.array([values[term] for (term,) in labels])
+    lost = at, np.full(len(labels), np.inf)
     structure = Structure(tuple(term for (term,) in labels))
     if values.get("inertia", 1.0) <= 0.0:
-        return np.full(len(labels), np.inf)
-    held = Estimate(
-        structure, tuple(labels), np.array([values[term] for (term,) in labels]), np.inf, 0, np.zeros((0, 0)), (), True
-    )
-    settled = evaluate(held, [replace(trace, number=0)])
-    if not np.isfinite(settled.sigma):
-        return np.full(len(labels), np.inf)
-    return least_std_errors(settled.shots[0], settled, labels, trace.noise)
+        return lost
+    start: dict[Name, float] = {(term,): values[term] for (term,) in labels}
+    found = refine([replace(trace, number=0)], structure, start, None, SIMULATED, coarse=True)
+    if not np.isfinite(found.sigma):
+        return lost
+    there = dict(zip(found.names, found.values.tolist(), strict=True))
+    return np.array([there[label] for label in labels]), least_std_errors(found.shots[0], found, labels, trace.noise)
+
+
+def _is_known(value: float, error: float) -> bool:
+    return error < WELL_KNOWN * max(abs(value), 1e-300)
+
+
+def _tied(
+    trace: Trace, errors: Array, labels: Sequence[Name], values: Mapping[str, float],
+    platform: tuple[float, float, float],
+) -> Array:  # fmt: skip
+    """Errors, (p,), that know of each other: at one frequency inertia and stiffness are one number, K - J w^2.
+
+    Where a set does not tell the one, the other is off by as much as all of it (``platform``, of all sets) makes there.
+    """
+    out = errors.copy()
+    square = float(np.var(trace.fine[1]) / max(float(np.var(trace.fine[0])), 1e-300))
+    inertia, _, stiffness = platform
+    for lost, other, reach in (
+        ("inertia", "stiffness", inertia * square), ("stiffness", "inertia", stiffness / max(square, 1e-300)),
+    ):  # fmt: skip
+        if (
+            (lost,) in labels
+            and (other,) in labels
+            and not _is_known(values[lost], float(errors[labels.index((lost,))]))
+        ):
+            out[labels.index((other,))] = max(out[labels.index((other,))], abs(reach))
+    return out
 
 
 def _bounds(traces: Sequence[Trace], fitted: Fitted) -> list[dict[str, float]]:
@@ -236,14 +270,16 @@ def _result(
     solution = fit(regression, {}, start.platform, rho, 8)
     mask = [trace.keep]
     covariance, determined = _regression_covariance([trace], solution, mask)
-    least = _least_errors(trace, run.parameters, solution.labels)
+    simulated, least = _by_motion(trace, run.parameters, solution.labels)
     errors = np.maximum(np.sqrt(np.maximum(np.diag(covariance), 0.0)), least)
     errors = np.maximum(errors, [bound.get(term, 0.0) for (term,) in solution.labels])
+    apart = np.abs(simulated - [run.parameters[term] for (term,) in solution.labels])
+    errors = np.where(apart > APART * errors, apart, errors)
+    errors = _tied(trace, errors, solution.labels, run.parameters, start.platform)
     parameters, identifiable = {}, []
     for i, (term,) in enumerate(solution.labels):
         value, error = run.parameters[term], float(errors[i])
-        known = determined[i] and error < WELL_KNOWN * max(abs(value), 1e-300)
-        if not known:
+        if not (determined[i] and _is_known(value, error)):
             continue
         identifiable.append(term)
         parameters[term] = ParameterEstimate(

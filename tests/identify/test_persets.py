@@ -14,7 +14,9 @@ from identify.regression import Regression, Structure, fit
 from identify.screen import Start, first_guess
 from identify.traces import Trace
 from rig.config.identify import IdentifyConfig
-from rig.platform import TERMS
+from rig.dynamics import TorqueSignal, simulate
+from rig.platform import TERMS, Platform
+from rig.recording.run import Recording, Run
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, Effects, campaign, traces_of
 
 CENTRE = {"inertia": 0.015, "damping": 0.1, "stiffness": 900.0}
@@ -111,3 +113,18 @@ def test_a_result_repeats_itself_and_another_seed_gives_another_population() -> 
     runs = [genetic("all", traces, TERMS, start_of(traces), CENTRE, QUICK, s, 0.0, False) for s in (1, 1, 2)]
     assert runs[0].parameters == runs[1].parameters
     assert runs[0].parameters != runs[2].parameters
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_set_that_hardly_tells_its_numbers_apart_says_so_in_their_errors(seed: int) -> None:
+    truth = (0.02, 0.1, 20.0)
+    time = np.arange(4001) * 5e-3
+    torque = TorqueSignal(time, np.minimum(time / 8.0, 1.0) * np.sin(2 * np.pi * time))
+    rate = simulate(Platform(*truth), time, torque, substeps=16).sensed_rate_rad_s
+    rate = rate + 0.002 * np.random.default_rng(seed).standard_normal(len(time))
+    run = Run("1 Hz", time, np.ones(len(time), bool), rate_rad_s=rate, torque_time_s=time, torque_nm=torque.torque_nm)
+    traces = traces_of(Recording((run,)))
+    sets, _ = each_set(traces, fitted(traces, {}), start_of(traces), CENTRE, QUICK, "rotary")
+    for term, value in zip(TERMS, truth, strict=True):
+        found = sets[0].parameters.get(term)
+        assert found is None or abs(found.value - value) < 3.0 * found.std_error, term
