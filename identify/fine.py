@@ -154,10 +154,14 @@ class FineSearch:
         """Whether what was added ends near the noise, and leaves little of what it was to explain.
 
         What is in no library is resembled by something that is: three effects took four fifths of a gain that warms.
+        What can follow anything has to bring the model all the way: with creep and cogging a spring that relaxes twice
+        came to 1.2.
         """
         added = len(now.structure.effects) - len(declared)
         if now.level > ENDS_NEAR or added > MOST_NAMED:
             return False
+        if any(effects.get(e).resembles_much for e in now.structure.effects[len(declared) :]):
+            return now.level < AT_FLOOR
         little = now.level - 1.0 < LEFT_OVER * (self.declared_level - 1.0)
         return added <= 0 or now.level < AT_FLOOR or little
 

@@ -200,7 +200,8 @@ class _Identifier:
         return ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), "1")
 
     def _before(self, search: Search) -> Fitted:
-        if search.base.sigma < 2.0 * search.floor or self.structure.effects:
+        # A decay is judged by its free run, which the regression does not look at.
+        if self.torque_free or search.base.sigma < 2.0 * search.floor or self.structure.effects:
             return by_output_error(
                 self.traces, self.structure, search.base.values(), search.horizon,
                 self.split.final, self.split.everything,

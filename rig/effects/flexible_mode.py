@@ -6,7 +6,7 @@ import math
 
 from rig.effects.base import Effect, LargeStart, Parameter, Place, Scale, kernel
 
-LIGHT, HEAVY = 0.03, 0.5  # of the inertia
+LIGHT, QUARTER, HEAVY = 0.03, 0.25, 0.5  # of the inertia
 
 
 @kernel
@@ -31,8 +31,10 @@ def _large(jck: tuple[float, float, float], scale: Scale) -> tuple[LargeStart, .
     if stiffness <= 0.0:
         return ()
     natural_hz = scale.natural_frequency_hz
-    own = {"inertia": 0.25 * inertia, "ratio": 0.02}
-    return tuple(LargeStart({"inertia": 0.75 * inertia}, {**own, "frequency": n * natural_hz}) for n in (1.2, 1.8))
+    own = {"inertia": QUARTER * inertia, "ratio": 0.02}
+    return tuple(
+        LargeStart({"inertia": (1.0 - QUARTER) * inertia}, {**own, "frequency": n * natural_hz}) for n in (1.2, 1.8)
+    )
 
 
 def _others(jck: tuple[float, float, float], own: tuple[float, ...], scale: Scale) -> tuple[LargeStart, ...]:
@@ -44,7 +46,7 @@ def _others(jck: tuple[float, float, float], own: tuple[float, ...], scale: Scal
     inertia, frequency, ratio = own
     both, out = jck[0] + inertia, []
     for ring in scale.rings_hz:
-        for share in (LIGHT, HEAVY):
+        for share in (LIGHT, QUARTER, HEAVY):
             mine = {"inertia": share * both, "frequency": ring * math.sqrt(1.0 - share), "ratio": 0.02}
             out.append(LargeStart({"inertia": (1.0 - share) * both}, mine))
     for times in (0.6, 1.6, 2.5):
