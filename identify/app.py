@@ -273,4 +273,6 @@ def _write(
 
     path = folder.made()
     with desk.stops.saving():
-        write_results(path, found, recording, loaded.config.model.platform(), loaded.config.name)
+        model = loaded.config.model
+        given = model.inertia_declared
+        write_results(path, found, recording, model.platform(), loaded.config.name, inertia_declared=given)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identify import clipping, glitches, persets, sampling
 from identify.channels import Offer
+from identify.declared_values import declared_values, kept_as_declared
 from identify.finish import Fitted
 from identify.holdout import Split
 from identify.measures import Measured
 from identify.next_steps import opposite_signs, unexplained_reason
-from identify.parameters import platform_of
+from identify.parameters import Name, platform_of
 from identify.regression import Structure
 from identify.results import (
     UNITS,
@@ -33,6 +34,7 @@ from identify.verdict import sentences_of
 from rig import effects
 from rig.config.identify import IdentifyConfig
 from rig.effects.base import Place
+from rig.platform import Platform
 from rig.recording.run import Recording
 
 TIED = 0.95  # correlation beyond which two parameters are one
@@ -52,6 +54,7 @@ class Case:
     split: Split
     offer: Offer
     torque_free: bool
+    declared: Platform
 
 
 def conclude(
@@ -64,6 +67,10 @@ def conclude(
     dropped = (*idle, *(NotReported(n, why) for n, why in search.dropped))
     result_before = _model(case, before, measured_before, idle)
     result_after = _model(case, after, measured_after, dropped) if changed else None
+    if result_after is not None:
+        result_after = _to_build_on(case, after, result_after)
+    else:
+        result_before = _to_build_on(case, before, result_before)
     final = result_after or result_before
     ratio = _ratio(case, after, search)
     unexplained = ratio > UNEXPLAINED
@@ -89,7 +96,7 @@ def conclude(
         accepted=not reasons and not unexplained, reasons=(), axis=case.recording.axis, before=result_before,
         verdict=verdict, after=result_after, noise_floor=floor, per_set=per_set, joint=joint,
         traces=_series(case, measured_before, measured_after), holdout_note=_note(case),
-        max_error_percent=reference,
+        max_error_percent=reference, torque_free=case.torque_free,
     )  # fmt: skip
     if unexplained:
         reasons.insert(0, unexplained_reason(ratio, found))
@@ -120,43 +127,82 @@ def _ratio(case: Case, after: Fitted, search: Search) -> float:
 
 
 def _model(case: Case, fitted: Fitted, measured: Measured, dropped: tuple[NotReported, ...]) -> ModelResult:
-    units = UNITS[case.recording.axis]
     parameters: dict[str, ParameterEstimate] = {}
     of_effects: dict[str, dict[str, ParameterEstimate]] = {e: {} for e in fitted.structure.effects}
-    missing: list[NotReported] = []
-    per = "/(kg*m^2)" if case.torque_free else ""
-    runs = {t.number for t, m in zip(case.traces, case.split.final, strict=True) if np.any(m)}  # that a fit looked at
-    for i, name in enumerate(fitted.names):
+    lost = _lost(case, fitted)
+    for name in fitted.names:
+        if name in lost or _of_a_run_held_out(case, name):
+            continue
         value, error = fitted.values[name], fitted.std_error(name)
-        label, unit = name[0], units.get(name[0], "")
-        if len(name) > 1:
-            parameter = next(p for p in effects.get(name[0]).parameters if p.name == name[1])
-            label, unit = ".".join(name), parameter.unit + (per if parameter.linear else "")
-            if case.recording.axis == "linear":
-                unit = unit.replace("kg*m^2", "kg").replace("N*m", "N").replace("rad", "m")
-        elif case.torque_free:
-            label, unit = TORQUE_FREE[name[0]]
-        if len(name) == 3 and int(name[2]) not in runs:
-            continue
-        tied = len(name) == 1 and _tied_to_nothing(fitted, i, len(case.traces) == 1)
-        if tied:
-            missing.append(NotReported(label, f"it is tied to {tied}, which the data do not determine"))
-            continue
-        if not fitted.determined[i] or not np.isfinite(error) or (error > 0.5 * abs(value) and len(name) == 1):
-            if len(name) > 1 and fitted.determined[i]:
-                pass
-            else:
-                missing.append(NotReported(label, _undetermined(value, error, fitted.determined[i])))
-                continue
-        estimate = ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), unit)
+        estimate = ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), _unit(case, name))
         if len(name) == 1:
-            parameters[label] = estimate
+            parameters[_label(case, name)] = estimate
         else:
             key = name[1] if len(name) == 2 else f"{name[1]}_run_{int(name[2]) + 1}"
             of_effects[name[0]][key] = estimate
-    names = tuple(fitted.values)
-    platform = platform_of(fitted.structure, names, np.array(list(fitted.values.values())), min(runs, default=0))
-    return ModelResult(parameters, of_effects, measured.errors, dropped, tuple(missing), _correlation(fitted), platform)
+    missing = tuple(NotReported(_label(case, name), why) for name, why in lost.items())
+    platform = _platform(case, fitted, fitted.values)
+    return ModelResult(parameters, of_effects, measured.errors, dropped, missing, _correlation(fitted), platform)
+
+
+def _platform(case: Case, fitted: Fitted, values: Mapping[Name, float]) -> Platform:
+    """As it stood in the first run that a fit looked at."""
+    run = min(_runs_fitted(case), default=0)
+    return platform_of(fitted.structure, tuple(values), np.array(list(values.values())), run)
+
+
+def _runs_fitted(case: Case) -> set[int]:
+    return {t.number for t, m in zip(case.traces, case.split.final, strict=True) if np.any(m)}
+
+
+def _of_a_run_held_out(case: Case, name: Name) -> bool:
+    """Whether a parameter belongs to a run that no fit looked at: it came with the start state, to judge that run."""
+    return len(name) == 3 and int(name[2]) not in _runs_fitted(case)
+
+
+def _lost(case: Case, fitted: Fitted) -> dict[Name, str]:
+    """What the data do not determine, and why; in the order of the fit."""
+    out: dict[Name, str] = {}
+    for i, name in enumerate(fitted.names):
+        if _of_a_run_held_out(case, name):
+            continue
+        value, error, term = fitted.values[name], fitted.std_error(name), len(name) == 1
+        tied = _tied_to_nothing(fitted, i, len(case.traces) == 1) if term else ""
+        wide = term and (not np.isfinite(error) or error > 0.5 * abs(value))
+        if tied:
+            out[name] = f"it is tied to {tied}, which the data do not determine"
+        elif not fitted.determined[i] or wide:
+            out[name] = _undetermined(value, error, fitted.determined[i])
+    return out
+
+
+def _label(case: Case, name: Name) -> str:
+    """As the tables call a parameter."""
+    if len(name) > 1:
+        return ".".join(name)
+    return TORQUE_FREE[name[0]][0] if case.torque_free else name[0]
+
+
+def _unit(case: Case, name: Name) -> str:
+    if len(name) == 1:
+        return TORQUE_FREE[name[0]][1] if case.torque_free else UNITS[case.recording.axis][name[0]]
+    effect = effects.get(name[0])
+    parameter = next(p for p in effect.parameters if p.name == name[1])
+    unit = parameter.unit + ("/(kg*m^2)" if case.torque_free and effect.per_inertia(parameter) else "")
+    if case.recording.axis == "linear":
+        unit = unit.replace("kg*m^2", "kg").replace("N*m", "N").replace("rad", "m")
+    return unit
+
+
+def _to_build_on(case: Case, fitted: Fitted, model: ModelResult) -> ModelResult:
+    """The final model with declared numbers where the data say nothing, as far as it replays the runs with them."""
+    lost, declared = _lost(case, fitted), declared_values(case.declared, case.torque_free)
+    values = kept_as_declared(case.traces, case.split.final, fitted, lost, declared)
+    missing = tuple(
+        replace(told, as_declared=name in declared and values[name] == declared[name])
+        for name, told in zip(lost, model.not_determined, strict=True)
+    )
+    return replace(model, not_determined=missing, platform=_platform(case, fitted, values))
 
 
 def _against_reference(

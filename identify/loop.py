@@ -179,8 +179,9 @@ class _Identifier:
                 self.traces, after, self.start, centre, self.settings, self.recording.axis
             )  # fmt: skip
         case = Case(
-            self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free
-        )
+            self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
+            self.declared,
+        )  # fmt: skip
         found = conclude(case, search, before, after, measured_before, measured_after, floor, per_set, joint)
         return replace(found, torque_scale=self._torque_scale(after)) if in_full else found
 

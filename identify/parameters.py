@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -48,6 +49,19 @@ def platform_of(
         elif len(name) == 2 or int(name[2]) == run:
             held[name[0]][name[1]] = float(value)
     return Platform(terms["inertia"] + added, terms["damping"], terms["stiffness"], held, structure.terms)
+
+
+def with_inertia(ratios: Platform, inertia_kg_m2: float) -> Platform:
+    """A platform known per unit of its inertia, as it is with that inertia: it moves the same without torque."""
+    scale = inertia_kg_m2 / ratios.inertia_kg_m2
+    held = {}
+    for name, given in ratios.effects.items():
+        effect = effects.get(name)
+        held[name] = {p.name: given[p.name] * (scale if effect.per_inertia(p) else 1.0) for p in effect.parameters}
+    return replace(
+        ratios, inertia_kg_m2=inertia_kg_m2, damping_nm_s_rad=scale * ratios.damping_nm_s_rad,
+        stiffness_nm_rad=scale * ratios.stiffness_nm_rad, effects=held,
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=128)

@@ -33,6 +33,7 @@ class NotReported:
 
     name: str  # "stiffness", or "stribeck_friction.speed"
     reason: str
+    as_declared: bool = False  # the model stands there with its declared value, and replays the runs with it
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,8 @@ class ModelResult:
     dropped: tuple[NotReported, ...] = ()
     not_determined: tuple[NotReported, ...] = ()
     correlation: Mapping[str, float] = field(default_factory=dict)  # "inertia, stiffness" -> -0.98
-    platform: Platform | None = None  # what was simulated, numbers included that stand in no table: for model.yaml
+    # What replays the runs, numbers included that stand in no table; without torque per unit of inertia.
+    platform: Platform | None = None
 
 
 @dataclass(frozen=True)
@@ -213,6 +215,7 @@ class Identification:
     max_error_percent: Mapping[str, float] | None = None  # Eq. 15 over the sets
     aborted: bool = False
     follow_up: FollowUp | None = None  # where a name has a rival
+    torque_free: bool = False  # no run has torque: only ratios to the inertia show
     torque_scale: ParameterEstimate | None = None  # shaft's over recorded; where runs carry a known added inertia
 
     @property

@@ -10,6 +10,7 @@ from typing import Any
 from identify.follow_up_wording import file_name, follow_up_yaml
 from identify.json_values import finite
 from identify.next_steps import next_steps
+from identify.parameters import with_inertia
 from identify.report import report_html
 from identify.results import (
     Errors,
@@ -25,8 +26,7 @@ from identify.results import (
 )
 from identify.wording import bent_percent
 from rig.config.model import model_yaml
-from rig.effects import get
-from rig.platform import TERMS, Platform
+from rig.platform import Platform
 from rig.recording.hdf5 import write_recording_h5
 from rig.recording.journal_reader import JournalContents
 from rig.recording.run import Recording
@@ -154,40 +154,25 @@ def _genetic(run: GeneticRun) -> dict[str, Any]:
     return {key: value for key, value in vars(run).items() if key != "history"} | {"generations": len(run.history)}
 
 
-def final_platform(identification: Identification, declared: Platform) -> Platform:
+def final_platform(identification: Identification, declared: Platform, inertia_declared: bool = True) -> Platform:
     """The identified platform, fit to be declared or simulated next.
 
-    What the data do not determine keeps the declared value; a dropped term is no longer part of the model.
-    Without torque the declared inertia sets the scale of damping and stiffness. An effect with a parameter
-    that has no number is left out.
+    It replays the runs; what they do not determine keeps the declared value where it replays them so, too. Without
+    torque all is known per unit of inertia: the declared inertia sets the scale, and where none was declared the
+    inertia stays at one.
+
+    Raises
+    ------
+    ValueError
+        Where no model came out.
     """
-    final = identification.final
-    if final.platform is not None:
-        return final.platform
-    dropped = {item.name for item in final.dropped}
-    terms = tuple(t for t in TERMS if t in declared.terms and t not in dropped and f"{t}_over_inertia" not in dropped)
-    kept = dict(zip(TERMS, _jck(declared), strict=True))
-    scale = final.parameters["inertia"].value if "inertia" in final.parameters else kept["inertia"]
-    for name in TERMS:
-        if name in final.parameters:
-            kept[name] = final.parameters[name].value
-        elif f"{name}_over_inertia" in final.parameters:
-            kept[name] = scale * final.parameters[f"{name}_over_inertia"].value
-        elif name not in terms:
-            kept[name] = 0.0
-    effects = {
-        effect: {name: p.value for name, p in parameters.items()}
-        for effect, parameters in final.effect_parameters.items()
-        if {p.name for p in get(effect).parameters} == set(parameters)
-    }
-    return Platform(kept["inertia"], kept["damping"], kept["stiffness"], effects, terms)
+    found = identification.final.platform
+    if found is None:
+        raise ValueError("no model came out")
+    return with_inertia(found, declared.inertia_kg_m2) if identification.torque_free and inertia_declared else found
 
 
-def _jck(platform: Platform) -> tuple[float, float, float]:
-    return platform.inertia_kg_m2, platform.damping_nm_s_rad, platform.stiffness_nm_rad
-
-
-def model_text(identification: Identification, declared: Platform) -> str:
+def model_text(identification: Identification, declared: Platform, inertia_declared: bool = True) -> str:
     """model.yaml: the augmented model, with what stands behind its numbers as a comment.
 
     Raises
@@ -195,7 +180,7 @@ def model_text(identification: Identification, declared: Platform) -> str:
     ValueError
         Where the identified numbers are none that a model may have (an inertia that is not positive).
     """
-    final, platform = identification.final, final_platform(identification, declared)
+    final, platform = identification.final, final_platform(identification, declared, inertia_declared)
     lines = [
         "The identified model. Use it as `model:` of the next campaign (a path, or pasted), or as",
         "`simulated.platform:` for a twin of the rig.",
@@ -204,13 +189,36 @@ def model_text(identification: Identification, declared: Platform) -> str:
         lines.append("NOT ACCEPTED: see result.json and report.html before you build on it.")
     if identification.axis == "linear":
         lines.append("Linear axis: kg, N s/m and N/m stand where the keys say kg m^2, N m s/rad and N m/rad.")
-    if "damping_over_inertia" in final.parameters or "stiffness_over_inertia" in final.parameters:
-        lines.append("No torque was recorded: the declared inertia sets the scale of damping and stiffness.")
+    if identification.torque_free:
+        lines += _scale_lines(declared, inertia_declared)
     lines += [f"Dropped: {item.name}: {item.reason}" for item in final.dropped]
-    lines += [f"Not determined, kept as declared: {item.name}: {item.reason}" for item in final.not_determined]
-    lost = [effect for effect in final.effect_parameters if effect not in platform.effects]
-    lines += [f"Left out, since not all of its parameters are determined: {effect}" for effect in lost]
-    return model_yaml(platform, "\n".join(" ".join(line.split()) for line in lines))
+    lines += [f"{_standing(item)}: {item.name}: {item.reason}" for item in final.not_determined]
+    unknown = identification.torque_free and not inertia_declared
+    return model_yaml(platform, "\n".join(" ".join(line.split()) for line in lines), unknown)
+
+
+def _scale_lines(declared: Platform, inertia_declared: bool) -> list[str]:
+    """What the numbers of a decay without torque are worth."""
+    if inertia_declared:
+        return [
+            "No torque was recorded, so only ratios to the inertia are known: the declared inertia sets the scale.",
+            f"All else is in its units only as far as the declared {declared.inertia_kg_m2:g} is right.",
+        ]
+    return [
+        "ONLY RATIOS TO THE INERTIA ARE KNOWN: no torque was recorded and no inertia declared (model.inertia_kg_m2).",
+        "All below is per unit of inertia. It replays the decay, and tells nothing of what a torque would move:",
+        "`backend: bench` refuses it. Declare the inertia and identify again, or multiply by it all in N m (N m s/rad,",
+        "...), set inertia_kg_m2 to it and take inertia_unknown out.",
+    ]
+
+
+def _standing(item: NotReported) -> str:
+    """What the number of a parameter is that the data do not determine."""
+    if item.as_declared:
+        return "Not determined, kept as declared"
+    return (
+        "Not determined, NOT as declared: fitted, and good together with the others for motion like these runs' alone"
+    )
 
 
 def write_results(
@@ -220,10 +228,12 @@ def write_results(
     declared: Platform,
     name: str,
     journal: JournalContents | None = None,
+    inertia_declared: bool = True,
 ) -> tuple[Path, ...]:
     """Write model.yaml, follow_up.yaml, result.json, recording.h5 and report.html into ``folder``, in that order.
 
-    ``declared`` is the platform of the configuration, ``name`` the campaign's. A recording.h5 that stands
+    ``declared`` is the platform of the configuration, ``name`` the campaign's; ``inertia_declared`` is false where
+    the inertia is a default that nobody stands for. A recording.h5 that stands
     there already is left alone. Each file appears whole or not at all, and what is small comes first: on a disk
     that fills up, the numbers are there. Returns the paths written; model.yaml is left out where no valid model
     came out, follow_up.yaml where nothing is planned.
@@ -236,7 +246,7 @@ def write_results(
         The same, while writing recording.h5.
     """
     try:
-        texts = {"model.yaml": model_text(identification, declared)}
+        texts = {"model.yaml": model_text(identification, declared, inertia_declared)}
     except ValueError:
         texts = {}
     follow_up = identification.follow_up

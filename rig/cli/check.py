@@ -25,6 +25,11 @@ from rig.errors import Aborted, PreflightRefusal, RecordingError, RigError
 from rig.interface import Torque
 from rig.preflight import Prediction, playable_of, predict_all
 
+NO_SCALE = (
+    "forecast for a platform of unit inertia (model.inertia_unknown): how far a torque moves the real one nobody can "
+    "tell before its inertia is declared"
+)
+
 
 @dataclass(frozen=True)
 class Known:
@@ -60,7 +65,8 @@ def forecast(known: Known) -> list[str]:
         playable_of(known.predictions, config.model.platform(), config.excitation)
     except PreflightRefusal as error:
         raise with_places(error, known.loaded) from None
-    return [
+    doubt = [NO_SCALE] if config.model.inertia_unknown else []
+    return doubt + [
         f"forecast {plain(p.sentence())}" + ("" if p.passes else f", scaled to {100 * p.scale:.1f} % as asked")
         for p in known.predictions
     ]

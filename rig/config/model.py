@@ -24,6 +24,7 @@ class ModelConfig(Section):
     damping_nm_s_rad: float = 0.045
     stiffness_nm_rad: float = 677.3
     terms: tuple[Term, ...] = TERMS  # type: ignore[assignment]
+    inertia_unknown: bool = False  # all numbers are per unit of an inertia that nobody gave: of a decay without torque
     effects_from: tuple[Annotated[str, Field(min_length=1, max_length=4096)], ...] = ()  # files with effects of yours
     # What its effects read besides angle, rate and torque; stands before them, who are checked against it.
     channels: Annotated[Mapping[str, ModelChannel], AfterValidator(check_channels)] = Field(default_factory=dict)
@@ -37,6 +38,11 @@ class ModelConfig(Section):
         if "inertia" not in terms:
             raise ValueError("inertia has to stay: without it there is no motion to simulate; leave out others")
         return terms
+
+    @property
+    def inertia_declared(self) -> bool:
+        """Whether somebody gave the inertia: neither the default, nor the unit of an earlier decay."""
+        return "inertia_kg_m2" in self.model_fields_set and not self.inertia_unknown
 
     def platform(self) -> Platform:
         """The declared platform; a term that is left out is zero."""
@@ -72,14 +78,17 @@ def channels_of(platform: Platform) -> tuple[Channel, ...]:
     return tuple(dict.fromkeys(channel for channel in read if channel is not None))
 
 
-def model_yaml(platform: Platform, comment: str = "") -> str:
+def model_yaml(platform: Platform, comment: str = "", inertia_unknown: bool = False) -> str:
     """The text of a model.yaml that `model:` of the next campaign takes as a path or pasted.
 
-    Numbers are written with all their digits, parameters under the keys that carry their units.
+    Numbers are written with all their digits, parameters under the keys that carry their units. With
+    ``inertia_unknown`` the file says of itself that no torque may be planned with it.
     """
     section = ModelConfig.from_platform(platform)
     content = section.model_dump(mode="json", include={"inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"})
     content["terms"] = list(section.terms)
+    if inertia_unknown:
+        content["inertia_unknown"] = True
     if platform.effects:
         from rig import effects  # noqa: PLC0415  compiled kernels: only where there is an effect
 

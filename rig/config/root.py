@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from rig.config.base import Section
 from rig.config.bench import BenchConfig
@@ -43,6 +43,17 @@ class Config(Section):
         if not name.isprintable() or _NOT_IN_A_NAME.search(name) or name != name.strip(" ."):
             raise ValueError("becomes part of a folder's name: use letters, digits, spaces, - _ . inside it")
         return name
+
+    @field_validator("model")
+    @classmethod
+    def _torque_needs_an_inertia(cls, model: ModelConfig, info: ValidationInfo) -> ModelConfig:
+        if model.inertia_unknown and info.data.get("backend") == "bench":
+            raise ValueError(
+                "inertia_unknown is true: its numbers are per unit of an inertia that nobody gave, so what a torque "
+                "would move cannot be foretold; multiply damping, stiffness and all that is in N m (N m s/rad, ...) by "
+                "the platform's inertia, set inertia_kg_m2 to it and take inertia_unknown out"
+            )
+        return model
 
 
 def name_from_stem(stem: str) -> str:

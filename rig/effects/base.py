@@ -135,6 +135,10 @@ class Effect:
     separated_by: str = ""
     reads: Channel | None = None  # the measured channel that it is an effect of
 
+    def per_inertia(self, parameter: Parameter) -> bool:
+        """Whether a decay without torque shows only the ratio of a parameter to the inertia: all that is a torque."""
+        return self.place in (Place.LOAD, Place.FRICTION) and parameter.unit.startswith(("N", "kg"))
+
     def values(self, given: Mapping[str, float]) -> tuple[float, ...]:
         """Parameter values in declared order from a mapping of name (or key) to value.
 

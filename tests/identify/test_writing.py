@@ -36,9 +36,9 @@ def written(found: Identification) -> dict[str, Any]:
     return dict(json.loads(json.dumps(result_json(found), allow_nan=False)))
 
 
-def without_platform(found: Identification, **changes: Any) -> Identification:
-    """The identification with another final model that has to be put together from its parameters."""
-    return replace(found, after=replace(found.final, platform=None, **changes))
+def with_final(found: Identification, **changes: Any) -> Identification:
+    """The identification with another final model."""
+    return replace(found, after=replace(found.final, **changes))
 
 
 def test_it_has_the_keys_that_outside_scripts_rely_on(written: dict[str, Any]) -> None:
@@ -112,7 +112,7 @@ def test_after_is_null_where_nothing_was_added_or_dropped(found: Identification)
 def test_nan_and_infinity_become_null(found: Identification) -> None:
     wild = replace(estimate(1.0, float("nan")), ci95=(-np.inf, np.inf))
     errors = Errors(float("nan"), np.float64("inf"), None, None, None, None)  # type: ignore[arg-type]
-    odd = without_platform(found, parameters={"inertia": wild}, error=errors)
+    odd = with_final(found, parameters={"inertia": wild}, error=errors)
     after = json.loads(json.dumps(result_json(odd), allow_nan=False))["after"]
     assert after["parameters"]["inertia"]["std_error"] is None
     assert after["parameters"]["inertia"]["ci95"] == [None, None]
@@ -130,45 +130,64 @@ def test_model_yaml_declares_the_very_platform_that_was_identified(found: Identi
     assert section.platform() == TRUTH
 
 
-def test_without_a_platform_it_is_put_together_from_the_parameters(found: Identification) -> None:
-    made = final_platform(without_platform(found), DECLARED)
-    assert made.damping_nm_s_rad == 0.0447012
-    assert made.effects == {"coulomb_friction": {"level": 1.1998}, "torque_delay": {"delay": 6.003e-4}}
-
-
-def test_what_the_data_do_not_determine_keeps_its_declared_value_and_says_so(found: Identification) -> None:
-    parameters = {"inertia": estimate(0.02, 1e-6), "stiffness": estimate(680.0, 0.1, "N*m/rad")}
-    lost = (NotReported("damping", "one tone gives two numbers"),)
-    odd = without_platform(found, parameters=parameters, not_determined=lost)
-    assert final_platform(odd, DECLARED).damping_nm_s_rad == 0.06
-    assert "# Not determined, kept as declared: damping: one tone gives two numbers" in model_text(odd, DECLARED)
+def test_what_is_lost_says_whether_its_number_is_the_declared_one(found: Identification) -> None:
+    lost = (NotReported("inertia", "one tone gives two numbers", True), NotReported("stiffness", "it is tied"))
+    text = model_text(with_final(found, not_determined=lost), DECLARED)
+    assert "# Not determined, kept as declared: inertia: one tone gives two numbers" in text
+    assert "# Not determined, NOT as declared: " in text and ": stiffness: it is tied" in text
 
 
 def test_a_dropped_term_is_no_longer_part_of_the_model(found: Identification) -> None:
-    parameters = {"inertia": estimate(0.02, 1e-6), "damping": estimate(0.2, 1e-3, "N*m*s/rad")}
-    odd = without_platform(found, parameters=parameters, dropped=(NotReported("stiffness", "nothing pulls back"),))
-    made = final_platform(odd, DECLARED)
-    assert made.terms == ("inertia", "damping")
-    assert made.stiffness_nm_rad == 0.0
+    dropped = (NotReported("stiffness", "nothing pulls back"),)
+    odd = with_final(found, dropped=dropped, platform=Platform(0.02, 0.2, 0.0, terms=("inertia", "damping")))
     assert yaml.safe_load(model_text(odd, DECLARED))["terms"] == ["inertia", "damping"]
+    assert "# Dropped: stiffness: nothing pulls back" in model_text(odd, DECLARED)
 
 
-def test_without_torque_the_declared_inertia_sets_the_scale() -> None:
-    made = final_platform(unhappy(), Platform(0.02, 0.1, 600.0))
-    assert made.inertia_kg_m2 == 0.02
-    assert made.damping_nm_s_rad == pytest.approx(0.044)
-    assert "the declared inertia sets the scale" in model_text(unhappy(), Platform(0.02, 0.1, 600.0))
+RATIOS = Platform(
+    1.0, 2.2, 300.0,
+    {
+        "unbalance": {"sine": 33.0, "cosine": 0.5},
+        "stribeck_friction": {"coulomb": 1.0, "static": 2.0, "speed": 0.08},
+        "flexible_mode": {"inertia": 0.1, "frequency": 12.0, "ratio": 0.01},
+        "load_dependent_friction": {"factor": 0.3},
+        "rate_bias": {"bias": 0.02},
+        "torque_saturation": {"limit": 40.0},
+    },
+)  # fmt: skip
 
 
-def test_an_effect_without_all_its_numbers_is_left_out_and_named(found: Identification) -> None:
-    half = {"stribeck_friction": {"coulomb": estimate(1.0, 0.1, "N*m")}}
-    odd = without_platform(found, effect_parameters=half)
-    assert final_platform(odd, DECLARED).effects == {}
-    assert "not all of its parameters are determined: stribeck_friction" in model_text(odd, DECLARED)
+def test_without_torque_the_declared_inertia_sets_the_scale_of_all_that_is_a_torque(found: Identification) -> None:
+    decay = replace(with_final(found, platform=RATIOS), torque_free=True)
+    made = final_platform(decay, DECLARED)
+    j = DECLARED.inertia_kg_m2
+    assert (made.inertia_kg_m2, made.damping_nm_s_rad, made.stiffness_nm_rad) == (j, j * 2.2, j * 300.0)
+    assert made.effects == {
+        "unbalance": {"sine": j * 33.0, "cosine": j * 0.5},
+        "stribeck_friction": {"coulomb": j, "static": j * 2.0, "speed": 0.08},
+        "flexible_mode": {"inertia": j * 0.1, "frequency": 12.0, "ratio": 0.01},
+        "load_dependent_friction": {"factor": 0.3},
+        "rate_bias": {"bias": 0.02},
+        "torque_saturation": {"limit": 40.0},
+    }
+
+
+def test_without_torque_the_scale_is_said_also_where_no_ratio_stands_in_the_tables(found: Identification) -> None:
+    decay = replace(with_final(found, platform=RATIOS, parameters={}), torque_free=True)
+    assert "the declared inertia sets the scale" in model_text(decay, DECLARED)
+    assert "declared 0.0185 is right" in model_text(decay, DECLARED)
+
+
+def test_without_torque_and_without_a_declared_inertia_nothing_in_n_m_is_made_up(found: Identification) -> None:
+    decay = replace(with_final(found, platform=RATIOS), torque_free=True)
+    text = model_text(decay, DECLARED, inertia_declared=False)
+    assert "# ONLY RATIOS TO THE INERTIA ARE KNOWN" in text
+    assert ModelConfig.model_validate(yaml.safe_load(text)).platform() == RATIOS
+    assert yaml.safe_load(text)["inertia_unknown"] is True
 
 
 def test_a_reason_of_several_lines_cannot_break_out_of_its_comment(found: Identification) -> None:
-    odd = without_platform(found, not_determined=(NotReported("damping", "first\ninertia_kg_m2: 99"),))
+    odd = with_final(found, not_determined=(NotReported("damping", "first\ninertia_kg_m2: 99"),))
     assert yaml.safe_load(model_text(odd, DECLARED))["inertia_kg_m2"] != 99
 
 
@@ -192,7 +211,7 @@ def test_a_recording_that_stands_there_already_is_left_alone(
 def test_numbers_that_no_model_may_have_give_no_model_yaml(
     found: Identification, recording: Recording, tmp_path: Path
 ) -> None:
-    odd = without_platform(found, parameters={"inertia": estimate(-0.02, 1e-6)})
+    odd = with_final(found, platform=replace(TRUTH, inertia_kg_m2=-0.02))
     written = write_results(tmp_path, odd, recording, DECLARED, "default")
     assert [path.name for path in written] == ["result.json", "recording.h5", "report.html"]
 

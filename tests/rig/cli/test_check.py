@@ -45,6 +45,13 @@ def test_what_passes_by_its_word_does_pass(tmp_path: Path) -> None:
     assert command(app, "check", config).exit_code == 0
 
 
+def test_a_forecast_for_a_platform_of_unit_inertia_says_so(tmp_path: Path) -> None:
+    model = "model: {inertia_kg_m2: 1.0, stiffness_nm_rad: 300.0, inertia_unknown: true}\n"
+    lines = command(app, "check", write_config(tmp_path, TWO_SETS + model)).stdout.splitlines()
+    told = next(i for i, line in enumerate(lines) if "unit inertia (model.inertia_unknown)" in line)
+    assert told < next(i for i, line in enumerate(lines) if "would travel" in line)
+
+
 def test_a_wrong_file_is_refused_with_its_line(tmp_path: Path) -> None:
     done = command(app, "check", write_config(tmp_path, TWO_SETS.replace("rest_s", "rest_ms")))
     assert done.exit_code == 2

@@ -150,6 +150,22 @@ def test_an_included_model_can_be_overridden(tmp_path: Path) -> None:
     assert (config.model.inertia_kg_m2, config.model.stiffness_nm_rad) == (0.5, 650.0)
 
 
+def test_a_model_known_per_unit_of_inertia_makes_a_twin_and_moves_no_bench(tmp_path: Path) -> None:
+    (tmp_path / "twin.yaml").write_text(model_yaml(TWIN, inertia_unknown=True))
+    models = "model: twin.yaml\nsimulated: {platform: twin.yaml}\n"
+    model = load(tmp_path, "backend: simulated\n" + models).config.model
+    assert model.platform() == TWIN
+    assert not model.inertia_declared
+    with pytest.raises(ConfigError, match=r"model: .*per unit of an inertia that nobody gave"):
+        load(tmp_path, "backend: bench\n" + models, "model.inertia_kg_m2=0.5")
+
+
+def test_an_inertia_is_declared_where_somebody_gave_it(tmp_path: Path) -> None:
+    assert not load(tmp_path, SMALLEST).config.model.inertia_declared
+    assert not load(tmp_path, SMALLEST + "model: {stiffness_nm_rad: 3}\n").config.model.inertia_declared
+    assert load(tmp_path, SMALLEST + "model: {inertia_kg_m2: 0.02}\n").config.model.inertia_declared
+
+
 def test_a_fault_in_an_included_model_names_that_file_and_line(tmp_path: Path) -> None:
     (tmp_path / "twin.yaml").write_text("inertia_kg_m2: 0.02\nstifness_nm_rad: 3\n")
     with pytest.raises(ConfigError, match=r"twin\.yaml:2: model\.stifness_nm_rad: .*did you mean 'stiffness_nm_rad'"):
