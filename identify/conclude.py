@@ -83,6 +83,7 @@ def conclude(
         candidates=(*search.candidates, *case.offer.refused),
         sentences=(),
         rival_models=search.rival_models,
+        contribution=search.contribution,
     )
     reasons = []
     searched = [g for g in (*(s.genetic for s in per_set), joint) if g is not None]

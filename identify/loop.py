@@ -14,6 +14,7 @@ from identify.channels import offer_of, with_causes
 from identify.clipping import full_scale_of
 from identify.compare import Judged, horizon_s
 from identify.conclude import Case, conclude
+from identify.contribution import contributions
 from identify.fine import FineSearch
 from identify.finish import Fitted, by_output_error, by_regression, noise_of_all
 from identify.holdout import Split, pieces, split
@@ -137,6 +138,8 @@ class _Identifier:
                 self.say(f"not named: {', '.join(had)}; together they leave too much for any of them to be believed")
             before = self._before(search)
             after = self._after(search) if search.best.structure != self.structure else before
+            named = [e for e in after.structure.effects if e not in self.structure.effects]
+            search.contribution = contributions(on_offer.fits, after.structure, after.values, named)
             return self._report(search, before, after)
         except (Aborted, KeyboardInterrupt):
             if loop.so_far is None:

@@ -85,7 +85,7 @@ class Verdict:
     candidates: tuple[Candidate, ...]
     sentences: tuple[str, ...]  # the verdict in words, one finding each
     rival_models: Mapping[str, Mapping[str, Platform]] = field(default_factory=dict)  # effect -> rival -> fitted model
-    contribution: Mapping[str, float] = field(default_factory=dict)  # effect -> error without it / error with it
+    contribution: Mapping[str, float] = field(default_factory=dict)  # effect -> held-out error without it / with it
 
 
 @dataclass(frozen=True)

@@ -64,6 +64,8 @@ class Search:
         Terms of the declared model and effects that the data do not support, with the reason.
     free_running
         Whether ``best`` was judged over whole runs, by a search that believed it there.
+    contribution
+        Effect -> held-out error without it over the one with it, once the search is through.
     """
 
     base: Judged
@@ -75,6 +77,7 @@ class Search:
     rival_models: dict[str, dict[str, Platform]] = field(default_factory=dict)
     dropped: list[tuple[str, str]] = field(default_factory=list)
     free_running: bool = False
+    contribution: dict[str, float] = field(default_factory=dict)
 
     @property
     def share(self) -> float:

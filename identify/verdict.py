@@ -6,7 +6,19 @@ from identify.channels import REFUSED
 from identify.next_steps import opposite_signs
 from identify.results import Identification
 from identify.sign_check import SENTENCE
-from identify.wording import capital, joined, number, percent, plain, readable, title, told_apart, unit, value_of
+from identify.wording import (
+    capital,
+    joined,
+    number,
+    percent,
+    plain,
+    readable,
+    title,
+    told_apart,
+    unit,
+    value_of,
+    without,
+)
 from rig import effects
 
 SHOWN_PERCENT = 0.05  # a change below that is not worth a sentence
@@ -60,6 +72,8 @@ def _named(found: Identification, name: str) -> str:
     numbers = ", ".join(f"{k} {value_of(v)} {unit(v.unit)}" for k, v in shown.items())
     rivals = found.verdict.confusable_with.get(name, ())
     text = f"The model lacked {plain(name)} ({numbers})."
+    if name in found.verdict.contribution:
+        text += f" {without(found.verdict.contribution[name])}"
     if rivals:
         separate = effects.get(name).separated_by
         text += f" These data cannot exclude {' or '.join(plain(r) for r in rivals)}"

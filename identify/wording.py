@@ -180,6 +180,11 @@ def not_reported(several: Sequence[NotReported]) -> list[str]:
     return [capital(f"{plain(item.name.replace('.', ', '))}: {item.reason}") for item in several]
 
 
+def without(times: float) -> str:
+    """What an effect contributes: the held-out error without it over the one with it."""
+    return f"Without it, all else fitted anew, the held-out error is {number(times, 3)} times as large."
+
+
 def told_apart(how: str) -> str:
     """What separates an effect from its rivals, as part of a sentence: "what tells it from a delay: ..."."""
     return f"what tells it {how}" if how.startswith("from ") else f"to separate: {how}"

@@ -24,6 +24,7 @@ from identify.wording import (
     told_apart,
     unit,
     value_of,
+    without,
 )
 from rig import effects
 
@@ -227,7 +228,7 @@ def _card(identification: Identification, name: str) -> Markup:
     ]
     lines: list[Piece] = [effect.sign, f"Source: {effect.source}."]
     if name in verdict.contribution:
-        lines.append(f"Without {plain(name)} the error is {number(verdict.contribution[name], 3)} times as large.")
+        lines.append(without(verdict.contribution[name]))
     rivals = verdict.confusable_with.get(name, ())
     if rivals:
         parted = f" {capital(told_apart(effect.separated_by))}." if effect.separated_by else ""

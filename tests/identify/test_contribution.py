@@ -1,0 +1,56 @@
+"""What each named effect contributes."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from identify.contribution import contributions
+from identify.fits import Fits
+from identify.holdout import split
+from identify.loop import identify
+from identify.parameters import Name
+from identify.regression import Structure
+from identify.summary import summary
+from identify.writing import result_json
+from rig.config.identify import IdentifyConfig
+from rig.platform import Platform
+from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
+
+EFFECTS = {"coulomb_friction": {"level": 1.0}, "torque_delay": {"delay": 6e-4}}
+VALUES: dict[Name, float] = {
+    **{(t,): v for t, v in zip(("inertia", "damping", "stiffness"), TRUTH, strict=True)},
+    ("coulomb_friction", "level"): 1.0,
+    ("torque_delay", "delay"): 6e-4,
+}
+
+
+def test_it_is_the_held_out_error_without_the_effect_once_the_rest_has_made_up_for_what_it_can() -> None:
+    traces = traces_of(campaign(EFFECTS, duration_s=2.0))
+    fits, structure = Fits(traces, split(traces)), Structure(effects=tuple(EFFECTS))
+    found = contributions(fits, structure, VALUES, tuple(EFFECTS))
+    for name in EFFECTS:
+        start = {n: v for n, v in VALUES.items() if n[0] != name}
+        best = fits.whole(structure.minus(name), start, steps=30)
+        assert best is not None
+        left = float(np.sqrt(best.held / best.held_count)) * fits.noise
+        assert found[name] == pytest.approx(left / NOISE_RAD_S, rel=0.1)
+
+
+def test_a_model_to_which_nothing_was_added_has_none() -> None:
+    traces = traces_of(campaign(duration_s=1.0))
+    terms = {n: v for n, v in VALUES.items() if len(n) == 1}
+    assert contributions(Fits(traces, split(traces)), Structure(), terms, ()) == {}
+
+
+def test_every_named_effect_says_what_it_contributes_and_a_declared_one_does_not() -> None:
+    settings = IdentifyConfig.model_validate({"candidates": ("coulomb_friction", "torque_delay")})
+    declared = Platform(*TRUTH, effects={"torque_delay": {"delay": 5e-4}})
+    found = identify(campaign(EFFECTS, duration_s=2.0), declared, settings)
+    written = json.loads(json.dumps(result_json(found)))["verdict"]
+    assert written["effects"] == ["coulomb_friction"]
+    assert list(written["contribution"]) == ["coulomb_friction"]
+    assert written["contribution"]["coulomb_friction"] > 10.0
+    assert "Without it, all else fitted anew" in summary(found)
