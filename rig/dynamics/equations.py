@@ -103,7 +103,9 @@ class Equations:
         self.z_at = _offsets([effects.get(name).states for name in body])
         rest = {name: slots(read, None)[1] if (read := effects.get(name).reads) else () for name in body}
         self.p_at = _offsets([3 + len(values[name]) + len(rest[name]) for name in body])
-        self.p = np.array([x for name in body for x in (*self.jck, *values[name], *rest[name])], dtype=float)
+        own = [x for name in body for x in (*self.jck, *values[name], *rest[name])]
+        ways = [self._way_rad(name, values[name]) for name in body for _ in range(effects.get(name).states)]
+        self.p = np.array([*own, min(ways, default=np.inf), *ways], dtype=float)
         self._reading = [(name, int(self.p_at[i + 1]) - SLOTS) for i, name in enumerate(body) if rest[name]]
         self.drive = _Filters(drive, drives, tuple(values[n] for n in drives))
         self.sensor = _Filters(sensor, sensors, tuple(values[n] for n in sensors))
@@ -112,6 +114,11 @@ class Equations:
         bends = [effects.get(name).kinks for name in body]
         found = [at(values[name]) for name, at in zip(body, bends, strict=True) if at]
         self.kinks = np.unique(np.array([x for each in found for x in each], dtype=float))
+
+    def _way_rad(self, name: str, values: tuple[float, ...]) -> float:
+        """Angle over which the states of an effect follow the motion; infinite where they follow something else."""
+        way = effects.get(name).follows_within_rad
+        return float(way((*self.jck.tolist(), *values))) if way else np.inf
 
     @property
     def states(self) -> int:

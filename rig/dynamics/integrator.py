@@ -9,7 +9,9 @@ angle passes a kink of the torque (a gap, a support on one side) it is split as 
 Layout of the arrays, so that any set of effects runs through one compiled function:
 ``motion`` holds angle, rate, slip direction (-1, 0 stuck, +1) and time; ``z`` the internal states of all
 kernels end to end, ``z_at`` where each kernel's begin; ``p`` the parameter vectors end to end, ``p_at``
-where each begins. LOAD kernels come first, FRICTION kernels from ``loads`` on.
+where each begins. LOAD kernels come first, FRICTION kernels from ``loads`` on. Behind the last parameter
+vector of ``p`` stands for every internal state the angle over which it follows the motion, infinite where it follows
+something else, and before these their least.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from rig.dynamics.filters import through_filters
 from rig.dynamics.native import call, floats_at, integers_at, jit, offset, pointer
 
 EVENTS_PER_STEP = 12  # more reversals than this in one fine step is chatter: the plant is held stuck
+MOST_RELAXED = 1.6  # time constants in a Runge-Kutta step after which least is left, 0.27; after 2.79 it runs away
 
 
 @jit
@@ -44,6 +47,19 @@ def _copy(source, target, n):  # type: ignore[no-untyped-def]
 
 
 @jit
+def slowed(dz, n, w, h, count, p, p_at):  # type: ignore[no-untyped-def]
+    """Make internal states that follow the motion within an angle follow it no faster than a step can.
+
+    Where the platform turns through several such angles in a step, a state has long reached its limit: how fast it got
+    there makes no difference, but the step would overshoot and run away.
+    """
+    first, turned = p_at[count] + 1, abs(w) * h
+    for i in range(n):
+        if turned > MOST_RELAXED * p[first + i]:
+            dz[i] *= MOST_RELAXED * p[first + i] / turned
+
+
+@jit
 def _acceleration(th, w, t, m, slip, z, dz, jck, body):  # type: ignore[no-untyped-def]
     loads, count = body[0], body[1]
     net = m - jck[1] * w - jck[2] * th
@@ -59,24 +75,34 @@ def _rk4(motion, x0, x1, h, m0, m1, m2, n, z, z0, k1, k2, k3, k4, jck, body):  #
     """Advance angle, rate and z from fraction x0 to x1 of the step, the slip direction kept."""
     dt = (x1 - x0) * h
     th, w, slip, t = motion[0], motion[1], motion[2], motion[3]
+    count, p, p_at = body[1], body[4], body[5]
+    most = MOST_RELAXED * p[p_at[count]] / dt if n > 0 else np.inf  # rate beyond which a state would be overrun
     begin = _quadratic(m0, m1, m2, x0)
     middle = _quadratic(m0, m1, m2, 0.5 * (x0 + x1))
     end = _quadratic(m0, m1, m2, x1)
     for i in range(n):
         z0[i] = z[i]
     a1 = _acceleration(th, w, t, begin, slip, z, k1, jck, body)
+    if abs(w) > most:
+        slowed(k1, n, w, dt, count, p, p_at)
     w2, th2 = w + 0.5 * dt * a1, th + 0.5 * dt * w
     for i in range(n):
         z[i] = z0[i] + 0.5 * dt * k1[i]
     a2 = _acceleration(th2, w2, t + 0.5 * dt, middle, slip, z, k2, jck, body)
+    if abs(w2) > most:
+        slowed(k2, n, w2, dt, count, p, p_at)
     w3, th3 = w + 0.5 * dt * a2, th + 0.5 * dt * w2
     for i in range(n):
         z[i] = z0[i] + 0.5 * dt * k2[i]
     a3 = _acceleration(th3, w3, t + 0.5 * dt, middle, slip, z, k3, jck, body)
+    if abs(w3) > most:
+        slowed(k3, n, w3, dt, count, p, p_at)
     w4, th4 = w + dt * a3, th + dt * w3
     for i in range(n):
         z[i] = z0[i] + dt * k3[i]
     a4 = _acceleration(th4, w4, t + dt, end, slip, z, k4, jck, body)
+    if abs(w4) > most:
+        slowed(k4, n, w4, dt, count, p, p_at)
     motion[0] = th + dt * (w + 2.0 * w2 + 2.0 * w3 + w4) / 6.0
     motion[1] = w + dt * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
     motion[3] = t + dt

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.dynamics.integrator import jit, pointer, resisting
+from rig.dynamics.integrator import jit, pointer, resisting, slowed
 from rig.recording.run import Array
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ def _state_along(motion, middle, spans, t0, z, h, torque, kernels, loads, z_at, 
                 else:
                     th, w, m = middle[i, 0], middle[i, 1], torque[i, 1]
                 resisting(0, loads, th, w, t + at * h, m, pointer(now), pointer(k[stage]), *body)
+                slowed(k[stage], n, w, h, len(kernels), p, p_at)
             for j in range(n):
                 out[i, j] = z[j] + h * (5.0 * k[0, j] + 4.0 * (k[1, j] + k[2, j]) - k[3, j]) / 24.0
                 z[j] += h * (k[0, j] + 2.0 * k[1, j] + 2.0 * k[2, j] + k[3, j]) / 6.0
@@ -90,11 +91,13 @@ def _coefficients(middle, states, spans, t0, h, torque, jck, kernels, loads, z_a
             for j in range(n - 2):
                 z[j] = states[i, j]
             pull = resisting(0, loads, th, w, t, m, pointer(z), pointer(dz0), *body)
+            slowed(dz0, n - 2, w, h, len(kernels), p, p_at)
             for c in range(n):
                 if c >= 2:
                     z[c - 2] += near[c]
                 a, b = th + (near[0] if c == 0 else 0.0), w + (near[1] if c == 1 else 0.0)
                 slope = (resisting(0, loads, a, b, t, m, pointer(z), pointer(dz), *body) - pull) / near[c]
+                slowed(dz, n - 2, b, h, len(kernels), p, p_at)
                 if c >= 2:
                     z[c - 2] = states[i, c - 2]
                 slope += jck[2] if c == 0 else (jck[1] if c == 1 else 0.0)

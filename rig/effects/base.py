@@ -118,6 +118,8 @@ class Effect:
     filter_states: Callable[[float, tuple[float, ...]], int] | None = None
     rest_state: Callable[[float, float], tuple[float, ...]] | None = None  # of angle and rate at the start
     fastest_rad_s: Callable[[tuple[float, ...]], float] | None = None  # of (J, C, K, *values): sets the step
+    # Of the same: the angle over which its states follow the motion, where that is what they follow.
+    follows_within_rad: Callable[[tuple[float, ...]], float] | None = None
     kinks: Callable[[tuple[float, ...]], tuple[float, ...]] | None = None  # angles at which its torque bends
     bends_torque: bool = False  # a drive effect that puts corners into a smooth torque
     leans_on: tuple[str, ...] = ()  # terms of the platform that scale its torque (backlash: the stiffness)

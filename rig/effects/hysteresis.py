@@ -8,7 +8,8 @@ from rig.effects.base import Effect, Parameter, Place, Scale, kernel
 @kernel
 def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
     z = state[0]
-    size = abs(z) ** p[5]
+    beyond = max(abs(z) - 1.0, 0.0)  # of the limit: a stage of a step may be, and must not be flung back by a power
+    size = min(abs(z), 1.0) ** p[5] + p[5] * beyond
     same = 1.0 if rate * z > 0.0 else -1.0
     dstate[0] = rate / p[4] * (1.0 - size * (p[6] * same + 1.0 - p[6]))
     return p[3] * z
@@ -48,6 +49,7 @@ EFFECT = Effect(
     kernel=_torque,
     states=1,
     fastest_rad_s=_fastest,
+    follows_within_rad=lambda values: values[4] / values[5],
     nests=("presliding_friction",),
     resembles_much=True,
     separated_by="from presliding friction: repeats at several amplitudes",

@@ -17,7 +17,7 @@ def _displacements(scale: Scale) -> tuple[float, ...]:
 
 def _fastest(values: tuple[float, ...]) -> float:
     inertia, _, _, level, displacement = values
-    # The bristles' spring, and their relaxation at 8 rad/s, which a fine step must not overrun.
+    # The bristles' spring, and their bending at 8 rad/s; a faster motion has bent them before a fine step ends.
     return max((abs(level) / displacement / inertia) ** 0.5, 0.5 / displacement)
 
 
@@ -44,6 +44,7 @@ EFFECT = Effect(
     kernel=_torque,
     states=1,
     fastest_rad_s=_fastest,
+    follows_within_rad=lambda values: values[4],
     nests=("coulomb_friction",),
     separated_by="from Coulomb friction and hysteresis: repeats at a small amplitude",
 )

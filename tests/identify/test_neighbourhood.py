@@ -93,6 +93,32 @@ def test_a_torque_that_resists_besides(name: str) -> None:
     assert share_missed(near.resisted(push), simulated) < 2e-3
 
 
+FAST: dict[str, Mapping[str, float]] = {
+    "presliding_friction": {"level": 0.5, "displacement": 0.002},
+    "hysteresis": {"level": 0.5, "yield_angle": 0.002, "exponent": 2.0, "share": 0.5},
+}
+
+
+@pytest.mark.parametrize("name", FAST)
+def test_on_a_servo_that_overruns_its_contact_in_every_step(name: str) -> None:
+    """At 60 rad/s a fine step is many times the angle within which the contact bends."""
+    declared = Platform(0.01, 0.02, 0.0, {name: FAST[name]})
+    run = sine_run(4.0, 1.0, effects=declared.effects, duration_s=2.0, jck=(0.01, 0.02, 0.0))
+    shots = make_shots(prepare(run), 4, None, None, Equations(declared))
+    assert float(np.max(np.abs(shots.trace.measured))) > 50.0
+    near = neighbourhood_of(shots, Equations(declared))
+    assert near is not None
+    for k, size in enumerate((1e-5, 1e-3)):
+        starts = shots.starts.copy()
+        starts[:, k] += size
+        simulated = predict(shots, Equations(declared), starts, shots.bias) - near.channel
+        assert np.max(np.abs(near.begun(k) - simulated / size)) < 5e-3 * np.max(np.abs(near.begun(1)))
+    time = shots.grid.step_s * np.arange(shots.grid.n)
+    push = 1e-4 * np.stack([np.sin(13.0 * (time + f * shots.grid.step_s)) for f in (0.0, 0.5, 1.0)], axis=1)
+    simulated = predict(shots, Equations(declared), shots.starts, shots.bias, push) - near.channel
+    assert share_missed(near.resisted(push), simulated) < 2e-2
+
+
 @pytest.mark.parametrize(
     "effects", [{}, {"coulomb_friction": {"level": 1.0}}, {"backlash": {"half_gap": 1e-3}}], ids=["bare", "dry", "gap"]
 )

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rig.dynamics import TorqueSignal, simulate
+from rig.dynamics import Equations, TorqueSignal, simulate
 from rig.platform import Platform
 from rig.recording.run import Array
 
@@ -130,3 +130,39 @@ def test_a_corner_of_the_torque_inside_a_step_is_felt_as_it_is(effects: dict[str
     platform = Platform(effects=effects)
     fine = simulate(platform, time, torque, substeps=128).rate_rad_s
     assert np.abs(simulate(platform, time, torque, substeps=4).rate_rad_s - fine).max() < 0.05 * NOISE_RAD_S
+
+
+FOLLOWING = {
+    "presliding": {"presliding_friction": {"level": 0.5, "displacement": 0.002}},
+    "hysteresis": {"hysteresis": {"level": 0.5, "yield_angle": 0.002, "exponent": 1.0, "share": 0.5}},
+    "sharp knee": {"hysteresis": {"level": 0.5, "yield_angle": 0.01, "exponent": 6.0, "share": 0.5}},
+}
+
+
+@pytest.mark.parametrize("effects", FOLLOWING.values(), ids=FOLLOWING)
+@pytest.mark.parametrize("substeps", [None, 2])
+@pytest.mark.parametrize("rate_rad_s", [5.0, 30.0, 60.0, 300.0, 2000.0])
+def test_a_contact_that_slides_fast_resists_with_its_level_and_no_more(
+    effects: dict[str, dict[str, float]], substeps: int | None, rate_rad_s: float
+) -> None:
+    """In one fine step the platform turns through many times the angle within which the contact bends."""
+    time = np.arange(301) * 1e-3
+    platform = Platform(0.01, 0.02, 0.0, effects)
+    torque = TorqueSignal(time, np.full(len(time), 0.02 * rate_rad_s + 0.5))
+    rate = simulate(platform, time, torque, (0.0, rate_rad_s), substeps).rate_rad_s
+    assert rate[-1] == pytest.approx(rate_rad_s, abs=0.03)  # what it gained before the contact was bent
+    np.testing.assert_allclose(np.diff(rate[10:]), -0.002 * (rate[10:-1] - rate_rad_s), atol=1e-6)
+
+
+@pytest.mark.parametrize("effects", FOLLOWING.values(), ids=FOLLOWING)
+@pytest.mark.parametrize(("peak_rad_s", "missed_rad_s"), [(60.0, 0.5 * NOISE_RAD_S), (300.0, 1e-4 * 300.0)])
+def test_a_servo_that_reverses_fast_is_as_right_as_on_finer_steps(
+    effects: dict[str, dict[str, float]], peak_rad_s: float, missed_rad_s: float
+) -> None:
+    time, torque = sine(peak_rad_s * math.hypot(0.01 * 2 * np.pi, 0.02), 1, 2)
+    platform = Platform(0.01, 0.02, 0.0, effects)
+    usual = Equations(platform).substeps(1e-3)
+    rate = simulate(platform, time, torque).rate_rad_s
+    finer = simulate(platform, time, torque, substeps=16 * usual).rate_rad_s
+    assert np.max(np.abs(rate)) > peak_rad_s
+    assert np.max(np.abs(rate - finer)) < missed_rad_s
