@@ -131,7 +131,10 @@ def page(effect: Effect) -> str:
         "| parameter | unit | bounds | how found | key in rig.yaml | meaning |", "|---|---|---|---|---|---|", *rows,
     ]  # fmt: skip
     out += ["", "## What it is confused with", ""]
-    out += [f"- `{rival}`, always: {why}." for rival, why in (effect.never_separable or {}).items()]
+    out += [
+        f"- `{rival}`, {'always: ' if alike.travel_deg == math.inf else ''}{alike.why}."
+        for rival, alike in (effect.never_separable or {}).items()
+    ]
     out += [f"- `{simpler}`, which it contains as a special case." for simpler in effect.nests]
     out += [f"- `{wider}`, which contains it." for wider in effects.names() if effect.name in effects.get(wider).nests]
     out += [f"- `{low}` is looked for first: a constant before a slope." for low in effect.lower_order]

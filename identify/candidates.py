@@ -16,7 +16,7 @@ from identify.pairs import Pair, pairs
 from identify.regression import Structure
 from identify.scores import Scored, Scores
 from identify.screen import Screen, first_guess
-from identify.traces import Trace
+from identify.traces import Trace, loads_differ
 from identify.unseen import why_unseen
 from identify.whole_runs import AT_FLOOR, CHANCE, ENDS_NEAR, NEAR_THEN, TWICE, Whole
 from rig import effects
@@ -57,7 +57,7 @@ class Candidates:
         self.allowed = [n for n in allowed if self._possible(n)]
 
     def _possible(self, name: str) -> bool:
-        if effects.get(name).needs_added_inertia and not _loads_differ(self.fits.traces):
+        if effects.get(name).needs_added_inertia and not loads_differ(self.fits.traces):
             return False
         return not why_unseen(name, self.fits.traces)
 
@@ -247,8 +247,3 @@ def _is_like(name: str, others: Iterable[str]) -> bool:
     return any(
         name in (effects.get(o).never_separable or {}) and count < len(effects.get(o).parameters) for o in others
     )
-
-
-def _loads_differ(traces: Sequence[Trace]) -> bool:
-    """Whether a known inertia was mounted for some of the runs."""
-    return len({t.run.added_inertia_kg_m2 for t in traces}) > 1

@@ -29,7 +29,7 @@ from identify.results import (
 )
 from identify.search import Search
 from identify.sign_check import SENTENCE
-from identify.traces import UPSAMPLING, Trace
+from identify.traces import UPSAMPLING, Trace, loads_differ
 from identify.verdict import sentences_of
 from rig import effects
 from rig.config.identify import IdentifyConfig
@@ -60,6 +60,7 @@ class Case:
 def conclude(
     case: Case, search: Search, before: Fitted, after: Fitted, measured_before: Measured, measured_after: Measured,
     floor: NoiseFloor, per_set: tuple[SetResult, ...], joint: persets.GeneticRun | None,
+    torque_scale: ParameterEstimate | None = None,
 ) -> Identification:  # fmt: skip
     """The identification, of what the search found and the two final fits (the same where nothing changed)."""
     changed = after.structure != case.structure
@@ -77,7 +78,7 @@ def conclude(
     verdict = Verdict(
         effects=tuple(e for e in search.best.structure.effects if e not in case.structure.effects),
         confusable_with=search.rivals,
-        never_separable=_never(search.best.structure),
+        never_separable=inseparable(search.best.structure, max(t.travel_deg for t in case.traces)),
         unexplained_fraction=_fraction(measured_before, measured_after, floor) if unexplained else 0.0,
         unexplained=unexplained,
         candidates=(*search.candidates, *case.offer.refused),
@@ -97,7 +98,8 @@ def conclude(
         accepted=not reasons and not unexplained, reasons=(), axis=case.recording.axis, before=result_before,
         verdict=verdict, after=result_after, noise_floor=floor, per_set=per_set, joint=joint,
         traces=_series(case, measured_before, measured_after), holdout_note=_note(case),
-        max_error_percent=reference, torque_free=case.torque_free,
+        max_error_percent=reference, torque_free=case.torque_free, torque_scale=torque_scale,
+        scale_shows=loads_differ(case.traces),
     )  # fmt: skip
     if unexplained:
         reasons.insert(0, unexplained_reason(ratio, found))
@@ -283,11 +285,13 @@ def _correlation(fitted: Fitted) -> dict[str, float]:
     return out
 
 
-def _never(structure: Structure) -> dict[str, str]:
+def inseparable(structure: Structure, travel_deg: float) -> dict[str, str]:
+    """The rivals of what is in the model that no data within the travel of these runs can exclude."""
     out = {}
     for name in structure.effects:
-        for rival, why in (effects.get(name).never_separable or {}).items():
-            out[f"{name} / {rival}"] = why
+        for rival in effects.get(name).never_separable or {}:
+            if why := effects.get(name).alike(rival, travel_deg):
+                out[f"{name} / {rival}"] = why
     return out
 
 

@@ -80,7 +80,7 @@ def plan_follow_up(
         return None
     noise = max(found.noise_floor.holdout_rate_rms, found.final.error.holdout_rate_rms or 0.0)
     with np.errstate(all="ignore"), threadpool_limits(1):  # small matrices: a second BLAS thread only waits
-        pairs, without = pairs_of(found, traces, noise)
+        pairs, without = pairs_of(found, traces, noise, allowed.travel_deg)
         if not pairs:
             return FollowUp(None, tuple(without))
         sensor = Sensor(sample_rate_hz, noise, traces[0].channel)
@@ -269,5 +269,5 @@ def with_follow_up(found: Identification, planned: FollowUp | None) -> Identific
     before = found.follow_up
     if before is not None:
         planned = replace(before, plan=planned.plan, unparted=planned.unparted, note="")
-    told = (*found.verdict.sentences, *verdict_sentences(planned))
+    told = (*found.verdict.sentences, *verdict_sentences(planned, found.verdict.never_separable))
     return replace(found, follow_up=planned, verdict=replace(found.verdict, sentences=told))

@@ -30,26 +30,24 @@ class Pair:
     ways: tuple[Way, ...]
 
 
-def never_reason(effect: str, rival: str) -> str:
-    """Why no excitation can tell two effects apart; empty where some can."""
+def never_reason(effect: str, rival: str, travel_deg: float) -> str:
+    """Why no excitation within the allowed travel can tell two effects apart; empty where some can."""
     read = [c.name for c in (effects.get(effect).reads, effects.get(rival).reads) if c is not None]
     if read:
         return f"no torque makes {' and '.join(read)} change: play a run in which that changes by itself"
-    for one, other in ((effect, rival), (rival, effect)):
-        why = (effects.get(one).never_separable or {}).get(other)
-        if why:
-            return why
-    return ""
+    return effects.get(effect).alike(rival, travel_deg) or effects.get(rival).alike(effect, travel_deg)
 
 
-def pairs_of(found: Identification, traces: Sequence[Trace], noise: float) -> tuple[list[Pair], list[Unparted]]:
-    """The pairs to part, and those for which nothing can be planned."""
+def pairs_of(
+    found: Identification, traces: Sequence[Trace], noise: float, travel_deg: float
+) -> tuple[list[Pair], list[Unparted]]:
+    """The pairs to part, and those for which nothing can be planned within a travel."""
     pairs: list[Pair] = []
     without: list[Unparted] = []
     final = found.final.platform
     for effect, rivals in found.verdict.confusable_with.items():
         for rival in rivals:
-            why = never_reason(effect, rival)
+            why = never_reason(effect, rival, travel_deg)
             model = found.verdict.rival_models.get(effect, {}).get(rival)
             if why:
                 without.append(Unparted(effect, rival, why))

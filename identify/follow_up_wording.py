@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 import yaml
 
 from identify.results import FollowUp, FollowUpPlan, Parting, Unparted
 from identify.wording import capital, joined, plain
-from rig import effects
 
 if TYPE_CHECKING:
     from identify.follow_up_shapes import Candidate
@@ -41,15 +40,18 @@ def unparted_sentence(one: Unparted) -> str:
     return capital(f"{plain(one.effect)} and {plain(one.rival)}: {one.reason}.")
 
 
-def verdict_sentences(follow_up: FollowUp) -> list[str]:
-    """What the verdict adds: the plan, and the pairs that no plan parts for want of limits."""
+def verdict_sentences(follow_up: FollowUp, told: Collection[str] = ()) -> list[str]:
+    """What the verdict adds: the plan, and the pairs that no plan parts for want of limits.
+
+    ``told`` are the pairs ("actuator_lag / sensor_lag") of which the verdict says already that nothing parts them.
+    """
     out = []
     if follow_up.plan is not None:
         out.append(f"To part what these data cannot: {_lower(follow_up.plan.why)}")
     out += [
         f"No follow-up for {plain(one.effect)} and {plain(one.rival)}: {one.reason}."
         for one in follow_up.unparted
-        if one.rival not in (effects.get(one.effect).never_separable or {})  # said by the verdict already
+        if not {f"{one.effect} / {one.rival}", f"{one.rival} / {one.effect}"} & set(told)
     ]
     return out
 

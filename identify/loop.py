@@ -27,7 +27,7 @@ from identify.results import (
 )
 from identify.screen import Start, first_guess
 from identify.search import Loop, Search
-from identify.traces import Trace, one_noise, prepare
+from identify.traces import Trace, loads_differ, one_noise, prepare
 from identify.unseen import why_unseen
 from rig import effects
 from rig.config.identify import IdentifyConfig
@@ -185,13 +185,13 @@ class _Identifier:
             self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
             self.declared,
         )  # fmt: skip
-        found = conclude(case, search, before, after, measured_before, measured_after, floor, per_set, joint)
-        return replace(found, torque_scale=self._torque_scale(after)) if in_full else found
+        scale = self._torque_scale(after) if in_full else None
+        return conclude(case, search, before, after, measured_before, measured_after, floor, per_set, joint, scale)
 
     def _torque_scale(self, fitted: Fitted) -> ParameterEstimate | None:
         """The shaft's torque over the recorded one, where a known inertia was added for some of the runs."""
         name = ("torque_scale", "scale")
-        if not fitted.sensor_limited or len({t.run.added_inertia_kg_m2 for t in self.traces}) < 2:
+        if not fitted.sensor_limited or not loads_differ(self.traces):
             return None
         if name not in fitted.names:
             fitted = by_output_error(

@@ -24,18 +24,20 @@ class Pruning:
 
     def pruned(self, found: Search, now: Whole, names: Sequence[str]) -> Whole:
         """Without every term or effect that the data do as well without."""
+        travel_deg = max(t.travel_deg for t in self.fits.traces)
         for name in names:
             kept_by = [e for e in now.structure.effects if name in effects.get(e).lower_order]
             last = len(now.structure.terms) - len(self.fits.fixed) + len(now.structure.effects) <= 1
             if name == "inertia" or kept_by or last:
                 continue
+            tied = _tied(name, now, travel_deg)
             start = {n: v for n, v in now.values().items() if n[0] != name}
             wider = [e for e in now.structure.effects if name in effects.get(e).nests]
             if wider:
                 start = _taken_in(start, now.values(), name, wider[0])
-            elif now.judged().strength(name) > CERTAIN and not (_own_in_each_run(name) or _tied(name, now)):
+            elif now.judged().strength(name) > CERTAIN and not (_own_in_each_run(name) or tied):
                 continue
-            without = None if _tied(name, now) else self.fits.whole(now.structure.minus(name), start)
+            without = None if tied else self.fits.whole(now.structure.minus(name), start)
             if without is None or (now.level > STILL_FAR and without.squares > now.squares):
                 fits = (without, self._left(now, name, start, found.base.values()))
                 without = min((w for w in fits if w is not None), key=lambda w: w.squares, default=None)
@@ -79,11 +81,10 @@ def _taken_in(start: Mapping[Name, float], values: Mapping[Name, float], name: s
     return {n: v + gain if n[0] == wider and n[1] in linear else v for n, v in start.items()}
 
 
-def _tied(name: str, now: Whole) -> bool:
-    """Whether the model has both of two effects that no record parts: their errors say nothing then."""
-    others = [e for e in now.structure.effects if e != name]
-    mine = effects.get(name).never_separable or {} if name not in TERMS else {}
-    return any(e in mine or name in (effects.get(e).never_separable or {}) for e in others)
+def _tied(name: str, now: Whole, travel_deg: float) -> bool:
+    """Whether the model has both of two effects that this record cannot part: their errors say nothing then."""
+    others = [e for e in now.structure.effects if e != name and name not in TERMS]
+    return any(effects.get(name).alike(e, travel_deg) or effects.get(e).alike(name, travel_deg) for e in others)
 
 
 def _own_in_each_run(name: str) -> bool:

@@ -217,6 +217,7 @@ class Identification:
     follow_up: FollowUp | None = None  # where a name has a rival
     torque_free: bool = False  # no run has torque: only ratios to the inertia show
     torque_scale: ParameterEstimate | None = None  # shaft's over recorded; where runs carry a known added inertia
+    scale_shows: bool = False  # whether runs carry one, so that a scale of the torque is no part of J, C and K
 
     @property
     def set_scatter(self) -> dict[str, float]:

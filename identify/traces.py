@@ -31,6 +31,7 @@ SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than 
 LEAD_S = 0.1
 LEAD_IN_S = 0.01  # at the start of a run that carry no weight
 STRAIGHT = 0.1  # of the sensor's noise
+MOST_BIAS_RAD_S = 0.05  # of a gyro: what its integral runs away faster with is the motion itself
 LONGEST_FILL = 25  # missing samples that a spline may bridge
 STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
 
@@ -100,6 +101,17 @@ class Trace:
     def biased(self) -> bool:
         """Whether the channel may carry an unknown constant: a gyro alone; an encoder beside it would show it."""
         return self.channel == "rate" and self.run.angle_rad is None
+
+    @property
+    def travel_deg(self) -> float:
+        """How far the platform goes to either side of where it mostly is, what a gyro's bias adds left out."""
+        angle, time = self.fine[0][::UPSAMPLING], self.fine[2][::UPSAMPLING]
+        slopes = [0.0]
+        if self.biased and len(angle) > 2:
+            slope = float(np.polynomial.Polynomial.fit(time, angle, 1).convert().coef[-1])
+            slopes.append(min(max(slope, -MOST_BIAS_RAD_S), MOST_BIAS_RAD_S))
+        level = [angle - slope * time for slope in slopes]  # an even swing may have a slope of its own
+        return float(np.degrees(min(np.max(np.abs(x - np.median(x)), initial=0.0) for x in level)))
 
     @property
     def count(self) -> int:
@@ -232,6 +244,11 @@ def _channel(run: Run) -> Literal["rate", "angle"]:
     moving_rad_s = 2.0 * np.pi * f[np.searchsorted(np.cumsum(power), 0.99 * np.sum(power))]
     as_rate = noise_of(run.angle_rad[ok]) * moving_rad_s
     return "rate" if noise_of(run.rate_rad_s[ok]) < as_rate else "angle"
+
+
+def loads_differ(traces: Sequence[Trace]) -> bool:
+    """Whether a known inertia was mounted for some of the runs."""
+    return len({t.run.added_inertia_kg_m2 for t in traces}) > 1
 
 
 def bias_beside(run: Run, time: Array, values: Array, good: Any) -> float:

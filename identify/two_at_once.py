@@ -64,9 +64,10 @@ def _as_seen(offer: Candidates, now: Whole) -> list[Whole]:
 def _both_large(offer: Candidates, now: Whole, first_tried: Mapping[str, Whole]) -> list[Whole]:
     """The candidates of the first round that took the most, two at a time."""
     took = {n: w for n, w in first_tried.items() if w.squares < TOOK * now.squares}
+    travel_deg = max(t.travel_deg for t in offer.fits.traces)
     out: list[Whole] = []
     for a, b in combinations(sorted(took, key=lambda n: took[n].squares)[:LARGE], 2):
-        if b in (effects.get(a).never_separable or {}) or b in effects.get(a).nests or a in effects.get(b).nests:
+        if effects.get(a).alike(b, travel_deg) or b in effects.get(a).nests or a in effects.get(b).nests:
             continue
         structure = now.structure.plus(a).plus(b)
         for first, second in ((a, b), (b, a)):  # J, C and K of either

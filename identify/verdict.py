@@ -7,6 +7,7 @@ from identify.next_steps import opposite_signs
 from identify.results import Identification
 from identify.sign_check import SENTENCE
 from identify.wording import (
+    SYMBOLS,
     capital,
     joined,
     number,
@@ -18,8 +19,9 @@ from identify.wording import (
     unit,
     value_of,
     without,
-)
+)  # fmt: skip
 from rig import effects
+from rig.platform import TERMS
 
 SHOWN_PERCENT = 0.05  # a change below that is not worth a sentence
 
@@ -44,6 +46,7 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
             f"{number(1.96 * scale.std_error, 2)} of the recorded one"
             + ("; J, C and K are that much larger or smaller." if off else ": the torque scale is right.")
         )
+    out += _unseen_scale(found)
     if found.verdict.unexplained:
         out.append(
             f"{number(100.0 * found.verdict.unexplained_fraction, 2)} % of the residual above the noise floor stays "
@@ -64,6 +67,19 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
         for pair, why in found.verdict.never_separable.items()
     ]
     return tuple(out)
+
+
+def _unseen_scale(found: Identification) -> list[str]:
+    """That a scale of the torque is part of J, C and K, where no run carries a known inertia that would show it."""
+    given = [SYMBOLS[name] for name in TERMS if name in found.final.parameters]
+    if found.scale_shows or not given:
+        return []
+    torque, kind = ("force", "mass") if found.axis == "linear" else ("torque", "inertia")
+    makes = "larger or smaller alike" if len(given) > 1 else "larger or smaller"
+    return [
+        f"A {torque} or sensor scale that is off makes {joined(given)} {makes}, and nothing in these runs can show "
+        f"it: only further runs with a known added {kind} (added_inertia_kg_m2) do."
+    ]
 
 
 def _named(found: Identification, name: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rig.effects._first_order import lag, remembers, times
-from rig.effects.base import Effect, Parameter, Place
+from rig.effects.base import Alike, Effect, Parameter, Place
 
 EFFECT = Effect(
     name="actuator_lag",
@@ -27,8 +27,9 @@ EFFECT = Effect(
     kernel=lag,
     filter_states=remembers,
     never_separable={
-        "sensor_lag": "a lag in the torque and a lag in the gyro answer alike; "
-        "measure the current, or use a second sensor"
+        "sensor_lag": Alike(
+            "a lag in the torque and a lag in the gyro answer alike", cure="measure the current, or use a second sensor"
+        )
     },
     separated_by="from a delay: higher frequencies",
 )

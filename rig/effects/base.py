@@ -11,6 +11,7 @@ parameters in their declared order, so that an effect may lean on the spring it 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -97,6 +98,20 @@ class LargeStart(NamedTuple):
     own: Mapping[str, float]
 
 
+class Alike(NamedTuple):
+    """Why no torque-to-rate data can tell two effects apart, and up to which travel to either side that holds."""
+
+    because: str
+    travel_deg: float = math.inf
+    cure: str = ""
+
+    @property
+    def why(self) -> str:
+        """One clause for report and docs: within what, why, and what parts them."""
+        within = f"within {self.travel_deg:g} deg " if math.isfinite(self.travel_deg) else ""
+        return f"{within}{self.because}" + (f"; {self.cure}" if self.cure else "")
+
+
 @dataclass(frozen=True)
 class Effect:
     """A physical effect, described once.
@@ -126,7 +141,7 @@ class Effect:
     ordered: tuple[tuple[str, str], ...] = ()  # pairs of parameters of which the first is the smaller
     lower_order: tuple[str, ...] = ()  # effects that come first by marginality: a constant before a slope
     nests: tuple[str, ...] = ()  # simpler effects that this one contains as a special case
-    never_separable: Mapping[str, str] | None = None  # rival -> why no torque-to-rate data can tell
+    never_separable: Mapping[str, Alike] | None = None  # rival -> why no torque-to-rate data can tell
     needs_added_inertia: bool = False  # shows only where runs carry a known inertia besides the platform's own
     # Of (J, C, K) and the scale: terms of the platform and own parameters to begin from where the effect is large.
     large_starts: Callable[[tuple[float, float, float], Scale], tuple[LargeStart, ...]] | None = None
@@ -140,6 +155,11 @@ class Effect:
     def per_inertia(self, parameter: Parameter) -> bool:
         """Whether a decay without torque shows only the ratio of a parameter to the inertia: all that is a torque."""
         return self.place in (Place.LOAD, Place.FRICTION) and parameter.unit.startswith(("N", "kg"))
+
+    def alike(self, rival: str, travel_deg: float) -> str:
+        """Why no data within a travel can tell it from a rival; empty where the data decide."""
+        found = (self.never_separable or {}).get(rival)
+        return found.why if found is not None and travel_deg <= found.travel_deg else ""
 
     def values(self, given: Mapping[str, float]) -> tuple[float, ...]:
         """Parameter values in declared order from a mapping of name (or key) to value.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rig.effects._small_angle import SINE
 from rig.effects.base import Effect, Parameter, Place, kernel
 
 
@@ -22,8 +23,9 @@ EFFECT = Effect(
         Parameter("factor", "N*m/rad^3", "torque per angle^3", linear=True, low=-float("inf"), suffix="nm_rad3"),
     ),
     kernel=_torque,
-    never_separable={
-        "unbalance": "sin and cos of a small angle are polynomials in it; only turning the base tells them apart"
-    },
-    separated_by="from unbalance: turn the platform's base; from backlash: small and large amplitudes",
+    never_separable={"unbalance": SINE},
+    separated_by=(
+        "from unbalance: turn the platform's base, or swing through a large angle; "
+        "from backlash: small and large amplitudes"
+    ),
 )

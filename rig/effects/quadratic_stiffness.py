@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rig.effects._small_angle import COSINE
 from rig.effects.base import Effect, Parameter, Place, kernel
 
 
@@ -23,8 +24,6 @@ EFFECT = Effect(
     ),
     kernel=_torque,
     lower_order=("torque_offset",),
-    never_separable={
-        "unbalance": "sin and cos of a small angle are polynomials in it; only turning the base tells them apart"
-    },
-    separated_by="from unbalance: turn the platform's base",
+    never_separable={"unbalance": COSINE},
+    separated_by="from unbalance: turn the platform's base, or swing through a large angle",
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rig.effects._first_order import lag, remembers, times
-from rig.effects.base import Effect, Parameter, Place
+from rig.effects.base import Alike, Effect, Parameter, Place
 
 EFFECT = Effect(
     name="sensor_lag",
@@ -27,8 +27,9 @@ EFFECT = Effect(
     kernel=lag,
     filter_states=remembers,
     never_separable={
-        "actuator_lag": "a lag in the gyro and a lag in the torque answer alike; "
-        "measure the current, or use a second sensor"
+        "actuator_lag": Alike(
+            "a lag in the gyro and a lag in the torque answer alike", cure="measure the current, or use a second sensor"
+        )
     },
     separated_by="from a delay: higher frequencies",
 )

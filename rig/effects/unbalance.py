@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from rig.effects._small_angle import COSINE, SINE
 from rig.effects.base import Effect, Parameter, Place, kernel
 
 
@@ -26,8 +27,8 @@ EFFECT = Effect(
     ),
     kernel=_torque,
     never_separable={
-        "quadratic_stiffness": "within 10 deg cos(th) is 1 - th^2/2; only turning the base tells them apart",
-        "cubic_stiffness": "within 10 deg sin(th) is th - th^3/6; only turning the base tells them apart",
+        "quadratic_stiffness": COSINE,
+        "cubic_stiffness": SINE,
     },
     separated_by="turn the platform's base, or swing through a large angle",
 )

@@ -226,5 +226,8 @@ def test_a_known_added_inertia_tells_the_torque_scale(scale: float, named: tuple
     assert found.torque_scale is not None
     assert abs(found.torque_scale.value - scale) < 4.5 * found.torque_scale.std_error
     assert found.torque_scale.std_error < 1e-3
+    said = " ".join(found.verdict.sentences)
+    assert "nothing in these runs can show it" not in said
+    assert ("From the known added inertia" in said) == (not named)
     assert found.accepted, found.reasons
     assert found.set_scatter["stiffness"] < 1.0

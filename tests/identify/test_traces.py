@@ -215,3 +215,17 @@ def test_the_noise_of_several_runs_is_neither_the_least_nor_the_largest_that_cha
         found.append(one[0].noise / NOISE_RAD_S)
     assert np.mean(found) == pytest.approx(1.0, abs=0.015)
     assert np.std(found) < 0.035
+
+
+@pytest.mark.parametrize(("bias_rad_s", "near"), [(0.0, 0.005), (0.02, 0.12)])
+def test_the_travel_is_what_the_platform_does_and_not_what_the_bias_of_a_gyro_adds(
+    bias_rad_s: float, near: float
+) -> None:
+    rate = 0.3 * 2 * np.pi * np.cos(2 * np.pi * TIME)
+    assert prepare(gyro(rate + bias_rad_s)).travel_deg == pytest.approx(math.degrees(0.3), rel=near)
+
+
+def test_the_travel_of_an_encoder_is_counted_from_where_it_mostly_stands_and_turns_count() -> None:
+    swing = Run("swing", TIME, np.ones(len(TIME), bool), angle_rad=2.0 + np.sin(2 * np.pi * TIME))
+    assert prepare(swing).travel_deg == pytest.approx(math.degrees(1.0), rel=0.02)
+    assert prepare(gyro(np.full(len(TIME), 60.0) + white(len(TIME), 1e-3))).travel_deg > 360.0

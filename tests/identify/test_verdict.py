@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
+from identify.conclude import inseparable
+from identify.regression import Structure
 from identify.results import NotReported
 from identify.verdict import sentences_of
-from tests.identify.sample import sample
+from tests.identify.sample import estimate, sample
 
 FOUND, _ = sample(1.0)
 
@@ -53,6 +57,34 @@ def test_nothing_found_is_said_as_plainly_whether_the_floor_is_reached_or_not() 
     said = sentences_of(replace(FOUND, verdict=lost, after=None))
     assert "none of those tried" in said[0]
     assert any("42 %" in s for s in said)
+
+
+def test_a_scale_that_nothing_shows_is_said_once_where_no_known_inertia_was_added() -> None:
+    (said,) = [s for s in sentences_of(FOUND) if "scale" in s]
+    assert "J, C and K larger or smaller alike" in said
+    assert "added_inertia_kg_m2" in said
+    assert not any("scale" in s for s in sentences_of(replace(FOUND, scale_shows=True)))
+
+
+def test_a_scale_that_was_found_is_said_with_what_it_means() -> None:
+    scaled = replace(FOUND, scale_shows=True, torque_scale=estimate(1.07, 0.001, "1"))
+    (said,) = [s for s in sentences_of(scaled) if "1.0700" in s]
+    assert "that much larger or smaller" in said
+
+
+def test_without_torque_there_is_no_scale_to_speak_of() -> None:
+    assert FOUND.after is not None
+    names = {"damping": "damping_over_inertia", "stiffness": "stiffness_over_inertia"}
+    ratios = {names[k]: v for k, v in FOUND.after.parameters.items() if k in names}
+    said = sentences_of(replace(FOUND, after=replace(FOUND.after, parameters=ratios)))
+    assert not any("scale" in s for s in said)
+
+
+@pytest.mark.parametrize(("travel_deg", "told"), [(9.0, True), (57.0, False)])
+def test_gravity_and_a_bent_spring_are_inseparable_in_small_swings_alone(travel_deg: float, told: bool) -> None:
+    never = inseparable(Structure(effects=("unbalance", "actuator_lag")), travel_deg)
+    assert ("unbalance / cubic_stiffness" in never) == ("unbalance / quadratic_stiffness" in never) == told
+    assert "actuator_lag / sensor_lag" in never
 
 
 def test_what_can_never_be_told_apart_is_said_with_the_reason() -> None:

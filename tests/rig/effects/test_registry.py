@@ -73,8 +73,18 @@ def test_a_search_for_a_shape_starts_within_its_bounds(name: str) -> None:
 def test_effects_that_are_mentioned_exist_and_rivals_name_each_other(name: str) -> None:
     effect = effects.get(name)
     assert {*effect.lower_order, *effect.nests, *(effect.never_separable or {})} <= set(effects.names())
-    for rival in effect.never_separable or {}:
-        assert name in (effects.get(rival).never_separable or {})
+    for rival, alike in (effect.never_separable or {}).items():
+        back = (effects.get(rival).never_separable or {})[name]
+        assert back.travel_deg == alike.travel_deg
+
+
+def test_gravity_passes_for_a_bent_spring_up_to_a_travel_and_a_lag_for_a_lag_at_any() -> None:
+    gravity, lag = effects.get("unbalance"), effects.get("actuator_lag")
+    for spring in ("cubic_stiffness", "quadratic_stiffness"):
+        assert gravity.alike(spring, 10.0).startswith("within 12 deg")
+        assert gravity.alike(spring, 57.0) == ""
+    assert "second sensor" in lag.alike("sensor_lag", math.inf)
+    assert gravity.alike("coulomb_friction", 0.1) == ""
 
 
 def test_values_are_taken_by_name_or_by_key_and_never_guessed() -> None:
