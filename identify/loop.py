@@ -139,7 +139,8 @@ class _Identifier:
             before = self._before(search)
             after = self._after(search) if search.best.structure != self.structure else before
             named = [e for e in after.structure.effects if e not in self.structure.effects]
-            search.contribution = contributions(on_offer.fits, after.structure, after.values, named)
+            on_offer.fits.horizon, start = search.horizon, search.base.values()
+            search.contribution = contributions(on_offer.fits, after.structure, after.values, named, start)
             return self._report(search, before, after)
         except (Aborted, KeyboardInterrupt):
             if loop.so_far is None:

@@ -17,7 +17,8 @@ from identify.summary import summary
 from identify.writing import result_json
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
-from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
+from rig.recording.run import Recording
+from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, decay_run, traces_of
 
 EFFECTS = {"coulomb_friction": {"level": 1.0}, "torque_delay": {"delay": 6e-4}}
 VALUES: dict[Name, float] = {
@@ -30,7 +31,7 @@ VALUES: dict[Name, float] = {
 def test_it_is_the_held_out_error_without_the_effect_once_the_rest_has_made_up_for_what_it_can() -> None:
     traces = traces_of(campaign(EFFECTS, duration_s=2.0))
     fits, structure = Fits(traces, split(traces)), Structure(effects=tuple(EFFECTS))
-    found = contributions(fits, structure, VALUES, tuple(EFFECTS))
+    found = contributions(fits, structure, VALUES, tuple(EFFECTS), VALUES)
     for name in EFFECTS:
         start = {n: v for n, v in VALUES.items() if n[0] != name}
         best = fits.whole(structure.minus(name), start, steps=30)
@@ -39,10 +40,24 @@ def test_it_is_the_held_out_error_without_the_effect_once_the_rest_has_made_up_f
         assert found[name] == pytest.approx(left / NOISE_RAD_S, rel=0.1)
 
 
+def test_a_declared_term_that_an_effect_made_needless_comes_back_without_it() -> None:
+    level = {"coulomb_friction": {"level": 0.02}}
+    traces = traces_of(Recording((decay_run(Platform(1.0, 0.0, 30.0, level), duration_s=15.0),)))
+    fits = Fits(traces, split(traces))
+    held: dict[Name, float] = {("inertia",): 1.0, ("stiffness",): 30.0, ("coulomb_friction", "level"): 0.02}
+    structure = Structure(("inertia", "stiffness"), tuple(level))
+    base = {("inertia",): 1.0, ("damping",): 0.05, ("stiffness",): 30.0}
+    found = contributions(fits, structure, held, tuple(level), base)
+    damped = fits.whole(Structure(), base)
+    assert damped is not None
+    left = float(np.sqrt(damped.held / damped.held_count))
+    assert found["coulomb_friction"] == pytest.approx(left, rel=0.1)
+
+
 def test_a_model_to_which_nothing_was_added_has_none() -> None:
     traces = traces_of(campaign(duration_s=1.0))
     terms = {n: v for n, v in VALUES.items() if len(n) == 1}
-    assert contributions(Fits(traces, split(traces)), Structure(), terms, ()) == {}
+    assert contributions(Fits(traces, split(traces)), Structure(), terms, (), terms) == {}
 
 
 def test_every_named_effect_says_what_it_contributes_and_a_declared_one_does_not() -> None:
