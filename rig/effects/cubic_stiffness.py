@@ -25,7 +25,6 @@ EFFECT = Effect(
     kernel=_torque,
     never_separable={"unbalance": SINE},
     separated_by=(
-        "from unbalance: turn the platform's base, or swing through a large angle; "
-        "from backlash: small and large amplitudes"
+        "from unbalance: turn the platform's base, or swing farther; from backlash: small and large amplitudes"
     ),
 )

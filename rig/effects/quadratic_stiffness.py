@@ -25,5 +25,5 @@ EFFECT = Effect(
     kernel=_torque,
     lower_order=("torque_offset",),
     never_separable={"unbalance": COSINE},
-    separated_by="from unbalance: turn the platform's base, or swing through a large angle",
+    separated_by="from unbalance: turn the platform's base, or swing farther",
 )

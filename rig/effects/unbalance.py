@@ -30,5 +30,5 @@ EFFECT = Effect(
         "quadratic_stiffness": COSINE,
         "cubic_stiffness": SINE,
     },
-    separated_by="turn the platform's base, or swing through a large angle",
+    separated_by="turn the platform's base, or swing farther",
 )
