@@ -25,6 +25,14 @@ RUN = {
     "time": "Something drifts: play the first set once more at the end, after a warm-up of ten minutes, and look at "
     "temperature and clamping.",
 }
+RELEASED_RUN = {  # the same without a motor
+    "rate": "Friction and drag show at other speeds: release the platform from a larger and from a smaller angle, and "
+    "record each until it rests.",
+    "angle": "Spring, gap or gravity show along the travel: release the platform from both ends of its travel, record "
+    "each until it rests; where gravity may act, once more with the base turned.",
+    "time": "Something drifts: repeat the first release at the end, after ten minutes, and look at temperature and "
+    "clamping.",
+}
 LINEAR = {"rate": "speed", "angle": "position", "torque": "force"}
 OTHERWISE = (
     "The rest goes with none of rate, angle, torque and time: look in the residual's spectrum and the frequency "
@@ -110,9 +118,11 @@ def _to_explain(found: Identification) -> list[str]:
         late = [f"{capital(joined(late))} {'begins' if len(late) == 1 else 'begin'} in motion: what remembers (creep, "
                 "hysteresis, a second mode) is known from rest only, and is not found there. Begin every recording "
                 "before the torque does."]  # fmt: skip
+    free = _torque_free(found)
     if share < TELLING:
-        return [*late, RELEASED if _torque_free(found) else OTHERWISE]
-    told = f"{number(100.0 * share, 2)} % of the residual's power goes with the {name}. {RUN[name]}"
+        return [*late, RELEASED if free else OTHERWISE]
+    run = RELEASED_RUN[name] if free else RUN[name]
+    told = f"{number(100.0 * share, 2)} % of the residual's power goes with the {name}. {run}"
     if found.axis == "linear":
         for rotary, linear in LINEAR.items():
             told = told.replace(f" {rotary}", f" {linear}")

@@ -68,6 +68,21 @@ def test_a_decay_is_not_told_to_raise_its_torque() -> None:
     assert len(steps) == 2 and all("release" in step and "soft_start" not in step for step in steps)
 
 
+@pytest.mark.parametrize(("rest", "words"), [("rate", "smaller angle"), ("angle", "both ends"), ("time", "drifts")])
+def test_without_a_motor_the_step_is_a_release_whatever_the_rest_goes_with(rest: str, words: str) -> None:
+    def of(t: RunTraces) -> RunTraces:
+        values = {
+            "rate": np.sign(t.rate_rad_s), "angle": 1e3 * t.angle_rad**3,
+            "time": t.time_s * white(len(t.time_s), seed=7),
+        }[rest]  # fmt: skip
+        left = t.measured - values - white(len(t.time_s), 0.1)
+        return replace(t, torque_nm=None, torque_residual_after=None, simulated_after=left)
+
+    (step,) = next_steps(replace(LOST, traces=tuple(of(t) for t in LOST.traces[4:])))
+    assert words in step and f"goes with the {rest}" in step
+    assert "torque" not in step and "play" not in step and "ramp_hold_release" not in step
+
+
 def test_a_linear_axis_is_spoken_of_in_its_own_words() -> None:
     (step,) = next_steps(replace(with_rest(LOST, "rate"), axis="linear"))
     assert "goes with the speed" in step
