@@ -10,6 +10,7 @@ import numpy as np
 from identify import clipping, glitches, persets, sampling
 from identify.channels import Offer
 from identify.declared_values import declared_values, kept_as_declared
+from identify.diagnosis import with_diagnosis
 from identify.finish import Fitted
 from identify.holdout import Split
 from identify.measures import Measured
@@ -106,7 +107,7 @@ def conclude(
     if opposite_signs(found):
         reasons.insert(0, SENTENCE)
     found = replace(found, accepted=not reasons, reasons=tuple(reasons))
-    return replace(found, verdict=replace(verdict, sentences=sentences_of(found)))
+    return with_diagnosis(replace(found, verdict=replace(verdict, sentences=sentences_of(found))))
 
 
 def _note(case: Case) -> str:
@@ -240,7 +241,7 @@ def _series(case: Case, before: Measured, after: Measured) -> tuple[RunTraces, .
                 trace.channel, trace.keep.astype(float), before.simulated[i], after.simulated[i],
                 None if first is None else first.residual, None if last is None else last.residual,
                 angle[::UPSAMPLING], rate[::UPSAMPLING], None if trace.torque is None else torque[::UPSAMPLING],
-                case.split.judge[i].astype(float),
+                case.split.judge[i].astype(float), trace.run.frequency_hz,
             )
         )  # fmt: skip
     return tuple(out)

@@ -138,6 +138,48 @@ class RunTraces:
     rate_rad_s: Array
     torque_nm: Array | None
     holdout: Array  # 1.0 where the sample was held out
+    frequency_hz: float | None = None  # of its torque, where that is one tone by plan
+
+
+@dataclass(frozen=True)
+class Share:
+    """Part of the residual's power; ``by_chance`` is what the sensor's noise alone would show in its place at most."""
+
+    share: float
+    by_chance: float
+
+
+@dataclass(frozen=True)
+class Harmonics:
+    """What of the residual repeats with the excitation; ``odd`` and ``even`` None where its torque has both."""
+
+    repeats: Share
+    own: Share | None  # at the frequencies that were played
+    odd: Share | None  # at their other odd multiples
+    even: Share | None
+    orders: Mapping[int, float]  # of single tones: multiple -> share, where it stands out
+
+
+@dataclass(frozen=True)
+class FreeLine:
+    """A steady tone in the residual that belongs to no set's excitation."""
+
+    frequency_hz: float
+    size: float  # amplitude, in the residual's unit
+    runs: int  # that show it
+
+
+@dataclass(frozen=True)
+class ResidualDiagnosis:
+    """Where the residual of one model lives."""
+
+    quantity: Literal["torque", "rate", "angle"]
+    unit: str
+    over_floor: float | None  # root mean square over that of the noise alone
+    harmonics: Harmonics | None  # None where no excitation repeats
+    free_lines: tuple[FreeLine, ...]
+    direction: Share | None  # what differs with the direction of motion at the same angle
+    memory: Share | None  # what the past explains and the present does not
 
 
 @dataclass(frozen=True)
@@ -216,6 +258,8 @@ class Identification:
     aborted: bool = False
     follow_up: FollowUp | None = None  # where a name has a rival
     torque_free: bool = False  # no run has torque: only ratios to the inertia show
+    residual_before: ResidualDiagnosis | None = None
+    residual_after: ResidualDiagnosis | None = None  # None where nothing was added or dropped
     torque_scale: ParameterEstimate | None = None  # shaft's over recorded; where runs carry a known added inertia
     scale_shows: bool = False  # whether runs carry one, so that a scale of the torque is no part of J, C and K
 

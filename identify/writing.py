@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from identify.diagnosis_wording import diagnosis_sentences
 from identify.follow_up_wording import file_name, follow_up_yaml
 from identify.json_values import finite
 from identify.next_steps import next_steps
@@ -48,6 +50,7 @@ def result_json(identification: Identification) -> dict[str, Any]:
         "verdict": _verdict(identification.verdict),
         "after": _model(identification.after) if identification.after else None,
         "noise_floor": dict(vars(identification.noise_floor)),
+        "residual": _residual(identification),
         "per_set": [_set(one) for one in identification.per_set],
         "set_scatter": identification.set_scatter,
         "torque_scale": _parameter(identification.torque_scale) if identification.torque_scale else None,
@@ -75,6 +78,15 @@ def _model(model: ModelResult) -> dict[str, Any]:
         "dropped": _listed(model.dropped),
         "not_determined": _listed(model.not_determined),
         "correlation": model.correlation,
+    }
+
+
+def _residual(identification: Identification) -> dict[str, Any]:
+    """Where the residual of either model lives: shares of its power with what chance would show, and in words."""
+    found = {"before": identification.residual_before, "after": identification.residual_after}
+    return {
+        which: asdict(one) | {"sentences": list(diagnosis_sentences(one, identification.axis))} if one else None
+        for which, one in found.items()
     }
 
 

@@ -135,6 +135,12 @@ def level(y: float, color: str, panel: int = 1, dash: str = "dash") -> dict[str,
     } | style
 
 
+def upright(x: float, color: str) -> dict[str, Any]:
+    """A vertical dotted line through the first panel, as a shape."""
+    style = {"line": {"color": color, "width": 1.2, "dash": "dot"}, "layer": "below"}
+    return {"type": "line", "xref": "x", "x0": x, "x1": x, "yref": "y domain", "y0": 0, "y1": 1} | style
+
+
 def band(x0: float, x1: float, panel: int = 1) -> dict[str, Any]:
     """A shaded stretch of x, as a shape behind the data."""
     number = "" if panel == 1 else str(panel)

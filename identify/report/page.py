@@ -11,6 +11,7 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs
 
+from identify.diagnosis_wording import diagnosis_sentences
 from identify.expected_delay import delay_lines
 from identify.follow_up_wording import lines as follow_up_lines
 from identify.hindsight import hindsight
@@ -180,8 +181,18 @@ def _errors(identification: Identification, gallery: _Gallery) -> Markup:
         paragraph(state),
         error_table(identification),
         paragraph(capital(identification.holdout_note), class_="note"),
+        *_where_it_lives(identification),
         *figures,
     )
+
+
+def _where_it_lives(identification: Identification) -> list[Markup]:
+    """What the residual holds in words, before and after, so that one sees what went away."""
+    found = {"declared model": identification.residual_before, "final model": identification.residual_after}
+    return [
+        _titled(f"Where it lives: {name}", diagnosis_sentences(one, identification.axis))
+        for name, one in found.items() if one is not None
+    ]  # fmt: skip
 
 
 def _candidates(identification: Identification) -> Markup:

@@ -13,6 +13,7 @@ from identify.report.figure import (
     AFTER,
     BEFORE,
     FLOOR,
+    SETS,
     Figure,
     Panel,
     Trace,
@@ -21,6 +22,7 @@ from identify.report.figure import (
     lines,
     once_in_legend,
     points,
+    upright,
 )
 from identify.report.motion import left_over
 from identify.report.quantities import QUANTITIES, axis
@@ -33,19 +35,22 @@ CLOUD_POINTS = 1500
 EDGE_PERIODS = 3.0  # of the low-pass, not drawn at either end of a run: there the filter looks into nothing
 SHORTEST_EDGES = 20.0  # a run has to be this many times longer
 SEGMENT = 4096  # samples of one Welch segment at most
+FORWARD, BACKWARD = SETS[2], SETS[3]
+ODD, EVEN, FREE = SETS[7], SETS[1], SETS[6]
 Which = Literal["before", "after"]
 NAMES = {"before": "declared model", "after": "final model"}
 COLORS = {"before": BEFORE, "after": AFTER}
 
 
 def residual_figures(identification: Identification) -> list[Figure]:
-    """Four figures: residual against time, angle, rate and frequency; none where nothing was simulated."""
+    """Residual against time, angle, rate and frequency, and by direction; none where nothing was simulated."""
     if not identification.traces:
         return []
     quantities = QUANTITIES[identification.axis]
     return [
         _against_time(identification),
         _against(identification, "angle_rad", quantities.angle, quantities.angle_unit),
+        _by_direction(identification),
         _against(identification, "rate_rad_s", quantities.rate, quantities.rate_unit),
         _spectrum(identification),
     ]
@@ -147,6 +152,57 @@ def _against(
     )
 
 
+def _by_direction(identification: Identification) -> Figure:
+    """Residual against angle, motion one way and the other apart: friction and loops open a gap between the two."""
+    quantities, (title, torque) = QUANTITIES[identification.axis], _titled(identification)
+    models, drawn = _models(identification), []
+    cutoff = identification.final.error.lowpass_hz
+    x = np.concatenate([t.angle_rad for t in identification.traces])
+    forward = np.concatenate([t.rate_rad_s for t in identification.traces]) > 0.0
+    for panel, which in enumerate(models, 1):
+        y = np.concatenate([_residual(t, which, torque, cutoff) for t in identification.traces])
+        for way, name, color in ((forward, "forward", FORWARD), (~forward, "backward", BACKWARD)):
+            here = np.where(way, y, np.nan)
+            drawn.append(points(*cloud(x, here, CLOUD_POINTS // 2), name, color, panel, showlegend=False))
+            drawn.append(lines(*binned_mean(x, here), f"mean, {name}", color, panel, width=3))
+    panels = [Panel(axis(quantities.angle, quantities.angle_unit), title, NAMES[which]) for which in models]
+    return Figure(
+        label=f"Residual against {quantities.angle} for either direction of motion, before and after",
+        caption=f"The same by direction of motion: positive {quantities.rate} (forward) and negative (backward). Two "
+        "means that part show friction or a loop; two that run together show a spring, gravity or cogging.",
+        traces=once_in_legend(drawn),
+        layout=grid(panels, columns=len(models), gap=0.1),
+        height=300,
+    )
+
+
+def _marks(identification: Identification, which: Which, hertz: Array, density: Array) -> list[Trace]:
+    """Multiples of the played tones that stand out of the residual, on its curve, odd and even apart."""
+    found = identification.residual_before if which == "before" else identification.residual_after
+    if found is None or found.harmonics is None or len(hertz) < 2:
+        return []
+    tones = sorted({t.frequency_hz for t in identification.traces if t.frequency_hz})
+    out = []
+    for name, color, rest in (("odd harmonics", ODD, 1), ("even harmonics", EVEN, 0)):
+        at = np.array([k * f for f in tones for k in found.harmonics.orders if k % 2 == rest and k * f < hertz[-1]])
+        if len(at):
+            values = np.interp(at, hertz, np.sqrt(density))
+            drawn = points(at, values, name, color, size=8, opacity=0.9)
+            drawn["marker"]["symbol"] = "triangle-up" if rest else "square"
+            out.append(drawn)
+    return out
+
+
+def _free_lines(identification: Identification) -> tuple[list[dict[str, object]], list[dict[str, object]]]:
+    """Shapes and names of the lines that no excitation makes, of the model that shows them last."""
+    both = [d for d in (identification.residual_before, identification.residual_after) if d is not None]
+    free = {round(line.frequency_hz, 1): line.frequency_hz for d in both for line in d.free_lines}
+    shapes = [upright(f, FREE) for f in free.values()]
+    place = {"yref": "paper", "yanchor": "bottom", "xanchor": "center", "showarrow": False, "font": {"size": 10}}
+    names = [{"text": f"{f:.4g} Hz, free", "x": float(np.log10(f)), "y": 1.0, **place} for f in free.values()]
+    return shapes, names
+
+
 def spectrum(traces: Sequence[RunTraces], which: Which) -> tuple[Array, Array]:
     """Power density of measured less simulated, averaged over the runs: frequencies (m,) in Hz, density (m,) per Hz.
 
@@ -178,6 +234,7 @@ def _spectrum(identification: Identification) -> Figure:
     for which in _models(identification):
         hertz, density = spectrum(traces, which)
         drawn.append(lines(hertz, np.sqrt(density), NAMES[which], COLORS[which], width=1.3))
+        drawn += _marks(identification, which, hertz, density)
     steps = [float(t.time_s[-1] - t.time_s[0]) / max(1, len(t.time_s) - 1) for t in traces]
     white = identification.noise_floor.holdout_rate_rms * float(np.sqrt(2.0 * np.median(steps)))
     panel = Panel(
@@ -189,12 +246,15 @@ def _spectrum(identification: Identification) -> Figure:
         extra_y={"dtick": 1},
     )
     layout = grid([panel])
-    layout["shapes"] = [level(white, FLOOR)] if white > 0.0 else []
+    shapes, names = _free_lines(identification)
+    layout["shapes"] = [*([level(white, FLOOR)] if white > 0.0 else []), *shapes]
+    layout["annotations"] += names
     return Figure(
-        label="Residual against frequency, before and after, with the noise floor",
+        label="Residual against frequency, before and after, with the noise floor, harmonics and free lines",
         caption="Amplitude density of measured less simulated. Dashed green: white noise of the sensor's own size; "
-        "what stands above it at some frequency is motion that the model does not have.",
-        traces=drawn,
+        "what stands above it at some frequency is motion that the model does not have. Triangles and squares: odd and "
+        "even multiples of a played tone that stand out. Dotted: a line that belongs to no set's excitation.",
+        traces=once_in_legend(drawn),
         layout=layout,
         height=330,
     )

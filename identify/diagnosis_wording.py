@@ -1,0 +1,105 @@
+"""What a residual holds, in sentences for the person at the bench."""
+
+from __future__ import annotations
+
+from identify.results import FreeLine, Harmonics, ResidualDiagnosis, Share
+from identify.wording import joined, number, unit
+
+WORTH, WORTH_OF_PAST = 0.02, 0.1  # shares of the residual's power below which nothing is said
+AT_THE_NOISE = 1.3  # times the noise floor
+TWIN = {"angle": "position", "rate": "speed", "torque": "force"}  # on a linear axis
+LINEAR = (
+    "what repeats at the played frequency alone is linear: a delay, a lag, creep, a second mode, a spring that drifts"
+)
+ODD = "odd harmonics come from what acts alike on both sides of rest: friction, a cubic spring, a gap, a limited drive"
+EVEN = "even harmonics come from what differs from side to side: a one-sided or quadratic spring, unbalance, an offset"
+
+
+def diagnosis_sentences(found: ResidualDiagnosis, axis: str) -> tuple[str, ...]:
+    """How far above the noise, then where it lives, one finding a sentence; nothing that chance would show."""
+    said = [
+        *_harmonics(found.harmonics),
+        *(_line(line, found) for line in found.free_lines),
+        *_direction(found.direction),
+        *_memory(found.memory),
+    ]
+    said = [_level(found, bool(said)), *said] if found.over_floor is not None or said else []
+    return tuple(_on(axis, text) for text in said if text)
+
+
+def told(share: Share | None, worth: float = WORTH) -> bool:
+    """Whether a share is more than chance, and worth a word."""
+    return share is not None and share.share > share.by_chance and share.share >= worth
+
+
+def _level(found: ResidualDiagnosis, more: bool) -> str:
+    over, what = found.over_floor, "The torque residual" if found.quantity == "torque" else "The error in free run"
+    if over is None:
+        return ""
+    if not more and over < AT_THE_NOISE:
+        return f"{what} is at the sensor's noise ({number(over, 3)} times), and nothing in it stands out of that."
+    rest = "" if more else "; it shows no harmonics, free lines, direction or memory"
+    return f"{what} is {number(over, 3)} times what the sensor's noise leaves{rest}."
+
+
+def _harmonics(found: Harmonics | None) -> list[str]:
+    if found is None or not told(found.repeats):
+        return []
+    begin = f"{_percent(found.repeats.share)} of it repeats with the excitation"
+    if found.own is None or found.odd is None or found.even is None:
+        return [f"{begin}, which has odd and even multiples itself and so hides which of them the platform makes."]
+    parts, why = [], []
+    if told(found.own):
+        parts.append(f"{_percent(found.own.share)} at the played frequency")
+    for share, parity, rest, meaning in ((found.odd, "odd", 1, ODD), (found.even, "even", 0, EVEN)):
+        if told(share):
+            orders = [f"{_nth(k)} {_percent(v)}" for k, v in found.orders.items() if k % 2 == rest and k > 1][:3]
+            parts.append(
+                f"{_percent(share.share)} in {parity} harmonics" + (f" ({', '.join(orders)})" if orders else "")
+            )
+            why.append(meaning)
+    if not parts:
+        return [f"{begin}."]
+    return [f"{begin}: {joined(parts)}; {'; '.join(why or [LINEAR])}."]
+
+
+def _line(line: FreeLine, found: ResidualDiagnosis) -> str:
+    runs = f", in {line.runs} runs" if line.runs > 1 else ""
+    return (
+        f"A line at {number(line.frequency_hz, 4)} Hz, not locked to the excitation of any set: "
+        f"{number(line.size, 2)} {unit(found.unit)}{runs}. Look for what turns or hums at that frequency."
+    )
+
+
+def _direction(share: Share | None) -> list[str]:
+    if share is None or not told(share):
+        return []
+    return [
+        f"{_percent(share.share)} of it changes sign with the direction of motion at the same angle: friction, or the "
+        "two branches of a loop."
+    ]
+
+
+def _memory(share: Share | None) -> list[str]:
+    if share is None or not told(share, WORTH_OF_PAST):
+        return []
+    return [
+        f"{_percent(share.share)} of it hangs on what came before, and on no function of the present angle, rate and "
+        "torque: hysteresis, creep, or a second mode."
+    ]
+
+
+def _percent(share: float) -> str:
+    return f"{min(100.0 * share, 100.0):.{0 if share >= 0.1 else 1}f} %"
+
+
+def _nth(order: int) -> str:
+    return f"{order}" + {2: "nd", 3: "rd"}.get(order, "th")
+
+
+def _on(axis: str, text: str) -> str:
+    if axis == "linear":
+        for rotary, linear in TWIN.items():
+            text = text.replace(f"{rotary} ", f"{linear} ").replace(f"{rotary}:", f"{linear}:")
+            text = text.replace(f"{rotary},", f"{linear},")
+    return text
