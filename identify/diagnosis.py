@@ -24,6 +24,7 @@ from rig.recording.run import Array
 DRAWS = 8
 SURE = 8.0  # standard deviations above what the draws show on average
 FEWEST = 500  # samples
+OVERSAMPLED = 8.0  # samples in a period of the low-pass's cut-off: more tell nothing more
 LEAST = 0.01  # of the residual's power: a single multiple with less is not told
 ASTRAY = 0.5  # of the motion
 
@@ -56,7 +57,7 @@ def diagnose(
     if sum(int(np.sum(r.use)) for r in runs) < FEWEST or not all(np.all(np.isfinite(r.left)) for r in runs):
         return ()
     total = np.mean(np.concatenate([r.left[r.use] for r in runs]) ** 2, axis=0)
-    if not np.all(total > 0.0):
+    if not np.all(total[:2] > 0.0):
         return ()
     known = torque and all(t.torque_nm is not None for t in traces)
     repeated = harmonics(runs, [_period(t) for t in traces]) if known else None
@@ -113,7 +114,9 @@ def _run(trace: RunTraces, sensor: Sensor, torque: bool, number: int) -> Moved:
         columns.append(as_torque(white, trace.channel, step, sensor) if torque else white)
     left = np.column_stack([np.where(use, c, 0.0) for c in columns])
     known = trace.torque_nm if trace.torque_nm is not None else np.zeros(len(time))
-    return Moved(step, trace.angle_rad, trace.rate_rad_s, known, *_by_model(trace, step), use, left)
+    thin = max(1, int(1.0 / (OVERSAMPLED * sensor.lowpass_hz * step))) if torque and sensor.lowpass_hz else 1
+    motion = (one[::thin] for one in (trace.angle_rad, trace.rate_rad_s, known, *_by_model(trace, step)))
+    return Moved(thin * step, *motion, use=use[::thin], left=left[::thin])
 
 
 def _by_model(trace: RunTraces, step_s: float) -> tuple[Array, Array]:

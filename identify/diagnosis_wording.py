@@ -38,7 +38,8 @@ def _level(found: ResidualDiagnosis, more: bool) -> str:
         return ""
     if not more and over < AT_THE_NOISE:
         return f"{what} is at the sensor's noise ({number(over, 3)} times), and nothing in it stands out of that."
-    rest = "" if more else "; it shows no harmonics, free lines, direction or memory"
+    looked_for = "harmonics, free lines, direction or memory" if found.direction is not None else "free lines"
+    rest = "" if more else f"; it shows no {looked_for}"
     return f"{what} is {number(over, 3)} times what the sensor's noise leaves{rest}."
 
 

@@ -18,6 +18,7 @@ STANDS_OUT = 20.0  # times the power around, and times that of the sensor's nois
 STEADY = 2.0  # ratio of the amplitudes in both halves
 ALIKE = 3.0  # ratio of the amplitudes in two runs
 OWN = 0.03  # of the natural frequency: a line that near is the platform's own ring
+SWING, SWINGS = 0.1, 4  # the same of a free swing, whose frequency moves with its amplitude, and of its multiples
 BLOCK = 40  # bins whose median is what stands around
 BESIDE, FOOT = 0.003, 30  # of a stronger line's power within that many bins: its foot, no line
 SHORTEST = 256  # samples
@@ -74,15 +75,28 @@ def _lines(
     noise = np.convolve(np.mean(power[2:], axis=0), np.full(9, 1.0 / 9.0), "same")
     use = (hertz > 3.0 * width) & (hertz < (cutoff_hz or np.inf))
     use &= np.abs(hertz - natural_hz) > max(OWN * natural_hz, 2.0 * width)
+    if not np.any(run.torque):
+        use &= ~_of_swing(hertz, run, width)
     out: tuple[list[_Line], list[_Line]] = ([], [])
     for which in (0, 1):
         for k in _peaks(power[which], noise, use):
-            f = _top(np.log(power[which, k - 1 : k + 2]), float(hertz[k]), float(hertz[1]))
+            f = _top(np.log(power[which, k - 1 : k + 2] + 1e-300), float(hertz[k]), float(hertz[1]))
             halves = [_amplitude(part, f, step) for part in (left[: n // 2, which], left[n // 2 :, which])]
             if max(halves) < STEADY * min(halves):
                 line = _Line(f, _amplitude(left[:, which], f, step), _locked(f, run, period_s, width), number)
                 out[which].append(line)
     return out
+
+
+def _of_swing(hertz: Array, run: Moved, width: float) -> NDArray[np.bool_]:
+    """Whether a frequency is that of a free swing or a multiple, whatever the amplitude has made of it, (m,)."""
+    angle = (run.angle - np.mean(run.angle)) * np.hanning(len(run.angle))
+    power = np.abs(fft.rfft(angle, fft.next_fast_len(len(angle), real=True)))
+    swing = float(np.argmax(power)) / (run.step_s * fft.next_fast_len(len(angle), real=True))
+    if swing <= 0.0:
+        return np.zeros(len(hertz), dtype=bool)
+    multiple = np.clip(np.rint(hertz / swing), 1.0, SWINGS)
+    return np.asarray(np.abs(hertz - multiple * swing) < np.maximum(SWING * multiple * swing, 2.0 * width))
 
 
 def _peaks(power: Array, noise: Array, use: NDArray[np.bool_]) -> list[int]:

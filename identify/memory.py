@@ -23,6 +23,7 @@ ROWS = 16_000  # of all runs together: enough for some fifty columns
 PAST_S = (0.004, 0.02, 0.1, 0.5)
 PAST_TRAVEL = (0.02, 0.1, 0.4)  # of the travel
 BLOCKS = 16  # a run
+LONGEST = 400_000  # steps along the path of one run
 RIDGE = 1e-7
 ANGLES = 16  # bins in which the two directions are compared
 FEWEST = 8  # samples of either direction in a bin
@@ -122,10 +123,10 @@ def came_from(angle: Array, length: float) -> Array:
     path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(angle)))])
     if path[-1] < length or length <= 0.0:
         return np.zeros_like(angle)
-    step = length / 12.0
+    step = max(length / 12.0, float(path[-1]) / LONGEST)
     even = np.arange(0.0, path[-1] + step, step)
     where = np.interp(even, path, angle)
-    keep = float(np.exp(-1.0 / 12.0))
+    keep = float(np.exp(-step / length))
     lagged = signal.lfilter([1.0 - keep], [1.0, -keep], np.diff(where, prepend=where[0]) / step)
     return np.asarray(np.interp(path, even, lagged))
 

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 
+from identify.diagnosis import with_diagnosis
 from identify.genetic import QuadraticObjective, search
 from identify.results import (
     Candidate,
@@ -89,9 +90,11 @@ def sample(duration_s: float = 10.0) -> tuple[Identification, Recording]:
                 rate_rad_s=true.rate_rad_s,
                 torque_nm=torque.torque_nm,
                 holdout=holdout,
+                frequency_hz=hertz,
             )
         )
-    return _identification(tuple(traces)), Recording(tuple(runs), info={"backend": "SIMULATED torque: nothing moves"})
+    found = with_diagnosis(_identification(tuple(traces)))
+    return found, Recording(tuple(runs), info={"backend": "SIMULATED torque: nothing moves"})
 
 
 def _genetic(name: str, seed: int) -> GeneticRun:

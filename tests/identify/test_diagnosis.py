@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identify.diagnosis import Sensor, diagnose
 from identify.diagnosis_wording import WORTH_OF_PAST, diagnosis_sentences, told
-from identify.results import Share
+from identify.results import RunTraces, Share
+from rig.platform import Platform
 from tests.identify.leftover import diagnosed, diagnosis_of, leftover
-from tests.identify.simulated import white
+from tests.identify.simulated import NOISE_RAD_S, TRUTH, white
 from tests.rig.effects.values import VALUES
 
 
@@ -114,18 +116,18 @@ def test_samples_that_do_not_count_are_not_looked_at() -> None:
     assert len(diagnosis_sentences(diagnosis_of(spoiled, over), "rotary")) == 1
 
 
-def test_too_little_to_tell_says_nothing() -> None:
+def test_of_too_little_nothing_is_told() -> None:
     runs, _ = leftover()
     short = [replace(r, keep=np.where(r.time_s < 0.2, 1.0, 0.0)) for r in runs[:1]]
-    with pytest.raises(IndexError):
-        diagnosis_of(short)
+    assert diagnose(short, Sensor(NOISE_RAD_S, Platform(*TRUTH), 100.0), (1.0, 1.0), ("N*m", "rad/s")) == ()
+    assert diagnose([], Sensor(NOISE_RAD_S, None, None), (None, None), ("N*m", "rad/s")) == ()
 
 
 def test_a_decay_has_its_free_lines_and_no_more() -> None:
     runs, _ = leftover()
     seconds = np.arange(20_000) * 1e-3
 
-    def free(hum: float) -> object:
+    def free(hum: float) -> RunTraces:
         left = white(len(seconds), 1e-3, seed=3) + hum * np.sin(2 * np.pi * 7.7 * seconds)
         motion = np.sin(2 * np.pi * 29.0 * seconds) * np.exp(-seconds)
         zeros = np.zeros(len(seconds))
@@ -135,10 +137,27 @@ def test_a_decay_has_its_free_lines_and_no_more() -> None:
             angle_rad=motion, rate_rad_s=motion, holdout=zeros, frequency_hz=None,
         )  # fmt: skip
 
-    quiet, humming = (diagnosis_of([free(size)]) for size in (0.0, 1e-3))  # type: ignore[list-item]
+    quiet, humming = (diagnosis_of([free(size)]) for size in (0.0, 1e-3))
     assert quiet.free_lines == () and quiet.harmonics is None and quiet.memory is None
     assert humming.free_lines[0].frequency_hz == pytest.approx(7.7, abs=0.02)
     assert humming.unit == "rad/s"
+
+
+def test_what_the_swing_of_a_decay_leaves_near_its_own_frequency_is_no_free_line() -> None:
+    runs, _ = leftover()
+    seconds = np.arange(10_000) * 1e-2
+    swing = np.exp(-0.005 * seconds) * np.sin(2 * np.pi * 0.93 * seconds)
+    left = 1e-2 * np.exp(-0.005 * seconds) * np.sin(2 * np.pi * (0.92 * seconds + 1e-4 * seconds**2))
+    zeros = np.zeros(len(seconds))
+    run = replace(
+        runs[0], time_s=seconds, measured=swing + left + white(len(seconds), 1e-3), simulated_before=swing,
+        simulated_after=swing, keep=zeros + 1.0, torque_nm=None, torque_residual_before=None,
+        torque_residual_after=None, angle_rad=swing, rate_rad_s=np.gradient(swing, 1e-2), holdout=zeros,
+        frequency_hz=None,
+    )  # fmt: skip
+    found = diagnosis_of([run], 8.0)
+    assert found.free_lines == ()
+    assert diagnosis_sentences(found, "rotary")[0].endswith("it shows no free lines.")
 
 
 def test_five_runs_take_a_fraction_of_a_second() -> None:

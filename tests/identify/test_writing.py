@@ -235,3 +235,15 @@ def test_a_folder_that_cannot_be_written_leaves_no_partial_file(
         write_results(tmp_path, found, recording, DECLARED, "default")
     assert not list(tmp_path.glob("*.part"))
     assert not (tmp_path / "report.html").exists()
+
+
+def test_the_residual_stands_with_shares_chance_and_words_before_and_after() -> None:
+    found, _ = sample(2.0)
+    told = json.loads(json.dumps(result_json(found), allow_nan=False))["residual"]
+    assert told["before"]["harmonics"]["odd"]["share"] > 10.0 * told["before"]["harmonics"]["odd"]["by_chance"]
+    assert told["before"]["direction"]["share"] > 0.3
+    assert told["after"]["free_lines"] == []
+    assert len(told["after"]["sentences"]) == 1
+    assert result_json(replace(found, residual_before=None, after=None, residual_after=None))["residual"] == {
+        "before": None, "after": None
+    }  # fmt: skip

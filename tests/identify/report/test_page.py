@@ -19,7 +19,7 @@ from identify.report.markup import Markup, element, table
 from identify.report.motion import RUNS, motion_figures, stretches
 from identify.report.page import embedded
 from identify.report.residual import residual_figures, spectrum
-from identify.results import Identification
+from identify.results import FreeLine, Identification
 from rig.recording.run import Array
 from tests.identify.sample import SIGMA, sample, unhappy
 
@@ -127,8 +127,32 @@ def test_the_spectrum_makes_up_for_samples_that_do_not_count(found: Identificati
 
 
 def test_residuals_are_drawn_against_time_angle_rate_and_frequency(found: Identification) -> None:
-    assert len(residual_figures(found)) == 4
+    assert len(residual_figures(found)) == 5
     assert residual_figures(replace(found, traces=())) == []
+
+
+def test_the_page_says_where_the_residual_of_either_model_lives(page: str) -> None:
+    before, after = page.index("Where it lives: declared model"), page.index("Where it lives: final model")
+    assert before < page.index("in odd harmonics (3rd") < after
+    assert before < page.index("changes sign with the direction of motion") < after
+    assert after < page.index("nothing in it stands out of that")
+
+
+def test_a_gap_between_the_two_directions_of_motion_is_drawn(found: Identification) -> None:
+    figure = residual_figures(found)[2]
+    means = {t["name"]: numbers(t["y"]) for t in figure.traces if t["name"].startswith("mean") and t["yaxis"] == "y"}
+    assert np.median(means["mean, forward"]) > 0.5 and np.median(means["mean, backward"]) < -0.5
+
+
+def test_harmonics_and_free_lines_are_marked_in_the_spectrum(found: Identification) -> None:
+    assert found.residual_before is not None
+    pump = replace(found.residual_before, free_lines=(FreeLine(17.3, 0.1, 5),))
+    figure = residual_figures(replace(found, residual_before=pump))[-1]
+    odd = next(t for t in figure.traces if t["name"] == "odd harmonics")
+    assert {1.5, 9.0, 27.0} <= set(np.round(numbers(odd["x"]), 3).tolist())
+    assert not any(t["name"] == "even harmonics" for t in figure.traces)
+    assert "17.3 Hz, free" in [note["text"] for note in figure.layout["annotations"]]
+    assert any(shape.get("x0") == 17.3 for shape in figure.layout["shapes"])
 
 
 def test_without_torque_the_error_of_the_motion_takes_its_place() -> None:
