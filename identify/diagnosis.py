@@ -115,8 +115,11 @@ def _run(trace: RunTraces, sensor: Sensor, torque: bool, number: int) -> Moved:
     left = np.column_stack([np.where(use, c, 0.0) for c in columns])
     known = trace.torque_nm if trace.torque_nm is not None else np.zeros(len(time))
     thin = max(1, int(1.0 / (OVERSAMPLED * sensor.lowpass_hz * step))) if torque and sensor.lowpass_hz else 1
-    motion = (one[::thin] for one in (trace.angle_rad, trace.rate_rad_s, known, *_by_model(trace, step)))
-    return Moved(thin * step, *motion, use=use[::thin], left=left[::thin])
+    angle, rate = _by_model(trace, step)
+    return Moved(
+        thin * step, trace.angle_rad[::thin], trace.rate_rad_s[::thin], known[::thin], angle[::thin], rate[::thin],
+        use[::thin], left[::thin],
+    )  # fmt: skip
 
 
 def _by_model(trace: RunTraces, step_s: float) -> tuple[Array, Array]:
