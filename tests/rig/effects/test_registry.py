@@ -81,7 +81,7 @@ def test_effects_that_are_mentioned_exist_and_rivals_name_each_other(name: str) 
 def test_gravity_passes_for_a_bent_spring_up_to_a_travel_and_a_lag_for_a_lag_at_any() -> None:
     gravity, lag = effects.get("unbalance"), effects.get("actuator_lag")
     for spring in ("cubic_stiffness", "quadratic_stiffness"):
-        assert gravity.alike(spring, 10.0).startswith("within 12 deg")
+        assert gravity.alike(spring, 10.0).startswith("within 15 deg")
         assert gravity.alike(spring, 57.0) == ""
     assert "second sensor" in lag.alike("sensor_lag", math.inf)
     assert gravity.alike("coulomb_friction", 0.1) == ""
