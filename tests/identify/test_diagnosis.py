@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -158,11 +157,3 @@ def test_what_the_swing_of_a_decay_leaves_near_its_own_frequency_is_no_free_line
     found = diagnosis_of([run], 8.0)
     assert found.free_lines == ()
     assert diagnosis_sentences(found, "rotary")[0].endswith("it shows no free lines.")
-
-
-def test_five_runs_take_a_fraction_of_a_second() -> None:
-    runs, over = leftover({"coulomb_friction": VALUES["coulomb_friction"]})
-    diagnosis_of(runs, over)
-    begin = time.process_time()
-    diagnosis_of(runs, over)
-    assert time.process_time() - begin < 0.5
