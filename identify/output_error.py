@@ -332,9 +332,14 @@ def evaluate(
     shot_s: float | None = None,
     coarse: bool = False,
     finer: int = 1,
+    own_gains: bool = True,
 ) -> Estimate:
-    """The same parameters on other samples: start states and biases are fitted there, and what a run has of its own."""
-    estimate = _with_own_gains(estimate, traces, use, shot_s, coarse, finer)
+    """The same parameters on other samples: start states and biases are fitted there, and what a run has of its own.
+
+    ``own_gains`` False takes gains that no fit knows for nothing, which a tone pays for that fits one run alone.
+    """
+    if own_gains:
+        estimate = _with_own_gains(estimate, traces, use, shot_s, coarse, finer)
     names, x, structure = estimate.names, estimate.values, estimate.structure
     shots = shots_for(traces, structure, names, x, shot_s, use, None, coarse, finer)
     with ThreadPoolExecutor(2) as workers:
