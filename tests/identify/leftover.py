@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 from scipy import signal
@@ -23,7 +25,12 @@ JCK = {("inertia",): TRUTH[0], ("damping",): TRUTH[1], ("stiffness",): TRUTH[2]}
 
 def leftover(effects: Effects | None = None, seed: int = 0) -> tuple[list[RunTraces], float]:
     """The runs of a campaign with what the best J, C and K leave, and how far that is above the noise floor."""
-    traces = traces_of(campaign(effects, seed=seed))
+    return _leftover(json.dumps(effects), seed)
+
+
+@cache
+def _leftover(effects: str, seed: int) -> tuple[list[RunTraces], float]:
+    traces = traces_of(campaign(json.loads(effects), seed=seed))
     parts = [torque_residual(t, Structure(), JCK, CUTOFF_HZ) for t in traces]
     left = [_flat(p.residual) for p in parts if p is not None]
     columns = [_flat(np.column_stack(motion(t, CUTOFF_HZ)[::-1])) for t in traces]
