@@ -65,6 +65,27 @@ def test_what_leaves_a_third_of_what_was_missing_is_not_believed_before_the_rest
     assert set(found.best.structure.effects) == {"coulomb_friction", "quadratic_damping"}
 
 
+@pytest.mark.parametrize(
+    ("level", "added", "declared", "believed"),
+    [
+        (1.2, ("cubic_stiffness",), (), True),
+        (1.2, ("cubic_stiffness", "creep"), (), False),
+        (1.05, ("cubic_stiffness", "creep"), (), True),
+        (1.2, ("cubic_stiffness",), ("creep",), True),
+    ],
+)
+def test_what_can_follow_anything_has_to_bring_the_model_to_the_noise(
+    level: float, added: tuple[str, ...], declared: tuple[str, ...], believed: bool
+) -> None:
+    traces = traces_of(campaign(sets=((67.0, 6.0),), duration_s=1))
+    fine = FineSearch(Candidates(traces, split(traces), ()), lambda text: None)
+    fine.declared_level = 1000.0
+    plain = fine.whole(Structure(), START)
+    assert plain is not None
+    estimate = replace(plain.estimate, structure=Structure(effects=(*declared, *added)))
+    assert fine._believed(replace(plain, estimate=estimate, squares=level * plain.count), declared) is believed
+
+
 def test_a_lag_of_the_sensor_is_named_in_the_drive_which_no_record_tells_from_it() -> None:
     found, took = searched(campaign({"sensor_lag": {"time": 3e-4}}, duration_s=4))
     assert took
