@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from identify.output_error import Estimate, evaluate, refine
+from identify.evaluation import evaluate
+from identify.output_error import Estimate, refine
 from identify.parameters import Name, names_of
 from identify.regression import Shapes, Solution, Structure
 from identify.traces import Trace

@@ -11,7 +11,8 @@ from scipy import signal
 from scipy.linalg import block_diag
 
 from identify.compare import start_values
-from identify.output_error import Estimate, evaluate, refine
+from identify.evaluation import evaluate
+from identify.output_error import Estimate, refine
 from identify.parameters import Name
 from identify.regression import Regression, Solution, Structure, residuals
 from identify.screen import Start, best_rho

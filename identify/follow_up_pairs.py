@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identify.evaluation import evaluate
 from identify.follow_up_separation import Way, prior_of
 from identify.identifiability import vector_of
-from identify.output_error import Estimate, evaluate, refine
+from identify.output_error import Estimate, refine
 from identify.results import Identification, Unparted
 from identify.traces import Trace
 from rig import effects

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from identify.compare import Judged
+from identify.evaluation import evaluate
 from identify.holdout import Split
-from identify.output_error import Estimate, evaluate, refine
+from identify.output_error import Estimate, refine
 from identify.parameters import Name
 from identify.regression import Structure
 from identify.traces import Trace

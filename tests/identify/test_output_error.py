@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from identify.output_error import bounds_of, evaluate, make_shots, names_of, ordered, refine
+from identify.evaluation import evaluate
+from identify.output_error import bounds_of, make_shots, names_of, ordered, refine
 from identify.regression import Structure
 from identify.traces import prepare
 from rig.recording.run import Recording
