@@ -21,7 +21,7 @@ from identify.identifiability import information_of
 from identify.output_error import refine
 from identify.parameters import Name, platform_of
 from identify.prefilter import Denominator
-from identify.regression import Regression, Structure, fit, normal
+from identify.regression import Regression, Solution, Structure, fit, normal
 from identify.results import UNITS, GeneticRun, ParameterEstimate, SetResult
 from identify.screen import Start
 from identify.start_doubt import least_std_errors
@@ -106,6 +106,7 @@ class Condensed:
     terms: tuple[str, ...]
     count: int
     floor: float  # sum of squares that the sensor's noise makes
+    solution: Solution | None  # that its filter comes from, unless it is plain
 
 
 def condense(
@@ -113,6 +114,7 @@ def condense(
 ) -> Condensed:
     """Normal equations of the linear model, prefiltered to white (or, ``plain``, as bare equation error)."""
     regression = Regression(traces, Structure(terms))
+    solution: Solution | None = None
     if plain:
         w = 2.0 * np.pi * start.cutoff_hz  # a low-pass on both sides, as section 3 of the paper filters
         denominator = Denominator(1.0, 1.4 * w, w * w)
@@ -123,19 +125,20 @@ def condense(
     kept = tuple(label[0] for label in regression.labels)
     noise = float(np.mean([t.noise**2 for t in traces]))
     objective = QuadraticObjective(equations.a, equations.b, equations.c)
-    return Condensed(objective, kept, equations.count, noise * equations.count)
+    return Condensed(objective, kept, equations.count, noise * equations.count, solution)
 
 
 def genetic(
     name: str, traces: Sequence[Trace], terms: tuple[str, ...], start: Start, centre: Mapping[str, float],
-    settings: IdentifyConfig, seed: int, rho: float, beside: bool,
+    settings: IdentifyConfig, seed: int, rho: float, beside: bool, condensed: Condensed | None = None,
 ) -> GeneticRun:  # fmt: skip
     """The paper's search on one set (or all), with the closed form beside it.
 
     ``centre`` are the values around which the range spans ``search_factor`` either way; ``beside`` also runs
-    Eq. 13 alone and the plain equation error, to be reported next to it.
+    Eq. 13 alone and the plain equation error, to be reported next to it. ``condensed`` is what ``condense`` makes
+    of all this, where somebody has it already.
     """
-    condensed = condense(traces, terms, start, rho)
+    condensed = condensed or condense(traces, terms, start, rho)
     goal = condensed.objective
     low, high = search_range(condensed.terms, goal.closed_form, centre, settings.genetic.search_factor)
     j_dec = settings.j_dec if settings.j_dec is not None else ALLOWANCE * condensed.floor
@@ -197,12 +200,16 @@ def each_set(
 
     def alone(i: int) -> SetResult:
         trace = whole[i]
-        run = genetic(trace.run.name, [trace], terms, begin, centre, settings, settings.seed + i, rho, False)
-        return _result(trace, run, terms, begin, rho, axis, bounds[i])
+        seed, condensed = settings.seed + i, condense([trace], terms, begin, rho)
+        run = genetic(trace.run.name, [trace], terms, begin, centre, settings, seed, rho, False, condensed)
+        assert condensed.solution is not None
+        return _result(trace, run, condensed.solution, terms, begin.platform, axis, bounds[i])
 
     with ThreadPoolExecutor(2) as workers:
-        results = tuple(workers.map(alone, range(len(whole))))
-    return results, genetic("all sets", whole, terms, begin, centre, settings, settings.seed, rho, True)
+        joint = workers.submit(
+            genetic, "all sets", whole, terms, begin, centre, settings, settings.seed, rho, True
+        )  # fmt: skip
+        return tuple(workers.map(alone, range(len(whole)))), joint.result()
 
 
 def _by_motion(trace: Trace, values: Mapping[str, float], labels: Sequence[Name]) -> tuple[Array, Array]:
@@ -263,11 +270,9 @@ def _bounds(traces: Sequence[Trace], fitted: Fitted) -> list[dict[str, float]]:
 
 
 def _result(
-    trace: Trace, run: GeneticRun, terms: tuple[str, ...], start: Start, rho: float, axis: str,
-    bound: Mapping[str, float],
+    trace: Trace, run: GeneticRun, solution: Solution, terms: tuple[str, ...],
+    platform: tuple[float, float, float], axis: str, bound: Mapping[str, float],
 ) -> SetResult:  # fmt: skip
-    regression = Regression([trace], Structure(terms))
-    solution = fit(regression, {}, start.platform, rho, 8)
     mask = [trace.keep]
     covariance, determined = _regression_covariance([trace], solution, mask)
     simulated, least = _by_motion(trace, run.parameters, solution.labels)
@@ -275,7 +280,7 @@ def _result(
     errors = np.maximum(errors, [bound.get(term, 0.0) for (term,) in solution.labels])
     apart = np.abs(simulated - [run.parameters[term] for (term,) in solution.labels])
     errors = np.where(apart > APART * errors, apart, errors)
-    errors = _tied(trace, errors, solution.labels, run.parameters, start.platform)
+    errors = _tied(trace, errors, solution.labels, run.parameters, platform)
     parameters, identifiable = {}, []
     for i, (term,) in enumerate(solution.labels):
         value, error = run.parameters[term], float(errors[i])

@@ -23,6 +23,7 @@ from rig.dynamics import TorqueSignal
 from rig.dynamics.equations import MAX_SUBSTEPS, slots
 from rig.dynamics.filters import run_filter
 from rig.dynamics.native import addresses
+from rig.dynamics.polynomials import Polynomials
 from rig.effects.base import Effect, Place
 from rig.recording.run import Array, Run
 
@@ -138,13 +139,13 @@ class Trace:
         fine_t = self.step_s / UPSAMPLING * np.arange((len(y) - 1) * UPSAMPLING + 1)
         spline = CubicSpline(t, y)
         if self.channel == "rate":
-            angle, rate = spline.antiderivative()(fine_t), spline(fine_t)
+            angle, rate = Polynomials(spline.antiderivative())(fine_t), Polynomials(spline)(fine_t)
             left = self.noise * np.sqrt(min(1.0, wn))
             if self.run.angle_rad is not None:
                 encoder = np.interp(t + self.start_s, self.run.time_s, self.run.angle_rad)
                 angle = angle + np.median(encoder - angle[::UPSAMPLING])
         else:
-            angle, rate = spline(fine_t), spline.derivative()(fine_t)
+            angle, rate = Polynomials(spline)(fine_t), Polynomials(spline.derivative())(fine_t)
             left = self.noise * 2.0 * np.pi * self.cutoff_hz / np.sqrt(3.0) * np.sqrt(min(1.0, wn))
         torque = np.zeros_like(fine_t) if self.torque is None else self.torque.at(fine_t + self.start_s)
         return angle, rate, fine_t + self.offset_s, torque, float(left)

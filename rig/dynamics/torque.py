@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from rig.dynamics.polynomials import Polynomials
 from rig.recording.run import Array, TorqueHold
 
 KEPT = 6  # readings between the samples: every fit to a run asks for one of a few
@@ -33,10 +33,10 @@ class TorqueSignal:
     _read: dict[tuple[float, float, int], Array] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @cached_property
-    def _spline(self) -> Any:
+    def _spline(self) -> Polynomials:
         k = min(5, len(self.time_s) - 1)
         k -= 1 - k % 2 if k > 1 else 0  # an odd degree
-        return make_interp_spline(self.time_s, self.torque_nm, k=max(1, k))
+        return Polynomials(make_interp_spline(self.time_s, self.torque_nm, k=max(1, k)))
 
     @cached_property
     def shortest_s(self) -> float:
@@ -52,7 +52,7 @@ class TorqueSignal:
         t = np.clip(time_s, self.time_s[0], self.time_s[-1])
         if self.hold == "zero_order":
             return self.torque_nm[np.clip(np.searchsorted(self.time_s, t, "right") - 1, 0, None)]
-        return np.asarray(self._spline(t), dtype=float)
+        return self._spline(np.asarray(t))
 
     def _impulse(self, t: Array) -> Array:
         inside = np.clip(t, self.time_s[0], self.time_s[-1])
