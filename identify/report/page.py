@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
-from itertools import count
 from typing import Any
-
-from plotly.offline import get_plotlyjs
 
 from identify.diagnosis_wording import diagnosis_sentences
 from identify.expected_delay import delay_lines
 from identify.follow_up_wording import lines as follow_up_lines
 from identify.hindsight import hindsight
-from identify.json_values import finite
 from identify.next_steps import next_steps
 from identify.report.convergence import convergence_figure, convergence_table
 from identify.report.determined import determined_table
+from identify.report.document import Gallery, document
 from identify.report.estimates import estimates_figure
-from identify.report.figure import Figure
 from identify.report.markup import Markup, Piece, bullets, element, join, paragraph, section
 from identify.report.motion import RUNS, motion_figures
 from identify.report.residual import residual_figures
@@ -52,8 +46,6 @@ from identify.wording import (
 from rig.recording.run import Recording
 
 KICKER = {"rotary": "Identification of an inertial stability platform", "linear": "Identification of a linear axis"}
-# Nothing may be fetched and nothing sent: the browser itself holds the page to it.
-POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 
 
 def report_html(identification: Identification, recording: Recording, name: str) -> str:
@@ -61,7 +53,7 @@ def report_html(identification: Identification, recording: Recording, name: str)
 
     ``name`` is the campaign's. Plots are thinned to a few thousand points a line with all peaks kept.
     """
-    gallery = _Gallery()
+    gallery = Gallery()
     body = join(
         [
             _header(identification, name),
@@ -74,32 +66,7 @@ def report_html(identification: Identification, recording: Recording, name: str)
             _origin(recording),
         ]
     )
-    return _page(name, body, gallery.figures)
-
-
-class _Gallery:
-    """Hands out places for figures and remembers what is to be drawn there."""
-
-    def __init__(self) -> None:
-        self.figures: dict[str, dict[str, Any]] = {}
-        self._numbers = count(1)
-
-    def place(self, figure: Figure | None) -> Markup:
-        """Where the figure will stand; nothing for None."""
-        if figure is None:
-            return Markup("")
-        key = f"figure-{next(self._numbers)}"
-        self.figures[key] = {"data": list(figure.traces), "layout": figure.layout | {"height": figure.height}}
-        buttons = [
-            element("button", text, type="button", data_figure=key, data_range=json.dumps(span))
-            for text, span in figure.zooms
-        ]
-        plot = element(
-            "div", class_="plot", id=key, role="img", aria_label=figure.label, style=f"height:{figure.height}px"
-        )
-        heading = element("h3", figure.heading) if figure.heading else Markup("")
-        zooms = element("div", *buttons, class_="zooms") if buttons else Markup("")
-        return element("figure", heading, zooms, plot, element("figcaption", figure.caption))
+    return document(f"{name}: identification", body, gallery.figures)
 
 
 def _header(identification: Identification, name: str) -> Markup:
@@ -115,7 +82,7 @@ def _header(identification: Identification, name: str) -> Markup:
     )
 
 
-def _verdict(identification: Identification, recording: Recording, gallery: _Gallery) -> Markup:
+def _verdict(identification: Identification, recording: Recording, gallery: Gallery) -> Markup:
     verdict, final = identification.verdict, identification.final
     steps = next_steps(identification)
     reasons = [
@@ -167,7 +134,7 @@ def _tiles(identification: Identification) -> Markup:
     return element("div", *tiles, class_="tiles")
 
 
-def _errors(identification: Identification, gallery: _Gallery) -> Markup:
+def _errors(identification: Identification, gallery: Gallery) -> Markup:
     share = identification.verdict.unexplained_fraction
     state = (
         f"Unexplained: the residual stays significantly above the noise floor ({number(100.0 * share, 2)} % of it)."
@@ -211,7 +178,7 @@ def _candidates(identification: Identification) -> Markup:
     )
 
 
-def _sets(identification: Identification, recording: Recording, gallery: _Gallery) -> Markup:
+def _sets(identification: Identification, recording: Recording, gallery: Gallery) -> Markup:
     determined = determined_table(hindsight(identification, recording))
     if not identification.per_set and identification.joint is None:
         return section("sets", "What the data could determine", determined) if determined.html else determined
@@ -225,12 +192,12 @@ def _sets(identification: Identification, recording: Recording, gallery: _Galler
     )
 
 
-def _response(identification: Identification, recording: Recording, gallery: _Gallery) -> Markup:
+def _response(identification: Identification, recording: Recording, gallery: Gallery) -> Markup:
     figure = response_figure(identification, recording)
     return Markup("") if figure is None else section("response", "Frequency response", gallery.place(figure))
 
 
-def _motion(identification: Identification, gallery: _Gallery) -> Markup:
+def _motion(identification: Identification, gallery: Gallery) -> Markup:
     figures = [gallery.place(figure) for figure in motion_figures(identification)]
     total = len(identification.traces)
     note = f"The {RUNS} of {total} runs with the largest error; recording.h5 has all." if total > RUNS else ""
@@ -262,33 +229,3 @@ def _flat(info: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
         elif value is not None:
             out[name] = str(value)
     return {name: text for name, text in out.items() if text}
-
-
-def embedded(value: Any) -> str:
-    """JSON that may stand inside a script element: no character of it can end the element."""
-    text = json.dumps(finite(value), allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-
-
-def _page(name: str, body: Markup, figures: Mapping[str, Any]) -> str:
-    own = files("identify.report")
-    title = element("title", f"{name}: identification").html
-    return "\n".join(
-        [
-            "<!DOCTYPE html>",
-            '<html lang="en"><head><meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            '<meta name="color-scheme" content="light dark">',
-            '<link rel="icon" href="data:,">',
-            title,
-            f"<style>{(own / 'page.css').read_text(encoding='utf-8')}</style></head>",
-            f"<body><main>{body.html}</main>",
-            "<noscript><p>The plots need JavaScript, which this page carries; text and tables do not.</p></noscript>",
-            f'<script type="application/json" id="figures">{embedded(figures)}</script>',
-            f"<script>{get_plotlyjs()}</script>",
-            f"<script>{(own / 'page.js').read_text(encoding='utf-8')}</script>",
-            "</body></html>",
-            "",
-        ]
-    )

@@ -14,10 +14,10 @@ from plotly.offline import get_plotlyjs
 
 from identify.report import report_html
 from identify.report.convergence import convergence_figure
+from identify.report.document import embedded
 from identify.report.estimates import estimates_figure
 from identify.report.markup import Markup, element, table
 from identify.report.motion import RUNS, motion_figures, stretches
-from identify.report.page import embedded
 from identify.report.residual import residual_figures, spectrum
 from identify.results import FreeLine, Identification
 from rig.recording.run import Array
