@@ -11,7 +11,7 @@ from identify import clipping, glitches, persets, sampling
 from identify.channels import Offer
 from identify.declared_values import declared_values, kept_as_declared
 from identify.diagnosis import with_diagnosis
-from identify.finish import Fitted
+from identify.finish import Fitted, noise_of_all
 from identify.holdout import Split
 from identify.measures import Measured
 from identify.next_steps import opposite_signs, unexplained_reason
@@ -31,6 +31,7 @@ from identify.results import (
 from identify.search import Search
 from identify.sign_check import SENTENCE
 from identify.traces import UPSAMPLING, Trace, loads_differ
+from identify.undetermined import of_another_run, undetermined
 from identify.verdict import sentences_of
 from rig import effects
 from rig.config.identify import IdentifyConfig
@@ -38,7 +39,6 @@ from rig.effects.base import Place
 from rig.platform import Platform
 from rig.recording.run import Recording
 
-TIED = 0.95  # correlation beyond which two parameters are one
 STRAYED = 3.0  # times the sensor's noise: a free run with friction may have gone astray
 UNEXPLAINED = 1.1  # times the noise floor in free run: above it, something is left that no effect here explains
 TORQUE_FREE = {"damping": ("damping_over_inertia", "1/s"), "stiffness": ("stiffness_over_inertia", "1/s^2")}
@@ -120,7 +120,7 @@ def _note(case: Case) -> str:
 
 def _ratio(case: Case, after: Fitted, search: Search) -> float:
     """Residual over sensor noise: in free run where the model can run free, else over the horizon."""
-    noise = floor_noise(case.traces)
+    noise = noise_of_all(case.traces)
     if after.free_run is not None and after.sensor_limited:
         return after.sigma / noise
     free = after.free_run.sigma / noise if after.free_run is not None else np.inf
@@ -135,7 +135,7 @@ def _model(case: Case, fitted: Fitted, measured: Measured, dropped: tuple[NotRep
     of_effects: dict[str, dict[str, ParameterEstimate]] = {e: {} for e in fitted.structure.effects}
     lost = _lost(case, fitted)
     for name in fitted.names:
-        if name in lost or _of_a_run_held_out(case, name):
+        if name in lost or of_another_run(name, _runs_fitted(case)):
             continue
         value, error = fitted.values[name], fitted.std_error(name)
         estimate = ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), _unit(case, name))
@@ -159,25 +159,8 @@ def _runs_fitted(case: Case) -> set[int]:
     return {t.number for t, m in zip(case.traces, case.split.final, strict=True) if np.any(m)}
 
 
-def _of_a_run_held_out(case: Case, name: Name) -> bool:
-    """Whether a parameter belongs to a run that no fit looked at: it came with the start state, to judge that run."""
-    return len(name) == 3 and int(name[2]) not in _runs_fitted(case)
-
-
 def _lost(case: Case, fitted: Fitted) -> dict[Name, str]:
-    """What the data do not determine, and why; in the order of the fit."""
-    out: dict[Name, str] = {}
-    for i, name in enumerate(fitted.names):
-        if _of_a_run_held_out(case, name):
-            continue
-        value, error, term = fitted.values[name], fitted.std_error(name), len(name) == 1
-        tied = _tied_to_nothing(fitted, i, len(case.traces) == 1) if term else ""
-        wide = term and (not np.isfinite(error) or error > 0.5 * abs(value))
-        if tied:
-            out[name] = f"it is tied to {tied}, which the data do not determine"
-        elif not fitted.determined[i] or wide:
-            out[name] = _undetermined(value, error, fitted.determined[i])
-    return out
+    return undetermined(fitted, _runs_fitted(case), len(case.traces) == 1)
 
 
 def _label(case: Case, name: Name) -> str:
@@ -245,34 +228,6 @@ def _series(case: Case, before: Measured, after: Measured) -> tuple[RunTraces, .
             )
         )  # fmt: skip
     return tuple(out)
-
-
-def _tied_to_nothing(fitted: Fitted, i: int, alone: bool) -> str:
-    """A term that the data do not determine and that drags this one along; empty where there is none.
-
-    In a single run (``alone``) inertia and stiffness are one number at each frequency.
-    """
-    size = np.sqrt(np.maximum(np.diag(fitted.covariance), 1e-300))
-    for k, name in enumerate(fitted.names):
-        if k == i or len(name) > 1:
-            continue
-        lost = not fitted.determined[k] or not size[k] <= 0.5 * abs(fitted.values[name])
-        pair = alone and {name[0], fitted.names[i][0]} == {"inertia", "stiffness"}
-        one = abs(fitted.covariance[i, k]) > TIED * size[i] * size[k]
-        if lost and fitted.determined[i] and (pair or one):
-            return name[0]
-    return ""
-
-
-def floor_noise(traces: Sequence[Trace]) -> float:
-    """The sensor's noise, pooled."""
-    return float(np.sqrt(np.mean([t.noise**2 for t in traces])))
-
-
-def _undetermined(value: float, error: float, determined: bool) -> str:
-    if not determined:
-        return "these runs hold no information on it; add a set at another frequency or keep the start transient"
-    return f"its standard error {error:.3g} is more than half of its value {value:.3g}; excite it more or for longer"
 
 
 def _correlation(fitted: Fitted) -> dict[str, float]:
