@@ -94,6 +94,8 @@ class _Identifier:
             )
         self.torque_free = free
         _refuse_the_idle(self.traces, free)
+        if free:
+            _refuse_added_inertia(self.traces)
         self.split: Split = split(self.traces, settings.holdout)
         offer = offer_of(self.traces, declared)
         unseen = tuple((n, why) for n in declared.effects if (why := why_unseen(n, self.traces)))
@@ -280,6 +282,23 @@ def _refuse_the_idle(traces: list[Trace], free: bool) -> None:
         raise RecordingError(
             "the torque has the same value in every sample of every run: J, C and K need a torque that changes; "
             "check recorded.columns.torque, or leave the torque out for a free decay"
+        )
+
+
+def _refuse_added_inertia(traces: list[Trace]) -> None:
+    """Refuse a known mass on a platform whose inertia is the unit of everything.
+
+    Raises
+    ------
+    RecordingError
+        Where a run without torque says that an inertia was added.
+    """
+    loaded = [t.run for t in traces if t.run.added_inertia_kg_m2]
+    if loaded:
+        raise RecordingError(
+            f"{loaded[0].name} was recorded with an added inertia of {loaded[0].added_inertia_kg_m2:g} and without "
+            "torque: only ratios to the inertia can be known, and there is nothing to add it to; identify the runs of "
+            "each load by themselves, without added_inertia_kg_m2 and with model.inertia_kg_m2 of the loaded platform"
         )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -9,6 +11,7 @@ from scipy.integrate import solve_ivp
 from identify.decay import PLENTY, thinned
 from identify.loop import identify
 from rig.config.identify import IdentifyConfig
+from rig.errors import RecordingError
 from rig.platform import Platform
 from rig.recording.run import Array, Recording, Run
 
@@ -62,3 +65,9 @@ def test_a_short_run_beside_long_ones_keeps_enough_samples_to_be_used() -> None:
 def test_a_fast_decay_keeps_every_sample() -> None:
     run = decay(step_s=0.001, duration_s=60.0)
     assert thinned([run], 30.0) == [run]
+
+
+def test_an_added_inertia_without_torque_is_refused_with_what_to_do() -> None:
+    bare, loaded = decay(duration_s=20.0), replace(decay(duration_s=20.0), name="with ring", added_inertia_kg_m2=0.02)
+    with pytest.raises(RecordingError, match=r"with ring .* 0\.02 .*each load by themselves"):
+        identify(Recording((bare, loaded)), Platform(1.0, 0.1, 20.0), IdentifyConfig())
