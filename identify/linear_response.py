@@ -53,7 +53,8 @@ def linear_response(platform: Platform, frequency_hz: Array, size: Size) -> tupl
             one = _filter_response(effect, values, np.asarray(frequency_hz, dtype=float), level)
             through = through if one is None else through * one
         else:
-            one = _load_response(effect, (*jck, *values), s, size) if effect.place is Place.LOAD else None
+            alone = effect.place is Place.LOAD and not effect.reads  # what follows a channel has no response of its own
+            one = _load_response(effect, (*jck, *values), s, size) if alone else None
             stiff = stiff if one is None else stiff + one
         if one is None:
             left_out.append(name)

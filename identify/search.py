@@ -104,7 +104,7 @@ class Search:
             replace(c, status="best of a bad lot") if c.status == "added" and c.effect not in kept else c
             for c in self.candidates
         ]  # fmt: skip
-        self.best, self.rivals, self.dropped = self.base, {}, []
+        self.best, self.rivals, self.rival_models, self.dropped = self.base, {}, {}, []
 
 
 class Loop:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import sys
 import traceback
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -115,6 +116,8 @@ def _effects_in(path: Path) -> list[Effect]:
     if spec is None or spec.loader is None:
         raise ConfigError(f"{path} is no Python file: its name has to end in .py")
     module = importlib.util.module_from_spec(spec)
+    # What Numba compiles of it is kept beside the file under the module's name, and has to find it there next time.
+    sys.modules[spec.name] = module
     try:
         spec.loader.exec_module(module)
     except Exception as error:  # the user's code: whatever it raises is said with its line

@@ -7,6 +7,7 @@ import pytest
 
 from identify.linear_response import Size, linear_response
 from rig import effects
+from rig.channels import Channel
 from rig.platform import Platform
 
 F = np.geomspace(0.3, 60.0, 60)
@@ -40,3 +41,12 @@ def test_what_depends_on_amplitude_or_time_stands_in_no_line_and_is_named(name: 
     found, left_out = linear_response(Platform(0.02, 0.045, 677.3, {name: values}), F, SIZE)
     assert left_out == (name,)
     assert found == pytest.approx(S / (0.02 * S**2 + 0.045 * S + 677.3))
+
+
+def test_what_follows_a_measured_channel_has_no_response_of_its_own() -> None:
+    effects.declare_channels([Channel("winding", "temperature")])
+    for name in effects.of_channel("winding"):
+        given = {p.name: 0.01 for p in effects.get(name).parameters}
+        found, left_out = linear_response(Platform(0.02, 0.045, 677.3, {name: given}), F, SIZE)
+        assert left_out == (name,)
+        assert found == pytest.approx(S / (0.02 * S**2 + 0.045 * S + 677.3))

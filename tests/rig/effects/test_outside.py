@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
@@ -69,6 +71,14 @@ def test_a_file_named_in_the_yaml_is_known_wherever_an_effect_may_stand(tmp_path
     assert loaded.config.simulated.platform.platform().effects == {"eddy_brake": {"level": 2.0, "speed": 3.0}}
     assert EXAMPLE in loaded.included.values()
     load(tmp_path, text)  # a second time is no second effect of that name
+
+
+def test_a_program_started_anew_reads_the_same_file_again(tmp_path: Path) -> None:
+    """The compiled kernel is kept beside the file; the next start has to find the module that it belongs to."""
+    code = f"from rig import effects; effects.read_file(__import__('pathlib').Path({str(written(tmp_path))!r}))"
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
 
 
 def test_the_twin_says_where_its_effect_is_written(tmp_path: Path) -> None:
