@@ -71,6 +71,8 @@ class Candidates:
         short = self._shortlist(looks, now, most, 0.0 if in_full else FAINT)  # far off a decay's scores point anywhere
         for look in sorted(short, key=lambda s: -s.gain):  # where that is the one, the others need no fit
             best = min(tried.values(), key=lambda w: w.squares, default=now)
+            if self.fits.gives_up(best):
+                return tried, looks
             found = best.structure.effects[-1] if best is not now and best.at_noise else None
             holds_it = found is not None and look.effect in effects.get(found).nests
             behind = look.gain < FAR_BEHIND * short[0].gain and not _is_like(look.effect, tried)
@@ -83,6 +85,8 @@ class Candidates:
         if best.level > ENDS_NEAR and best.squares > MOST_OF_IT * now.squares:
             tried |= self._seen_otherwise(now, tried, best)
             best = min(tried.values(), key=lambda w: w.squares, default=now)
+        if self.fits.gives_up(best):
+            return tried, looks
         pliant = best is not now and effects.get(best.structure.effects[-1]).resembles_much
         for name, w in list(tried.items()):
             plain = not effects.get(name).resembles_much
@@ -147,11 +151,13 @@ class Candidates:
             start = first_guess(self.fits.fitting, Structure(structure.terms))
             screen = Screen(self.fits.fitting, structure, now.judged().shapes(), start)
             for name in seen_by_regression:
+                if self.fits.gives_up(best):
+                    break
                 seen = self.fits.as_seen(screen, name, structure, now.values(), best.estimate.sigma)
                 if seen is not None and seen.squares < tried.get(name, best).squares:
                     out[name] = seen
         for name in changing:
-            if min((w.level for w in out.values()), default=np.inf) < ENDS_NEAR:
+            if min((w.level for w in out.values()), default=np.inf) < ENDS_NEAR or self.fits.gives_up(best):
                 break
             small = out.get(name, tried.get(name))
             large = self.fits.or_large(name, now, small, best.estimate.sigma)

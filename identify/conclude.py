@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify import clipping, glitches, persets, sampling
+from identify import clipping, glitches, persets, sampling, turned_runs
 from identify.channels import Offer
 from identify.declared_values import declared_values, kept_as_declared
 from identify.diagnosis import with_diagnosis
@@ -31,7 +31,7 @@ from identify.results import (
 from identify.search import Search
 from identify.sign_check import SENTENCE
 from identify.traces import UPSAMPLING, Trace, loads_differ
-from identify.undetermined import of_another_run, undetermined
+from identify.undetermined import of_another_run, open_phases, undetermined
 from identify.verdict import sentences_of
 from rig import effects
 from rig.config.identify import IdentifyConfig
@@ -56,6 +56,7 @@ class Case:
     offer: Offer
     torque_free: bool
     declared: Platform
+    turned: tuple[str, ...] = ()  # runs left out for the sign of their torque
 
 
 def conclude(
@@ -115,7 +116,7 @@ def _note(case: Case) -> str:
     torn = glitches.told([(t.run.name, t.glitches_s) for t in case.traces])
     beyond = clipping.told([(t.run.name, *t.clipped) for t in case.traces], case.recording.axis)
     uneven = sampling.told([(t.run.name, *t.scatter) for t in case.traces])
-    return ". ".join(note for note in (case.split.note, torn, beyond, uneven) if note)
+    return ". ".join(note for note in (case.split.note, turned_runs.told(case.turned), torn, beyond, uneven) if note)
 
 
 def _ratio(case: Case, after: Fitted, search: Search) -> float:
@@ -133,11 +134,11 @@ def _ratio(case: Case, after: Fitted, search: Search) -> float:
 def _model(case: Case, fitted: Fitted, measured: Measured, dropped: tuple[NotReported, ...]) -> ModelResult:
     parameters: dict[str, ParameterEstimate] = {}
     of_effects: dict[str, dict[str, ParameterEstimate]] = {e: {} for e in fitted.structure.effects}
-    lost = _lost(case, fitted)
+    lost, open_ = _lost(case, fitted), open_phases(fitted)
     for name in fitted.names:
         if name in lost or of_another_run(name, _runs_fitted(case)):
             continue
-        value, error = fitted.values[name], fitted.std_error(name)
+        value, error = fitted.values[name], open_.get(name, fitted.std_error(name))
         estimate = ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), _unit(case, name))
         if len(name) == 1:
             parameters[_label(case, name)] = estimate

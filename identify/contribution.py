@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify import whole_runs
+from identify import fits as whole_fits
 from identify.fits import Fits
 from identify.parameters import Name
 from identify.regression import Structure
@@ -50,4 +50,4 @@ def _without(fits: Fits, structure: Structure, rest: Mapping[Name, float], base:
 
 
 def _steps(fits: Fits) -> int:
-    return whole_runs.STEPS if fits.torque_free else STEPS
+    return whole_fits.STEPS if fits.torque_free else STEPS

@@ -1,4 +1,4 @@
-"""Where a model's residual lives: harmonics of the excitation, free lines, direction of motion, memory.
+"""Where a model's residual lives: harmonics of the excitation, free lines, direction of motion, memory, moments.
 
 Every figure is a power of the residual. The same is asked of draws of the sensor's noise, sent through the same
 differentiator, low-pass and drift removal: what these show is what chance shows.
@@ -15,6 +15,7 @@ import numpy as np
 from identify.free_lines import free_lines, without_lines
 from identify.harmonics import Repeated, harmonics
 from identify.memory import Moved, direction_power, memory_power
+from identify.moments import moments
 from identify.period import period_of
 from identify.residual import EDGE_PERIODS, low_pass
 from identify.results import UNITS, Harmonics, Identification, ResidualDiagnosis, RunTraces, Share
@@ -66,10 +67,11 @@ def diagnose(
     direction = _shares(direction_power(rest), total) if known else None
     memory = _shares(memory_power(rest), total) if known else None
     quantity: Literal["torque", "rate", "angle"] = "torque" if torque else traces[0].channel
+    brief = moments(runs, [float(t.time_s[0]) for t in traces], [t.name for t in traces])
     return tuple(
         ResidualDiagnosis(
             quantity, units[0] if torque else units[1], floors[i], _harmonics(repeated, i) if repeated else None,
-            lines[i], direction[i] if direction else None, memory[i] if memory else None,
+            lines[i], direction[i] if direction else None, memory[i] if memory else None, brief[i],
         )
         for i in (0, 1)
     )  # fmt: skip

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from identify.results import FreeLine, Harmonics, ResidualDiagnosis, Share
+from collections.abc import Sequence
+
+from identify.results import FreeLine, Harmonics, Moment, ResidualDiagnosis, Share
 from identify.wording import joined, number, unit
 
 WORTH, WORTH_OF_PAST = 0.02, 0.1  # shares of the residual's power below which nothing is said
@@ -22,6 +24,7 @@ def diagnosis_sentences(found: ResidualDiagnosis, axis: str) -> tuple[str, ...]:
         *(_line(line, found) for line in found.free_lines),
         *_direction(found.direction),
         *_memory(found.memory),
+        *_moments(found.moments),
     ]
     said = [_level(found, bool(said)), *said] if found.over_floor is not None or said else []
     return tuple(_on(axis, text) for text in said if text)
@@ -87,6 +90,17 @@ def _memory(share: Share | None) -> list[str]:
     return [
         f"{_percent(share.share)} of it hangs on what came before, and on no function of the present angle, rate and "
         "torque: hysteresis, creep, or a second mode."
+    ]
+
+
+def _moments(found: Sequence[Moment]) -> list[str]:
+    if not found:
+        return []
+    places = [f"{m.run} from {m.from_s:.2f} to {m.to_s:.2f} s ({_percent(m.share)})" for m in found]
+    share = _percent(sum(m.share for m in found))
+    return [
+        f"{share} of it lies in {joined(places)}: something happened there that happens at no other time (a touch, a "
+        "slip, the way a run began). Leave it out with from_s or to_s, or record the run again."
     ]
 
 

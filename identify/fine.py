@@ -63,6 +63,8 @@ class FineSearch:
         and nothing found here is kept.
         """
         begin = self.whole(found.best.structure, found.best.values())
+        if begin is not None and self.on_offer.fits.gives_up(begin):
+            return False
         pliant = any(effects.get(e).resembles_much for e in found.best.structure.effects)
         if begin is not None and begin.structure.effects == found.base.structure.effects:
             self.declared_level = begin.level
@@ -75,7 +77,7 @@ class FineSearch:
         trial = _copy_of(found)
         through = self._rounds(trial, begin)
         for other in (self._hidden_pair, self._large_beside):
-            if not through:
+            if not through and not self.on_offer.fits.gives_up(begin):
                 trial = _copy_of(found)
                 started = other(trial, begin)
                 through = started is not None and self._rounds(trial, started)
@@ -125,6 +127,9 @@ class FineSearch:
             now = self.on_offer.sharp(now)
             if len(now.structure.effects) >= most and now.level > ENDS_NEAR:
                 return False  # more than that are not believed, and each round costs more than the one before
+            if self.on_offer.fits.gives_up(now):
+                self.say("no more is tried over whole runs: nothing of all that was comes near the sensor's noise")
+                return False
             chosen = self._round(found, now, round_)
             if chosen is None:
                 break
@@ -134,7 +139,8 @@ class FineSearch:
             self.passed[frozenset(now.structure.effects)] = now.level
             if len(now.structure.effects) >= most and now.level > NO_SWAP:
                 return False
-            if now.level > AT_FLOOR:  # a lag in the sensor looks like one in the drive until the rest is there
+            # A lag in the sensor looks like one in the drive until the rest is there.
+            if now.level > AT_FLOOR and not self.on_offer.fits.gives_up(now):
                 now = self._asked_again(found, now)
         if not self._believed(now, declared.effects):
             return False

@@ -10,12 +10,12 @@ from identify.choice import STILL_FAR
 from identify.compare import start_values
 from identify.holdout import Split
 from identify.lines import foreign_lines_hz, ringing_hz, rings_hz
-from identify.output_error import refine, squares_at
+from identify.output_error import Estimate, refine, squares_at
 from identify.parameters import Name
 from identify.regression import Structure
 from identify.screen import Screen, scale_of
 from identify.traces import Trace
-from identify.whole_runs import ENDS_NEAR, STEPS, Whole, fit_whole
+from identify.whole_runs import ENDS_NEAR, Whole, measured
 from rig import effects
 from rig.effects.base import Scale
 from rig.platform import TERMS
@@ -25,6 +25,9 @@ GOING = 0.95  # to less than this share
 WALKED = 2  # times that other minima are looked for from the best so far
 WELL_BEHIND = 1.2  # times the best error of the round after three steps of a large start
 OUT_OF_SIGHT = 10.0  # the same of any other: a sharp resonance is arrived at late, and then at once
+TOLERANCE = 3e-4
+STEPS = 15
+MOST_SIMULATIONS = 10_000  # of all runs: what the slowest searches cost that found what there was, twice
 WORTH_A_FIT = 15.0  # expected fall of chi square
 
 
@@ -47,6 +50,8 @@ class Fits:
         self.torque_free = all(t.torque is None for t in traces)
         self.fixed: list[Name] = [("inertia",)] if self.torque_free else []
         self.finer = 1  # times the fine steps that models are compared with
+        self.simulations = 0.0  # spent on fits so far: of all runs, as finely as the first model was
+        self._once = 0.0  # fine steps of one
         self.horizon = 1.0  # of a first fit over short runs, in seconds
         self.moving = float(
             np.std(np.concatenate([t.measured[m] for t, m in zip(self.fitting, self.use, strict=True)]))
@@ -55,10 +60,28 @@ class Fits:
     def whole(
         self, structure: Structure, start: Mapping[Name, float], hopeless: float = np.inf, steps: int = STEPS
     ) -> Whole | None:
-        """A structure fitted over whole runs; None where it runs away."""
-        return fit_whole(
-            self.traces, self.split, structure, start, self.noise, self.fixed, hopeless, steps, self.finer
+        """A structure fitted over whole runs; None where it runs away.
+
+        ``hopeless`` is the root mean square above which the fit is given up after three steps.
+        """
+        estimate = refine(
+            self.fitting, structure, start, None, steps, self.use, fixed=self.fixed, coarse=True,
+            tolerance=TOLERANCE, hopeless=hopeless, finer=self.finer,
         )  # fmt: skip
+        self._spend(estimate)
+        return measured(self.traces, self.split, estimate, self.noise, self.finer)
+
+    def _spend(self, estimate: Estimate) -> None:
+        self._once = self._once or float(sum(s.grid.n for s in estimate.shots))
+        self.simulations += estimate.work / self._once
+
+    def gives_up(self, best: Whole) -> bool:
+        """Whether a search has cost so much that no more is tried, with the best of its models far from the noise.
+
+        What is in the library comes near the noise long before; what is not would be tried against all of it. Nothing
+        comes to the noise in a decay, which is searched by its own rules.
+        """
+        return not self.torque_free and best.level > ENDS_NEAR and self.simulations > MOST_SIMULATIONS
 
     def squares(self, structure: Structure, values: Mapping[Name, float], finer: int | None = None) -> float:
         """Sum of squares over the noise's variance of a model as it is, fitted in its start states alone."""
@@ -71,6 +94,7 @@ class Fits:
         near = refine(
             self.fitting, structure, start, self.horizon, 8, self.use, fixed=self.fixed, coarse=True, tolerance=1e-3
         )
+        self._spend(near)
         if np.isfinite(near.sigma):
             start = dict(zip(near.names, near.values.tolist(), strict=True))
         return self.whole(structure, start, hopeless, steps)

@@ -28,6 +28,7 @@ from identify.results import (
 from identify.screen import Start, first_guess
 from identify.search import Loop, Search
 from identify.traces import Trace, loads_differ, one_noise, prepare
+from identify.turned_runs import turned_runs
 from identify.unseen import why_unseen
 from rig import effects
 from rig.config.identify import IdentifyConfig
@@ -92,6 +93,10 @@ class _Identifier:
             raise RecordingError(
                 "no run holds a usable stretch of 40 samples: look at valid, min_rate_rad_s, from_s and to_s"
             )
+        self.turned = turned_runs(self.traces)
+        self.traces = [t for t in self.traces if not any(t is gone for gone in self.turned)]
+        for trace in self.turned:
+            self.say(f"{trace.run.name} is left out: its torque has the opposite sign of the other runs'")
         self.torque_free = free
         _refuse_the_idle(self.traces, free)
         if free:
@@ -186,7 +191,7 @@ class _Identifier:
             )  # fmt: skip
         case = Case(
             self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
-            self.declared,
+            self.declared, tuple(t.run.name for t in self.turned),
         )  # fmt: skip
         scale = self._torque_scale(after) if in_full else None
         return conclude(case, search, before, after, measured_before, measured_after, floor, per_set, joint, scale)

@@ -45,6 +45,12 @@ RELEASED = (
     "The rest goes with neither rate nor angle nor time: release the platform from other angles, record each until it "
     "rests, and play a campaign with torque: a decay shows ratios only, and few of its causes."
 )
+COLOURED = (
+    "The noise floor is estimated from the fastest changes alone: where the sensor's own noise is slower than that "
+    "(coloured), this is it. Record the sensor at rest, drive off, and give the noise's root mean square as "
+    "recorded.noise."
+)
+NEAR_FLOOR = 4.0  # times the noise floor
 AT_ONCE, MOVING = 3, 0.1  # first samples of a run, and the share of its largest rate that they may have
 
 
@@ -111,6 +117,21 @@ def _to_determine(several: Sequence[NotReported], torque_free: bool) -> str:
 
 
 def _to_explain(found: Identification) -> list[str]:
+    left = found.residual_before if found.after is None else found.residual_after
+    if left is not None and left.moments:
+        places = joined([f"in {m.run} from {m.from_s:.2f} to {m.to_s:.2f} s" for m in left.moments])
+        return [f"Most of what is left lies {places}. Leave that out with from_s or to_s, or record it again."]
+    return [*_by_what_it_goes_with(found), *_coloured(found)]
+
+
+def _coloured(found: Identification) -> list[str]:
+    """A residual little above an estimated floor may be noise that is slower than what the estimate looks at."""
+    error, floor = found.final.error.holdout_rate_rms, found.noise_floor
+    near = error is not None and error < NEAR_FLOOR * floor.holdout_rate_rms
+    return [COLOURED] if near and floor.source == "estimated" else []
+
+
+def _by_what_it_goes_with(found: Identification) -> list[str]:
     shares = dependence(found.traces, found.final.error.lowpass_hz or USUAL_CUTOFF_HZ)
     name, share = next(iter(shares.items()), ("", 0.0))
     late = _begun_in_motion(found.traces)

@@ -42,6 +42,8 @@ class Estimate:
         Root mean square of measured minus simulated over the samples that count.
     information
         Normal matrix of the global parameters, start states and bias eliminated, for unit noise.
+    work
+        Fine steps that were simulated on the way, each parameter's sensitivity counted as a simulation.
     """
 
     structure: Structure
@@ -52,6 +54,7 @@ class Estimate:
     information: Array
     shots: tuple[Shots, ...]
     converged: bool
+    work: float = 0.0
 
     def platform(self, run: int = 0, added: float = 0.0) -> Platform:
         """The fitted platform, as it stood in one run."""
@@ -188,6 +191,8 @@ class _Descent:
         self.damping = 1e-6
         self.counts = np.concatenate([s.counts for s in shots])
         self.count = int(np.sum(self.counts))
+        self.once = float(sum(s.grid.n for s in shots))  # fine steps of one simulation of every run
+        self.work = self.once
         found = list(workers.map(lambda s: residual_at(s, structure, names, x), shots))
         self.residuals = [r for r, _ in found]
         self.outlier = _outlier(np.concatenate([each for _, each in found]), self.counts)
@@ -202,6 +207,7 @@ class _Descent:
             )
         )
         self.fresh = True
+        self.work += (1 + int(np.sum(~self.still)) + 2) * self.once
         self._add_up()
 
     def keep(self) -> None:
@@ -240,6 +246,7 @@ class _Descent:
             new = ordered(self.names, np.clip(self.x + dx / size, self.low, self.high))
             steps = [q.back(new - self.x) for q in self.parts]
             trial = [moved(s, m) for s, m in zip(self.shots, steps, strict=True)]
+            self.work += self.once
             found = list(self.workers.map(lambda s, new=new: residual_at(s, self.structure, self.names, new), trial))
             losses = np.concatenate([each for _, each in found])
             after = _cost(losses, self.counts, self.outlier)
@@ -299,7 +306,7 @@ def _levenberg(descent: _Descent, iterations: int, tolerance: float, hopeless: f
         age = 0
         d.renew()
     sigma = float(np.sqrt(d.cost / max(d.count, 1)))
-    return Estimate(d.structure, d.names, d.x, sigma, d.count, d.a, tuple(d.shots), converged)
+    return Estimate(d.structure, d.names, d.x, sigma, d.count, d.a, tuple(d.shots), converged, d.work)
 
 
 def _arrived(step: _Step, tolerance: float) -> bool:

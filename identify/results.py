@@ -170,6 +170,16 @@ class FreeLine:
 
 
 @dataclass(frozen=True)
+class Moment:
+    """A short part of one run that holds much of the residual's power."""
+
+    run: str
+    from_s: float
+    to_s: float
+    share: float
+
+
+@dataclass(frozen=True)
 class ResidualDiagnosis:
     """Where the residual of one model lives."""
 
@@ -180,6 +190,7 @@ class ResidualDiagnosis:
     free_lines: tuple[FreeLine, ...]
     direction: Share | None  # what differs with the direction of motion at the same angle
     memory: Share | None  # what the past explains and the present does not
+    moments: tuple[Moment, ...] = ()  # that hold most of it, the loudest first; empty where it is spread
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,17 @@ SENTENCE = (
 
 
 @dataclass(frozen=True)
+class Swing:
+    """Motion and torque of one run, each of shape (n,); ``keep`` is positive where a sample counts."""
+
+    time_s: Array
+    angle_rad: Array
+    rate_rad_s: Array
+    torque_nm: Array | None
+    keep: Array
+
+
+@dataclass(frozen=True)
 class Signs:
     """What a plain regression of the torque makes of inertia and spring.
 
@@ -56,7 +67,9 @@ def signs(traces: Sequence[RunTraces], cutoff_hz: float) -> Signs | None:
     """The signs that torque and motion of some runs show; None where no run holds a torque that moves."""
     rows, targets = [], []
     for trace in traces:
-        found = _equations(trace, cutoff_hz)
+        found = equations(
+            Swing(trace.time_s, trace.angle_rad, trace.rate_rad_s, trace.torque_nm, trace.keep), cutoff_hz
+        )
         if found is not None:
             rows.append(found[0])
             targets.append(found[1])
@@ -77,15 +90,15 @@ def signs(traces: Sequence[RunTraces], cutoff_hz: float) -> Signs | None:
     return Signs(float(ratio[0]), float(ratio[2]), float(1.0 - (left @ left) / (y @ y)))
 
 
-def _equations(trace: RunTraces, cutoff_hz: float) -> tuple[Array, Array] | None:
+def equations(swing: Swing, cutoff_hz: float) -> tuple[Array, Array] | None:
     """Acceleration, rate and angle (n, 3) and torque (n,) of one run; unknown constant and ramp taken out."""
-    if trace.torque_nm is None or np.ptp(trace.torque_nm) == 0.0:
+    if swing.torque_nm is None or np.ptp(swing.torque_nm) == 0.0:
         return None
-    step = float(trace.time_s[-1] - trace.time_s[0]) / (len(trace.time_s) - 1)
-    rate, angle, torque = (low_pass(v, cutoff_hz, step) for v in (trace.rate_rad_s, trace.angle_rad, trace.torque_nm))
+    step = float(swing.time_s[-1] - swing.time_s[0]) / (len(swing.time_s) - 1)
+    rate, angle, torque = (low_pass(v, cutoff_hz, step) for v in (swing.rate_rad_s, swing.angle_rad, swing.torque_nm))
     columns = np.stack([np.gradient(rate, step), rate, angle, torque], axis=1)
     edge = int(EDGE_PERIODS / (cutoff_hz * step))
-    keep = trace.keep > 0.0
+    keep = swing.keep > 0.0
     if len(keep) > 20 * edge > 0:
         keep[:edge] = keep[-edge:] = False
     if int(np.sum(keep)) < 4 * BLOCKS or not np.all(np.isfinite(columns)):

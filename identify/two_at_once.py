@@ -46,6 +46,8 @@ def _as_seen(offer: Candidates, now: Whole) -> list[Whole]:
     """Pairs fitted from where the regression along the measured motion sees them, until one comes near."""
     out: list[Whole] = []
     for pair in offer.pairs(now):
+        if offer.fits.gives_up(now):
+            break
         structure = now.structure.plus(pair.names[0]).plus(pair.names[1])
         own = {n: v for n, v in pair.start.items() if len(n) > 1}  # with J, C, K of the model, or of the regression
         starts = ({**now.values(), **own}, {**now.values(), **pair.start})

@@ -10,6 +10,7 @@ from identify.finish import Fitted
 from identify.parameters import Name
 
 TIED = 0.95  # correlation beyond which two parameters are one
+OPEN_RAD = 0.5  # standard error of a phase beyond which it is open
 WIDE = 0.5  # of its value: a standard error that says nothing of a term
 
 
@@ -29,6 +30,26 @@ def undetermined(fitted: Fitted, runs: Set[int], alone: bool) -> dict[Name, str]
             out[name] = f"it is tied to {tied}, which the data do not determine"
         elif not fitted.determined[i] or wide:
             out[name] = _why(value, error, fitted.determined[i])
+    return out
+
+
+def open_phases(fitted: Fitted) -> dict[Name, float]:
+    """Standard errors of sine and cosine gains whose phase the data do not tell: their amplitude at least.
+
+    Beside a phase that may be anything the errors of a fit hold at the one phase where it stopped.
+    """
+    out: dict[Name, float] = {}
+    for effect in fitted.structure.effects:
+        pair: tuple[Name, Name] = (effect, "sine"), (effect, "cosine")
+        if not all(name in fitted.names for name in pair):
+            continue
+        at = np.array([fitted.names.index(name) for name in pair])
+        sine, cosine = fitted.values[pair[0]], fitted.values[pair[1]]
+        amplitude = float(np.hypot(sine, cosine))
+        along = np.array([-cosine, sine]) / max(amplitude, 1e-300)
+        spread = float(np.sqrt(max(along @ fitted.covariance[np.ix_(at, at)] @ along, 0.0)))
+        if not spread < OPEN_RAD * amplitude:
+            out |= {name: max(fitted.std_error(name), amplitude) for name in pair}
     return out
 
 

@@ -1,8 +1,8 @@
-"""A structure fitted over whole runs, its squares in units of the noise's variance."""
+"""A structure as fitted over whole runs, its squares in units of the noise's variance."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from identify.compare import Judged
 from identify.evaluation import evaluate
 from identify.holdout import Split
-from identify.output_error import Estimate, refine
+from identify.output_error import Estimate
 from identify.parameters import Name
 from identify.regression import Structure
 from identify.traces import Trace
@@ -22,8 +22,6 @@ TWICE = 2.0  # times the squares of the best: a special case of it does as well 
 NEAR_THEN = 4.0  # times the best squares of its round: asked again in the finished model
 AT_FLOOR = 1.1  # mean square over the noise's variance: who is there has found what there is
 ENDS_NEAR = 2.0  # mean square over the noise's variance at the end for what was found to be believed
-TOLERANCE = 3e-4
-STEPS = 15
 
 
 @dataclass(frozen=True)
@@ -67,32 +65,19 @@ class Whole:
         return dict(zip(self.estimate.names, self.estimate.values.tolist(), strict=True))
 
 
-def fit_whole(
-    traces: Sequence[Trace], split: Split, structure: Structure, start: Mapping[Name, float], noise: float,
-    fixed: Sequence[Name], hopeless: float = np.inf, steps: int = STEPS, finer: int = 1,
-) -> Whole | None:  # fmt: skip
-    """A structure fitted to the samples that fit, measured on those that judge; None where it runs away.
+def measured(traces: Sequence[Trace], split: Split, estimate: Estimate, noise: float, finer: int) -> Whole | None:
+    """An estimate on the samples that fit and on those that judge; None where it runs away.
 
     Parameters
     ----------
     noise
         One standard deviation of the measured channel.
-    hopeless
-        Root mean square above which the fit is given up after three steps.
     finer
         How many times the fine steps that models are compared with.
     """
+    if not np.isfinite(estimate.sigma):
+        return None
     fit = [i for i, m in enumerate(split.fit) if np.any(m)]
-    estimate = refine(
-        [traces[i] for i in fit], structure, start, None, steps, [split.fit[i] for i in fit], fixed=fixed,
-        coarse=True, tolerance=TOLERANCE, hopeless=hopeless, finer=finer,
-    )  # fmt: skip
-    return _measured(traces, split, fit, estimate, noise, finer) if np.isfinite(estimate.sigma) else None
-
-
-def _measured(
-    traces: Sequence[Trace], split: Split, fit: Sequence[int], estimate: Estimate, noise: float, finer: int
-) -> Whole | None:
     squares, count, losses, counts = 0.0, 0, [], []
     for i, r in zip(fit, estimate.residuals(), strict=True):
         fitted, judged = split.fit[i], split.judge[i]

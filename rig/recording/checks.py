@@ -172,6 +172,10 @@ def _check_motion(run: Run, path: Path) -> None:
             raise RecordingError(
                 f"{path}: the {name} never exceeds {largest:g}, which nothing measures: correct recorded.scale.{name}"
             )
+        if largest > LARGEST_VALUE:
+            raise RecordingError(
+                f"{path}: the {name} reaches {largest:g}, which nothing survives: correct recorded.scale.{name}"
+            )
     if np.ptp(values[run.valid]) > 0:
         return
     torque = run.torque_nm

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identify import fits
 from identify.candidates import Candidates
 from identify.fine import FineSearch
 from identify.holdout import split
@@ -224,3 +225,24 @@ def test_held_out_runs_take_no_part_in_the_fit() -> None:
 
 def test_every_name_it_may_try_is_an_effect() -> None:
     assert set(ALLOWED) <= set(effects.names())
+
+
+def test_a_search_that_has_cost_too_much_goes_on_only_where_the_noise_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
+    hidden = campaign({"cubic_stiffness": {"factor": 300.0}, "coulomb_friction": {"level": 0.1}}, duration_s=4)
+    monkeypatch.setattr(fits, "MOST_SIMULATIONS", 100)
+    found, took = searched(hidden)
+    assert not took  # the first candidates have cost that, and leave thirty times the noise's variance
+    assert found.best.structure.effects == ()
+    found, took = searched(campaign({"coulomb_friction": {"level": 0.002}}, duration_s=4))
+    assert took
+    assert found.best.structure.effects == ("coulomb_friction",)
+
+
+def test_a_decay_is_searched_however_much_it_costs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fits, "MOST_SIMULATIONS", 0)
+    torque_free = [replace(t, torque=None) for t in traces_of(campaign(duration_s=1))]
+    offer = Candidates(torque_free, split(torque_free), ALLOWED)
+    astray = offer.fits.whole(Structure(), {**START, ("stiffness",): 200.0}, steps=1)
+    assert astray is not None
+    assert astray.level > 100.0
+    assert not offer.fits.gives_up(astray)

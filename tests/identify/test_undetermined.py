@@ -5,7 +5,7 @@ import numpy as np
 from identify.finish import Fitted
 from identify.parameters import Name
 from identify.regression import Structure
-from identify.undetermined import undetermined
+from identify.undetermined import open_phases, undetermined
 from rig.recording.run import Array
 
 TERMS: tuple[Name, ...] = (("inertia",), ("damping",), ("stiffness",))
@@ -58,3 +58,17 @@ def test_a_parameter_of_a_run_that_no_fit_looked_at_is_not_listed() -> None:
     )  # fmt: skip
     assert undetermined(lost, {0, 1}, alone=False) == {}
     assert list(undetermined(lost, {0, 1, 3}, alone=False)) == [name]
+
+
+def test_a_phase_that_may_be_anything_leaves_its_gains_open_by_their_amplitude() -> None:
+    pair: tuple[Name, ...] = (("cogging", "sine"), ("cogging", "cosine"))
+    values = dict(zip(pair, (0.01, 0.0), strict=True))
+
+    def of(cosine_error: float) -> dict[Name, float]:
+        covariance = np.diag([3e-5, cosine_error]) ** 2
+        return open_phases(
+            Fitted(Structure((), ("cogging",)), values, covariance, pair, 1.0, None, True, (True,) * 2, "")
+        )
+
+    assert of(1e-3) == {}
+    assert of(0.14) == {pair[0]: 0.01, pair[1]: 0.14}

@@ -176,6 +176,13 @@ ARRAYS: dict[str, tuple[Columns, str, str, str, str]] = {
     "dead encoder": (changed(angle_rad=np.full(500, 0.3)), "", "", "the angle never changes (0.3)", "encoder"),
     "next to no time": (changed(time_s=1e-290 * motion()["time_s"]), "", "", "1e-293 s apart", "recorded.scale.time"),
     "next to no torque": (changed(torque_nm=1e-200 * motion()["time_s"]), "", "", "the torque never exceeds", "scale"),
+    "a scale beyond all": (
+        motion(),
+        "  scale: {torque: 1.0e+300}\n",
+        "",
+        "the torque reaches",
+        "recorded.scale.torque",
+    ),
     "valid is a half": (changed(valid=np.full(500, 0.5)), "", "", "index 0: valid is 0.5", "write 1 for a good sample"),
     "valid is NaN": (changed(valid=np.full(500, np.nan)), "", "", "valid is empty", "write 1 for a good sample"),
 }
