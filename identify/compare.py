@@ -86,16 +86,14 @@ class Judged:
         shapes = [i for i in mine if i not in gains]
         x = self.estimate.values
         out = []
+        known: list[int] = []
         if gains and shapes and not effects.get(name).nests:
-            covariance = _given(covariance, shapes)
+            known = shapes
         else:
             untold = self._untold()
             out = [0.0 if untold[i] else abs(x[i]) / float(np.sqrt(max(covariance[i, i], 1e-300))) for i in shapes]
         if gains:
-            part = covariance[np.ix_(gains, gains)]
-            size = np.sqrt(np.maximum(np.diag(part), 1e-300))
-            t = x[gains] / size
-            joint = float(t @ np.linalg.pinv(part / np.outer(size, size), rcond=1e-9, hermitian=True) @ t)
+            joint = _distance(self.estimate.information, x, gains, known) / self.estimate.sigma**2
             out.append(float(np.sqrt(max(joint, 0.0) / len(gains))))
         return float(min(out)) if np.all(np.isfinite(out)) else 0.0
 
@@ -108,13 +106,20 @@ class Judged:
         }
 
 
-def _given(covariance: Array, known: Sequence[int]) -> Array:
-    """Covariance of all parameters were some of them known."""
-    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    scaled = covariance / np.outer(size, size)
-    across = scaled[:, known]
-    left = scaled - across @ np.linalg.pinv(scaled[np.ix_(known, known)], rcond=1e-12, hermitian=True) @ across.T
-    return np.asarray(left * np.outer(size, size))
+def _distance(information: Array, x: Array, gains: Sequence[int], known: Sequence[int]) -> float:
+    """Squared distance of some parameters from zero in their own information, all others but ``known`` fitted anew.
+
+    From the information itself: a phase that the data leave open takes an amplitude that they know well out of any
+    inverse of it.
+    """
+    others = [i for i in range(len(x)) if i not in gains and i not in known]
+    size = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    scaled, t = information / np.outer(size, size), (x * size)[gains]
+    across = scaled[np.ix_(gains, others)]
+    left = scaled[np.ix_(gains, gains)] - across @ np.linalg.pinv(
+        scaled[np.ix_(others, others)], rcond=1e-12, hermitian=True
+    ) @ across.T  # fmt: skip
+    return float(t @ left @ t)
 
 
 def horizon_s(platform: tuple[float, float, float], traces: Sequence[Trace]) -> float:

@@ -107,6 +107,18 @@ def test_a_limit_that_nothing_reaches_is_no_strong_effect() -> None:
     assert unreached.std_errors()[("stiffness",)] == pytest.approx(1.0)
 
 
+def test_an_open_phase_does_not_weaken_an_amplitude_that_is_known() -> None:
+    """The right cogging of a platform without a spring was left out: a gyro does not tell where its phase counts from."""
+    amplitude, phase, error, adrift = 0.01, 0.49, 1e-6, 0.2
+    values = [1.0, 1.0, 1.0, amplitude * np.cos(phase), amplitude * np.sin(phase), 8.0]
+    found = judged([1.0], ("cogging",), values=values)
+    across, along = np.array([np.cos(phase), np.sin(phase)]), np.array([-np.sin(phase), np.cos(phase)])
+    information = np.diag([1.0, 1.0, 1.0, 0.0, 0.0, 1e6])
+    information[3:5, 3:5] = np.outer(across, across) / error**2 + np.outer(along, along) / adrift**2
+    found = replace(found, estimate=replace(found.estimate, information=information, sigma=1.0))
+    assert found.strength("cogging") == pytest.approx(amplitude / error / np.sqrt(2.0), rel=1e-4)
+
+
 def test_an_effect_of_a_model_that_runs_away_stands_nowhere() -> None:
     found = judged([1.0], ("coulomb_friction",), information=16.0, values=[1, 1, 1, 3])
     across = found.estimate.information.copy()
