@@ -108,7 +108,7 @@ def test_a_limit_that_nothing_reaches_is_no_strong_effect() -> None:
 
 
 def test_an_open_phase_does_not_weaken_an_amplitude_that_is_known() -> None:
-    """The right cogging of a platform without a spring was left out: a gyro does not tell where its phase counts from."""
+    """The right cogging of a platform without a spring was left out: a gyro does not tell where its phase begins."""
     amplitude, phase, error, adrift = 0.01, 0.49, 1e-6, 0.2
     values = [1.0, 1.0, 1.0, amplitude * np.cos(phase), amplitude * np.sin(phase), 8.0]
     found = judged([1.0], ("cogging",), values=values)
