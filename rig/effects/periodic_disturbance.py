@@ -41,5 +41,8 @@ EFFECT = Effect(
     fastest_rad_s=lambda values: 2.0 * math.pi * values[5],
     large_starts=_large,
     resembles_much=True,
-    separated_by="from harmonics of friction or stiffness: excite at other frequencies",
+    separated_by=(
+        "from harmonics of friction or stiffness: excite at other frequencies; from a line that the sensor itself shows "
+        "(an aliased vibration, pickup) and that looks the same: mount a known inertia, which leaves that one as it is"
+    ),
 )
