@@ -42,7 +42,7 @@ EFFECT = Effect(
     large_starts=_large,
     resembles_much=True,
     separated_by=(
-        "from harmonics of friction or stiffness: excite at other frequencies; from a line that the sensor itself shows "
-        "(an aliased vibration, pickup) and that looks the same: mount a known inertia, which leaves that one as it is"
+        "from harmonics of friction or stiffness: excite at other frequencies; from a line that the sensor itself "
+        "shows (an aliased vibration, pickup) and that looks the same: mount a known inertia, which leaves that one as it is"
     ),
 )
