@@ -15,6 +15,7 @@ FEWEST = 12  # windows in a run: of fewer none is a moment
 LOUD = 10.0  # times the median power of the run's windows
 MOST_OF_IT = 0.5  # of the residual's power of all runs that they hold together
 RARE = 0.1  # of all windows at most
+LEAST = 0.05  # of the power: a moment with less is not told
 MANY = 3  # moments: more are no accident
 
 
@@ -46,5 +47,5 @@ def _of_one(runs: Sequence[tuple[float, Array]], begins_s: Sequence[float], name
             share = float(np.sum(power[a:b])) / total
             found.append(Moment(name, begin_s + a * window_s, begin_s + b * window_s, share))
     rare = count <= RARE * sum(len(power) for _, power in runs)
-    main = sorted(found, key=lambda m: -m.share)[:MANY]
+    main = sorted((m for m in found if m.share > LEAST), key=lambda m: -m.share)[:MANY]
     return tuple(main) if rare and sum(m.share for m in main) > MOST_OF_IT else ()
