@@ -24,10 +24,11 @@ MOST_AT_ONCE = 10  # runs whose signs are tried in all ways; of more each is tri
 
 @dataclass(frozen=True)
 class _Run:
-    """Normal equations of one run whose torque has unit power."""
+    """Normal equations of one run whose torque has unit power; ``added`` is what it has beside J, C and K, (3,)."""
 
     a: Array
     b: Array
+    added: Array
 
 
 def turned_runs(traces: Sequence[Trace]) -> list[Trace]:
@@ -73,20 +74,22 @@ def _normal(trace: Trace) -> _Run | None:
         return None
     x, y = found
     power = float(np.linalg.norm(y))
-    return _Run(x.T @ x / power**2, x.T @ y / power**2) if power > 0.0 else None
+    added = np.array([trace.run.added_inertia_kg_m2, 0.0, 0.0])
+    return _Run(x.T @ x / power**2, x.T @ y / power**2, added) if power > 0.0 else None
 
 
 def _fit(runs: Sequence[_Run], signs: Array) -> Array:
     """J, C and K that all runs share, each torque with its sign."""
     a = np.sum([r.a for r in runs], axis=0)
-    b = np.sum([s * r.b for r, s in zip(runs, signs, strict=True)], axis=0)
+    b = np.sum([s * r.b - r.a @ r.added for r, s in zip(runs, signs, strict=True)], axis=0)
     size = np.sqrt(np.maximum(np.diag(a), 1e-300))
     return np.asarray(np.linalg.pinv(a / np.outer(size, size), rcond=1e-9, hermitian=True) @ (b / size) / size)
 
 
 def _left(run: _Run, sign: float, values: Array) -> float:
     """Share of a run's torque that is left."""
-    return float(1.0 - 2.0 * sign * run.b @ values + values @ run.a @ values)
+    own = values + run.added
+    return float(1.0 - 2.0 * sign * run.b @ own + own @ run.a @ own)
 
 
 def _best(runs: Sequence[_Run]) -> Array:
@@ -97,13 +100,15 @@ def _best(runs: Sequence[_Run]) -> Array:
         return sum(_left(r, s, values) for r, s in zip(runs, signs, strict=True))
 
     if len(runs) <= MOST_AT_ONCE:
-        best = min((np.array([1.0, *rest]) for rest in product((1.0, -1.0), repeat=len(runs) - 1)), key=left)
+        best = min((np.array(way) for way in product((1.0, -1.0), repeat=len(runs))), key=left)
     else:
         best = np.ones(len(runs))
         for i in range(len(runs)):
             other = best.copy()
             other[i] = -1.0
             best = min((best, other), key=left)
+    if any(np.any(r.added) for r in runs):
+        return best  # a known mass tells a platform from its mirror image
     return best if _possible(runs, best) else -best
 
 

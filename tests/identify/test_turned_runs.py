@@ -11,7 +11,7 @@ from identify.loop import identify
 from identify.turned_runs import told, turned_runs
 from rig.config.identify import IdentifyConfig
 from rig.recording.run import Recording, Run
-from tests.identify.simulated import DECLARED, TRUTH, campaign, traces_of
+from tests.identify.simulated import DECLARED, TRUTH, campaign, sine_run, traces_of
 
 
 def turned(run: Run) -> Run:
@@ -33,6 +33,21 @@ def test_the_runs_that_were_turned_are_found_even_where_they_are_the_most(number
 @pytest.mark.parametrize("numbers", [(), (0, 1, 2, 3, 4)])
 def test_where_all_agree_none_is_taken_out(numbers: tuple[int, ...]) -> None:
     assert turned_runs(traces_of(with_turned(*numbers))) == []
+
+
+def loaded(torque_nm: float, frequency_hz: float, added: float) -> Run:
+    inertia, damping, stiffness = TRUTH
+    run = sine_run(torque_nm, frequency_hz, jck=(inertia + added, damping, stiffness))
+    return replace(run, name=f"{frequency_hz:g} Hz, {added:g}", added_inertia_kg_m2=added)
+
+
+@pytest.mark.parametrize("number", [None, 0, 1, 3])
+def test_a_mass_that_takes_a_tone_across_the_resonance_turns_no_run(number: int | None) -> None:
+    sets = [(20.0, 25.0, 0.0), (20.0, 25.0, 0.02), (20.0, 35.0, 0.0), (20.0, 22.0, 0.02)]
+    runs = [loaded(*each) for each in sets]
+    runs = [turned(r) if i == number else r for i, r in enumerate(runs)]
+    found = turned_runs(traces_of(Recording(tuple(runs))))
+    assert [t.number for t in found] == ([] if number is None else [number])
 
 
 def test_a_run_whose_torque_has_nothing_to_do_with_its_motion_is_not_called_turned() -> None:
