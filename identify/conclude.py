@@ -87,6 +87,8 @@ def conclude(
         sentences=(),
         rival_models=search.rival_models,
         contribution=search.contribution,
+        left_open=search.left_open,
+        tells_apart=search.tells_apart,
     )
     reasons = []
     searched = [g for g in (*(s.genetic for s in per_set), joint) if g is not None]

@@ -42,11 +42,11 @@ def evaluate(
     names, x, structure = estimate.names, estimate.values, estimate.structure
     shots = shots_for(traces, structure, names, x, shot_s, use, None, coarse, finer)
     with ThreadPoolExecutor(2) as workers:
-        settled = list(workers.map(lambda s: _settle(s, structure, names, x), shots))
-    rss = sum(float(np.sum(losses)) for _, losses in settled)
-    count = sum(int(np.sum(s.weight)) for s, _ in settled)
+        fitted = list(workers.map(lambda s: settled(s, structure, names, x), shots))
+    rss = sum(float(np.sum(losses)) for _, losses in fitted)
+    count = sum(int(np.sum(s.weight)) for s, _ in fitted)
     sigma = float(np.sqrt(rss / max(count, 1)))
-    return Estimate(structure, names, x, sigma, count, np.zeros((len(x),) * 2), tuple(s for s, _ in settled), True)
+    return Estimate(structure, names, x, sigma, count, np.zeros((len(x),) * 2), tuple(s for s, _ in fitted), True)
 
 
 def _with_own_gains(
@@ -76,7 +76,7 @@ def _with_own_gains(
 
 
 @RUNAWAY
-def _settle(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> tuple[Shots, Array]:
+def settled(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> tuple[Shots, Array]:
     """Start states and bias of one run at fixed parameters; every shot keeps what is best for itself."""
     still = np.ones(len(x), dtype=bool)
     equations = equations_of(structure, names, x, s.number, s.added)

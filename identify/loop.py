@@ -17,8 +17,10 @@ from identify.conclude import Case, conclude
 from identify.contribution import contributions
 from identify.fine import FineSearch
 from identify.finish import Fitted, by_output_error, by_regression, noise_of_all
+from identify.fits import Fits
 from identify.holdout import Split, pieces, split
 from identify.measures import floor_of, measure
+from identify.refusals import refuse_added_inertia, refuse_the_idle
 from identify.regression import Structure, shape_values
 from identify.results import (
     Identification,
@@ -27,6 +29,7 @@ from identify.results import (
 )
 from identify.screen import Start, first_guess
 from identify.search import Loop, Search
+from identify.standing_tones import TONE, standing_line, told
 from identify.traces import Trace, loads_differ, one_noise, prepare
 from identify.turned_runs import turned_runs
 from identify.unseen import why_unseen
@@ -36,7 +39,6 @@ from rig.errors import Aborted, RecordingError
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
-MOVES = 3.0  # times the sensor's noise that a motion has to reach
 TWICE_THE_NOISE = 2.0
 MUCH_CLOSER = 0.5  # times the free-run error of the other fit
 STOPPED = "stopped before the search was through: what is missing may still be unnamed"
@@ -98,9 +100,9 @@ class _Identifier:
         for trace in self.turned:
             self.say(f"{trace.run.name} is left out: its torque has the opposite sign of the other runs'")
         self.torque_free = free
-        _refuse_the_idle(self.traces, free)
+        refuse_the_idle(self.traces, free)
         if free:
-            _refuse_added_inertia(self.traces)
+            refuse_added_inertia(self.traces)
         self.split: Split = split(self.traces, settings.holdout)
         offer = offer_of(self.traces, declared)
         unseen = tuple((n, why) for n in declared.effects if (why := why_unseen(n, self.traces)))
@@ -145,6 +147,11 @@ class _Identifier:
                 self.say(f"not named: {', '.join(had)}; together they leave too much for any of them to be believed")
             before = self._before(search)
             after = self._after(search) if search.best.structure != self.structure else before
+            line = standing_line(after, self.traces) if TONE not in self.structure.effects else None
+            if line is not None:
+                search.leave_open(TONE, told(line, self.recording.axis), self._without(search, on_offer.fits, TONE))
+                self.say(f"not named: {TONE}; it may as well be a line of the sensor's own")
+                after = self._after(search) if search.best.structure != self.structure else before
             named = [e for e in after.structure.effects if e not in self.structure.effects]
             on_offer.fits.horizon, start = search.horizon, search.base.values()
             search.contribution = contributions(on_offer.fits, after.structure, after.values, named, start)
@@ -158,6 +165,14 @@ class _Identifier:
             if not found.verdict.effects:  # the search may have been about to name what this model lacks
                 found = replace(found, verdict=replace(found.verdict, sentences=(NOTHING_YET,)))
             return replace(found, aborted=True, accepted=False, reasons=(STOPPED,))
+
+    @staticmethod
+    def _without(search: Search, fits: Fits, name: str) -> Judged:
+        """The best model without one of its effects; the declared one where that was all there was."""
+        left = search.best.structure.minus(name)
+        start = {n: v for n, v in search.best.values().items() if n[0] != name}
+        fitted = None if left.effects == search.base.structure.effects else fits.whole(left, start)
+        return search.base if fitted is None else fitted.judged()
 
     def _searched(self) -> tuple[list[Trace], Split]:
         """What the search looks at: of a slow decay that was sampled fast only every so manyth sample."""
@@ -266,45 +281,6 @@ class _Identifier:
         search.dropped[:] = [d for d in search.dropped if d[0] != "damping"]
         self.say(f"took damping back: {damping:.4g} +- {error:.2g} over whole runs")
         return fuller
-
-
-def _refuse_the_idle(traces: list[Trace], free: bool) -> None:
-    """Refuse a recording in which nothing happens.
-
-    Raises
-    ------
-    RecordingError
-        Where no run moves more than the sensor's noise, or the torque never changes in any run.
-    """
-    moved = [float(np.std(t.measured[t.keep])) / max(t.noise, 1e-300) for t in traces]
-    if max(moved) < MOVES:
-        raise RecordingError(
-            f"no run moves more than {max(moved):.2g} times the sensor's noise (needed: {MOVES:g}): nothing to "
-            "identify; use more torque, or give recorded.noise if the noise is smaller than it looks"
-        )
-    steady = [t.torque is not None and float(np.ptp(t.torque.torque_nm)) == 0.0 for t in traces]
-    if not free and all(steady):
-        raise RecordingError(
-            "the torque has the same value in every sample of every run: J, C and K need a torque that changes; "
-            "check recorded.columns.torque, or leave the torque out for a free decay"
-        )
-
-
-def _refuse_added_inertia(traces: list[Trace]) -> None:
-    """Refuse a known mass on a platform whose inertia is the unit of everything.
-
-    Raises
-    ------
-    RecordingError
-        Where a run without torque says that an inertia was added.
-    """
-    loaded = [t.run for t in traces if t.run.added_inertia_kg_m2]
-    if loaded:
-        raise RecordingError(
-            f"{loaded[0].name} was recorded with an added inertia of {loaded[0].added_inertia_kg_m2:g} and without "
-            "torque: only ratios to the inertia can be known, and there is nothing to add it to; identify the runs of "
-            "each load by themselves, without added_inertia_kg_m2 and with model.inertia_kg_m2 of the loaded platform"
-        )
 
 
 def _plain(declared: Platform, name: str) -> dict[str, float]:

@@ -98,7 +98,10 @@ def unexplained_reason(ratio: float, found: Identification) -> str:
         share = f"{percent(100.0 - error.holdout_fit_percent).lstrip('+')} of the motion"
     size = f"{number(ratio, 3)} times the sensor's noise"
     told = f"{share} ({size})" if share else size
-    return f"the model leaves {told} unexplained: something acts that none of the effects tried describes"
+    acts = "something acts that none of the effects tried describes"
+    if found.verdict.left_open:
+        acts = "the runs do not tell whether it is a torque or the sensor"
+    return f"the model leaves {told} unexplained: {acts}"
 
 
 def _torque_free(found: Identification) -> bool:
@@ -117,6 +120,8 @@ def _to_determine(several: Sequence[NotReported], torque_free: bool) -> str:
 
 
 def _to_explain(found: Identification) -> list[str]:
+    if found.verdict.tells_apart:
+        return [found.verdict.tells_apart]
     left = found.residual_before if found.after is None else found.residual_after
     if left is not None and left.moments:
         places = joined([f"in {m.run} from {m.from_s:.2f} to {m.to_s:.2f} s" for m in left.moments])

@@ -86,6 +86,8 @@ class Verdict:
     sentences: tuple[str, ...]  # the verdict in words, one finding each
     rival_models: Mapping[str, Mapping[str, Platform]] = field(default_factory=dict)  # effect -> rival -> fitted model
     contribution: Mapping[str, float] = field(default_factory=dict)  # effect -> held-out error without it / with it
+    left_open: str = ""  # what was found and may be either of two things, in words
+    tells_apart: str = ""  # what would tell which
 
 
 @dataclass(frozen=True)

@@ -66,6 +66,8 @@ class Search:
         Whether ``best`` was judged over whole runs, by a search that believed it there.
     contribution
         Effect -> held-out error without it over the one with it, once the search is through.
+    left_open, tells_apart
+        In words, an effect that was found and may be something else as well, and what would tell which.
     """
 
     base: Judged
@@ -78,6 +80,8 @@ class Search:
     dropped: list[tuple[str, str]] = field(default_factory=list)
     free_running: bool = False
     contribution: dict[str, float] = field(default_factory=dict)
+    left_open: str = ""
+    tells_apart: str = ""
 
     @property
     def share(self) -> float:
@@ -105,6 +109,18 @@ class Search:
             for c in self.candidates
         ]  # fmt: skip
         self.best, self.rivals, self.rival_models, self.dropped = self.base, {}, {}, []
+
+    def leave_open(self, name: str, told: tuple[str, str], without: Judged) -> None:
+        """Take an effect back that may as well be something no library has; ``without`` is the model without it."""
+        self.candidates = [
+            replace(c, status="left open") if c.status == "added" and c.effect == name else c for c in self.candidates
+        ]
+        self.rivals.pop(name, None)
+        self.rival_models.pop(name, None)
+        if without is self.base:
+            self.dropped = []
+        self.best, self.free_running = without, False
+        self.left_open, self.tells_apart = told
 
 
 class Loop:

@@ -32,11 +32,13 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
     for name in found.verdict.effects:
         out.append(_named(found, name))
     if not found.verdict.effects:
+        why = "what was found may be something else." if found.verdict.left_open else ""
         out.append(
             "No effect is named: "
-            + ("none of those tried explains the residual." if found.verdict.unexplained
+            + (why or "none of those tried explains the residual." if found.verdict.unexplained
                else "the declared model reaches the noise floor.")
         )  # fmt: skip
+    out += [found.verdict.left_open] if found.verdict.left_open else []
     out += _bent(found)
     if found.torque_scale is not None and "torque_scale" not in found.verdict.effects:
         scale = found.torque_scale

@@ -23,7 +23,8 @@ ORDER: Mapping[str, tuple[str, ...]] = {
     "hysteresis": ("level", "yield_angle", "exponent", "share"), "creep": ("stiffness", "time"),
     "stiffness_drift": ("slope",), "unbalance": ("sine", "cosine"), "cogging": ("sine", "cosine", "order"),
     "torque_offset": ("level",), "flexible_mode": ("inertia", "frequency", "ratio"),
-    "periodic_disturbance": ("amplitude", "frequency", "phase_run"), "presliding_friction": ("level", "displacement"),
+    "periodic_disturbance": ("amplitude", "frequency", "phase_run"),
+    "standing_tone": ("amplitude", "frequency", "phase_run"), "presliding_friction": ("level", "displacement"),
     "coulomb_friction": ("level",), "stribeck_friction": ("coulomb", "static", "speed"),
     "load_dependent_friction": ("factor",), "torque_delay": ("delay",), "actuator_lag": ("time",),
     "torque_saturation": ("limit",), "torque_deadzone": ("width",), "sensor_lag": ("time",), "rate_bias": ("bias",),
@@ -131,7 +132,7 @@ class Hidden:
                 rates.append(v["order"] * peak_rate)
             elif name == "stribeck_friction":
                 rates.append(STEP_RAD / self.step_s * 8.0)  # the rate runs through the knee in a fraction of a sample
-            elif name in {"periodic_disturbance", "shaken_stiffness"}:
+            elif name in {"periodic_disturbance", "standing_tone", "shaken_stiffness"}:
                 rates.append(2.0 * math.pi * v["frequency"])
             elif name in {"torque_ripple", "coarse_torque"}:
                 rates.append(800.0)
@@ -143,8 +144,8 @@ class Hidden:
         rest = self.rest_angle()
         y = np.zeros(size)
         y[0] = rest
-        if "periodic_disturbance" in self.effects:  # it was there long before the set: its own steady motion
-            v = self.effects["periodic_disturbance"]
+        if "standing_tone" in self.effects:  # it was there long before the set: its own steady motion
+            v = self.effects["standing_tone"]
             s = 2j * math.pi * v["frequency"]
             answer = -v["amplitude"] / (self.inertia * s * s + self.damping * s + self.stiffness)
             turning = answer * np.exp(1j * self._phase(number))

@@ -167,6 +167,9 @@ OUTSIDE: Mapping[str, Kind] = {
     ),
     "warming_gain": Kind(lambda r, s: {"loss": 0.012, "time": r.uniform(2.0, 9.0), "torque": s.torque}, ("loss",)),
     "coupling_slip": Kind(_coupling, ()),
+    "standing_tone": Kind(  # a hum that was always there: no record of torque and rate parts it from a line of the gyro
+        lambda r, s: {"amplitude": 0.014 * s.torque, "frequency": _between(r, 1.3, 120.0)}, ("amplitude",)
+    ),
     "sagging_gain": Kind(lambda r, s: {"loss": 0.01 / s.rate}, ("loss",)),
     "coarse_torque": Kind(
         lambda r, s: {"amplitude": 0.014 * s.torque, "period": s.torque_peak * r.uniform(0.05, 0.15)}, ("amplitude",)

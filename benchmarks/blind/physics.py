@@ -31,6 +31,7 @@ SENSORS = ("sensor_lag", "rate_bias", "aliased_vibration", "cubic_gyro")
 CODES = {
     name: group * 100 + i for group, g in enumerate((LOADS, FRICTIONS, DRIVES, SENSORS)) for i, name in enumerate(g)
 }
+CODES["standing_tone"] = CODES["periodic_disturbance"]  # the same torque: only its start differs
 STATES = {
     "hysteresis": 1, "creep": 1, "flexible_mode": 2, "presliding_friction": 1, "two_relaxations": 2,
     "actuator_lag": 1, "warming_gain": 1, "coupling_slip": 2, "sensor_lag": 1,

@@ -45,7 +45,6 @@ class Score:
     seconds: float
     cpu_seconds: float
     exit_code: int
-    steady_line: bool = False  # a steady line aliased into the gyro, called a periodic torque: no record parts the two
 
     @property
     def nothing_to_name(self) -> bool:
@@ -64,8 +63,7 @@ class Score:
     def _wrong_verdict(self) -> str:
         if self.kind == "outside":
             silent = "" if self.unexplained else "outside: not unexplained"
-            named = "outside: steady line called a torque" if self.steady_line else "outside: named"
-            return named if self.named else silent
+            return "outside: named" if self.named else silent
         if self.exact:
             return ""
         if not self.named:
@@ -112,7 +110,6 @@ def score(
         pairs = [e for e in matched if e in INSEPARABLE or alike.get(e)]
         if pairs and first:
             declared = all(_declared(e, matched[e], rivals, set(alike.get(e, ()))) for e in pairs)
-    steady = effects == ("aliased_vibration",) and hidden.effects["aliased_vibration"]["wander"] == 0.0
     reference = list(truth["reference"])
     if "sine" in final["effect_parameters"].get("unbalance", {}):
         reference[2] = hidden.stiffness * hidden.torque_scale  # its gradient stands in a number of its own
@@ -122,7 +119,7 @@ def score(
         empty, named=named, rivals=tuple(sorted(rivals)), unexplained=verdict["unexplained"],
         accepted=result["accepted"], first=first, exact=exact, declared=declared, errors_percent=errors,
         covered=covered, residual=None if holdout is None else holdout / hidden.noise, replayed=replayed,
-        imitates=imitates, steady_line=steady and named == ("periodic_disturbance",),
+        imitates=imitates,
     )  # fmt: skip
 
 

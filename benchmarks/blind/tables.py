@@ -62,8 +62,6 @@ def rows(scores: Sequence[Score]) -> list[tuple[str, str, str]]:
          _share(scores, lambda s: s.nothing_to_name, lambda s: bool(s.named))),
         ("outside the library: unexplained, nothing named", "95 %",
          _share(scores, outside, lambda s: not s.named and bool(s.unexplained))),
-        ("... without steady aliased lines called a periodic torque", "",
-         _share(scores, lambda s: outside(s) and not s.steady_line, lambda s: not s.named and bool(s.unexplained))),
         ("inseparable pair declared", "100 %",
          _share(scores, lambda s: s.declared is not None, lambda s: bool(s.declared))),
         ("free-run residual at most 1.1 of the noise (as the tool says), of named", "95 %",

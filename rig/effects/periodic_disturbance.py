@@ -43,7 +43,7 @@ EFFECT = Effect(
     resembles_much=True,
     separated_by=(
         "from harmonics of friction or stiffness: excite at other frequencies; from a line that the sensor itself "
-        "shows (an aliased vibration, pickup) and that looks the same: mount a known inertia, which leaves that one "
-        "as it is"
+        "shows (an aliased vibration, pickup): a torque that begins with the run moves the platform from rest, and a "
+        "known inertia changes how far it moves it; where neither shows, it is left open and not named"
     ),
 )

@@ -96,7 +96,6 @@ def test_the_bench_and_the_product_move_the_same_platform_alike(name: str) -> No
             v, phase = VALUES[name], hidden._phase(number)
             parts = {"sine": v["amplitude"] * math.cos(phase), "cosine": v["amplitude"] * math.sin(phase)}
             given = {name: {**parts, "frequency": v["frequency"]}}
-            start = (float(record.angle_rad[0]), float(record.rate_rad_s[0]))
         torque = TorqueSignal(record.time_s, record.torque_nm)
         motion = simulate(Platform(*JCK, given), record.time_s, torque, start=start, substeps=24)
         # The product knows the torque at its samples only: a kink between two of them costs a little.

@@ -1,0 +1,51 @@
+"""Recordings that nothing can be identified from, refused with what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identify.traces import Trace
+from rig.errors import RecordingError
+
+MOVES = 3.0  # times the sensor's noise that a motion has to reach
+
+
+def refuse_the_idle(traces: Sequence[Trace], free: bool) -> None:
+    """Refuse a recording in which nothing happens.
+
+    Raises
+    ------
+    RecordingError
+        Where no run moves more than the sensor's noise, or the torque never changes in any run.
+    """
+    moved = [float(np.std(t.measured[t.keep])) / max(t.noise, 1e-300) for t in traces]
+    if max(moved) < MOVES:
+        raise RecordingError(
+            f"no run moves more than {max(moved):.2g} times the sensor's noise (needed: {MOVES:g}): nothing to "
+            "identify; use more torque, or give recorded.noise if the noise is smaller than it looks"
+        )
+    steady = [t.torque is not None and float(np.ptp(t.torque.torque_nm)) == 0.0 for t in traces]
+    if not free and all(steady):
+        raise RecordingError(
+            "the torque has the same value in every sample of every run: J, C and K need a torque that changes; "
+            "check recorded.columns.torque, or leave the torque out for a free decay"
+        )
+
+
+def refuse_added_inertia(traces: Sequence[Trace]) -> None:
+    """Refuse a known mass on a platform whose inertia is the unit of everything.
+
+    Raises
+    ------
+    RecordingError
+        Where a run without torque says that an inertia was added.
+    """
+    loaded = [t.run for t in traces if t.run.added_inertia_kg_m2]
+    if loaded:
+        raise RecordingError(
+            f"{loaded[0].name} was recorded with an added inertia of {loaded[0].added_inertia_kg_m2:g} and without "
+            "torque: only ratios to the inertia can be known, and there is nothing to add it to; identify the runs of "
+            "each load by themselves, without added_inertia_kg_m2 and with model.inertia_kg_m2 of the loaded platform"
+        )

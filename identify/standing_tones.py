@@ -1,0 +1,151 @@
+"""A steady line in the gyro, or a torque that shakes the platform: what the beginning of a run and a known mass tell.
+
+A torque tone moves a linear platform as a line of the sensor's own (a vibration aliased into the band, pickup) moves
+its reading, once the platform stands in its steady motion. Apart they are where the platform gets there only during
+the run, as one does that was at rest, and where a known mass changes how far the same torque moves it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identify.evaluation import settled
+from identify.finish import Fitted
+from identify.output_error import shots_for
+from identify.parameters import equations_of
+from identify.shots import RUNAWAY, Shots, losses_of, predict
+from identify.traces import Trace, loads_differ
+from identify.wording import number
+from rig.dynamics import Equations
+from rig.recording.run import Array
+
+TONE = "periodic_disturbance"
+DECISIVE = 25.0  # times the noise's variance by which one beginning has to fit better than the other
+AS_GOOD = 0.25  # of what the other beginning loses: losses that the platform's other effects may cost a steady one
+MOVED = 0.05  # relative: by which the mass has to change how far the line's torque moves the platform
+ALIKE = 0.3  # of the scatter of the other: amplitudes that are the same in every run
+SOON_S = 0.1  # a run whose first sample that counts comes later does not show how it began
+
+
+FOLDS = (
+    "Look for a vibration above half of the sample rate that folds back (record once at another rate: it moves), or "
+    "for pickup on the cable."
+)
+TELLS = (
+    "Repeat a set with a known mass on the platform (added_inertia_kg_m2): that changes how far a torque moves it, and "
+    "nothing in the sensor. Or record at another sample rate, at which an aliased vibration moves. If you know that it "
+    "is a torque (a pump, a fan), declare it: model.effects.periodic_disturbance: "
+    "{{sine_nm: {torque:.3g}, cosine_nm: 0, frequency_hz: {hertz:.6g}}}."
+)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line whose origin a recording does not tell.
+
+    Attributes
+    ----------
+    torque_nm, rate_rad_s
+        Amplitude, if it is a torque on the platform, and if it is the sensor's own.
+    in_sensor
+        A known mass leaves the line as it is, which it does to no torque.
+    """
+
+    frequency_hz: float
+    torque_nm: float
+    rate_rad_s: float
+    in_sensor: bool
+
+
+def standing_line(fitted: Fitted, traces: Sequence[Trace]) -> Line | None:
+    """The tone of a fit where it may as well be a line of the sensor; None where it is a torque, or none was fitted.
+
+    A line is left open only where the runs say that the platform moved with it from their first sample on.
+    """
+    if TONE not in fitted.structure.effects or all(t.torque is None for t in traces):
+        return None
+    tones = {t.number: _amplitudes(fitted, t) for t in traces if (TONE, "sine", str(t.number)) in fitted.values}
+    if not tones:
+        return None
+    sizes = np.abs(np.array(list(tones.values())))  # torque, rate
+    torque_nm, rate_rad_s = (float(np.median(s)) for s in sizes.T)
+    line = Line(fitted.values[TONE, "frequency"], torque_nm, rate_rad_s, in_sensor=False)
+    mobility = sizes[:, 1] / np.maximum(sizes[:, 0], 1e-300)
+    if loads_differ(traces) and np.ptp(mobility) > MOVED * np.mean(mobility):
+        torque, rate = np.std(sizes, axis=0) / np.mean(sizes, axis=0)
+        if torque < ALIKE * rate:
+            return None
+        if rate < ALIKE * torque:
+            return replace(line, in_sensor=True)
+    return line if _stood_from_the_first(fitted, traces) else None
+
+
+def _amplitudes(fitted: Fitted, trace: Trace) -> tuple[complex, complex]:
+    """Torque and the rate of its steady motion in one run, complex: the real part of it times exp(i w t)."""
+    v, run = fitted.values, str(trace.number)
+    torque = -(v[TONE, "cosine", run] - 1j * v[TONE, "sine", run])
+    s = 2j * np.pi * v[TONE, "frequency"]
+    j, c, k = (v.get((n,), 0.0) for n in ("inertia", "damping", "stiffness"))
+    return torque, torque * s / ((j + trace.run.added_inertia_kg_m2) * s * s + c * s + k)
+
+
+def told(line: Line, axis: str) -> tuple[str, str]:
+    """The line in words, and what would tell where it comes from."""
+    linear = axis == "linear"
+    torque = f"{number(line.torque_nm, 3)} {'N' if linear else 'N m'}"
+    rate = f"{number(line.rate_rad_s, 3)} m/s" if linear else f"{number(math.degrees(line.rate_rad_s), 3)} deg/s"
+    name = f"A steady line at {line.frequency_hz:.5g} Hz"
+    if line.in_sensor:
+        return (
+            f"{name}, {rate}, is the sensor's own and no torque: runs with a known added mass show it as large as the "
+            "others."
+        ), FOLDS
+    return (
+        f"{name} is left open: a torque of {torque} on the platform, or {rate} of the sensor's own (a vibration above "
+        "half of the sample rate that folds back, pickup). It stood in its steady motion when the runs began, and then "
+        "both look the same."
+    ), TELLS.format(torque=line.torque_nm, hertz=line.frequency_hz)
+
+
+@RUNAWAY
+def _stood_from_the_first(fitted: Fitted, traces: Sequence[Trace]) -> bool:
+    """Whether the runs begin in the tone's steady motion, and not at rest."""
+    names, x = tuple(fitted.values), np.array(list(fitted.values.values()))
+    turn = 2.0 * np.pi * fitted.values[TONE, "frequency"]
+    sounds = np.array([len(n) == 3 and n[0] == TONE for n in names])
+    losses = np.zeros(3)  # at rest, in steady motion, from anywhere
+    for shots in shots_for(traces, fitted.structure, names, x, None, None, None, coarse=False):
+        trace = shots.trace
+        if trace.stretches[0][0] * trace.step_s > SOON_S or (TONE, "sine", str(trace.number)) not in fitted.values:
+            continue
+        equations = equations_of(fitted.structure, names, x, shots.number, shots.added)
+        begun = _from_first_sample(shots)
+        _, rate = _amplitudes(fitted, trace)
+        now = rate * np.exp(1j * turn * trace.start_s)
+        still = equations_of(fitted.structure, names, np.where(sounds, 0.0, x), shots.number, shots.added)
+        rest = np.array([still.rest_angle_rad(), 0.0])
+        steady = rest + np.array([(now / (1j * turn)).real, now.real])
+        tried = [_loss(begun, equations, start) for start in (rest, steady)]
+        begun.starts[:] = steady if tried[1] < tried[0] else rest
+        _, free = settled(begun, fitted.structure, names, x)
+        losses += np.array([*tried, float(np.sum(free))])
+    rest, steady, free = losses / fitted.sigma**2
+    return bool(rest - steady > DECISIVE and steady - free < AS_GOOD * (rest - free))
+
+
+def _from_first_sample(shots: Shots) -> Shots:
+    """The first usable stretch of a run, simulated from the run's first sample on."""
+    weight = shots.weight.copy()
+    weight[shots.trace.stretches[0][1] + 1 :] = False
+    return Shots(shots.trace, shots.grid, np.array([0]), np.zeros((1, 2)), shots.bias, weight)
+
+
+def _loss(shots: Shots, equations: Equations, start: Array) -> float:
+    """Sum of squares from a start state, the gyro's bias as it comes out best there."""
+    residual = shots.trace.measured - predict(shots, equations, start[None, :], 0.0)
+    bias = float(np.mean(residual[shots.weight])) if shots.trace.biased else 0.0
+    return float(np.sum(losses_of(shots, residual - bias)))
