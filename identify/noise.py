@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,8 @@ from rig.recording.run import Array
 LOWER = 0.8  # of the periodogram's values
 LOWER_MEAN = (1.0 - (1.0 - LOWER) * (1.0 - np.log(1.0 - LOWER))) / LOWER  # of an exponential distribution, its mean one
 SCATTER = 1.55  # of ``noise_of`` over the root of the number of samples, as a share of itself
+
+ALIKE = 3.0  # standard errors by which two readings of one noise may differ
 
 
 def noise_of(values: Array) -> float:
@@ -48,10 +49,13 @@ def bandwidth_of(values: Array, step_s: float) -> float:
 def least_of(found: Sequence[tuple[float, int]]) -> float:
     """The noise that several readings, each of so many samples, show at the least; zero where there is none.
 
-    The least of several equal readings lies below them by what chance makes of their scatter; that is added again.
+    The mean of the quietest ones that differ by no more than chance: motion that reaches the upper half of the spectrum
+    only ever adds to a reading.
     """
-    readings = [(noise, SCATTER / np.sqrt(count)) for noise, count in found]
-    least, scatter = min(readings, default=(0.0, 0.0))
-    alike = sum(noise < least * (1.0 + 3.0 * scatter) for noise, _ in readings)
-    depth = NormalDist().inv_cdf((alike - 0.375) / (alike + 0.25)) if alike > 1 else 0.0
-    return float(least * (1.0 + depth * scatter))
+    value, weight = 0.0, 0
+    for noise, count in sorted(found):
+        apart = SCATTER * np.sqrt(1.0 / count + (1.0 / weight if weight else 0.0))
+        if weight and noise > value * (1.0 + ALIKE * apart):
+            break
+        value, weight = (value * weight + noise * count) / (weight + count), weight + count
+    return float(value)

@@ -342,7 +342,7 @@ def prepare(
 
 
 def one_noise(traces: Sequence[Trace], known: bool) -> list[Trace]:
-    """All runs were measured by one sensor; the quietest run shows its noise with the least of the motion in it."""
+    """All runs were measured by one sensor; the quietest runs show its noise with the least of the motion in it."""
     quietest = {}
     for channel in ("rate", "angle"):
         found = [(t.noise, len(t.measured)) for t in traces if t.channel == channel]

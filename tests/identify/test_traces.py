@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.noise import bandwidth_of, noise_of
+from identify.noise import SCATTER, bandwidth_of, least_of, noise_of
 from identify.traces import UPSAMPLING, one_noise, prepare
 from rig import effects
 from rig.recording.run import Array, Run
@@ -215,6 +215,19 @@ def test_the_noise_of_several_runs_is_neither_the_least_nor_the_largest_that_cha
         found.append(one[0].noise / NOISE_RAD_S)
     assert np.mean(found) == pytest.approx(1.0, abs=0.015)
     assert np.std(found) < 0.035
+
+
+def test_the_noise_of_several_runs_is_known_to_a_percent_and_a_run_that_moves_too_fast_does_not_count() -> None:
+    rng = np.random.default_rng(3)
+    each = 1.0 + SCATTER / math.sqrt(10_000) * rng.standard_normal((400, 5))
+    pooled = np.array([least_of([(x, 10_000) for x in five]) for five in each])
+    assert np.mean(pooled) == pytest.approx(1.0, abs=0.002)
+    assert np.std(pooled) < 0.01
+    each[:, 3:] *= 1.2
+    pooled = np.array([least_of([(x, 10_000) for x in five]) for five in each])
+    assert np.mean(pooled) == pytest.approx(1.0, abs=0.003)
+    assert np.std(pooled) < 0.012
+    assert least_of([]) == 0.0
 
 
 @pytest.mark.parametrize(("bias_rad_s", "near"), [(0.0, 0.005), (0.02, 0.12)])
