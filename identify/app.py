@@ -258,7 +258,8 @@ def _conclude(
     if found.accepted:
         return OK
     if found.aborted:
-        desk.terminal.insist("Stopped: torque is off, what was recorded is kept, the results are marked aborted.")
+        kept = "" if loaded.config.backend == "recorded" else "torque is off, what was recorded is kept, "
+        desk.terminal.insist(f"Stopped: {kept}the results are marked aborted.")
         return STOPPED
     for reason in found.reasons:
         desk.terminal.insist(f"Not accepted: {reason}")

@@ -20,7 +20,7 @@ from identify.finish import Fitted, by_output_error, by_regression, noise_of_all
 from identify.fits import Fits
 from identify.holdout import Split, pieces, split
 from identify.measures import floor_of, measure
-from identify.refusals import refuse_added_inertia, refuse_the_idle
+from identify.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
 from identify.regression import Structure, shape_values
 from identify.results import (
     Identification,
@@ -111,6 +111,7 @@ class _Identifier:
         names = tuple(n for n in declared.effects if n not in still)
         self.structure = Structure(declared.terms, names)
         self.start: Start = first_guess(self.traces, Structure(declared.terms))
+        refuse_lowpass(self.traces, settings.lowpass_hz)
         if settings.lowpass_hz is not None:
             self.start = replace(self.start, cutoff_hz=settings.lowpass_hz)
 

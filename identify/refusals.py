@@ -49,3 +49,20 @@ def refuse_added_inertia(traces: Sequence[Trace]) -> None:
             "torque: only ratios to the inertia can be known, and there is nothing to add it to; identify the runs of "
             "each load by themselves, without added_inertia_kg_m2 and with model.inertia_kg_m2 of the loaded platform"
         )
+
+
+def refuse_lowpass(traces: Sequence[Trace], lowpass_hz: float | None) -> None:
+    """Refuse a low-pass above what the samples can hold.
+
+    Raises
+    ------
+    RecordingError
+        Where the cut-off is half of a run's sample rate or more.
+    """
+    slowest = max(traces, key=lambda t: t.step_s)
+    half_hz = 0.5 / slowest.step_s
+    if lowpass_hz is not None and lowpass_hz >= half_hz:
+        raise RecordingError(
+            f"identify.lowpass_hz is {lowpass_hz:g}, and {slowest.run.name} holds nothing above {half_hz:g} Hz (half "
+            "of its sample rate): take less, or leave the key out to have it chosen from the data"
+        )

@@ -32,11 +32,16 @@ class KeyFaults(ValueError):
 
 
 def check_effect_names(names: Sequence[str]) -> None:
-    """Raise KeyFaults naming every effect of a list that does not exist, with the nearest one that does."""
+    """Raise KeyFaults naming every effect of a list that does not exist, with the nearest one that does, or repeats."""
     from rig import effects  # noqa: PLC0415  compiled kernels: not paid for by a config that names no effect
 
     known = effects.known()
-    wrong = [((i,), unknown("effect", name, known)) for i, name in enumerate(names) if name not in known]
+    wrong: list[tuple[tuple[str | int, ...], str]] = []
+    for i, name in enumerate(names):
+        if name not in known:
+            wrong.append(((i,), unknown("effect", name, known)))
+        elif name in names[:i]:
+            wrong.append(((i,), f"{name!r} stands in the list twice"))
     if wrong:
         raise KeyFaults(wrong)
 

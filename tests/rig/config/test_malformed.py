@@ -106,6 +106,12 @@ CASES = {
         "unknown effect",
         "did you mean 'stribeck_friction'",
     ),
+    "candidate twice": (
+        RUNS + "identify:\n  candidates:\n    - backlash\n    - backlash",
+        ":8: identify.candidates.1",
+        "'backlash'",
+        "twice",
+    ),
     "unknown effect parameter": (
         RUNS + "model:\n  effects:\n    coulomb_friction:\n      levle_nm: 1",
         ":8: model.effects.coulomb_friction.levle_nm",
