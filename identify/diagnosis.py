@@ -61,9 +61,10 @@ def diagnose(
     if not np.all(total[:2] > 0.0):
         return ()
     known = torque and all(t.torque_nm is not None for t in traces)
-    repeated = harmonics(runs, [_period(t) for t in traces]) if known else None
-    lines = free_lines(runs, [_period(t) for t in traces], _natural_hz(sensor), sensor.lowpass_hz)
+    periods = [_period(t) for t in traces]
+    lines = free_lines(runs, periods, _natural_hz(sensor), sensor.lowpass_hz)
     rest = [without_lines(run, lines) for run in runs]
+    repeated = harmonics(rest, periods) if known else None
     direction = _shares(direction_power(rest), total) if known else None
     memory = _shares(memory_power(rest), total) if known else None
     quantity: Literal["torque", "rate", "angle"] = "torque" if torque else traces[0].channel

@@ -132,7 +132,7 @@ def _amplitude(y: Array, hertz: float, step_s: float) -> float:
 def _locked(hertz: float, run: Moved, period_s: float | None, width: float) -> bool | None:
     if period_s:
         multiple = max(round(hertz * period_s), 1)
-        return abs(hertz - multiple / period_s) < width
+        return bool(abs(hertz - multiple / period_s) < width)  # NumPy's False is not False
     return None if np.any(run.torque) else False
 
 

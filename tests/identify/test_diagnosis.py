@@ -60,6 +60,15 @@ def test_a_pump_is_a_free_line_at_its_frequency_and_size_and_nothing_else(hertz:
     assert not told(found.direction) and not told(found.memory, WORTH_OF_PAST)
 
 
+def test_a_free_line_beside_multiples_of_most_sets_is_no_harmonic() -> None:
+    found = diagnosed({"periodic_disturbance": {"sine": 0.05, "cosine": 0.06, "frequency": 11.96}})
+    (line,) = found.free_lines
+    assert line.frequency_hz == pytest.approx(11.96, abs=0.1), "no multiple of 9 Hz"
+    assert found.harmonics is not None
+    assert share(found.harmonics.even) == 0.0
+    assert share(found.harmonics.odd) == 0.0
+
+
 def test_harmonics_of_the_excitation_are_no_free_lines() -> None:
     for name in ("cubic_stiffness", "quadratic_stiffness", "coulomb_friction", "cogging"):
         assert diagnosed({name: VALUES[name]}).free_lines == (), name
