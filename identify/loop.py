@@ -30,6 +30,7 @@ from identify.results import (
 from identify.screen import Start, first_guess
 from identify.search import Loop, Search
 from identify.standing_tones import TONE, standing_line, told
+from identify.too_much import too_much_for
 from identify.traces import Trace, loads_differ, one_noise, prepare
 from identify.turned_runs import turned_runs
 from identify.unseen import why_unseen
@@ -148,11 +149,7 @@ class _Identifier:
                 self.say(f"not named: {', '.join(had)}; together they leave too much for any of them to be believed")
             before = self._before(search)
             after = self._after(search) if search.best.structure != self.structure else before
-            line = standing_line(after, self.traces) if TONE not in self.structure.effects else None
-            if line is not None:
-                search.leave_open(TONE, told(line, self.recording.axis), self._without(search, on_offer.fits, TONE))
-                self.say(f"not named: {TONE}; it may as well be a line of the sensor's own")
-                after = self._after(search) if search.best.structure != self.structure else before
+            after = self._doubted(search, on_offer.fits, before, after)
             named = [e for e in after.structure.effects if e not in self.structure.effects]
             on_offer.fits.horizon, start = search.horizon, search.base.values()
             search.contribution = contributions(on_offer.fits, after.structure, after.values, named, start)
@@ -167,12 +164,26 @@ class _Identifier:
                 found = replace(found, verdict=replace(found.verdict, sentences=(NOTHING_YET,)))
             return replace(found, aborted=True, accepted=False, reasons=(STOPPED,))
 
+    def _doubted(self, search: Search, fits: Fits, before: Fitted, after: Fitted) -> Fitted:
+        """The final fit, or another one where something else may pass for what was found."""
+        line = standing_line(after, self.traces) if TONE not in self.structure.effects else None
+        if line is not None:
+            search.leave_open(TONE, told(line, self.recording.axis), self._until(search, fits, TONE))
+            self.say(f"not named: {TONE}; it may as well be a line of the sensor's own")
+        elif too_much_for(after, self.structure.effects):
+            search.take_all_back()
+            self.say("not named: three effects of which one can follow anything, and they leave more than noise")
+        else:
+            return after
+        return self._after(search) if search.best.structure != self.structure else before
+
     @staticmethod
-    def _without(search: Search, fits: Fits, name: str) -> Judged:
-        """The best model without one of its effects; the declared one where that was all there was."""
-        left = search.best.structure.minus(name)
-        start = {n: v for n, v in search.best.values().items() if n[0] != name}
-        fitted = None if left.effects == search.base.structure.effects else fits.whole(left, start)
+    def _until(search: Search, fits: Fits, name: str) -> Judged:
+        """The model of what was found before an effect; the declared one where that is nothing."""
+        best, base = search.best.structure, search.base.structure
+        found = best.effects[: best.effects.index(name)]
+        start = {**search.base.values(), **{n: v for n, v in search.best.values().items() if n[0] in (*TERMS, *found)}}
+        fitted = None if set(found) <= set(base.effects) else fits.whole(replace(base, effects=found), start)
         return search.base if fitted is None else fitted.judged()
 
     def _searched(self) -> tuple[list[Trace], Split]:

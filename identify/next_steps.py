@@ -100,7 +100,7 @@ def unexplained_reason(ratio: float, found: Identification) -> str:
     told = f"{share} ({size})" if share else size
     acts = "something acts that none of the effects tried describes"
     if found.verdict.left_open:
-        acts = "the runs do not tell whether it is a torque or the sensor"
+        acts = "a steady line stands in it (see the verdict)"
     return f"the model leaves {told} unexplained: {acts}"
 
 

@@ -104,22 +104,33 @@ class Search:
         pliant = any(effects.get(e).resembles_much for e in self.best.structure.effects if e not in kept)
         if few and (nothing_left or (self.share > BULK and not pliant)):
             return
+        self.take_all_back()
+
+    def take_all_back(self) -> None:
+        """Name nothing: the declared model is what there is."""
+        kept = self.base.structure.effects
         self.candidates = [
             replace(c, status="best of a bad lot") if c.status == "added" and c.effect not in kept else c
             for c in self.candidates
         ]  # fmt: skip
         self.best, self.rivals, self.rival_models, self.dropped = self.base, {}, {}, []
+        self.free_running = False
 
     def leave_open(self, name: str, told: tuple[str, str], without: Judged) -> None:
-        """Take an effect back that may as well be something no library has; ``without`` is the model without it."""
+        """Take an effect back that may as well be something no library has, and what was found beside it.
+
+        ``without`` is the model of what was found before it.
+        """
+        gone = [e for e in self.best.structure.effects if e not in without.structure.effects]
+        status = {e: "left open" if e == name else "found beside what is left open" for e in gone}
         self.candidates = [
-            replace(c, status="left open") if c.status == "added" and c.effect == name else c for c in self.candidates
-        ]
-        self.rivals.pop(name, None)
-        self.rival_models.pop(name, None)
-        if without is self.base:
-            self.dropped = []
-        self.best, self.free_running = without, False
+            replace(c, status=status[c.effect]) if c.status == "added" and c.effect in status else c
+            for c in self.candidates
+        ]  # fmt: skip
+        for effect in gone:
+            self.rivals.pop(effect, None)
+            self.rival_models.pop(effect, None)
+        self.best, self.dropped, self.free_running = without, [], False
         self.left_open, self.tells_apart = told
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -19,13 +20,14 @@ from identify.output_error import shots_for
 from identify.parameters import equations_of
 from identify.shots import RUNAWAY, Shots, losses_of, predict
 from identify.traces import Trace, loads_differ
-from identify.wording import number
+from identify.wording import joined, number
 from rig.dynamics import Equations
 from rig.recording.run import Array
 
 TONE = "periodic_disturbance"
 DECISIVE = 25.0  # times the noise's variance by which one beginning has to fit better than the other
 AS_GOOD = 0.25  # of what the other beginning loses: losses that the platform's other effects may cost a steady one
+FAINT = 0.1  # of the amplitude in the loudest run: below, a run is not said to have the line
 MOVED = 0.05  # relative: by which the mass has to change how far the line's torque moves the platform
 ALIKE = 0.3  # of the scatter of the other: amplitudes that are the same in every run
 SOON_S = 0.1  # a run whose first sample that counts comes later does not show how it began
@@ -35,11 +37,15 @@ FOLDS = (
     "Look for a vibration above half of the sample rate that folds back (record once at another rate: it moves), or "
     "for pickup on the cable."
 )
+MOUNT = "Repeat a set with a known mass on the platform (added_inertia_kg_m2)"
+HEAVIER = (
+    "The known mass that was mounted does not tell: the line has to be as strong in every run, and the mass heavier"
+)
 TELLS = (
-    "Repeat a set with a known mass on the platform (added_inertia_kg_m2): that changes how far a torque moves it, and "
-    "nothing in the sensor. Or record at another sample rate, at which an aliased vibration moves. If you know that it "
-    "is a torque (a pump, a fan), declare it: model.effects.periodic_disturbance: "
-    "{{sine_nm: {torque:.3g}, cosine_nm: 0, frequency_hz: {hertz:.6g}}}."
+    ": that changes how far a {kind} moves it, and nothing in the sensor. Or switch the source on with the run, at "
+    "rest. Or record at another sample rate, at which an aliased vibration moves. If you know that it is a {kind} (a "
+    "pump, a fan), declare it: model.effects.periodic_disturbance: {{sine_nm: {torque:.3g}, cosine_nm: 0, "
+    "frequency_hz: {hertz:.6g}}}."
 )
 
 
@@ -51,37 +57,49 @@ class Line:
     ----------
     torque_nm, rate_rad_s
         Amplitude, if it is a torque on the platform, and if it is the sensor's own.
+    only
+        The runs in which it is heard, where not in all.
+    loaded
+        Runs with and without a known mass are there.
     in_sensor
-        A known mass leaves the line as it is, which it does to no torque.
+        The known mass leaves the line as it is, which it does to no torque.
+    stood
+        The runs show that it was there before them; else they do not show how they began.
     """
 
     frequency_hz: float
     torque_nm: float
     rate_rad_s: float
-    in_sensor: bool
+    only: tuple[str, ...] = ()
+    loaded: bool = False
+    in_sensor: bool = False
+    stood: bool = False
 
 
 def standing_line(fitted: Fitted, traces: Sequence[Trace]) -> Line | None:
     """The tone of a fit where it may as well be a line of the sensor; None where it is a torque, or none was fitted.
 
-    A line is left open only where the runs say that the platform moved with it from their first sample on.
+    A torque shows in how the runs begin, or in what a known mass makes of it; where neither tells, it is left open.
     """
     if TONE not in fitted.structure.effects or all(t.torque is None for t in traces):
         return None
-    tones = {t.number: _amplitudes(fitted, t) for t in traces if (TONE, "sine", str(t.number)) in fitted.values}
-    if not tones:
+    tones = {t.run.name: _amplitudes(fitted, t) for t in traces if (TONE, "sine", str(t.number)) in fitted.values}
+    sizes = np.abs(np.array(list(tones.values())).reshape(-1, 2))  # torque, rate
+    heard = sizes[:, 1] > FAINT * np.max(sizes[:, 1], initial=0.0)
+    if not np.any(heard):
         return None
-    sizes = np.abs(np.array(list(tones.values())))  # torque, rate
-    torque_nm, rate_rad_s = (float(np.median(s)) for s in sizes.T)
-    line = Line(fitted.values[TONE, "frequency"], torque_nm, rate_rad_s, in_sensor=False)
+    torque_nm, rate_rad_s = (float(np.median(s)) for s in sizes[heard].T)
+    only = tuple(name for name, yes in zip(tones, heard, strict=True) if yes) if not np.all(heard) else ()
+    line = Line(fitted.values[TONE, "frequency"], torque_nm, rate_rad_s, only, loads_differ(traces))
     mobility = sizes[:, 1] / np.maximum(sizes[:, 0], 1e-300)
-    if loads_differ(traces) and np.ptp(mobility) > MOVED * np.mean(mobility):
+    if line.loaded and np.ptp(mobility) > MOVED * np.mean(mobility):
         torque, rate = np.std(sizes, axis=0) / np.mean(sizes, axis=0)
         if torque < ALIKE * rate:
             return None
         if rate < ALIKE * torque:
             return replace(line, in_sensor=True)
-    return line if _stood_from_the_first(fitted, traces) else None
+    begun = _beginning(fitted, traces)
+    return None if begun == "at rest" else replace(line, stood=begun == "steady")
 
 
 def _amplitudes(fitted: Fitted, trace: Trace) -> tuple[complex, complex]:
@@ -98,22 +116,30 @@ def told(line: Line, axis: str) -> tuple[str, str]:
     linear = axis == "linear"
     torque = f"{number(line.torque_nm, 3)} {'N' if linear else 'N m'}"
     rate = f"{number(line.rate_rad_s, 3)} m/s" if linear else f"{number(math.degrees(line.rate_rad_s), 3)} deg/s"
-    name = f"A steady line at {line.frequency_hz:.5g} Hz"
+    name = f"A steady line at {line.frequency_hz:.5g} Hz" + (f" (only in {joined(line.only)})" if line.only else "")
     if line.in_sensor:
         return (
-            f"{name}, {rate}, is the sensor's own and no torque: runs with a known added mass show it as large as the "
-            "others."
+            f"{name}, {rate}, is the sensor's own and no {'force' if linear else 'torque'}: runs with a known added "
+            "mass show it as large as the others."
         ), FOLDS
+    why = (
+        "It stood in its steady motion when the runs began, and then both look the same."
+        if line.stood
+        else "The runs do not begin at rest, and then both look the same."
+    )
+    kind = "force" if linear else "torque"
     return (
-        f"{name} is left open: a torque of {torque} on the platform, or {rate} of the sensor's own (a vibration above "
-        "half of the sample rate that folds back, pickup). It stood in its steady motion when the runs began, and then "
-        "both look the same."
-    ), TELLS.format(torque=line.torque_nm, hertz=line.frequency_hz)
+        f"{name} is left open: a {kind} of {torque} on the platform, or {rate} of the sensor's own (a vibration above "
+        f"half of the sample rate that folds back, pickup). {why}"
+    ), (HEAVIER if line.loaded else MOUNT) + TELLS.format(kind=kind, torque=line.torque_nm, hertz=line.frequency_hz)
 
 
 @RUNAWAY
-def _stood_from_the_first(fitted: Fitted, traces: Sequence[Trace]) -> bool:
-    """Whether the runs begin in the tone's steady motion, and not at rest."""
+def _beginning(fitted: Fitted, traces: Sequence[Trace]) -> Literal["at rest", "steady", "unknown"]:
+    """Whether the platform was at rest when the runs began, or in the tone's steady motion.
+
+    Without a spring it may have stood anywhere.
+    """
     names, x = tuple(fitted.values), np.array(list(fitted.values.values()))
     turn = 2.0 * np.pi * fitted.values[TONE, "frequency"]
     sounds = np.array([len(n) == 3 and n[0] == TONE for n in names])
@@ -126,15 +152,21 @@ def _stood_from_the_first(fitted: Fitted, traces: Sequence[Trace]) -> bool:
         begun = _from_first_sample(shots)
         _, rate = _amplitudes(fitted, trace)
         now = rate * np.exp(1j * turn * trace.start_s)
-        still = equations_of(fitted.structure, names, np.where(sounds, 0.0, x), shots.number, shots.added)
-        rest = np.array([still.rest_angle_rad(), 0.0])
-        steady = rest + np.array([(now / (1j * turn)).real, now.real])
-        tried = [_loss(begun, equations, start) for start in (rest, steady)]
-        begun.starts[:] = steady if tried[1] < tried[0] else rest
+        moving = np.array([(now / (1j * turn)).real, now.real])
+        if trace.channel == "angle" and "stiffness" not in fitted.structure.terms:
+            rest = np.array([shots.starts[0, 0], 0.0])
+            moving[0] = 0.0
+        else:
+            still = equations_of(fitted.structure, names, np.where(sounds, 0.0, x), shots.number, shots.added)
+            rest = np.array([still.rest_angle_rad(), 0.0])
+        tried = [_loss(begun, equations, start) for start in (rest, rest + moving)]
+        begun.starts[:] = rest if tried[0] < tried[1] else rest + moving
         _, free = settled(begun, fitted.structure, names, x)
         losses += np.array([*tried, float(np.sum(free))])
-    rest, steady, free = losses / fitted.sigma**2
-    return bool(rest - steady > DECISIVE and steady - free < AS_GOOD * (rest - free))
+    rest_, steady, free_ = losses / fitted.sigma**2
+    if steady - rest_ > DECISIVE and rest_ - free_ < AS_GOOD * (steady - free_):
+        return "at rest"
+    return "steady" if rest_ - steady > DECISIVE and steady - free_ < AS_GOOD * (rest_ - free_) else "unknown"
 
 
 def _from_first_sample(shots: Shots) -> Shots:

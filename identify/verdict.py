@@ -32,7 +32,7 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
     for name in found.verdict.effects:
         out.append(_named(found, name))
     if not found.verdict.effects:
-        why = "what was found may be something else." if found.verdict.left_open else ""
+        why = "what was found is no effect of the platform, or may be none." if found.verdict.left_open else ""
         out.append(
             "No effect is named: "
             + (why or "none of those tried explains the residual." if found.verdict.unexplained
