@@ -37,6 +37,9 @@ PROOFS = 5  # sets that are put to the proof in a round
 LOOKED_AT = 14  # candidates of a pair whose sensitivities are taken
 LOOK_HZ = 2000.0  # sample rate that is fine enough for a first look
 USUAL_HZ = 5.0  # where nothing swings
+LEAST_DAMPING = 0.05  # of the identified one, where the runs hardly tell it
+IN_DOUBT = 3.0  # times its interval
+WELL_KNOWN = 0.8  # of it, that far below
 CAP = 1.3  # times the predicted travel: what a set may reach on a rig whose declared model is another one
 
 
@@ -86,24 +89,39 @@ def plan_follow_up(
         sensor = Sensor(sample_rate_hz, noise, traces[0].channel)
         played = max(float(np.max(np.abs(r.torque_nm))) for r in recording.runs if r.torque_nm is not None)
         table = Table(allowed, sensor, rest_s, prefix, found.axis == "linear", FAINT * played)
-        return _planned(pairs, without, table)
+        return _planned(pairs, without, table, _least_damping(found))
 
 
 def _all(found: Identification) -> list[tuple[str, tuple[str, ...]]]:
     return list(found.verdict.confusable_with.items())
 
 
-def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table) -> FollowUp:
+def _least_damping(found: Identification) -> float:
+    """The least share of the identified damping to reckon with: near a resonance that is what limits.
+
+    Three times as far below as its interval reaches: a follow-up is planned because the model is in doubt, and with the
+    wrong one of two rivals the interval holds for the wrong damping.
+    """
+    damping = found.final.parameters.get("damping")
+    if damping is None or not damping.value > 0.0:
+        return LEAST_DAMPING
+    below = IN_DOUBT * (damping.value - damping.ci95[0]) / damping.value
+    return float(np.clip(1.0 - below, LEAST_DAMPING, 1.0))
+
+
+def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table, least_damping: float) -> FollowUp:
     models: list[Platform] = []
     models += [m for p in pairs for m in p.models if m not in models]
+    lighter = [replace(m, damping_nm_s_rad=least_damping * m.damping_nm_s_rad) for m in models]
+    bearing = [*models, *(lighter if least_damping < WELL_KNOWN else [])]
     look, weight = coarser(table.sensor, LOOK_HZ)
     several = shapes(natural_hz(models[0]), table.sensor.sample_rate_hz)
-    choice = candidates(several, models, table.allowed, look, table.least_torque_nm)
+    choice = candidates(several, bearing, table.allowed, look, table.least_torque_nm)
     if not choice:
         why = f"no set of any kind stays within the limits with {number(table.least_torque_nm, 2)} N m or more"
         return FollowUp(None, (*without, *(Unparted(p.effect, p.rival, why) for p in pairs)))
     looks = _Looks(pairs, choice, models, look, weight)
-    sets = [s for i in _choose(looks) if (s := fitting(choice[i], models, table.allowed)) is not None]
+    sets = [s for i in _choose(looks) if (s := fitting(choice[i], bearing, table.allowed)) is not None]
     partings, failed = [], list(without)
     for pair in pairs:
         best = looks.checked(sets, pair) if sets else 0.0

@@ -36,6 +36,7 @@ from identify.turned_runs import turned_runs
 from identify.unseen import why_unseen
 from rig import effects
 from rig.config.identify import IdentifyConfig
+from rig.effects.base import Place
 from rig.errors import Aborted, RecordingError
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
@@ -278,7 +279,11 @@ class _Identifier:
         )  # fmt: skip
 
     def _with_dropped_damping(self, search: Search, fitted: Fitted) -> Fitted:
-        """The same with damping, where whole runs show what a few periods of the held-out part could not."""
+        """The same with damping, where whole runs show what a few periods of the held-out part could not.
+
+        Beside a lag or a delay always: at a few tones below the resonance both turn the phase alike, and without the
+        one the other would be told far more closely than the runs know it.
+        """
         terms = (*fitted.structure.terms, "damping")
         if "damping" in fitted.structure.terms or "damping" not in self.declared.terms:
             return fitted
@@ -288,7 +293,9 @@ class _Identifier:
             self.traces, structure, start, search.horizon, self.split.final, self.split.everything
         )  # fmt: skip
         damping, error = fuller.values[("damping",)], fuller.std_error(("damping",))
-        if not fuller.sensor_limited or damping < SHOWS * error:
+        late = any(effects.get(e).place in (Place.DRIVE, Place.SENSOR) for e in fitted.structure.effects)
+        shows = damping > 0.0 if late else damping > SHOWS * error
+        if not fuller.sensor_limited or not shows:
             return fitted
         search.dropped[:] = [d for d in search.dropped if d[0] != "damping"]
         self.say(f"took damping back: {damping:.4g} +- {error:.2g} over whole runs")

@@ -23,6 +23,7 @@ from identify.wording import (
 from rig import effects
 from rig.platform import TERMS
 
+SHOWN = 4  # numbers of an effect in a sentence
 SHOWN_PERCENT = 0.05  # a change below that is not worth a sentence
 
 
@@ -86,8 +87,9 @@ def _unseen_scale(found: Identification) -> list[str]:
 
 def _named(found: Identification, name: str) -> str:
     values = (found.after or found.before).effect_parameters.get(name, {})
-    shown = {k.replace("_", " "): readable(v) for k, v in list(values.items())[:4]}
-    numbers = ", ".join(f"{k} {value_of(v)} {unit(v.unit)}" for k, v in shown.items())
+    ordered = sorted(values.items(), key=lambda item: "_run_" in item[0])  # what every run has of its own comes last
+    shown = {k.replace("_", " "): readable(v) for k, v in ordered[:SHOWN]}
+    numbers = ", ".join(f"{k} {value_of(v)} {unit(v.unit)}".removesuffix(" 1") for k, v in shown.items())
     rivals = found.verdict.confusable_with.get(name, ())
     text = f"The model lacked {plain(name)} ({numbers})."
     if name in found.verdict.contribution:
