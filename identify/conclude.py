@@ -67,7 +67,8 @@ def conclude(
     """The identification, of what the search found and the two final fits (the same where nothing changed)."""
     changed = after.structure != case.structure
     idle = tuple(NotReported(n, why) for n, why in case.offer.idle)
-    dropped = (*idle, *(NotReported(n, why) for n, why in search.dropped))
+    declared = {*case.structure.terms, *case.structure.effects}  # what the search itself took up and gave up is no news
+    dropped = (*idle, *(NotReported(n, why) for n, why in search.dropped if n in declared))
     result_before = _model(case, before, measured_before, idle)
     result_after = _model(case, after, measured_after, dropped) if changed else None
     if result_after is not None:

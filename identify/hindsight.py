@@ -8,7 +8,7 @@ helps; where it lies far above, the model's own error is the limit, and a better
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from identify.foresight import FEWEST, silent
 from identify.identifiability import Information, information_of, together
 from identify.parameters import Name
 from identify.results import Identification, ParameterEstimate
-from identify.traces import Trace, prepare
+from identify.traces import Trace, one_noise, prepare
 from identify.wording import joined, percent
 from rig.platform import TERMS
 from rig.recording.run import Recording
@@ -74,11 +74,10 @@ def hindsight(found: Identification, recording: Recording) -> tuple[Told, ...]:
 
 
 def usable_traces(recording: Recording) -> list[Trace]:
-    """The runs that are long enough to tell anything, all with the noise of the quietest."""
+    """The runs that are long enough to tell anything, all with one noise."""
     found = [prepare(silent(run), i, recording.noise) for i, run in enumerate(recording.runs)]
     usable = [t for t in found if t.stretches and t.count > FEWEST]
-    quietest = {c: min((t.noise for t in usable if t.channel == c), default=0.0) for c in ("rate", "angle")}
-    return [replace(t, noise=quietest[t.channel]) for t in usable]
+    return one_noise(usable, recording.noise is not None)
 
 
 def _terms_only(information: Information) -> Information:

@@ -169,7 +169,8 @@ class _Identifier:
         """The final fit, or another one where something else may pass for what was found."""
         line = standing_line(after, self.traces) if TONE not in self.structure.effects else None
         if line is not None:
-            search.leave_open(TONE, told(line, self.recording.axis), self._until(search, fits, TONE))
+            words = told(line, self.recording.axis, self.traces[0].channel)
+            search.leave_open(TONE, words, self._until(search, fits, TONE))
             self.say(f"not named: {TONE}; it may as well be a line of the sensor's own")
         elif too_much_for(after, self.structure.effects):
             search.take_all_back()

@@ -72,7 +72,10 @@ def next_steps(found: Identification) -> tuple[str, ...]:
         steps.append(_to_reach(failed))
     follow_up = found.follow_up
     if follow_up is not None and follow_up.plan is not None:
-        steps.append(f"Play {file_name(len(follow_up.rounds))}: {follow_up.plan.why}")
+        file = file_name(len(follow_up.rounds))
+        stopped = "Tripped on" in follow_up.note  # as it stands the guard would stop it again
+        steps.append(f"Lower torque_nm in {file} before you play it again" if stopped else f"Play {file}")
+        steps[-1] += f": {follow_up.plan.why}"
     if found.aborted:
         steps.append("The campaign was aborted: run it again to its end.")
     return tuple(steps) or ("Run the campaign once more and compare: `rig check` says what each set can determine.",)

@@ -111,11 +111,13 @@ def _amplitudes(fitted: Fitted, trace: Trace) -> tuple[complex, complex]:
     return torque, torque * s / ((j + trace.run.added_inertia_kg_m2) * s * s + c * s + k)
 
 
-def told(line: Line, axis: str) -> tuple[str, str]:
-    """The line in words, and what would tell where it comes from."""
+def told(line: Line, axis: str, channel: str = "rate") -> tuple[str, str]:
+    """The line in words, of the channel that was measured, and what would tell where it comes from."""
     linear = axis == "linear"
     torque = f"{number(line.torque_nm, 3)} {'N' if linear else 'N m'}"
-    rate = f"{number(line.rate_rad_s, 3)} m/s" if linear else f"{number(math.degrees(line.rate_rad_s), 3)} deg/s"
+    size = line.rate_rad_s if channel == "rate" else line.rate_rad_s / (2.0 * math.pi * line.frequency_hz)
+    units = ("m" if linear else "deg") + ("/s" if channel == "rate" else "")
+    rate = f"{number(size if linear else math.degrees(size), 3)} {units}"
     name = f"A steady line at {line.frequency_hz:.5g} Hz" + (f" (only in {joined(line.only)})" if line.only else "")
     if line.in_sensor:
         return (
