@@ -83,13 +83,14 @@ def standing_line(fitted: Fitted, traces: Sequence[Trace]) -> Line | None:
     """
     if TONE not in fitted.structure.effects or all(t.torque is None for t in traces):
         return None
-    tones = {t.run.name: _amplitudes(fitted, t) for t in traces if (TONE, "sine", str(t.number)) in fitted.values}
-    sizes = np.abs(np.array(list(tones.values())).reshape(-1, 2))  # torque, rate
+    fitted_in = [t for t in traces if (TONE, "sine", str(t.number)) in fitted.values]
+    sizes = np.abs(np.array([_amplitudes(fitted, t) for t in fitted_in]).reshape(-1, 2))  # torque, rate
     heard = sizes[:, 1] > FAINT * np.max(sizes[:, 1], initial=0.0)
     if not np.any(heard):
         return None
     torque_nm, rate_rad_s = (float(np.median(s)) for s in sizes[heard].T)
-    only = tuple(name for name, yes in zip(tones, heard, strict=True) if yes) if not np.all(heard) else ()
+    some = [t.run.name for t, yes in zip(fitted_in, heard, strict=True) if yes]
+    only = () if np.all(heard) else tuple(some)
     line = Line(fitted.values[TONE, "frequency"], torque_nm, rate_rad_s, only, loads_differ(traces))
     mobility = sizes[:, 1] / np.maximum(sizes[:, 0], 1e-300)
     if line.loaded and np.ptp(mobility) > MOVED * np.mean(mobility):
