@@ -12,6 +12,7 @@ from identify.channels import Offer
 from identify.declared_values import declared_values, kept_as_declared
 from identify.diagnosis import with_diagnosis
 from identify.finish import Fitted, noise_of_all
+from identify.found import Search
 from identify.holdout import Split
 from identify.measures import Measured
 from identify.next_steps import opposite_signs, unexplained_reason
@@ -28,7 +29,6 @@ from identify.results import (
     SetResult,
     Verdict,
 )
-from identify.search import Search
 from identify.sign_check import SENTENCE
 from identify.traces import UPSAMPLING, Trace, loads_differ
 from identify.undetermined import of_another_run, open_phases, undetermined

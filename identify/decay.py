@@ -14,9 +14,9 @@ import numpy as np
 
 from identify.candidates import Candidates
 from identify.choice import STILL_FAR, STRONG
+from identify.found import MOST_NAMED, Search
 from identify.parameters import Name
 from identify.results import Candidate
-from identify.search import MOST_NAMED, Search
 from identify.whole_runs import TWICE, Whole
 from rig import effects
 from rig.effects.base import Place

@@ -16,11 +16,12 @@ import numpy as np
 from identify.candidates import VERY_FAR, Candidates
 from identify.choice import AT_NOISE, RIVAL, STILL_FAR, chosen_of, simplest
 from identify.fits import OUT_OF_SIGHT
+from identify.found import MOST_NAMED, Search
 from identify.parameters import Name
 from identify.pruning import Pruning
 from identify.results import Candidate
 from identify.scores import Scored
-from identify.search import MOST_EFFECTS, MOST_NAMED, Search
+from identify.search import MOST_EFFECTS
 from identify.two_at_once import can_follow_anything, two_at_once
 from identify.whole_runs import AT_FLOOR, ENDS_NEAR, NEAR_THEN, Whole
 from rig import effects

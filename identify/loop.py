@@ -18,6 +18,7 @@ from identify.contribution import contributions
 from identify.fine import FineSearch
 from identify.finish import Fitted, by_output_error, by_regression, noise_of_all
 from identify.fits import Fits
+from identify.found import Search
 from identify.holdout import Split, pieces, split
 from identify.measures import floor_of, measure
 from identify.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
@@ -28,7 +29,7 @@ from identify.results import (
     SetResult,
 )
 from identify.screen import Start, first_guess
-from identify.search import Loop, Search
+from identify.search import Loop
 from identify.standing_tones import TONE, standing_line, told
 from identify.too_much import too_much_for
 from identify.traces import Trace, loads_differ, one_noise, prepare

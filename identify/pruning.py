@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from identify.choice import RIVAL, STILL_FAR, worth
 from identify.fits import Fits
+from identify.found import Search
 from identify.parameters import Name
-from identify.search import Search
 from identify.whole_runs import Whole
 from rig import effects
 from rig.platform import TERMS

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from identify.compare import Judged, advantage, delta_bic, horizon_s, judge, share_explained
+from identify.found import Search
 from identify.output_error import Estimate, Name, names_of
 from identify.regression import Structure
-from identify.search import Search
 from identify.traces import prepare
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, sine_run
 

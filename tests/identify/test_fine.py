@@ -11,10 +11,10 @@ import pytest
 from identify import fits
 from identify.candidates import Candidates
 from identify.fine import FineSearch
+from identify.found import Search
 from identify.holdout import split
 from identify.parameters import Name
 from identify.regression import Structure
-from identify.search import Search
 from rig import effects
 from rig.recording.run import Recording
 from tests.identify.simulated import NOISE_RAD_S, SETS, TRUTH, campaign, traces_of

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from identify.compare import horizon_s
+from identify.found import Search
 from identify.holdout import pieces, split
 from identify.regression import Structure
 from identify.screen import first_guess
-from identify.search import Loop, Search
+from identify.search import Loop
 from rig.platform import Platform
 from rig.recording.run import Recording, Run
 from tests.identify.simulated import NOISE_RAD_S, campaign, traces_of, white
