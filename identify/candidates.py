@@ -13,6 +13,7 @@ from identify.compare import Judged
 from identify.fits import WORTH_A_FIT, Fits
 from identify.holdout import Split
 from identify.pairs import Pair, pairs
+from identify.parameters import Name
 from identify.regression import Structure
 from identify.scores import Scored, Scores
 from identify.screen import Screen, first_guess
@@ -34,6 +35,7 @@ FINER, SHARPER = 3, 2  # times the steps, and how often they are made finer
 FAINT = 0.03  # of the best score: what promises so little beside another is not what the round is about
 VERY_FAR = 1e4  # mean square over the noise's variance: there whole runs have false minima on the way down
 MOST_OF_IT = 0.2  # of the squares: a candidate that leaves less is there, whatever else is missing
+LIGHT = 0.01  # damping ratio of a start whose damping would be negative
 HOPELESS = 3.0  # times the best error of the round after three steps
 
 
@@ -208,7 +210,7 @@ class Candidates:
         the model without the candidate has lost it.
         """
         structure, hopeless = now.structure.plus(look.effect), HOPELESS * best.estimate.sigma
-        starts = [{**now.values(), **look.start}, {**now.values(), **look.besides, **look.start}]
+        starts = [{**now.values(), **look.start}, _damped({**now.values(), **look.besides, **look.start}, now)]
         squares = [self.fits.squares(structure, start) for start in starts]
         start = starts[int(np.argmin(squares))]
         friction, fitted = effects.get(look.effect).place is Place.FRICTION, None
@@ -245,6 +247,18 @@ class Candidates:
         special = looks if now.level > VERY_FAR else worth  # there the score of a special case points anywhere, too
         besides = [s for s in special if s.effect in wanted] + likes
         return short + [s for i, s in enumerate(besides) if s not in (*short, *besides[:i])]
+
+
+def _damped(start: dict[Name, float], now: Whole) -> dict[Name, float]:
+    """A start whose damping is not negative unless the model's is: from growing motion no fit finds its way back.
+
+    A lag takes from the damping what it had stood for, and the tangent at none takes a little too much.
+    """
+    name = ("damping",)
+    if start.get(name, 0.0) >= 0.0 or now.values()[name] < 0.0:
+        return start
+    inertia, stiffness = start.get(("inertia",), 0.0), start.get(("stiffness",), 0.0)
+    return {**start, name: 2.0 * LIGHT * float(np.sqrt(max(inertia * stiffness, 0.0)))}
 
 
 def _is_like(name: str, others: Iterable[str]) -> bool:

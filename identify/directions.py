@@ -133,11 +133,13 @@ class Directions:
         if effect.states and effect.fastest_rad_s:
             substeps = int(np.clip(np.ceil(step * effect.fastest_rad_s((*bare.jck, *values)) / PHASE_RAD), 1, 16))
         z = np.array(effect.rest_state(angle[0], rate[0]) if effect.rest_state else [0.0] * effect.states, dtype=float)
+        p = np.array([*bare.jck, *values])
         out = np.empty_like(angle)
-        torque_along(
-            effect.kernel.address, angle, rate, time, torque, step, z, substeps, np.array([*bare.jck, *values]),
-            False, 1.0, out,
-        )  # fmt: skip
+        torque_along(effect.kernel.address, angle, rate, time, torque, step, z.copy(), substeps, p, False, 1.0, out)
+        if s.trace.biased:  # a pull at rest shifts the place that angles are counted from (see from_rest): no push
+            still, rest = np.full(3, bare.rest_angle_rad()), np.zeros(3)
+            torque_along(effect.kernel.address, still, 0 * still, 0 * still, 0 * still, step, z, 1, p, False, 1.0, rest)
+            out -= rest[0]
         push = np.stack([out[:-1:2], out[1::2], out[2::2]], axis=1)
         return run.near.resisted(push) if run.near else predict(s, bare, s.starts, s.bias, push) - run.base
 

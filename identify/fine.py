@@ -22,6 +22,7 @@ from identify.pruning import Pruning
 from identify.results import Candidate
 from identify.scores import Scored
 from identify.search import MOST_EFFECTS
+from identify.special_cases import special_cases
 from identify.two_at_once import can_follow_anything, two_at_once
 from identify.whole_runs import AT_FLOOR, ENDS_NEAR, NEAR_THEN, Whole
 from rig import effects
@@ -233,7 +234,7 @@ class FineSearch:
         return now
 
     def _others(self, name: str, now: Whole) -> dict[str, dict[Name, float]]:
-        """Who came near an effect in its round, and its twin beyond the platform, with values to begin from."""
+        """Who came near an effect in its round, its twin beyond the platform, what it contains; where to begin from."""
         out = {
             other: {n: v for n, v in before.values().items() if n[0] == other}
             for other, before in self.came_near.get(name, {}).items()
@@ -242,6 +243,9 @@ class FineSearch:
         for twin in effects.get(name).never_separable or {}:
             if twin in self.on_offer.allowed and {p.name for p in effects.get(twin).parameters} == {k[0] for k in mine}:
                 out.setdefault(twin, {(twin, *k): v for k, v in mine.items()})
+        for simpler, own in special_cases(now, name).items():  # two that were found at once were never asked
+            if simpler in self.on_offer.allowed:
+                out.setdefault(simpler, own)
         return out
 
     def _round(self, found: Search, now: Whole, round_: int) -> Whole | None:

@@ -13,9 +13,11 @@ from identify.neighbourhood import Neighbourhood, neighbourhood_of
 from identify.parameters import Name, bounds_of, equations_of
 from identify.regression import Structure
 from identify.shots import RUNAWAY, Shots, losses_of, predict
+from rig.dynamics import Equations
 from rig.recording.run import Array
 
 STEP = 1e-6  # relative step of the differences: simulations repeat to 1e-13
+STUCK = 0.05  # of what a start rate shows on a free platform: one that shows less is taken up by friction
 
 
 @dataclass
@@ -120,7 +122,24 @@ def sensitivities(
         moved = s.starts.copy()
         moved[:, k] += STEP * 10.0 * span[k]
         state[:, k] = (run(x, moved) - base) / (STEP * 10.0 * span[k])
+    if equations.sticks:
+        _without_stuck_rates(s, state, equations)
     return columns, state, residual
+
+
+def _without_stuck_rates(s: Shots, state: Array, equations: Equations) -> None:
+    """Take out start rates that lead nowhere, in place: a platform that begins stuck shows its angle alone.
+
+    What friction leaves of a push would call for a huge one; a free platform turns it into an angle of rate / w0.
+    """
+    inertia, _, stiffness = equations.jck.tolist()
+    if stiffness <= 0.0:
+        return
+    for begin, end in s.edges:
+        used = s.weight[begin:end]
+        by_angle, by_rate = (float(np.linalg.norm(state[begin:end, k][used])) for k in range(2))
+        if by_rate < STUCK * by_angle * float(np.sqrt(inertia / stiffness)):
+            state[begin:end, 1] = 0.0
 
 
 @nb.njit(cache=True, error_model="numpy", nogil=True)

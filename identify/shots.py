@@ -17,6 +17,7 @@ from rig.dynamics.low_pass import low_pass_kernel, mean_rate, smoothed
 from rig.recording.run import Array
 
 SOON_S = 0.02  # a first stretch that begins by then is simulated from the beginning of the run
+AT_REST = 1e-3  # of the run's highest rate: below it a run begins at rest
 SENSOR_LEAD_S = 0.02  # longer than a gyro's filter remembers
 RUNAWAY = np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a simulation may; its error is then infinite
 
@@ -69,7 +70,7 @@ def make_shots(
     n = len(trace.measured)
     time = trace.start_s + trace.step_s * np.arange(n)
     begins = [0]  # every usable stretch begins anew: what happened in between is not to be predicted
-    soon = equations is not None and _begins_with_the_run(equations)
+    soon = equations is not None and _begins_with_the_run(equations, trace)
     for a, b in trace.stretches:
         if soon and a * trace.step_s <= SOON_S:
             a = 0  # noqa: PLW2901
@@ -87,13 +88,21 @@ def make_shots(
     return Shots(trace, Grid(time, trace.torque, substeps, min(LEAD_S, trace.offset_s)), first, starts, 0.0, weight)
 
 
-def _begins_with_the_run(equations: Equations) -> bool:
+def _begins_with_the_run(equations: Equations, trace: Trace) -> bool:
     """Whether the start state belongs to the first sample of a run, though the first ones that count come later.
 
     It takes up what a torque from before the run did, as a start at the first sample that counts would. Under dry
-    friction a run begins stuck, where no start rate leads anywhere.
+    friction only a run that begins at rest does so, and only for a sensor's memory: it is stuck there, and all that
+    the start state can tell is the angle.
     """
-    return bool(equations.states or equations.sensor.names) and not equations.sticks
+    if equations.sticks:
+        return bool(equations.sensor.names) and _begins_at_rest(trace)
+    return bool(equations.states or equations.sensor.names)
+
+
+def _begins_at_rest(trace: Trace) -> bool:
+    rate = trace.fine[1]
+    return bool(abs(rate[0]) < max(AT_REST * float(np.max(np.abs(rate))), 5.0 * trace.noise))
 
 
 def from_rest(shots: Shots, equations: Equations) -> Shots:

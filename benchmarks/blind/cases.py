@@ -76,8 +76,13 @@ def reference(hidden: Hidden) -> tuple[float, float, float]:
     return j * hidden.torque_scale, c * hidden.torque_scale, k * hidden.torque_scale
 
 
-def orders(seed: int, count: int, kinds: Sequence[str] = (), effects: Sequence[str] = ()) -> list[Order]:
-    """The plan of a bench: shares of kinds fixed, effects and sizes dealt evenly, in an order drawn from the seed."""
+def orders(
+    seed: int, count: int, kinds: Sequence[str] = (), effects: Sequence[str] = (), campaign: str = ""
+) -> list[Order]:
+    """The plan of a bench: shares of kinds fixed, effects and sizes dealt evenly, in an order drawn from the seed.
+
+    ``campaign`` is the same for all of them where it is given.
+    """
     rng = np.random.default_rng([seed, 1])
     shares = {"single": 0.5, "pair": 0.16, "outside": 0.16, "clean": 0.1, "torque_scale": 0.08}
     shares = {k: v for k, v in shares.items() if not kinds or k in kinds}
@@ -88,7 +93,7 @@ def orders(seed: int, count: int, kinds: Sequence[str] = (), effects: Sequence[s
     outside = [e for e in OUTSIDE if not effects or e in effects]
     decks = {"single": _deck(rng, inside), "outside": _deck(rng, outside)}
     out = []
-    for i, kind in enumerate(wanted[:count]):
+    for kind in wanted[:count]:
         names: tuple[str, ...] = ()
         size = SIZES[int(rng.integers(3))]
         if kind in decks:
@@ -96,7 +101,7 @@ def orders(seed: int, count: int, kinds: Sequence[str] = (), effects: Sequence[s
             size = max(size, SIZES[1]) if kind == "outside" else size
         elif kind == "pair":
             names, size = _pair(rng, inside), SIZES[1 + int(rng.integers(2))]
-        out.append(Order(kind, names, size, int(rng.integers(3)), _campaign(rng, i)))
+        out.append(Order(kind, names, size, int(rng.integers(3)), campaign or _campaign(rng)))
     return out
 
 
@@ -123,7 +128,7 @@ def _rubbing() -> set[str]:
     return {"coulomb_friction", "stribeck_friction", "presliding_friction", "hysteresis"}
 
 
-def _campaign(rng: Rng, number: int) -> str:
+def _campaign(rng: Rng) -> str:
     return str(rng.choice(["five_sines", "soft", "odd_sines", "multisine", "ramps"], p=[0.6, 0.1, 0.12, 0.1, 0.08]))
 
 
@@ -165,7 +170,7 @@ def _make(rng: Rng, number: int, order: Order) -> Case:
 
 
 def _sets(rng: Rng, plain: Hidden, campaign: str) -> tuple[Excitation, ...]:
-    """Sets of about fifty seconds in all, each scaled to a drawn share of the limits."""
+    """Sets of about fifty seconds in all (``low_sines``: of two), each scaled to a drawn share of the limits."""
     sets = [sine(1.0, f) for f in PAPER_HZ]
     if campaign == "soft":
         soft = rng.random(5) < 0.5
@@ -173,6 +178,9 @@ def _sets(rng: Rng, plain: Hidden, campaign: str) -> tuple[Excitation, ...]:
         sets = [
             sine(1.0, f, 10.0, float(rng.uniform(0.5, 2.0)) if s else 0.0) for f, s in zip(PAPER_HZ, soft, strict=True)
         ]
+    elif campaign == "low_sines":
+        low = np.sort(rng.choice(PAPER_HZ[:3], 2, replace=False))
+        sets = [sine(1.0, float(f), 10.0, float(rng.choice([0.0, 1.0]))) for f in low]
     elif campaign == "odd_sines":
         hz = np.sort(0.35 * (11.0 / 0.35) ** rng.random(int(rng.integers(4, 7))))
         sets = [sine(1.0, float(round(f, 3)), float(rng.integers(6, 14))) for f in hz]

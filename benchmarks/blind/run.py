@@ -121,6 +121,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--kinds", nargs="*", default=[], help="single, pair, outside, clean, torque_scale")
     parser.add_argument("--effects", nargs="*", default=[], help="only these effects")
+    parser.add_argument("--campaign", default="", help="the same for all; low_sines leaves much to follow-ups")
     parser.add_argument("--only", nargs="*", type=int, default=[], help="only the cases of these numbers")
     parser.add_argument("--again", action="store_true", help="run the tool once more on cases that stand there")
     parser.add_argument("--rivals", action="store_true", help="find out who passes for whom (a minute a case)")
@@ -132,7 +133,7 @@ def main() -> None:
     a.out.mkdir(parents=True, exist_ok=True)
     scores: list[Score] = []
     followed: list[tuple[Score, Score]] = []
-    for number, order in enumerate(orders(a.seed, a.cases, a.kinds, a.effects)):
+    for number, order in enumerate(orders(a.seed, a.cases, a.kinds, a.effects, a.campaign)):
         if a.only and number not in a.only:
             continue
         if a.generate:

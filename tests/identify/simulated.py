@@ -22,11 +22,15 @@ Effects = Mapping[str, Mapping[str, float]]
 def sine_run(
     torque_nm: float, frequency_hz: float, *, effects: Effects | None = None, duration_s: float = 4.0,
     noise: float = NOISE_RAD_S, seed: int = 0, bias: float = 0.0, jck: tuple[float, float, float] = TRUTH,
+    begin_rad: float = 0.0, soft_s: float = 0.0,
 ) -> Run:  # fmt: skip
-    """A sine set from rest at 1 kHz, read by a gyro."""
+    """A sine set from rest at 1 kHz, read by a gyro; under dry friction it may begin stuck beside the spring's rest."""
     time = np.arange(round(duration_s * 1000) + 1) * 1e-3
-    torque = TorqueSignal(time, torque_nm * np.sin(2 * np.pi * frequency_hz * time))
-    rate = simulate(Platform(*jck, effects or {}), time, torque, substeps=16).sensed_rate_rad_s
+    x = np.minimum(time / soft_s, 1.0) if soft_s else np.ones_like(time)
+    swell = x**3 * (10.0 + x * (6.0 * x - 15.0))
+    torque = TorqueSignal(time, torque_nm * swell * np.sin(2 * np.pi * frequency_hz * time))
+    platform = Platform(*jck, effects or {})
+    rate = simulate(platform, time, torque, start=(begin_rad, 0.0), substeps=16).sensed_rate_rad_s
     rate = rate + bias + noise * np.random.default_rng([seed, round(10 * frequency_hz)]).standard_normal(len(time))
     return Run(
         f"{frequency_hz:g} Hz", time, np.ones(len(time), bool), rate_rad_s=rate, torque_time_s=time,

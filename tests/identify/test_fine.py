@@ -17,7 +17,7 @@ from identify.parameters import Name
 from identify.regression import Structure
 from rig import effects
 from rig.recording.run import Recording
-from tests.identify.simulated import NOISE_RAD_S, SETS, TRUTH, campaign, traces_of
+from tests.identify.simulated import NOISE_RAD_S, SETS, TRUTH, campaign, sine_run, traces_of
 
 START: dict[Name, float] = {("inertia",): 0.0201, ("damping",): 0.05, ("stiffness",): 676.0}
 ALLOWED = (
@@ -26,11 +26,15 @@ ALLOWED = (
 )  # fmt: skip
 
 
+def offered(recording: Recording, allowed: tuple[str, ...] = ALLOWED) -> FineSearch:
+    traces = traces_of(recording)
+    return FineSearch(Candidates(traces, split(traces), allowed), lambda text: None)
+
+
 def searched(
     recording: Recording, allowed: tuple[str, ...] = ALLOWED, start: Mapping[Name, float] = START
 ) -> tuple[Search, bool]:
-    traces = traces_of(recording)
-    fine = FineSearch(Candidates(traces, split(traces), allowed), lambda text: None)
+    fine = offered(recording, allowed)
     begin = fine.whole(Structure(), start)
     assert begin is not None
     found = Search(begin.judged(), begin.judged(), 0.1, fine.noise)
@@ -246,3 +250,17 @@ def test_a_decay_is_searched_however_much_it_costs(monkeypatch: pytest.MonkeyPat
     assert astray is not None
     assert astray.level > 100.0
     assert not offer.fits.gives_up(astray)
+
+
+def test_a_lag_that_two_slow_soft_sines_cannot_tell_from_a_delay_stands_beside_it() -> None:
+    """The tangent at no lag asks for a negative damping, from which no fit of a lag finds its way."""
+    slow = [
+        sine_run(100.0, f, effects={"sensor_lag": {"time": 2e-3}}, duration_s=6.0, soft_s=1.0, seed=1)
+        for f in (1.0, 3.0)
+    ]
+    found, took = searched(Recording(tuple(slow)), start={**START, ("damping",): 1.4})
+    assert took
+    (name,) = found.best.structure.effects
+    lags = {"actuator_lag", "sensor_lag", "torque_delay"}
+    assert name in lags
+    assert lags - {name} <= set(found.rivals[name])

@@ -41,6 +41,22 @@ def test_a_delay_and_coulomb_friction_are_found_from_a_start_that_is_well_off() 
     np.testing.assert_allclose([values["inertia",], values["stiffness",]], [TRUTH[0], TRUTH[2]], rtol=1e-4)
 
 
+def test_runs_that_begin_stuck_beside_the_springs_rest_tell_friction_and_the_gyros_lag_to_the_noise() -> None:
+    hidden = {"coulomb_friction": {"level": 1.0}, "sensor_lag": {"time": 1e-3}}
+    stuck = 0.8 / TRUTH[2]  # as far as friction may hold it
+    runs = [sine_run(m, f, effects=hidden, duration_s=3.0, begin_rad=b) for (m, f), b in
+            zip(((104.0, 3.0), (42.0, 9.0)), (stuck, -stuck), strict=True)]  # fmt: skip
+    traces = traces_of(Recording(tuple(runs)))
+    structure = Structure(effects=("coulomb_friction", "sensor_lag"))
+    guess = start(coulomb_friction={"level": 0.97}, sensor_lag={"time": 0.95e-3})
+    found = refine(traces, structure, guess, None, 15)
+    values = dict(zip(found.names, found.values, strict=True))
+    assert found.sigma == pytest.approx(NOISE_RAD_S, rel=0.03)
+    assert values["sensor_lag", "time"] == pytest.approx(1e-3, rel=1e-3)
+    assert values["coulomb_friction", "level"] == pytest.approx(1.0, rel=1e-3)
+    np.testing.assert_allclose([s.starts[0, 0] for s in found.shots], [stuck, -stuck], rtol=0.02)
+
+
 def test_ten_seconds_of_stribeck_friction_are_repeated_to_the_noise_at_the_true_parameters() -> None:
     friction = {"coulomb": 1.2, "static": 2.4, "speed": 0.08}
     run = sine_run(42, 9, effects={"stribeck_friction": friction}, duration_s=10)

@@ -86,3 +86,15 @@ def test_a_gain_that_may_not_turn_its_sign_promises_nothing_where_it_would_have_
     assert x[1] == pytest.approx(0.3)
     assert fall == pytest.approx(0.09)
     assert _bounded(square[:1, :1], np.array([-1.0]), lowest[:1])[1] == 0.0
+
+
+def test_a_pull_at_rest_is_no_push_where_friction_holds_the_platform() -> None:
+    """Within a few degrees gravity beside the axis is a quadratic spring and a shift of the rest angle."""
+    hidden = {"coulomb_friction": {"level": 0.5}, "unbalance": {"sine": 0.0, "cosine": 2.0}}
+    traces = traces_of(campaign(hidden, sets=((100.0, 1.0), (42.0, 9.0)), duration_s=3))
+    known = {("coulomb_friction", "level"): 0.5}
+    estimate = refine(traces, Structure(effects=("coulomb_friction",)), {**START, **known}, None, 15, coarse=True)
+    looks = Scores(estimate, (), NOISE_RAD_S, scale_of(traces, TRUTH, ())).all(["unbalance", "quadratic_stiffness"])
+    gains = {s.effect: s.gain for s in looks}
+    assert gains["quadratic_stiffness"] > 100.0
+    assert gains["unbalance"] > 0.9 * gains["quadratic_stiffness"]
