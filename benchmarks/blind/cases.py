@@ -180,7 +180,7 @@ def _sets(rng: Rng, plain: Hidden, campaign: str) -> tuple[Excitation, ...]:
         ]
     elif campaign == "low_sines":
         low = np.sort(rng.choice(PAPER_HZ[:3], 2, replace=False))
-        sets = [sine(1.0, float(f), 10.0, float(rng.choice([0.0, 1.0]))) for f in low]
+        sets = [sine(1.0, float(f), 6.0, 1.0) for f in low]  # the platform never rings
     elif campaign == "odd_sines":
         hz = np.sort(0.35 * (11.0 / 0.35) ** rng.random(int(rng.integers(4, 7))))
         sets = [sine(1.0, float(round(f, 3)), float(rng.integers(6, 14))) for f in hz]
