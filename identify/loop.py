@@ -21,6 +21,7 @@ from identify.fits import Fits
 from identify.found import Search
 from identify.holdout import Split, pieces, split
 from identify.measures import floor_of, measure
+from identify.noisy_runs import noisy_runs
 from identify.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
 from identify.regression import Structure, shape_values
 from identify.results import (
@@ -93,7 +94,12 @@ class _Identifier:
             [r.rate_rad_s[r.valid & np.isfinite(r.rate_rad_s)] for r in runs if r.rate_rad_s is not None]
         )
         traces = [prepare(r, i, recording.noise, full_scale=beyond) for i, r in enumerate(runs)]
-        self.traces = one_noise([t for t in traces if t.stretches and t.count > 40], recording.noise is not None)
+        usable = [t for t in traces if t.stretches and t.count > 40]
+        self.noisy = [] if recording.noise is not None else noisy_runs(usable)
+        for trace, times in self.noisy:
+            self.say(f"{trace.run.name} is left out: {times:.2g} times as noisy as the other runs")
+        usable = [t for t in usable if not any(t is gone for gone, _ in self.noisy)]
+        self.traces = one_noise(usable, recording.noise is not None)
         if not self.traces:
             raise RecordingError(
                 "no run holds a usable stretch of 40 samples: look at valid, min_rate_rad_s, from_s and to_s"
@@ -222,6 +228,7 @@ class _Identifier:
         case = Case(
             self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
             self.declared, tuple(t.run.name for t in self.turned),
+            tuple((t.run.name, times) for t, times in self.noisy),
         )  # fmt: skip
         scale = self._torque_scale(after) if in_full else None
         return conclude(case, search, before, after, measured_before, measured_after, floor, per_set, joint, scale)

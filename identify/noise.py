@@ -17,8 +17,11 @@ SCATTER = 1.55  # of ``noise_of`` over the root of the number of samples, as a s
 ALIKE = 3.0  # standard errors by which two readings of one noise may differ
 
 
-def noise_of(values: Array) -> float:
-    """One standard deviation of the white part of a signal, from the upper half of its spectrum.
+UPPER = (0.5, 0.98)  # of Nyquist: where the noise is read
+
+
+def noise_of(values: Array, band: tuple[float, float] = UPPER) -> float:
+    """One standard deviation of the white part of a signal, from the upper half of its spectrum or another ``band``.
 
     The mean of the lower four fifths of the periodogram there is blind to lines and to a signal below, and scatters
     less than its median; a third difference first takes away what a steep low-frequency signal would leak.
@@ -29,7 +32,7 @@ def noise_of(values: Array) -> float:
     spectrum = np.abs(np.fft.rfft(d * signal.windows.hann(len(d), sym=False))) ** 2
     f = np.arange(len(spectrum)) / len(spectrum)  # of Nyquist
     gain = (2.0 * np.sin(0.5 * np.pi * f)) ** 6
-    upper = (f > 0.5) & (f < 0.98)
+    upper = (f > band[0]) & (f < band[1])
     power = np.sort(spectrum[upper] / gain[upper])
     level = np.mean(power[: round(LOWER * len(power))]) / LOWER_MEAN
     return float(np.sqrt(level / (0.375 * len(d))))
