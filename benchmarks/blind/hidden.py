@@ -16,6 +16,8 @@ from benchmarks.blind.physics import CODES, STATES, SWITCHES
 
 STEP_RAD = 0.2  # of the fastest motion in one step of eighth order: 1e-11 a step
 CONSTANT = ("unbalance", "cogging", "torque_offset")  # loads that pull at rest
+STICKING = {"coulomb_friction": "level", "stribeck_friction": "coulomb"}  # and the torque with which they hold
+HELD = 0.9  # of how far beside the spring's rest they can
 # What the compiled functions take, in their order. A name that ends in _run has one value a set.
 ORDER: Mapping[str, tuple[str, ...]] = {
     "quadratic_damping": ("factor",), "directional_damping": ("step",), "cubic_stiffness": ("factor",),
@@ -140,6 +142,11 @@ class Hidden:
             rates.append(STEP_RAD / self.step_s * 3.0)
         return max(rates)
 
+    def stuck_rad(self, number: int) -> float:
+        """How far beside its rest dry friction holds the platform when a set begins: wherever the last one left it."""
+        level = max((self.effects[n][k] for n, k in STICKING.items() if n in self.effects), default=0.0)
+        return HELD * level / self.stiffness * float(np.random.default_rng([self.phase_seed, number, 1]).uniform(-1, 1))
+
     def _begin(self, zo: Any, size: int, number: int) -> tuple[Any, float]:
         rest = self.rest_angle()
         y = np.zeros(size)
@@ -151,6 +158,7 @@ class Hidden:
             turning = answer * np.exp(1j * self._phase(number))
             y[0] += turning.imag
             y[1] = (turning * s).imag
+        y[0] += self.stuck_rad(number)
         for k, name in enumerate(self.effects):
             if name in {"creep", "flexible_mode", "two_relaxations"}:
                 y[zo[k]] = y[0]

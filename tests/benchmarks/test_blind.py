@@ -91,7 +91,7 @@ def test_every_effect_of_the_product_can_be_hidden() -> None:
 def test_the_bench_and_the_product_move_the_same_platform_alike(name: str) -> None:
     hidden = Hidden(*JCK, {name: VALUES[name]}, phase_seed=3)
     for number, (excitation, record) in enumerate(zip(SETS, hidden.play(SETS), strict=True)):
-        given, start = {name: VALUES[name]}, (hidden.rest_angle(), 0.0)
+        given, start = {name: VALUES[name]}, (hidden.rest_angle() + hidden.stuck_rad(number), 0.0)
         if name == "periodic_disturbance":
             v, phase = VALUES[name], hidden._phase(number)
             parts = {"sine": v["amplitude"] * math.cos(phase), "cosine": v["amplitude"] * math.sin(phase)}
@@ -111,11 +111,13 @@ def test_halving_the_step_changes_nothing(name: str) -> None:
 
 def test_dry_friction_holds_the_platform_until_the_torque_exceeds_it() -> None:
     hidden = Hidden(*JCK, {"coulomb_friction": {"level": 5.0}})
-    (held,) = hidden.play([sine(4.99, 1.0, 2.0)])
+    spring = JCK[2] * hidden.stuck_rad(0)  # it begins where friction holds it
+    assert 0.0 < abs(spring) < 0.9 * 5.0
+    (held,) = hidden.play([sine(0.99 * (5.0 - abs(spring)), 1.0, 2.0)])
     assert not np.any(held.rate_rad_s)
-    assert held.parts[:, 0] == pytest.approx(held.torque_nm, abs=1e-12)
-    (moved,) = hidden.play([sine(6.0, 1.0, 2.0)])
-    breaks = math.asin(5.0 / 6.0) / (2.0 * math.pi)
+    assert held.parts[:, 0] == pytest.approx(held.torque_nm - spring, abs=1e-9)
+    (moved,) = hidden.play([sine(20.0, 1.0, 2.0)])
+    breaks = math.asin((5.0 + spring) / 20.0) / (2.0 * math.pi)
     assert moved.time_s[np.flatnonzero(moved.rate_rad_s)[0]] == pytest.approx(breaks, abs=1.1e-3)
 
 
