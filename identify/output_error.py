@@ -19,6 +19,7 @@ from identify.parameters import Name, bounds_of, names_of, ordered, platform_of
 from identify.regression import Structure
 from identify.sensitivities import Reduced, at_residual, linearise
 from identify.shots import RUNAWAY, Shots, from_rest, make_shots, moved, predict, residual_at
+from identify.stuck_starts import begin_where_it_stuck
 from identify.traces import Trace
 from rig.dynamics import Equations
 from rig.dynamics.equations import MAX_SUBSTEPS
@@ -169,6 +170,8 @@ def shots_for(
         shots = from_rest(make_shots(trace, substeps, length, counting, equations), equations)
         if carry is not None and np.array_equal(carry[i].first, shots.first):
             shots.starts, shots.bias = carry[i].starts.copy(), carry[i].bias
+        elif length is None and equations.sticks:
+            begin_where_it_stuck(shots, equations)
         out.append(shots)
     return out
 

@@ -11,13 +11,13 @@ import numpy as np
 
 from identify.parameters import Name, equations_of
 from identify.regression import Structure
-from identify.traces import LEAD_S, Trace, clear_of_seam
+from identify.traces import LEAD_S, UPSAMPLING, Trace, clear_of_seam
 from rig.dynamics import Equations, Grid
 from rig.dynamics.low_pass import low_pass_kernel, mean_rate, smoothed
 from rig.recording.run import Array
 
 SOON_S = 0.02  # a first stretch that begins by then is simulated from the beginning of the run
-AT_REST = 1e-3  # of the run's highest rate: below it a run begins at rest
+AT_REST = 5e-3  # of the run's highest rate: below it, a gyro's bias included, a run begins at rest
 SENSOR_LEAD_S = 0.02  # longer than a gyro's filter remembers
 RUNAWAY = np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a simulation may; its error is then infinite
 
@@ -96,12 +96,13 @@ def _begins_with_the_run(equations: Equations, trace: Trace) -> bool:
     the start state can tell is the angle.
     """
     if equations.sticks:
-        return bool(equations.sensor.names) and _begins_at_rest(trace)
+        return bool(equations.sensor.names) and begins_at_rest(trace)
     return bool(equations.states or equations.sensor.names)
 
 
-def _begins_at_rest(trace: Trace) -> bool:
-    rate = trace.fine[1]
+def begins_at_rest(trace: Trace) -> bool:
+    """Whether the first sample shows no motion beyond the noise and a gyro's bias."""
+    rate = trace.measured if trace.channel == "rate" else trace.fine[1][::UPSAMPLING]  # smoothing looks ahead
     return bool(abs(rate[0]) < max(AT_REST * float(np.max(np.abs(rate))), 5.0 * trace.noise))
 
 
