@@ -246,6 +246,7 @@ class Candidates:
         likes = [s for s in promising if _is_like(s.effect, [w.effect for w in short])]
         special = looks if now.level > VERY_FAR else worth  # there the score of a special case points anywhere, too
         besides = [s for s in special if s.effect in wanted] + likes
+        besides += [s for s in looks if effects.get(s.effect).needs_added_inertia]  # the known mass was mounted for it
         return short + [s for i, s in enumerate(besides) if s not in (*short, *besides[:i])]
 
 

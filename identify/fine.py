@@ -17,6 +17,7 @@ from identify.candidates import VERY_FAR, Candidates
 from identify.choice import AT_NOISE, RIVAL, STILL_FAR, chosen_of, simplest
 from identify.fits import OUT_OF_SIGHT
 from identify.found import MOST_NAMED, Search
+from identify.one_for_two import one_for_two
 from identify.parameters import Name
 from identify.pruning import Pruning
 from identify.results import Candidate
@@ -44,10 +45,18 @@ LEFT_OVER = 0.1  # of the declared model's excess over the noise that what is na
 
 
 class FineSearch:
-    """The search over whole runs of one recording."""
+    """The search over whole runs of one recording.
 
-    def __init__(self, candidates: Candidates, say: Callable[[str], None]) -> None:
-        self.on_offer, self.say = candidates, say
+    Parameters
+    ----------
+    declared
+        Values of J, C, K and of the declared effects: another place to begin from.
+    """
+
+    def __init__(
+        self, candidates: Candidates, say: Callable[[str], None], declared: Mapping[Name, float] | None = None
+    ) -> None:
+        self.on_offer, self.say, self.declared = candidates, say, declared or {}
         self.whole, self.noise = candidates.fits.whole, candidates.fits.noise
         self.pruning = Pruning(candidates.fits, say)
         self.tried_at = np.inf
@@ -64,7 +73,7 @@ class FineSearch:
         Where no library can bring the model down to the sensor's noise, whole runs magnify what is wrong with it,
         and nothing found here is kept.
         """
-        begin = self.whole(found.best.structure, found.best.values())
+        begin = self._begin(found)
         if begin is not None and self.on_offer.fits.gives_up(begin):
             return False
         pliant = any(effects.get(e).resembles_much for e in found.best.structure.effects)
@@ -90,6 +99,22 @@ class FineSearch:
         found.candidates, found.rivals, found.dropped = trial.candidates, trial.rivals, trial.dropped
         found.rival_models = trial.rival_models
         return True
+
+    def _begin(self, found: Search) -> Whole | None:
+        """The model at hand over whole runs; where effects were declared also from the declared numbers, once.
+
+        A twin of the rig is right as it stands, and a short horizon may lead away from it.
+        """
+        structure = found.best.structure
+        begin = self.whole(structure, found.best.values())
+        as_declared = structure.effects and structure == found.base.structure and not self.attempts
+        if not as_declared or (begin is not None and begin.level < AT_FLOOR):
+            return begin
+        twin = self.whole(structure, {n: self.declared.get(n, v) for n, v in found.best.values().items()})
+        if twin is None or (begin is not None and begin.squares <= twin.squares):
+            return begin
+        found.base = found.best = twin.judged()
+        return twin
 
     def _large(self, found: Search) -> Whole | None:
         """Once, where the declared model runs astray: with an effect that changes all of the motion, if near."""
@@ -151,7 +176,7 @@ class FineSearch:
         swapped = self._asked_again(found, now)
         if swapped.structure != now.structure:  # what another one's mistakes had called for is no longer needed
             swapped = self.pruning.pruned(found, swapped, swapped.structure.effects)
-        now = swapped
+        now = one_for_two(self.on_offer, found, swapped, self.say)
         for name in now.structure.effects[len(declared.effects) :]:
             if now.judged().strength(name) < WELL_KNOWN:
                 now = self.on_offer.fits.elsewhere(now, name)

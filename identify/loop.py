@@ -15,6 +15,7 @@ from identify.clipping import full_scale_of
 from identify.compare import Judged, horizon_s
 from identify.conclude import Case, conclude
 from identify.contribution import contributions
+from identify.declared_values import declared_values
 from identify.fine import FineSearch
 from identify.finish import Fitted, by_output_error, by_regression, noise_of_all
 from identify.fits import Fits
@@ -22,7 +23,7 @@ from identify.found import Search
 from identify.holdout import Split, pieces, split
 from identify.measures import floor_of, measure
 from identify.noisy_runs import noisy_runs
-from identify.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
+from identify.refusals import refuse_a_moment, refuse_added_inertia, refuse_lowpass, refuse_the_idle
 from identify.regression import Structure, shape_values
 from identify.results import (
     Identification,
@@ -104,6 +105,7 @@ class _Identifier:
             raise RecordingError(
                 "no run holds a usable stretch of 40 samples: look at valid, min_rate_rad_s, from_s and to_s"
             )
+        refuse_a_moment(self.traces)
         self.turned = turned_runs(self.traces)
         self.traces = [t for t in self.traces if not any(t is gone for gone in self.turned)]
         for trace in self.turned:
@@ -142,7 +144,7 @@ class _Identifier:
             self.say("fitting the declared model")
             nominal = (d.inertia_kg_m2, d.damping_nm_s_rad, d.stiffness_nm_rad)
             on_offer = Candidates(traces, parts, allowed, self.structure.effects)
-            fine = FineSearch(on_offer, self.say)
+            fine = FineSearch(on_offer, self.say, declared_values(d, self.torque_free))
 
             def take_over(found: Search) -> bool:
                 over = self.torque_free and decay.take_over(on_offer, found, self.say)

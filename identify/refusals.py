@@ -9,6 +9,7 @@ import numpy as np
 from identify.traces import Trace
 from rig.errors import RecordingError
 
+FEWEST = 100  # samples: of 50 a stiffness was told thirty times more closely than they knew it
 MOVES = 3.0  # times the sensor's noise that a motion has to reach
 
 
@@ -31,6 +32,22 @@ def refuse_the_idle(traces: Sequence[Trace], free: bool) -> None:
         raise RecordingError(
             "the torque has the same value in every sample of every run: J, C and K need a torque that changes; "
             "check recorded.columns.torque, or leave the torque out for a free decay"
+        )
+
+
+def refuse_a_moment(traces: Sequence[Trace]) -> None:
+    """Refuse a recording so short that its noise, start states and bias hide what its motion tells.
+
+    Raises
+    ------
+    RecordingError
+        Where all runs together hold too few samples.
+    """
+    count = sum(t.count for t in traces)
+    if count < FEWEST:
+        raise RecordingError(
+            f"{count} usable samples in all (needed: {FEWEST}): too few to tell J, C and K from how the runs began; "
+            "record longer, at least a few periods of the platform's own ring"
         )
 
 

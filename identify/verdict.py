@@ -103,8 +103,8 @@ def _named(found: Identification, name: str) -> str:
 
 def _bent(found: Identification) -> list[str]:
     """What the change of the model did to each parameter, in one sentence that names the change."""
-    if found.after is None:
-        return []
+    if found.after is None or (found.verdict.unexplained and not found.verdict.effects):
+        return []  # of two wrong models neither says what the other did
     moved = []
     for name, before in found.before.parameters.items():
         after = found.after.parameters.get(name)

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from rig.effects.base import Effect, Parameter, Place, kernel
+from rig.effects.base import Effect, LargeStart, Parameter, Place, Scale, kernel
+
+LARGER = (3.0, 8.0)  # times the level that a model sees which never stuck: it thinks little of a lot of friction
 
 
 @kernel
 def _level(angle, speed, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
     return p[3]
+
+
+def _others(jck: tuple[float, float, float], own: tuple[float, ...], scale: Scale) -> tuple[LargeStart, ...]:
+    return tuple(LargeStart({}, {"level": factor * own[0]}) for factor in LARGER)
 
 
 EFFECT = Effect(
@@ -20,5 +26,6 @@ EFFECT = Effect(
     sign="Resisting: it opposes the rate.",
     parameters=(Parameter("level", "N*m", "friction level", linear=True, suffix="nm"),),
     kernel=_level,
+    other_minima=_others,
     separated_by="from Stribeck and presliding friction: slow ramp, hold and release; several amplitudes",
 )

@@ -264,3 +264,46 @@ def test_a_lag_that_two_slow_soft_sines_cannot_tell_from_a_delay_stands_beside_i
     lags = {"actuator_lag", "sensor_lag", "torque_delay"}
     assert name in lags
     assert lags - {name} <= set(found.rivals[name])
+
+
+def test_friction_of_which_a_model_that_never_stuck_sees_a_sixth_is_found() -> None:
+    """Slow sines from a standstill beside the spring's rest: the ring hides what friction does between its stops."""
+    hidden, level = {"coulomb_friction": {"level": 1.2}}, 1.2
+    slow = [
+        sine_run(m, f, effects=hidden, duration_s=10.0, begin_rad=b * level / TRUTH[2], seed=i)
+        for i, (m, f, b) in enumerate(((80.0, 0.3, 0.6), (80.0, 0.9, -0.7)))
+    ]
+    found, took = searched(Recording(tuple(slow)))
+    assert took
+    assert found.best.structure.effects == ("coulomb_friction",)
+    assert found.best.values()["coulomb_friction", "level"] == pytest.approx(level, rel=1e-3)
+
+
+def test_a_declared_twin_is_begun_from_its_own_numbers_where_the_search_came_by_other_ones() -> None:
+    hidden = {"coulomb_friction": {"level": 1.2}}
+    truth: dict[Name, float] = {("inertia",): TRUTH[0], ("damping",): TRUTH[1], ("stiffness",): TRUTH[2]}
+    truth[("coulomb_friction", "level")] = 1.2
+    traces = traces_of(campaign(hidden, sets=((104.0, 3.0), (42.0, 9.0)), duration_s=3))
+    structure = Structure(effects=("coulomb_friction",))
+    lost = {**truth, ("stiffness",): 60.0, ("inertia",): 0.3, ("coulomb_friction", "level"): 0.0}
+    for declared, near in ((None, False), (truth, True)):
+        fine = FineSearch(Candidates(traces, split(traces), (), structure.effects), lambda text: None, declared)
+        begin = fine.whole(structure, lost, steps=0)
+        assert begin is not None
+        found = Search(begin.judged(), begin.judged(), 0.1, fine.noise)
+        fitted = fine._begin(found)
+        assert fitted is not None
+        assert (fitted.level < 1.1) is near
+
+
+def test_a_known_mass_has_the_torque_scale_tried_though_others_promise_more() -> None:
+    runs = []
+    for added in (0.0, 0.01):
+        jck = ((TRUTH[0] + added) * 1.05, TRUTH[1] * 1.05, TRUTH[2] * 1.05)  # as if a torque 5 % too small acted
+        mine = [sine_run(m, f, effects={"coulomb_friction": {"level": 1.05 * 0.5}}, jck=jck) for m, f in SETS[:3]]
+        runs += [replace(r, name=f"{r.name}, {added:g}", added_inertia_kg_m2=added) for r in mine]
+    offer = offered(Recording(tuple(runs)), (*ALLOWED, "torque_scale", "cogging", "torque_saturation")).on_offer
+    now = offer.fits.whole(Structure(effects=("coulomb_friction",)), {**START, ("coulomb_friction", "level"): 0.5})
+    assert now is not None
+    tried, _ = offer.tried(now)
+    assert tried["torque_scale"].at_noise

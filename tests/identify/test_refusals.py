@@ -34,3 +34,8 @@ def test_a_torque_that_never_changes_is_refused() -> None:
     held = replace(RUN, torque_nm=0.0 * RUN.time_s + 3.0)
     with pytest.raises(RecordingError, match="same value in every sample of every run"):
         identify(Recording((held,)), Platform(*TRUTH), IdentifyConfig())
+
+
+def test_a_moment_of_a_platform_is_refused_with_how_many_samples_it_takes() -> None:
+    with pytest.raises(RecordingError, match=r"60 usable samples in all \(needed: 100\)"):
+        identify(Recording((sine_run(67.0, 6.0, duration_s=0.059),)), Platform(*TRUTH), IdentifyConfig())

@@ -36,6 +36,11 @@ def test_a_term_that_was_dropped_is_named_where_nothing_was_added() -> None:
     assert any(s.startswith("With stiffness in the model, ") for s in said)
 
 
+def test_of_two_wrong_models_neither_is_said_to_have_bent_the_other() -> None:
+    verdict = replace(FOUND.verdict, effects=(), unexplained=True)
+    assert not any("came out" in s for s in sentences_of(replace(FOUND, verdict=verdict)))
+
+
 def test_a_rival_is_named_with_what_would_separate_it() -> None:
     verdict = replace(FOUND.verdict, confusable_with={"coulomb_friction": ("stribeck_friction",)})
     said = sentences_of(replace(FOUND, verdict=verdict))[0]
