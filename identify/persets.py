@@ -35,6 +35,10 @@ from rig.platform import TERMS
 from rig.recording.run import Array
 
 ALLOWANCE = 1.2  # J_dec over the objective that the sensor's noise alone makes
+ARRIVED = (
+    1.02  # the same over the closed form's, where that lies higher and yet is near the noise: no search gets lower
+)
+NEAR_NOISE = 2.0  # times the objective that the noise makes
 SIMULATED = 8  # iterations of the fit that a set's values are held against
 APART = 3.0  # standard errors from it: further off, the distance is the error
 WELL_KNOWN = 0.05  # relative standard error up to which a set alone determines a parameter
@@ -141,10 +145,10 @@ def genetic(
     condensed = condensed or condense(traces, terms, start, rho)
     goal = condensed.objective
     low, high = search_range(condensed.terms, goal.closed_form, centre, settings.genetic.search_factor)
-    j_dec = settings.j_dec if settings.j_dec is not None else ALLOWANCE * condensed.floor
     chosen = (
         condense(traces, terms, start, rho, plain=True).objective if settings.genetic.objective == "plain" else goal
     )
+    j_dec = settings.j_dec if settings.j_dec is not None else _j_dec(goal.minimum, condensed.floor)
     outcome = search(chosen, low, high, settings.genetic, np.random.default_rng(seed), j_dec)
 
     def named(x: Array) -> dict[str, float]:
@@ -163,6 +167,12 @@ def genetic(
         float(outcome.objective), float(j_dec), outcome.restarts, bool(outcome.objective < j_dec),
         outcome.history, roulette, plain, chosen.minimum,
     )  # fmt: skip
+
+
+def _j_dec(minimum: float, floor: float) -> float:
+    """Below which a search has arrived, where nobody says: near the noise's share, or the closed form's above it."""
+    near = minimum < NEAR_NOISE * floor
+    return max(ALLOWANCE * floor, ARRIVED * minimum) if near else ALLOWANCE * floor
 
 
 def search_range(

@@ -9,7 +9,7 @@ import pytest
 
 from identify.finish import Fitted, by_output_error
 from identify.holdout import split
-from identify.persets import condense, each_set, genetic, linear_traces, search_range
+from identify.persets import _j_dec, condense, each_set, genetic, linear_traces, search_range
 from identify.regression import Regression, Structure, fit
 from identify.screen import Start, first_guess
 from identify.traces import Trace
@@ -128,3 +128,8 @@ def test_a_set_that_hardly_tells_its_numbers_apart_says_so_in_their_errors(seed:
     for term, value in zip(TERMS, truth, strict=True):
         found = sets[0].parameters.get(term)
         assert found is None or abs(found.value - value) < 3.0 * found.std_error, term
+
+
+@pytest.mark.parametrize(("minimum", "j_dec"), [(1.0, 1.2), (1.3, 1.326), (2.5, 1.2)])
+def test_j_dec_is_out_of_reach_only_of_a_set_that_is_far_from_the_noise(minimum: float, j_dec: float) -> None:
+    assert _j_dec(minimum, 1.0) == pytest.approx(j_dec)
