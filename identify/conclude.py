@@ -14,6 +14,7 @@ from identify.diagnosis import with_diagnosis
 from identify.finish import Fitted, noise_of_all
 from identify.found import Search
 from identify.holdout import Split
+from identify.lag_for_damping import lag_for_damping
 from identify.measures import Measured
 from identify.next_steps import opposite_signs, unexplained_reason
 from identify.parameters import Name, platform_of
@@ -103,7 +104,7 @@ def conclude(
     found = Identification(
         accepted=not reasons and not unexplained, reasons=(), axis=case.recording.axis, before=result_before,
         verdict=verdict, after=result_after, noise_floor=floor, per_set=per_set, joint=joint,
-        traces=_series(case, measured_before, measured_after), holdout_note=_note(case),
+        traces=_series(case, measured_before, measured_after), holdout_note=_note(case, after),
         max_error_percent=reference, torque_free=case.torque_free, torque_scale=torque_scale,
         scale_shows=loads_differ(case.traces),
     )  # fmt: skip
@@ -112,16 +113,28 @@ def conclude(
     if opposite_signs(found):
         reasons.insert(0, SENTENCE)
     found = replace(found, accepted=not reasons, reasons=tuple(reasons))
-    return with_diagnosis(replace(found, verdict=replace(verdict, sentences=sentences_of(found))))
+    said = (*sentences_of(found), *_about_damping(case, after, final))
+    return with_diagnosis(replace(found, verdict=replace(verdict, sentences=said)))
 
 
-def _note(case: Case) -> str:
-    """What was held out, and what was left out."""
+def _about_damping(case: Case, after: Fitted, final: ModelResult) -> tuple[str, ...]:
+    name = ("inertia",)
+    if final.platform is None or name not in after.names:
+        return ()
+    fitted = [t for t in case.traces if t.number in _runs_fitted(case)]
+    told = lag_for_damping(final.platform, after.std_error(name), fitted, case.recording.axis)
+    return (told,) if told else ()
+
+
+def _note(case: Case, after: Fitted) -> str:
+    """What was held out, what was left out, and what was taken for granted."""
+    rests = after.free_run is not None and any(s.rests for s in after.free_run.shots)
+    resting = "J hardly shows in these runs: those that begin at rest are taken to do so exactly" if rests else ""
     torn = glitches.told([(t.run.name, t.glitches_s) for t in case.traces])
     beyond = clipping.told([(t.run.name, *t.clipped) for t in case.traces], case.recording.axis)
     uneven = sampling.told([(t.run.name, *t.scatter) for t in case.traces])
     gone = (turned_runs.told(case.turned), noisy_runs.told(case.noisy))
-    return ". ".join(note for note in (case.split.note, *gone, torn, beyond, uneven) if note)
+    return ". ".join(note for note in (case.split.note, resting, *gone, torn, beyond, uneven) if note)
 
 
 def _ratio(case: Case, after: Fitted, search: Search) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from identify.follow_up_wording import file_name
 from identify.residual import dependence
-from identify.results import GeneticRun, Identification, NotReported, RunTraces
+from identify.results import GeneticRun, Identification, RunTraces
 from identify.sign_check import SENTENCE, signs
 from identify.wording import capital, joined, number, percent, plain
 
@@ -62,7 +62,7 @@ def next_steps(found: Identification) -> tuple[str, ...]:
         return (f"{capital(SENTENCE)}, then identify again.",)
     steps = []
     if found.final.not_determined:
-        steps.append(_to_determine(found.final.not_determined, _torque_free(found)))
+        steps.append(to_determine([item.name for item in found.final.not_determined], torque_free(found)))
     if found.verdict.unexplained:
         steps += _to_explain(found)
     failed = [one.genetic for one in found.per_set if one.genetic and not one.accepted]
@@ -107,13 +107,15 @@ def unexplained_reason(ratio: float, found: Identification) -> str:
     return f"the model leaves {told} unexplained: {acts}"
 
 
-def _torque_free(found: Identification) -> bool:
+def torque_free(found: Identification) -> bool:
+    """Whether all runs are decays."""
     return bool(found.traces) and all(t.torque_nm is None for t in found.traces)
 
 
-def _to_determine(several: Sequence[NotReported], torque_free: bool) -> str:
-    names = joined([plain(item.name.replace(".", " ")) for item in several])
-    if torque_free:
+def to_determine(several: Sequence[str], decays: bool) -> str:
+    """What to record next for parameters that are known badly or not at all; ``decays`` says without a torque."""
+    names = joined([plain(name.replace(".", " ")) for name in several])
+    if decays:
         return f"To determine {names}: release the platform from a larger angle and record until it rests."
     return (
         f"To determine {names}: add a set at another frequency or a multisine (0.5 Hz to beyond the resonance), let it "
@@ -147,7 +149,7 @@ def _by_what_it_goes_with(found: Identification) -> list[str]:
         late = [f"{capital(joined(late))} {'begins' if len(late) == 1 else 'begin'} in motion: what remembers (creep, "
                 "hysteresis, a second mode) is known from rest only, and is not found there. Begin every recording "
                 "before the torque does."]  # fmt: skip
-    free = _torque_free(found)
+    free = torque_free(found)
     if share < TELLING:
         return [*late, RELEASED if free else OTHERWISE]
     run = RELEASED_RUN[name] if free else RUN[name]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from identify.advice import WELL_KNOWN
 from identify.channels import REFUSED
-from identify.next_steps import opposite_signs
+from identify.next_steps import opposite_signs, to_determine, torque_free
 from identify.results import Identification
 from identify.sign_check import SENTENCE
 from identify.wording import (
     SYMBOLS,
     capital,
+    half_interval,
     joined,
     number,
     percent,
@@ -49,6 +51,7 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
             f"{number(1.96 * scale.std_error, 2)} of the recorded one"
             + ("; J, C and K are that much larger or smaller." if off else ": the torque scale is right.")
         )
+    out += _known_badly(found)
     out += _unseen_scale(found)
     if found.verdict.unexplained:
         out.append(
@@ -83,6 +86,18 @@ def _unseen_scale(found: Identification) -> list[str]:
         f"A {torque} or sensor scale that is off makes {joined(given)} {makes}, and nothing in these runs can show "
         f"it: only further runs with a known added {kind} (added_inertia_kg_m2) do."
     ]
+
+
+def _known_badly(found: Identification) -> list[str]:
+    """J, C and K that are given and yet say little, with what would tell more."""
+    given = found.final.parameters
+    wide = [name for name, p in given.items() if p.value and p.std_error > WELL_KNOWN * abs(p.value)]
+    if not wide or not found.accepted:
+        return []  # what else is wrong comes first
+    each = [
+        f"{title(n, found.axis)} to {number(100.0 * half_interval(given[n]) / abs(given[n].value), 2)} %" for n in wide
+    ]
+    return [f"Known badly: {joined(each)}. {to_determine(wide, torque_free(found))}"]
 
 
 def _named(found: Identification, name: str) -> str:

@@ -97,3 +97,12 @@ def test_what_can_never_be_told_apart_is_said_with_the_reason() -> None:
     said = sentences_of(replace(FOUND, verdict=verdict))[-1]
     assert "cannot be told apart" in said
     assert "they answer alike" in said
+
+
+def test_a_parameter_that_is_known_badly_is_said_with_what_would_tell_it() -> None:
+    assert FOUND.after is not None
+    assert not any("Known badly" in s for s in sentences_of(FOUND))
+    wide = replace(FOUND.after, parameters={**FOUND.after.parameters, "inertia": estimate(0.02, 0.002)})
+    said = [s for s in sentences_of(replace(FOUND, after=wide)) if "Known badly" in s]
+    assert said[0].startswith("Known badly: rotary inertia J to 20 %. To determine inertia: add a set at another")
+    assert not any("Known badly" in s for s in sentences_of(replace(FOUND, after=wide, accepted=False)))
