@@ -99,7 +99,8 @@ class Candidates:
             found_already = best.at_noise or (not plain and any(t.at_noise for t in tried.values()))
             if near and not found_already and not chosen_anyway:
                 tried[name] = self.fits.elsewhere(self.fits.taken_on(w) if falls else w, name)
-        return self._sharp({n: w for n, w in tried.items() if not w.at_noise}, tried), looks
+        tried = self._sharp({n: w for n, w in tried.items() if not w.at_noise}, tried)
+        return {n: self.fits.settled(w) for n, w in tried.items()}, looks
 
     def sharp(self, now: Whole) -> Whole:
         """A model near the noise, simulated as finely as it takes for its error not to be the simulation's."""

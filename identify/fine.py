@@ -66,6 +66,7 @@ class FineSearch:
         self.passed: dict[frozenset[str], float] = {}  # structures an attempt went on from, and how near they came
         self.first_tried: dict[str, Whole] = {}  # of the first round of an attempt
         self.declared_level = np.inf  # of the model before anything is added
+        self.noted_near: set[str] = set()  # whose rivals were noted over whole runs, near the noise
 
     def take_over(self, found: Search) -> bool:
         """Go on from the model at hand, if it runs free near the data; ``found`` is brought up to date.
@@ -151,7 +152,7 @@ class FineSearch:
         most = len(declared.effects) + PATIENCE
         first = 1 + max((c.round for c in found.candidates), default=0)
         for round_ in range(first, first + MOST_EFFECTS):
-            now = self.on_offer.sharp(now)
+            now = self.on_offer.fits.settled(self.on_offer.sharp(now))
             if len(now.structure.effects) >= most and now.level > ENDS_NEAR:
                 return False  # more than that are not believed, and each round costs more than the one before
             if self.on_offer.fits.gives_up(now):
@@ -173,7 +174,7 @@ class FineSearch:
             return False
         now = self.pruning.restored(found, now, declared.terms)
         now = self.pruning.pruned(found, now, (*now.structure.terms, *now.structure.effects))
-        swapped = self._asked_again(found, now)
+        swapped = self._asked_again(found, now, int(self.noted_near.issuperset(now.structure.effects[-1:])))
         if swapped.structure != now.structure:  # what another one's mistakes had called for is no longer needed
             swapped = self.pruning.pruned(found, swapped, swapped.structure.effects)
         now = one_for_two(self.on_offer, found, swapped, self.say)
@@ -294,6 +295,7 @@ class FineSearch:
     def _note_rivals(self, found: Search, name: str, tried: Mapping[str, Whole]) -> None:
         """Who did as well as the one named, and with which model."""
         best = tried[name]
+        (self.noted_near.add if best.level < ENDS_NEAR else self.noted_near.discard)(name)
         alike = {
             n: w.estimate.platform()
             for n, w in tried.items() if n != name and w.penalised - best.penalised < RIVAL * best.level

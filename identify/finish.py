@@ -12,6 +12,7 @@ from scipy.linalg import block_diag
 
 from identify.compare import start_values
 from identify.evaluation import evaluate
+from identify.inertia_profile import settled, widened
 from identify.output_error import Estimate, refine
 from identify.parameters import Name
 from identify.regression import Regression, Solution, Structure, residuals
@@ -24,6 +25,7 @@ from rig.recording.run import Array
 
 NEAR_FLOOR = 1.3  # times the sensor's noise: close enough for a free run over the whole set
 FEW_NOISES = 5.0  # times the noise that a free run leaves: disturbed moments, not a wrong model
+STEPS = 12  # of a fit
 FREER = 0.95  # of the free-run error
 BLOCKS_PER_RUN = 20
 SEGMENT = 256  # samples of a stretch whose spectrum is averaged
@@ -113,14 +115,19 @@ def by_output_error(
     torque_free = all(t.torque is None for t in traces)
     fixed = [("inertia",)] if torque_free else []
     noise = noise_of_all(traces)
-    best = at_once = refine(traces, structure, start, None, 12, use, fixed=fixed)
+
+    def refit(values: Mapping[Name, float], *, rests: bool = False, held: Sequence[Name] = ()) -> Estimate:
+        return refine(traces, structure, values, None, STEPS, use, fixed=[*fixed, *held], rests=rests)
+
+    at_once, valley = settled(refit(start), noise, refit)
+    best = at_once
     straight = best.sigma <= NEAR_FLOOR * noise  # the search came close enough: no ladder of horizons needed
     if not straight:
-        best = refine(traces, structure, start, horizon, 12, use, fixed=fixed)
+        best = refine(traces, structure, start, horizon, STEPS, use, fixed=fixed)
     whole_runs = [at_once]
     for longer in () if straight else (4.0 * horizon, None):
         values = dict(zip(best.names, best.values.tolist(), strict=True))
-        trial = refine(traces, structure, values, longer, 12, use, fixed=fixed)
+        trial = refine(traces, structure, values, longer, STEPS, use, fixed=fixed)
         whole_runs += [trial] if longer is None else []
         if trial.sigma <= NEAR_FLOOR * noise:
             best = trial
@@ -133,6 +140,8 @@ def by_output_error(
     whole = best if any(best is w for w in whole_runs) else None
     free_names = tuple(n for n in best.names if n not in fixed)
     covariance, determined = _output_covariance(best, free_names)
+    if valley is not None and best is at_once:
+        covariance = widened(covariance, free_names, best, valley)
     if whole is not None and whole.sigma <= NEAR_FLOOR * noise:
         best = whole = sharpened(whole, traces, use, fixed)
         values = dict(zip(best.names, best.values.tolist(), strict=True))

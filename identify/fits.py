@@ -9,6 +9,7 @@ import numpy as np
 from identify.choice import STILL_FAR
 from identify.compare import start_values
 from identify.holdout import Split
+from identify.inertia_profile import settled
 from identify.lines import foreign_lines_hz, ringing_hz, rings_hz
 from identify.output_error import Estimate, refine, squares_at
 from identify.parameters import Name
@@ -70,6 +71,22 @@ class Fits:
         )  # fmt: skip
         self._spend(estimate)
         return measured(self.traces, self.split, estimate, self.noise, self.finer)
+
+    def settled(self, fitted: Whole) -> Whole:
+        """A fit near the noise, at the bottom of the valley where its inertia hardly shows."""
+
+        def refit(values: Mapping[Name, float], *, rests: bool, held: Sequence[Name] = ()) -> Estimate:
+            estimate = refine(
+                self.fitting, fitted.structure, values, None, STEPS, self.use, fixed=[*self.fixed, *held], coarse=True,
+                tolerance=TOLERANCE, finer=self.finer, rests=rests,
+            )  # fmt: skip
+            self._spend(estimate)
+            return estimate
+
+        bottom, _ = settled(fitted.estimate, self.noise, refit)
+        if bottom is fitted.estimate:
+            return fitted
+        return measured(self.traces, self.split, bottom, self.noise, self.finer) or fitted
 
     def _spend(self, estimate: Estimate) -> None:
         self._once = self._once or float(sum(s.grid.n for s in estimate.shots))

@@ -18,7 +18,7 @@ import numpy as np
 from identify.parameters import Name, bounds_of, names_of, ordered, platform_of
 from identify.regression import Structure
 from identify.sensitivities import Reduced, at_residual, linearise
-from identify.shots import RUNAWAY, Shots, from_rest, make_shots, moved, predict, residual_at
+from identify.shots import RUNAWAY, Shots, from_rest, make_shots, may_rest, moved, predict, residual_at
 from identify.stuck_starts import begin_where_it_stuck
 from identify.traces import Trace
 from rig.dynamics import Equations
@@ -106,6 +106,7 @@ def refine(
     coarse: bool = False,
     hopeless: float = np.inf,
     finer: int = 1,
+    rests: bool = False,
 ) -> Estimate:
     """Fit all parameters of a structure by output error.
 
@@ -130,11 +131,13 @@ def refine(
         Give up after three iterations where the root mean square is still above this.
     finer
         That many times the fine steps.
+    rests
+        Runs that begin at rest are held to it: their start states are not fitted.
     """
     names = names_of(structure, 1 + max(t.number for t in traces))
     x = np.array([start.get(name, 0.0) if len(name) == 3 else start[name] for name in names])
     still = held_still(names, traces, use, fixed)
-    shots = shots_for(traces, structure, names, x, shot_s, use, carry, coarse, finer)
+    shots = shots_for(traces, structure, names, x, shot_s, use, carry, coarse, finer, rests)
     workers = ThreadPoolExecutor(2)
     try:
         return _levenberg(_Descent(workers, shots, structure, names, x, still), iterations, tolerance, hopeless, coarse)
@@ -151,6 +154,7 @@ def held_still(names: Sequence[Name], traces: Sequence[Trace], use: Sequence[Any
 def shots_for(
     traces: Sequence[Trace], structure: Structure, names: Sequence[Name], x: Array,
     shot_s: float | None, use: Sequence[Any] | None, carry: Sequence[Shots] | None, coarse: bool, finer: int = 1,
+    rests: bool = False,
 ) -> list[Shots]:  # fmt: skip
     """Every run cut into shots (see ``refine``), its steps as fine as the model needs, or ``finer`` times that."""
     out = []
@@ -167,7 +171,8 @@ def shots_for(
         substeps = min(MAX_SUBSTEPS, finer * substeps)
         length = None if shot_s is None else max(8, round(shot_s / trace.step_s))
         counting = None if use is None else use[i]
-        shots = from_rest(make_shots(trace, substeps, length, counting, equations), equations)
+        held = may_rest(trace, equations) and (rests if carry is None else carry[i].rests)
+        shots = from_rest(make_shots(trace, substeps, length, counting, equations, held), equations)
         if carry is not None and np.array_equal(carry[i].first, shots.first):
             shots.starts, shots.bias = carry[i].starts.copy(), carry[i].bias
         elif length is None and equations.sticks:

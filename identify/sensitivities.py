@@ -122,6 +122,9 @@ def sensitivities(
         moved = s.starts.copy()
         moved[:, k] += STEP * 10.0 * span[k]
         state[:, k] = (run(x, moved) - base) / (STEP * 10.0 * span[k])
+    if s.rests:
+        begin, end = s.edges[0]
+        state[begin:end] = 0.0
     if equations.sticks:
         _without_stuck_rates(s, state, equations)
     return columns, state, residual

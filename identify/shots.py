@@ -32,6 +32,7 @@ class Shots:
     starts: Array  # angle and rate there, (s, 2)
     bias: float = 0.0
     weight: Any = field(default=None)  # (n,) boolean: samples that count
+    rests: bool = False  # the first shot begins at rest, for certain: its start state is not fitted
 
     @property
     def number(self) -> int:
@@ -61,16 +62,18 @@ class Shots:
 
 
 def make_shots(
-    trace: Trace, substeps: int, length: int | None, use: Any = None, equations: Equations | None = None
-) -> Shots:
+    trace: Trace, substeps: int, length: int | None, use: Any = None, equations: Equations | None = None,
+    rests: bool = False,
+) -> Shots:  # fmt: skip
     """Cut a run into shots of ``length`` samples (None: one), started from the smoothed measurement.
 
-    What has a memory begins at rest, and that is where the run begins: with such ``equations`` the first shot does too.
+    What has a memory begins at rest, and that is where the run begins: with such ``equations`` the first shot does too,
+    and with ``rests`` whatever they are.
     """
     n = len(trace.measured)
     time = trace.start_s + trace.step_s * np.arange(n)
     begins = [0]  # every usable stretch begins anew: what happened in between is not to be predicted
-    soon = equations is not None and _begins_with_the_run(equations, trace)
+    soon = rests or (equations is not None and _begins_with_the_run(equations, trace))
     for a, b in trace.stretches:
         if soon and a * trace.step_s <= SOON_S:
             a = 0  # noqa: PLW2901
@@ -85,7 +88,11 @@ def make_shots(
     weight = trace.keep.copy() if use is None else trace.keep & use
     for seam in (*first.tolist(), n):
         clear_of_seam(trace, seam, weight)
-    return Shots(trace, Grid(time, trace.torque, substeps, min(LEAD_S, trace.offset_s)), first, starts, 0.0, weight)
+    rests = rests and bool(first[0] == 0 and np.any(weight[: [*first[1:], n][0]]))
+    if rests:
+        starts[0] = 0.0
+    grid = Grid(time, trace.torque, substeps, min(LEAD_S, trace.offset_s))
+    return Shots(trace, grid, first, starts, 0.0, weight, rests)
 
 
 def _begins_with_the_run(equations: Equations, trace: Trace) -> bool:
@@ -104,6 +111,14 @@ def begins_at_rest(trace: Trace) -> bool:
     """Whether the first sample shows no motion beyond the noise and a gyro's bias."""
     rate = trace.measured if trace.channel == "rate" else trace.fine[1][::UPSAMPLING]  # smoothing looks ahead
     return bool(abs(rate[0]) < max(AT_REST * float(np.max(np.abs(rate))), 5.0 * trace.noise))
+
+
+def may_rest(trace: Trace, equations: Equations) -> bool:
+    """Whether a run may be held to begin at rest, where the model stands without torque.
+
+    A gyro's angle begins at zero wherever that is; an encoder's zero and a platform held by friction are anywhere.
+    """
+    return trace.biased and not equations.sticks and begins_at_rest(trace)
 
 
 def from_rest(shots: Shots, equations: Equations) -> Shots:
@@ -201,4 +216,4 @@ def residual_at(s: Shots, structure: Structure, names: Sequence[Name], x: Array)
 
 def moved(s: Shots, by: tuple[Array, float]) -> Shots:
     """The same shots with other start states and bias."""
-    return Shots(s.trace, s.grid, s.first, s.starts + by[0], s.bias + by[1], s.weight)
+    return Shots(s.trace, s.grid, s.first, s.starts + by[0], s.bias + by[1], s.weight, s.rests)

@@ -1,0 +1,84 @@
+"""Inertia that hardly shows: what the runs' rest and the valley of the squares make of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from identify.at_rest import hangs_on_rings, held_to_rest
+from identify.finish import Fitted, by_output_error
+from identify.inertia_profile import settled
+from identify.output_error import Estimate, refine
+from identify.regression import Structure
+from identify.traces import Trace, prepare
+from tests.identify.simulated import NOISE_RAD_S, TRUTH, sine_run
+
+LOUD = 2.0 * NOISE_RAD_S
+INERTIA = ("inertia",)
+
+
+def slow(seed: int, begin_rad: float = 0.0) -> list[Trace]:
+    """Two soft sines far below the resonance at 29 Hz."""
+    return [
+        prepare(sine_run(85.0, f, duration_s=6.0, soft_s=1.0, seed=seed, noise=LOUD, begin_rad=begin_rad))
+        for f in (0.5, 1.0)
+    ]
+
+
+def fitted(traces: Sequence[Trace], inertia: float) -> Fitted:
+    start = {INERTIA: inertia, ("damping",): TRUTH[1], ("stiffness",): TRUTH[2]}
+    use = [t.keep for t in traces]
+    return by_output_error(traces, Structure(), start, 0.1, use, use)
+
+
+@pytest.mark.parametrize("begun", [0.5, 1.5, 2.0])
+def test_an_inertia_that_shows_in_rings_of_noise_comes_out_within_its_interval(begun: float) -> None:
+    off = []
+    for seed in range(6):
+        found = fitted(slow(seed), begun * TRUTH[0])
+        error = found.std_error(INERTIA)
+        assert 0.05 * TRUTH[0] < error < 0.15 * TRUTH[0]
+        off.append((found.values[INERTIA] - TRUTH[0]) / error)
+    assert max(abs(x) for x in off) < 3.0
+    assert float(np.sqrt(np.mean(np.square(off)))) < 1.7
+
+
+def test_stiffness_moves_with_an_inertia_that_is_hardly_known() -> None:
+    found = fitted(slow(3), TRUTH[0])
+    i, k = (found.names.index((term,)) for term in ("inertia", "stiffness"))
+    assert found.covariance[i, k] > 0.9 * found.std_error(INERTIA) * found.std_error(("stiffness",))
+    assert found.values[("stiffness",)] == pytest.approx(TRUTH[2], abs=3.0 * found.std_error(("stiffness",)))
+
+
+def test_runs_that_ring_by_themselves_tell_the_inertia_and_are_not_held_to_rest() -> None:
+    traces = slow(0, begin_rad=0.01)
+    found = fitted(traces, 1.2 * TRUTH[0])
+    assert found.values[INERTIA] == pytest.approx(TRUTH[0], rel=1e-3)
+    assert found.free_run is not None
+    assert not any(s.rests for s in found.free_run.shots)
+
+
+def estimate(traces: Sequence[Trace], rests: bool = False) -> Estimate:
+    start = {INERTIA: TRUTH[0], ("damping",): TRUTH[1], ("stiffness",): TRUTH[2]}
+    return refine(traces, Structure(), start, rests=rests)
+
+
+def test_a_well_known_inertia_is_left_alone() -> None:
+    traces = [prepare(sine_run(67.0, 6.0, seed=1)), prepare(sine_run(42.0, 9.0, seed=1))]
+    free = estimate(traces)
+
+    def never(*_: object, **__: object) -> Estimate:
+        raise AssertionError("fitted again")
+
+    assert not hangs_on_rings(free, NOISE_RAD_S)
+    assert held_to_rest(free, NOISE_RAD_S, never) is free
+    assert settled(free, NOISE_RAD_S, never) == (free, None)
+
+
+def test_a_run_held_to_rest_keeps_its_start_state() -> None:
+    found = estimate(slow(2), rests=True)
+    assert all(s.rests and s.first[0] == 0 for s in found.shots)
+    assert all(np.array_equal(s.starts[0], [0.0, 0.0]) for s in found.shots)
+    assert found.sigma == pytest.approx(LOUD, rel=0.03)
