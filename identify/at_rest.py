@@ -16,7 +16,8 @@ import numpy as np
 
 from identify.output_error import Estimate
 from identify.parameters import Name
-from identify.shots import may_rest
+from identify.shots import Shots, may_rest
+from identify.torque_band import highest_torque_hz
 from rig.dynamics import Equations
 
 WEAK = 1e-3  # relative standard error of the inertia beyond which a ring of noise may decide it
@@ -24,14 +25,21 @@ NEAR = 2.0  # mean square over the noise's variance up to which the noise, not t
 BY_CHANCE = 15.0  # fall of chi square that two start values a run make of noise, their ring free to find its place
 ROUNDS = 3  # the place of rest moves with the model
 SETTLED = 0.1  # of chi square, between rounds
+FAR_BELOW = 0.1  # of the natural frequency: what shakes no faster hardly tells the inertia but by a ring
 INERTIA: Name = ("inertia",)
 
 
 class Refit(Protocol):
     """Fits one structure to the same samples of whole runs anew."""
 
-    def __call__(self, values: Mapping[Name, float], *, rests: bool, held: Sequence[Name] = ()) -> Estimate:
-        """From given values; ``rests`` holds runs to the rest they begin at, ``held`` parameters to their values."""
+    def __call__(
+        self, values: Mapping[Name, float], *, rests: bool, held: Sequence[Name] = (),
+        carry: Sequence[Shots] | None = None,
+    ) -> Estimate:  # fmt: skip
+        """From given values; ``rests`` holds runs to the rest they begin at, ``held`` parameters to their values.
+
+        ``carry`` are the shots of an earlier fit, whose start states to begin with.
+        """
 
 
 def held_to_rest(free: Estimate, noise: float, refit: Refit) -> Estimate:
@@ -49,7 +57,7 @@ def held_to_rest(free: Estimate, noise: float, refit: Refit) -> Estimate:
     ``free`` itself where the inertia does not hang on rings, where no run begins at rest, or where rest does not
     describe the runs: where they fit worse by more than the start states' share in the noise.
     """
-    if not hangs_on_rings(free, noise):
+    if not (hangs_on_rings(free, noise) or (near(free, noise) and _is_shaken_far_below(free))):
         return free
     resting = sum(may_rest(s.trace, Equations(free.platform(s.number, s.added))) for s in free.shots)
     best, before = free, np.inf
@@ -67,9 +75,28 @@ def held_to_rest(free: Estimate, noise: float, refit: Refit) -> Estimate:
 
 def hangs_on_rings(fit: Estimate, noise: float) -> bool:
     """Whether the inertia is known so little, beside the noise, that a ring of noise may decide it."""
-    if INERTIA not in fit.names or not fit.sigma**2 < NEAR * noise**2:
+    if INERTIA not in fit.names or not near(fit, noise):
         return False
     return inertia_std_error(fit) > WEAK * abs(float(fit.values[fit.names.index(INERTIA)]))
+
+
+def near(fit: Estimate, noise: float) -> bool:
+    """Whether the noise, not the model, is in the way."""
+    return bool(fit.sigma**2 < NEAR * noise**2)
+
+
+def _is_shaken_far_below(fit: Estimate) -> bool:
+    """Whether all torque is far below the natural frequency: a ring of noise looks like knowledge there.
+
+    One that does not decay goes along with the noise of a whole run, at a frequency that tells the inertia to a
+    thousandth of a percent.
+    """
+    values = values_of(fit)
+    inertia, stiffness = values.get(INERTIA, 0.0), values.get(("stiffness",), 0.0)
+    if not (inertia > 0.0 and stiffness > 0.0) or not inertia_std_error(fit) > 0.0:
+        return False
+    natural_hz = float(np.sqrt(stiffness / inertia)) / (2.0 * np.pi)
+    return all(highest_torque_hz(s.trace) < FAR_BELOW * natural_hz for s in fit.shots)
 
 
 def inertia_std_error(fit: Estimate) -> float:

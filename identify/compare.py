@@ -69,9 +69,14 @@ class Judged:
         """Which parameters the data say nothing about, (p,): a limit that nothing reaches."""
         return ~(np.diag(self.estimate.information) > NOTHING)
 
+    def _neutral(self, name: str) -> Array:
+        """Values at which an effect is none, zero for all that is not its own, (p,)."""
+        none = {p.name: p.neutral for p in effects.get(name).parameters} if name not in TERMS else {}
+        return np.array([none[n[1]] if n[0] == name and len(n) > 1 else 0.0 for n in self.estimate.names])
+
     @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def strength(self, name: str) -> float:
-        """How many standard errors, taken as white, a term or an effect stands from zero.
+        """How many standard errors, taken as white, a term or an effect stands from none.
 
         Of an effect's gains it is the joint distance (one of a sine and a cosine may well be nothing). Of its shapes
         it is the smallest, where some shape makes it a simpler effect. Elsewhere a shape that the data hardly know (a
@@ -84,7 +89,7 @@ class Judged:
         mine = [i for i, n in enumerate(self.estimate.names) if n[0] == name]
         gains = [i for i in mine if len(self.estimate.names[i]) == 1 or linear[self.estimate.names[i][1]]]
         shapes = [i for i in mine if i not in gains]
-        x = self.estimate.values
+        x = self.estimate.values - self._neutral(name)
         out = []
         known: list[int] = []
         if gains and shapes and not effects.get(name).nests:

@@ -15,6 +15,7 @@ import numpy as np
 
 from identify.candidates import VERY_FAR, Candidates
 from identify.choice import AT_NOISE, RIVAL, STILL_FAR, chosen_of, simplest
+from identify.compare import Judged
 from identify.fits import OUT_OF_SIGHT
 from identify.found import MOST_NAMED, Search
 from identify.one_for_two import one_for_two
@@ -65,6 +66,7 @@ class FineSearch:
         self.came_near: dict[str, dict[str, Whole]] = {}
         self.passed: dict[frozenset[str], float] = {}  # structures an attempt went on from, and how near they came
         self.first_tried: dict[str, Whole] = {}  # of the first round of an attempt
+        self.twin: Judged | None = None  # the declared model, where its own numbers run free better than those found
         self.declared_level = np.inf  # of the model before anything is added
         self.noted_near: set[str] = set()  # whose rivals were noted over whole runs, near the noise
 
@@ -97,6 +99,7 @@ class FineSearch:
             self.say("taken back: what was added does not come down to the sensor's noise together")
             return False
         found.best, found.floor, found.free_running = trial.best, trial.floor, True
+        found.base = self.twin or found.base
         found.candidates, found.rivals, found.dropped = trial.candidates, trial.rivals, trial.dropped
         found.rival_models = trial.rival_models
         return True
@@ -114,7 +117,7 @@ class FineSearch:
         twin = self.whole(structure, {n: self.declared.get(n, v) for n, v in found.best.values().items()})
         if twin is None or (begin is not None and begin.squares <= twin.squares):
             return begin
-        found.base = found.best = twin.judged()
+        self.twin = twin.judged()
         return twin
 
     def _large(self, found: Search) -> Whole | None:
@@ -269,6 +272,12 @@ class FineSearch:
         for twin in effects.get(name).never_separable or {}:
             if twin in self.on_offer.allowed and {p.name for p in effects.get(twin).parameters} == {k[0] for k in mine}:
                 out.setdefault(twin, {(twin, *k): v for k, v in mine.items()})
+        own_values = tuple(v for n, v in now.values().items() if n[0] == name)
+        for rival, instead in (effects.get(name).as_rival or {}).items():
+            if rival in self.on_offer.allowed:
+                start = instead(own_values)
+                terms = {(t,): now.values().get((t,), 0.0) + more for t, more in start.terms.items()}
+                out.setdefault(rival, terms | {(rival, p): v for p, v in start.own.items()})
         for simpler, own in special_cases(now, name).items():  # two that were found at once were never asked
             if simpler in self.on_offer.allowed:
                 out.setdefault(simpler, own)

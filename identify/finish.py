@@ -19,6 +19,7 @@ from identify.regression import Regression, Solution, Structure, residuals
 from identify.screen import Start, best_rho
 from identify.sensitivities import jacobian
 from identify.sharpen import sharpened
+from identify.shots import Shots
 from identify.start_doubt import least_std_errors
 from identify.traces import Trace
 from rig.recording.run import Array
@@ -116,8 +117,11 @@ def by_output_error(
     fixed = [("inertia",)] if torque_free else []
     noise = noise_of_all(traces)
 
-    def refit(values: Mapping[Name, float], *, rests: bool = False, held: Sequence[Name] = ()) -> Estimate:
-        return refine(traces, structure, values, None, STEPS, use, fixed=[*fixed, *held], rests=rests)
+    def refit(
+        values: Mapping[Name, float], *, rests: bool = False, held: Sequence[Name] = (),
+        carry: Sequence[Shots] | None = None,
+    ) -> Estimate:  # fmt: skip
+        return refine(traces, structure, values, None, STEPS, use, carry, [*fixed, *held], rests=rests)
 
     at_once, valley = settled(refit(start), noise, refit)
     best = at_once

@@ -15,6 +15,7 @@ from identify.output_error import Estimate, refine, squares_at
 from identify.parameters import Name
 from identify.regression import Structure
 from identify.screen import Screen, scale_of
+from identify.shots import Shots
 from identify.traces import Trace
 from identify.whole_runs import ENDS_NEAR, Whole, measured
 from rig import effects
@@ -75,10 +76,13 @@ class Fits:
     def settled(self, fitted: Whole) -> Whole:
         """A fit near the noise, at the bottom of the valley where its inertia hardly shows."""
 
-        def refit(values: Mapping[Name, float], *, rests: bool, held: Sequence[Name] = ()) -> Estimate:
+        def refit(
+            values: Mapping[Name, float], *, rests: bool, held: Sequence[Name] = (),
+            carry: Sequence[Shots] | None = None,
+        ) -> Estimate:  # fmt: skip
             estimate = refine(
-                self.fitting, fitted.structure, values, None, STEPS, self.use, fixed=[*self.fixed, *held], coarse=True,
-                tolerance=TOLERANCE, finer=self.finer, rests=rests,
+                self.fitting, fitted.structure, values, None, STEPS, self.use, carry, [*self.fixed, *held],
+                TOLERANCE, coarse=True, finer=self.finer, rests=rests,
             )  # fmt: skip
             self._spend(estimate)
             return estimate

@@ -7,6 +7,7 @@ valley. Fits with the inertia held at values beside it show the valley.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,13 +17,19 @@ from identify.at_rest import INERTIA, Refit, chi_square, hangs_on_rings, held_to
 from identify.output_error import Estimate
 from identify.parameters import Name
 from identify.sensitivities import jacobian
+from identify.shots import RUNAWAY, residual_at
+from rig.platform import TERMS
 from rig.recording.run import Array
 
 FAR = 2.0  # standard errors beside the fit, to begin with
 MOST = 10  # doublings of that
-RISE = 16.0  # of chi square at either end of what is looked at: dents are half as deep
+RISE = 25.0  # of chi square at either end of what is looked at: dents are half as deep
+BOUND = 4.0  # of chi square at an end beyond which nothing is to be looked at: a 95 % interval ends before it
+LOOKS = 11  # between the ends
 COARSE = (0.5, 0.71, 0.84, 1.19, 1.41, 2.0)  # times the inertia: a deep dent may lie far from the bottom
 REACH = 100.0  # standard errors: no dent is deeper in that
+DEEP = 20.0  # of chi square: no chance makes a dent of that
+MOST_LOOKS = 800  # a damping ratio apart, which is how narrow a ring makes them
 LEAST = 1e-3  # of the inertia: less is not looked at
 
 
@@ -54,7 +61,7 @@ def settled(free: Estimate, noise: float, refit: Refit) -> tuple[Estimate, Valle
     Returns
     -------
     The fit, and the valley: ``free`` itself and None where the inertia is known well, or far from the noise; None also
-    where the valley has no bottom.
+    where the torque makes the platform ring, which tells the inertia.
     """
     fit = held_to_rest(free, noise, refit)
     if not hangs_on_rings(fit, noise):
@@ -81,39 +88,92 @@ def _bottom(fit: Estimate, noise: float, refit: Refit) -> tuple[Estimate, Valley
 
     def beside(e: Estimate, inertia: float) -> Estimate:
         value = max(inertia, LEAST * float(fit.values[at]))
-        return refit({**values_of(e), INERTIA: value}, rests=rests, held=[INERTIA])
+        return refit({**values_of(e), INERTIA: value}, rests=rests, held=[INERTIA], carry=e.shots)
 
     error, inertia = inertia_std_error(fit), float(fit.values[at])
     looks = [times * inertia for times in COARSE if abs(times - 1.0) * inertia < REACH * error]
     centre = min((fit, *(beside(fit, look) for look in looks)), key=lambda e: chi_square(e, noise))
     step = FAR * error
+    least = LEAST * inertia
     for _ in range(MOST):
-        sides = [beside(centre, float(centre.values[at]) + move) for move in (-step, step)]
+        middle = float(centre.values[at])
+        sides = [beside(centre, middle + move) for move in (-step, step)]
         rises = [chi_square(s, noise) - chi_square(centre, noise) for s in sides]
-        if min(rises) > RISE:
+        at_the_end = middle - step <= least and rises[1] > RISE  # lighter than nothing it is not
+        if min(rises) > RISE or at_the_end:
             break
         lowest = sides[int(np.argmin(rises))]
         if chi_square(lowest, noise) < chi_square(centre, noise):
             centre = lowest
         step *= 2.0  # over the dents, and faster where the bottom is far
-    else:
-        return centre, None
+    slope = (sides[1].values - sides[0].values) / float(sides[1].values[at] - sides[0].values[at])
+    if not min(rises) > BOUND:
+        return centre, Valley(float(centre.values[at]), slope)  # open on one side: nothing is known of it
+    centre, std_error = _vertex(centre, [beside(centre, look) for look in _between(sides, at)], sides, noise, beside)
+    found = _where_it_rings(centre, slope, noise, refit) if rests else None
+    if found is not None:
+        return found, None
+    return centre, Valley(std_error, slope)
+
+
+def _between(sides: Sequence[Estimate], at: int) -> list[float]:
     below, above = (float(s.values[at]) for s in sides)
-    lower = beside(centre, _vertex((below, float(centre.values[at]), above), (rises[0], 0.0, rises[1])))
-    fall = chi_square(centre, noise) - chi_square(lower, noise)
-    if fall > 0.0:
-        centre, rises = lower, [r + fall for r in rises]
-    widths = [abs(float(s.values[at] - centre.values[at])) / r**0.5 for s, r in zip(sides, rises, strict=True)]
-    return centre, Valley(max(widths), (sides[1].values - sides[0].values) / (above - below))
+    return np.linspace(below, above, LOOKS + 2)[1:-1].tolist()
+
+
+def _vertex(
+    centre: Estimate, looks: Sequence[Estimate], sides: Sequence[Estimate], noise: float,
+    beside: Callable[[Estimate, float], Estimate],
+) -> tuple[Estimate, float]:  # fmt: skip
+    """The fit at the vertex of the parabola through all that was looked at, and the standard error of its width.
+
+    What noise does to a start state makes the squares a little smaller at every inertia, here more and there less:
+    the lowest point is the luckiest one.
+    """
+    at = centre.names.index(INERTIA)
+    seen = [e for e in (*sides, *looks) if np.isfinite(e.sigma)]
+    x = np.array([float(e.values[at]) for e in seen])
+    middle, half = float(centre.values[at]), 0.5 * float(np.ptp(x))
+    a, b, _ = np.polyfit((x - middle) / half, [chi_square(e, noise) - chi_square(centre, noise) for e in seen], 2)
+    if not a > 0.0:
+        return centre, half
+    vertex = middle - half * float(b / (2.0 * a))
+    inside = min(max(vertex, float(np.min(x))), float(np.max(x)))
+    return beside(centre, inside), half / float(np.sqrt(a))
+
+
+def _where_it_rings(centre: Estimate, slope: Array, noise: float, refit: Refit) -> Estimate | None:
+    """The fit in the one deep dent that a ring of the platform makes, if there is one; it is as narrow as the ring.
+
+    Runs that are held to rest have no rings but those which their torque makes: a soft start leaves a small one, of
+    which the valley's bottom knows nothing. Chance makes no dent that deep.
+    """
+    names = centre.names
+    inertia, damping, stiffness = (centre.values[names.index((t,))] if (t,) in names else 0.0 for t in TERMS)
+    if not (damping > 0.0 and stiffness > 0.0):
+        return None
+    ratio = float(damping / (2.0 * np.sqrt(stiffness * inertia)))
+    looks = inertia * np.exp(np.arange(np.log(COARSE[0]), np.log(COARSE[-1]), ratio))
+    if not 1 < len(looks) < MOST_LOOKS:
+        return None
+    moved = [centre.values + slope * (look - inertia) for look in looks]
+    squares = [_squares_along(centre, x) / noise**2 for x in moved]
+    best = int(np.argmin(squares))
+    if squares[best] > _squares_along(centre, centre.values) / noise**2 - DEEP / 2.0:
+        return None  # between two looks it may be twice as deep
+    found = refit(dict(zip(names, moved[best].tolist(), strict=True)), rests=True)
+    return found if chi_square(found, noise) < chi_square(centre, noise) - DEEP else None
+
+
+@RUNAWAY
+def _squares_along(fit: Estimate, x: Array) -> float:
+    """Squares of the runs at other parameters, their biases fitted."""
+    total = 0.0
+    for s in fit.shots:
+        residual = residual_at(s, fit.structure, fit.names, x)[0][s.weight]
+        total += float(np.sum((residual - np.mean(residual)) ** 2)) if len(residual) else 0.0
+    return total if np.isfinite(total) else np.inf
 
 
 def _rests(fit: Estimate) -> bool:
     return any(s.rests for s in fit.shots)
-
-
-def _vertex(x: tuple[float, float, float], y: tuple[float, float, float]) -> float:
-    """Where the parabola through three points has its lowest point; the middle one is the lowest of them."""
-    if not np.all(np.isfinite(y)):
-        return x[1]
-    a, b, _ = np.polyfit(np.array(x) - x[1], y, 2)
-    return x[1] - float(b / (2.0 * a)) if a > 0.0 else x[1]

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.identifiability import information_of, together, with_delay
-from identify.traces import UPSAMPLING, Trace
+from identify.torque_band import highest_torque_hz
+from identify.traces import Trace
 from identify.wording import number
 from rig.platform import Platform
 
@@ -19,7 +20,6 @@ LAGS = ("torque_delay", "actuator_lag", "sensor_lag")
 LATE_S = 1e-3  # the example in the sentence
 FIRM = 1e-4  # relative standard error of the inertia: what tells that so well tells damping from a delay as well
 WORTH_SAYING = 0.02  # relative standard error of C beside an unknown delay
-MOST = 0.999  # of the torque's power
 
 
 def lag_for_damping(platform: Platform, inertia_std_error: float, traces: Sequence[Trace], axis: str) -> str:
@@ -39,7 +39,7 @@ def lag_for_damping(platform: Platform, inertia_std_error: float, traces: Sequen
     if not asked or not (inertia > 0.0 and stiffness > 0.0) or any(t.torque is None for t in traces):
         return ""
     natural_hz = float(np.sqrt(stiffness / inertia)) / (2.0 * np.pi)
-    if inertia_std_error < FIRM * inertia or not all(_highest_hz(t) < SLOW * natural_hz for t in traces):
+    if inertia_std_error < FIRM * inertia or not all(highest_torque_hz(t) < SLOW * natural_hz for t in traces):
         return ""
     with np.errstate(all="ignore"):
         late = together([information_of(t, with_delay(platform), len(traces)) for t in traces])
@@ -52,11 +52,3 @@ def lag_for_damping(platform: Platform, inertia_std_error: float, traces: Sequen
         f"{number(platform.damping_nm_s_rad, 3)} that C is here. A set near the resonance at {number(natural_hz, 2)} "
         "Hz, or one that starts at once, tells them apart."
     )
-
-
-def _highest_hz(trace: Trace) -> float:
-    """The frequency below which nearly all of a run's torque is."""
-    torque = trace.fine[3][::UPSAMPLING]
-    power = np.cumsum(np.abs(np.fft.rfft(torque)) ** 2)
-    at = int(np.searchsorted(power, MOST * power[-1]))
-    return at / (len(torque) * trace.step_s)

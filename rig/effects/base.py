@@ -84,6 +84,7 @@ class Parameter:
     suffix: str = ""  # unit suffix of the rig.yaml key, e.g. "nm"
     start: Callable[[Scale], tuple[float, ...]] | None = None
     per_run: bool = False  # takes a value of its own in every run (the phase of a disturbance)
+    neutral: float = 0.0  # at which the effect is none
 
     @property
     def key(self) -> str:
@@ -142,6 +143,8 @@ class Effect:
     lower_order: tuple[str, ...] = ()  # effects that come first by marginality: a constant before a slope
     nests: tuple[str, ...] = ()  # simpler effects that this one contains as a special case
     never_separable: Mapping[str, Alike] | None = None  # rival -> why no torque-to-rate data can tell
+    # Of its own values: what a rival that no data exclude has in its place, and what that adds to J, C, K.
+    as_rival: Mapping[str, Callable[[tuple[float, ...]], LargeStart]] | None = None
     needs_added_inertia: bool = False  # shows only where runs carry a known inertia besides the platform's own
     # Of (J, C, K) and the scale: terms of the platform and own parameters to begin from where the effect is large.
     large_starts: Callable[[tuple[float, float, float], Scale], tuple[LargeStart, ...]] | None = None

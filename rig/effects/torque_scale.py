@@ -20,7 +20,13 @@ EFFECT = Effect(
     sign="A factor; one where the recorded torque is the shaft's.",
     parameters=(
         Parameter(
-            "scale", "1", "torque on the shaft over torque recorded", low=0.02, high=50.0, start=lambda scale: (1.01,)
+            "scale",
+            "1",
+            "torque on the shaft over torque recorded",
+            low=0.02,
+            high=50.0,
+            start=lambda scale: (1.01,),
+            neutral=1.0,
         ),
     ),
     kernel=_scaled,

@@ -5,12 +5,22 @@ from __future__ import annotations
 import math
 
 from rig.effects._small_angle import COSINE, SINE
-from rig.effects.base import Effect, Parameter, Place, kernel
+from rig.effects.base import Effect, LargeStart, Parameter, Place, kernel
 
 
 @kernel
 def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
     return p[3] * math.sin(angle) + p[4] * math.cos(angle)
+
+
+def _as_cubic(values: tuple[float, ...]) -> LargeStart:
+    sine, _ = values
+    return LargeStart({"stiffness": sine}, {"factor": -sine / 6.0})
+
+
+def _as_quadratic(values: tuple[float, ...]) -> LargeStart:
+    sine, cosine = values
+    return LargeStart({"stiffness": sine}, {"factor": -0.5 * cosine})
 
 
 EFFECT = Effect(
@@ -30,5 +40,6 @@ EFFECT = Effect(
         "quadratic_stiffness": COSINE,
         "cubic_stiffness": SINE,
     },
+    as_rival={"cubic_stiffness": _as_cubic, "quadratic_stiffness": _as_quadratic},
     separated_by="turn the platform's base, or swing farther",
 )

@@ -68,6 +68,12 @@ def test_the_strength_of_an_effect_is_its_distance_from_zero_in_standard_errors(
     assert found.strength("coulomb_friction") == pytest.approx(3.0 / (2.0 / 4.0))
 
 
+@pytest.mark.parametrize(("scale", "strength"), [(1.0, 0.0), (1.02, 0.04), (0.9, 0.2)])
+def test_a_scale_is_as_strong_as_it_stands_from_one(scale: float, strength: float) -> None:
+    found = judged([1.0], ("torque_scale",), sigma=2.0, information=16.0, values=[1, 1, 1, scale])
+    assert found.strength("torque_scale") == pytest.approx(strength)
+
+
 @pytest.mark.parametrize(
     ("base", "best", "effect", "free_running", "kept"),
     [

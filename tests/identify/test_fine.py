@@ -307,3 +307,34 @@ def test_a_known_mass_has_the_torque_scale_tried_though_others_promise_more() ->
     assert now is not None
     tried, _ = offer.tried(now)
     assert tried["torque_scale"].at_noise
+
+
+def test_gravity_found_beside_another_effect_is_asked_against_the_spring_that_it_may_be() -> None:
+    traces = traces_of(campaign({"cubic_stiffness": {"factor": 3000.0}}, duration_s=3))
+    fine = FineSearch(Candidates(traces, split(traces), ("cubic_stiffness", "unbalance")), lambda text: None)
+    alone = fine.whole(Structure(), START)
+    begin = dict(zip(START, TRUTH, strict=True)) | {("stiffness",): TRUTH[2] + 18000.0}
+    begin |= {("unbalance", "sine"): -18000.0, ("unbalance", "cosine"): 0.0}
+    gravity = fine.whole(Structure(effects=("unbalance",)), begin)
+    assert alone is not None and gravity is not None and gravity.level < 2.0
+    found = Search(alone.judged(), gravity.judged(), 0.1, fine.noise)
+    left = fine._asked_again(found, gravity, 0)
+    assert left.structure.effects == ("cubic_stiffness",)
+    assert left.values()["cubic_stiffness", "factor"] == pytest.approx(3000.0, rel=1e-2)
+    assert left.values()["stiffness",] == pytest.approx(TRUTH[2], rel=1e-3)
+
+
+def test_a_declared_twin_that_leads_nowhere_leaves_the_search_as_it_was() -> None:
+    hysteresis = {"hysteresis": {"level": 1.0, "yield_angle": 0.05, "exponent": 1.5, "share": 0.5}}
+    traces = traces_of(campaign(hysteresis, sets=((104.0, 3.0), (42.0, 9.0)), duration_s=2))
+    structure = Structure(effects=("coulomb_friction",))
+    declared: dict[Name, float] = dict(zip(START, TRUTH, strict=True)) | {("coulomb_friction", "level"): 0.2}
+    fine = FineSearch(Candidates(traces, split(traces), (), structure.effects), lambda text: None, declared)
+    begin = fine.whole(structure, {**declared, ("stiffness",): 60.0, ("inertia",): 0.3}, steps=0)
+    assert begin is not None
+    found = Search(begin.judged(), begin.judged(), 0.1, fine.noise)
+    base, best = found.base, found.best
+    assert not fine.take_over(found)
+    assert fine.twin is not None
+    assert found.base is base
+    assert found.best is best

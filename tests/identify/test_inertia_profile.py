@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -58,6 +59,51 @@ def test_runs_that_ring_by_themselves_tell_the_inertia_and_are_not_held_to_rest(
     assert found.values[INERTIA] == pytest.approx(TRUTH[0], rel=1e-3)
     assert found.free_run is not None
     assert not any(s.rests for s in found.free_run.shots)
+
+
+def in_motion(seed: int) -> list[Trace]:
+    """The same, cut at two seconds and a bit: nothing is at rest there."""
+    out = []
+    for i, f in enumerate((0.5, 1.0)):
+        run = sine_run(85.0, f, duration_s=8.3, soft_s=1.0, seed=seed, noise=LOUD)
+        late = slice(2300, None)
+        assert run.rate_rad_s is not None
+        out.append(
+            prepare(replace(run, time_s=run.time_s[late], valid=run.valid[late], rate_rad_s=run.rate_rad_s[late]), i)
+        )
+    return out
+
+
+def test_runs_that_begin_in_motion_tell_as_little_and_say_so() -> None:
+    off = []
+    for seed in range(6):
+        found = fitted(in_motion(seed), TRUTH[0])
+        assert found.free_run is not None
+        assert not any(s.rests for s in found.free_run.shots)
+        off.append((found.values[INERTIA] - TRUTH[0]) / found.std_error(INERTIA))
+    assert max(abs(x) for x in off) < 3.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_one_slow_run_leaves_the_inertia_open_or_nearly(seed: int) -> None:
+    traces = slow(seed)[:1]
+    start = {INERTIA: 1e-4, ("damping",): 0.0, ("stiffness",): TRUTH[2]}  # where a ring that does not decay fits noise
+    use = [t.keep for t in traces]
+    found = by_output_error(traces, Structure(), start, 0.1, use, use)
+    error = found.std_error(INERTIA)
+    assert error > 0.15 * found.values[INERTIA]
+    assert abs(found.values[INERTIA] - TRUTH[0]) < 3.5 * error or error > 0.5 * found.values[INERTIA]
+
+
+def test_a_known_mass_and_a_faint_ring_of_the_torque_tell_the_inertia() -> None:
+    runs = []
+    for number, (f, added) in enumerate(((0.5, 0.0), (1.0, 0.0), (1.0, 0.004))):
+        jck = (TRUTH[0] + added, TRUTH[1], TRUTH[2])
+        run = sine_run(100.0, f, duration_s=6.0, soft_s=0.3, seed=number, noise=LOUD, jck=jck)
+        runs.append(prepare(replace(run, added_inertia_kg_m2=added), number))
+    found = fitted(runs, 0.6 * TRUTH[0])
+    assert found.values[INERTIA] == pytest.approx(TRUTH[0], rel=0.01)
+    assert found.std_error(INERTIA) < 5e-3 * TRUTH[0]
 
 
 def estimate(traces: Sequence[Trace], rests: bool = False) -> Estimate:
