@@ -18,13 +18,13 @@ from identify.choice import AT_NOISE, RIVAL, STILL_FAR, chosen_of, simplest
 from identify.compare import Judged
 from identify.fits import OUT_OF_SIGHT
 from identify.found import MOST_NAMED, Search
+from identify.instead import instead_of
 from identify.one_for_two import one_for_two
 from identify.parameters import Name
 from identify.pruning import Pruning
 from identify.results import Candidate
 from identify.scores import Scored
 from identify.search import MOST_EFFECTS
-from identify.special_cases import special_cases
 from identify.two_at_once import can_follow_anything, two_at_once
 from identify.whole_runs import AT_FLOOR, ENDS_NEAR, NEAR_THEN, Whole
 from rig import effects
@@ -241,7 +241,8 @@ class FineSearch:
         while waiting:
             name = waiting.pop(0)
             tried = {name: now}
-            for other, own in self._others(name, now).items():
+            near = self.came_near.get(name, {})
+            for other, own in instead_of(now, name, near, self.on_offer.allowed).items():
                 if other in now.structure.effects or name in effects.get(other).nests:
                     continue  # what contains the named one was asked in the last round, on top of it
                 start = {n: v for n, v in now.values().items() if n[0] != name} | own
@@ -261,27 +262,6 @@ class FineSearch:
             found.rival_models.pop(name, None)
             self._note_rivals(found, chosen, tried)
         return now
-
-    def _others(self, name: str, now: Whole) -> dict[str, dict[Name, float]]:
-        """Who came near an effect in its round, its twin beyond the platform, what it contains; where to begin from."""
-        out = {
-            other: {n: v for n, v in before.values().items() if n[0] == other}
-            for other, before in self.came_near.get(name, {}).items()
-        }  # fmt: skip
-        mine = {n[1:]: v for n, v in now.values().items() if n[0] == name}
-        for twin in effects.get(name).never_separable or {}:
-            if twin in self.on_offer.allowed and {p.name for p in effects.get(twin).parameters} == {k[0] for k in mine}:
-                out.setdefault(twin, {(twin, *k): v for k, v in mine.items()})
-        own_values = tuple(v for n, v in now.values().items() if n[0] == name)
-        for rival, instead in (effects.get(name).as_rival or {}).items():
-            if rival in self.on_offer.allowed:
-                start = instead(own_values)
-                terms = {(t,): now.values().get((t,), 0.0) + more for t, more in start.terms.items()}
-                out.setdefault(rival, terms | {(rival, p): v for p, v in start.own.items()})
-        for simpler, own in special_cases(now, name).items():  # two that were found at once were never asked
-            if simpler in self.on_offer.allowed:
-                out.setdefault(simpler, own)
-        return out
 
     def _round(self, found: Search, now: Whole, round_: int) -> Whole | None:
         tried, looks = self.on_offer.tried(now)
@@ -307,7 +287,7 @@ class FineSearch:
         (self.noted_near.add if best.level < ENDS_NEAR else self.noted_near.discard)(name)
         alike = {
             n: w.estimate.platform()
-            for n, w in tried.items() if n != name and w.penalised - best.penalised < RIVAL * best.level
+            for n, w in tried.items() if n != name and w.behind(best) < RIVAL * best.level
         }  # fmt: skip
         found.rivals[name], found.rival_models[name] = tuple(alike), alike
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -90,7 +91,8 @@ class Fits:
         bottom, _ = settled(fitted.estimate, self.noise, refit)
         if bottom is fitted.estimate:
             return fitted
-        return measured(self.traces, self.split, bottom, self.noise, self.finer) or fitted
+        at_bottom = measured(self.traces, self.split, bottom, self.noise, self.finer)
+        return fitted if at_bottom is None else replace(at_bottom, unsettled=fitted.squares)
 
     def _spend(self, estimate: Estimate) -> None:
         self._once = self._once or float(sum(s.grid.n for s in estimate.shots))

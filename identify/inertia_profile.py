@@ -15,7 +15,7 @@ import numpy as np
 
 from identify.at_rest import INERTIA, Refit, chi_square, hangs_on_rings, held_to_rest, inertia_std_error, values_of
 from identify.output_error import Estimate
-from identify.parameters import Name
+from identify.parameters import Name, bounds_of, ordered
 from identify.sensitivities import jacobian
 from identify.shots import RUNAWAY, residual_at
 from rig.platform import TERMS
@@ -156,7 +156,8 @@ def _where_it_rings(centre: Estimate, slope: Array, noise: float, refit: Refit) 
     looks = inertia * np.exp(np.arange(np.log(COARSE[0]), np.log(COARSE[-1]), ratio))
     if not 1 < len(looks) < MOST_LOOKS:
         return None
-    moved = [centre.values + slope * (look - inertia) for look in looks]
+    low, high = (np.array([bounds_of(n)[i] for n in names]) for i in (0, 1))
+    moved = [ordered(names, np.clip(centre.values + slope * (look - inertia), low, high)) for look in looks]
     squares = [_squares_along(centre, x) / noise**2 for x in moved]
     best = int(np.argmin(squares))
     if squares[best] > _squares_along(centre, centre.values) / noise**2 - DEEP / 2.0:

@@ -35,6 +35,7 @@ class Whole:
     held_count: int
     losses: Array  # held-out squares of every run, (runs,), in units of the channel squared
     counts: Array
+    unsettled: float = np.inf  # squares of the fit whose inertia was moved to the bottom of its valley, if it was
 
     @property
     def structure(self) -> Structure:
@@ -55,6 +56,14 @@ class Whole:
     def penalised(self) -> float:
         """Chi square and the penalty for parameters (Schwarz 1978)."""
         return self.squares + len(self.estimate.names) * float(np.log(max(self.count, 2)))
+
+    def behind(self, other: Whole) -> float:
+        """By how much it is less likely than another, at most as settled; less, if it was less before both were.
+
+        The bottom of a dented valley is no minimum: chance alone lifts one of two by more than what parts them.
+        """
+        before = min(self.squares, self.unsettled) - min(other.squares, other.unsettled)
+        return self.penalised - other.penalised + min(before - (self.squares - other.squares), 0.0)
 
     def judged(self) -> Judged:
         """As the rest of the search sees a model."""

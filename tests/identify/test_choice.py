@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -39,3 +41,13 @@ def test_what_can_follow_anything_displaces_a_plain_effect_only_where_it_explain
     levels: dict[str, float], chosen: str
 ) -> None:
     assert simplest({n: fitted(n, level) for n, level in levels.items()}) == chosen
+
+
+def test_one_that_only_its_settling_put_behind_is_no_less_likely() -> None:
+    """Chance lifts one of two bottoms of a dented valley by more than what parts their minima."""
+    best, other = fitted("actuator_lag", 1.0), fitted("torque_delay", 1.0015)
+    assert other.behind(best) == pytest.approx(15.0)
+    both = replace(best, unsettled=best.squares - 2.0), replace(other, unsettled=best.squares + 3.0)
+    assert both[1].behind(both[0]) == pytest.approx(5.0)
+    worse_before = replace(other, unsettled=other.squares - 1.0)
+    assert worse_before.behind(both[0]) == pytest.approx(15.0)

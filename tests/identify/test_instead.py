@@ -9,8 +9,8 @@ import pytest
 
 from identify.fine import FineSearch
 from identify.found import Search
+from identify.instead import special_cases, twins
 from identify.regression import Structure
-from identify.special_cases import special_cases
 from identify.whole_runs import Whole
 from tests.identify.simulated import campaign
 from tests.identify.test_fine import START, offered
@@ -34,6 +34,19 @@ def test_a_gain_begins_from_the_largest_of_the_richer_one(search: FineSearch) ->
 
 def test_what_contains_nothing_has_no_special_case(search: FineSearch) -> None:
     assert special_cases(model(search, "coulomb_friction", {"level": 0.3}), "coulomb_friction") == {}
+
+
+def test_a_twin_of_other_parameters_begins_with_what_it_makes_of_the_platform(search: FineSearch) -> None:
+    gravity = model(search, "unbalance", {"sine": -600.0, "cosine": 4.0})
+    found = twins(gravity, "unbalance")
+    stiffness = gravity.values()["stiffness",] - 600.0
+    assert found["cubic_stiffness"] == {("stiffness",): stiffness, ("cubic_stiffness", "factor"): 100.0}
+    assert found["quadratic_stiffness"] == {("stiffness",): stiffness, ("quadratic_stiffness", "factor"): -2.0}
+
+
+def test_a_twin_of_the_same_parameters_begins_with_their_values(search: FineSearch) -> None:
+    lag = model(search, "actuator_lag", {"time": 2e-4})
+    assert twins(lag, "actuator_lag") == {"sensor_lag": {("sensor_lag", "time"): 2e-4}}
 
 
 def test_a_shape_that_the_data_leave_open_gives_way_to_the_special_case(search: FineSearch) -> None:
