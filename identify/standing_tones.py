@@ -19,7 +19,7 @@ from identify.finish import Fitted
 from identify.output_error import shots_for
 from identify.parameters import equations_of
 from identify.shots import RUNAWAY, Shots, losses_of, predict
-from identify.traces import Trace, loads_differ
+from identify.traces import UPSAMPLING, Trace, loads_differ
 from identify.wording import joined, number
 from rig.dynamics import Equations
 from rig.recording.run import Array
@@ -40,6 +40,10 @@ FOLDS = (
 MOUNT = "Repeat a set with a known mass on the platform (added_inertia_kg_m2)"
 HEAVIER = (
     "The known mass that was mounted does not tell: the line has to be as strong in every run, and the mass heavier"
+)
+DIFFERS = (
+    "Compare {runs} with the others: the amplifier's gain and limits, and how torque and rate are stamped against each "
+    "other. Play that set again, with one of the others at its frequency; leave the run out if it does not repeat."
 )
 TELLS = (
     ": that changes how far a {kind} moves it, and nothing in the sensor. Or switch the source on with the run, at "
@@ -65,6 +69,8 @@ class Line:
         The known mass leaves the line as it is, which it does to no torque.
     stood
         The runs show that it was there before them; else they do not show how they began.
+    of_torque
+        It is heard in the runs whose own torque has that frequency, and in no other.
     """
 
     frequency_hz: float
@@ -74,6 +80,7 @@ class Line:
     loaded: bool = False
     in_sensor: bool = False
     stood: bool = False
+    of_torque: bool = False
 
 
 def standing_line(fitted: Fitted, traces: Sequence[Trace]) -> Line | None:
@@ -92,6 +99,8 @@ def standing_line(fitted: Fitted, traces: Sequence[Trace]) -> Line | None:
     some = [t.run.name for t, yes in zip(fitted_in, heard, strict=True) if yes]
     only = () if np.all(heard) else tuple(some)
     line = Line(fitted.values[TONE, "frequency"], torque_nm, rate_rad_s, only, loads_differ(traces))
+    if only and all(_shaken_at(t, line.frequency_hz) == yes for t, yes in zip(fitted_in, heard, strict=True)):
+        return replace(line, of_torque=True)
     mobility = sizes[:, 1] / np.maximum(sizes[:, 0], 1e-300)
     if line.loaded and np.ptp(mobility) > MOVED * np.mean(mobility):
         torque, rate = np.std(sizes, axis=0) / np.mean(sizes, axis=0)
@@ -112,6 +121,16 @@ def _amplitudes(fitted: Fitted, trace: Trace) -> tuple[complex, complex]:
     return torque, torque * s / ((j + trace.run.added_inertia_kg_m2) * s * s + c * s + k)
 
 
+def _shaken_at(trace: Trace, hertz: float) -> bool:
+    """Whether a run's own torque has a line there."""
+    if trace.torque is None:
+        return False
+    torque = trace.fine[3][::UPSAMPLING]
+    window = np.hanning(len(torque)) / np.sum(np.hanning(len(torque)))  # keeps a short run's neighbours out
+    there = 2.0 * abs(np.sum(window * torque * np.exp(-2j * np.pi * hertz * trace.step_s * np.arange(len(torque)))))
+    return bool(there > FAINT * np.sqrt(2.0) * np.std(torque))
+
+
 def told(line: Line, axis: str, channel: str = "rate") -> tuple[str, str]:
     """The line in words, of the channel that was measured, and what would tell where it comes from."""
     linear = axis == "linear"
@@ -125,6 +144,13 @@ def told(line: Line, axis: str, channel: str = "rate") -> tuple[str, str]:
             f"{name}, {rate}, is the sensor's own and no {'force' if linear else 'torque'}: runs with a known added "
             "mass show it as large as the others."
         ), FOLDS
+    if line.of_torque:
+        one, what = len(line.only) == 1, "force" if linear else "torque"
+        return (
+            f"{name} is no disturbance: {'that run has' if one else 'those runs have'} a {what} of that frequency, and "
+            f"the others are silent there. The platform got {torque} more or less there than was recorded, or at "
+            "another moment."
+        ), DIFFERS.format(runs=joined(line.only))
     why = (
         "It stood in its steady motion when the runs began, and then both look the same."
         if line.stood

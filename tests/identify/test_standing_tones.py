@@ -127,3 +127,17 @@ def test_nothing_is_named_that_was_only_found_beside_an_open_line() -> None:
     assert set(found.verdict.effects) <= {"torque_delay"}
     assert found.verdict.unexplained
     assert "13.37 Hz is left open" in found.verdict.left_open
+
+
+@pytest.mark.parametrize(("gain", "late"), [(1.01, 0), (1.0, 1)])
+def test_a_line_at_the_frequency_of_one_runs_own_torque_is_that_torque(gain: float, late: int) -> None:
+    """A drive that gave one percent more in one run, or a run stamped one sample late."""
+    runs = [sine_run(*one, seed=k) for k, one in enumerate(((67.0, 6.0), (111.0, 1.0), (104.0, 3.0), (60.0, 15.0)))]
+    assert runs[3].torque_nm is not None
+    runs[3] = replace(runs[3], torque_nm=np.roll(runs[3].torque_nm, late) / gain)
+    found = found_in(runs)
+    assert found.verdict.effects == ()
+    assert not found.accepted
+    assert "15 Hz (only in" in found.verdict.left_open
+    assert "is no disturbance" in found.verdict.left_open
+    assert "amplifier" in " ".join(next_steps(found))
