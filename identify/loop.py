@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from identify import decay, persets
+from identify import decay, persets, run_apart
 from identify.candidates import Candidates
 from identify.channels import offer_of, with_causes
 from identify.clipping import full_scale_of
@@ -177,7 +177,11 @@ class _Identifier:
     def _doubted(self, search: Search, fits: Fits, before: Fitted, after: Fitted) -> Fitted:
         """The final fit, or another one where something else may pass for what was found."""
         line = standing_line(after, self.traces) if TONE not in self.structure.effects else None
-        if line is not None:
+        apart = self._apart(search, fits, after) if line is None or line.of_torque else None
+        if apart is not None:
+            search.leave_open("", run_apart.told(apart, self.recording.axis == "linear"), search.base)
+            self.say("not named: the runs do not agree, and that alone would explain as much")
+        elif line is not None:
             words = told(line, self.recording.axis, self.traces[0].channel)
             search.leave_open(TONE, words, self._until(search, fits, TONE))
             self.say(f"not named: {TONE}; it may as well be a line of the sensor's own")
@@ -187,6 +191,14 @@ class _Identifier:
         else:
             return after
         return self._after(search) if search.best.structure != self.structure else before
+
+    def _apart(self, search: Search, fits: Fits, after: Fitted) -> run_apart.RunsApart | None:
+        """What would explain all that the declared model leaves, if it is likelier than what was named."""
+        apart = run_apart.runs_apart(fits, self.structure, search.base.values())
+        if apart is None or after.structure == self.structure:
+            return apart
+        named = fits.whole(after.structure, after.values)
+        return apart if named is None or run_apart.as_likely(apart, named) else None
 
     @staticmethod
     def _until(search: Search, fits: Fits, name: str) -> Judged:
