@@ -140,7 +140,10 @@ def _columns(estimate: Estimate, use: Sequence[Array]) -> tuple[Array, tuple[Arr
         terms = [k for k, n in enumerate(estimate.names) if n[0] in TERMS]
         whole = estimate.values + np.array([s.added if n == ("inertia",) else 0.0 for n in estimate.names])
         gain = -columns[:, terms] @ whole[terms]
-        delay = -np.gradient(s.trace.measured - residual, s.trace.step_s)
+        moving, delay = s.trace.measured - residual, np.zeros(len(residual))
+        for begin, end in s.edges:  # at which it jumps
+            if end - begin > 1:
+                delay[begin:end] = -np.gradient(moving[begin:end], s.trace.step_s)
         mask = s.weight & use[i]
         ones = [np.ones(int(mask.sum()))] if s.trace.biased else []
         q = np.linalg.qr(np.column_stack([state[mask], *ones]))[0]

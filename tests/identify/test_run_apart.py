@@ -55,13 +55,13 @@ def test_the_run_and_the_size_are_told() -> None:
 
 def test_a_run_whose_torque_is_stamped_late_is_told_by_its_milliseconds() -> None:
     five = runs()
-    five[2] = recorded(five[2], late_s=2e-4)
+    five[2] = recorded(five[2], late_s=2e-3)
     found = runs_apart(fits_of(five), Structure(), START)
     assert found is not None
     ((run, kind, size),) = found.changes
     assert (run, kind) == ("3 Hz", "delay")
-    assert size == pytest.approx(-2e-4, abs=5e-6)
-    assert "0.20 ms earlier in 3 Hz" in told(found, linear=False)[0]
+    assert size == pytest.approx(-2e-3, abs=2e-6)
+    assert "2.0 ms earlier in 3 Hz" in told(found, linear=False)[0]
 
 
 @pytest.mark.parametrize(
