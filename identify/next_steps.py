@@ -103,7 +103,7 @@ def unexplained_reason(ratio: float, found: Identification) -> str:
     told = f"{share} ({size})" if share else size
     acts = "something acts that none of the effects tried describes"
     if found.verdict.left_open:
-        acts = "a steady line stands in it (see the verdict)"
+        acts = "what the verdict leaves open stands in it"
     return f"the model leaves {told} unexplained: {acts}"
 
 

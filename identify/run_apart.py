@@ -21,7 +21,7 @@ from identify.parameters import Name
 from identify.regression import Structure
 from identify.sensitivities import sensitivities
 from identify.traces import Trace
-from identify.whole_runs import Whole
+from identify.whole_runs import AT_FLOOR, Whole
 from identify.wording import joined, number
 from rig.dynamics import TorqueSignal
 from rig.platform import TERMS
@@ -90,7 +90,7 @@ def runs_apart(fits: Fits, declared: Structure, start: dict[Name, float]) -> Run
         if not estimate.sigma < 0.999 * before:
             break
     squares = estimate.sigma**2 * estimate.count / fits.noise**2
-    if not squares < AT_NOISE * estimate.count:
+    if not squares < AT_FLOOR * estimate.count:
         return None
     penalty = (len(estimate.names) + len(total)) * float(np.log(max(estimate.count, 2)))
     named = tuple((fits.fitting[i].run.name, kind, v) for (i, kind), v in total.items())

@@ -144,6 +144,19 @@ def sampled(beat: Beat, time_s: Array, values: Array, good: Any) -> Sampled:
     return Sampled(beat, even if wrong else moved, there, scatter_s, wrong)
 
 
+def torque_instants(torque_time_s: Array, time_s: Array, laid: Sampled) -> Array:
+    """When the torque was what it is recorded to be: on the beat, where its rows are those of samples wrongly stamped.
+
+    ``time_s`` are the stamps of the samples; a torque with stamps of its own keeps them.
+    """
+    if not laid.stamps_wrong:
+        return torque_time_s
+    row = np.minimum(np.searchsorted(time_s, torque_time_s), len(time_s) - 1)
+    if np.any(time_s[row] != torque_time_s):
+        return torque_time_s
+    return np.asarray(time_s[0] + laid.beat.instants[laid.beat.index[row]])
+
+
 def _followed(values: Array, step_s: float, cutoff_hz: float) -> Any:
     """The motion in a channel, as a function of the time since its first instant."""
     wn = min(2.0 * ABOVE * cutoff_hz * step_s, SLOW)

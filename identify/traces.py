@@ -16,7 +16,7 @@ from identify.channel_readings import lost, table_of
 from identify.glitches import glitches
 from identify.noise import bandwidth_of, least_of, noise_of
 from identify.prefilter import held_pieces, linear_pieces, smooth_pieces
-from identify.sampling import HOLE, beat_of, sampled
+from identify.sampling import HOLE, beat_of, sampled, torque_instants
 from rig import effects
 from rig.channels import Channel
 from rig.dynamics import TorqueSignal
@@ -316,7 +316,7 @@ def prepare(
     whole = filled[quiet[0] : quiet[1] + 1]
     torque = None
     if run.torque_nm is not None and run.torque_time_s is not None:
-        torque = TorqueSignal(run.torque_time_s, run.torque_nm, run.torque_hold)
+        torque = TorqueSignal(torque_instants(run.torque_time_s, run.time_s, laid), run.torque_nm, run.torque_hold)
     trace = Trace(
         run, channel, step, filled, keep, [], torque, noise if noise is not None else noise_of(whole),
         bandwidth_of(whole, step), number, laid.beat.offset_s, float(run.time_s[0]) + grid[torn],

@@ -15,7 +15,7 @@ from identify.traces import Trace, prepare
 from rig.dynamics import TorqueSignal, simulate
 from rig.platform import Platform
 from rig.recording.run import Array, Run
-from tests.identify.simulated import NOISE_RAD_S, SETS, TRUTH, white
+from tests.identify.simulated import NOISE_RAD_S, SETS, TRUTH, sine_run, white
 
 NAMES = (("inertia",), ("damping",), ("stiffness",))
 START = dict(zip(NAMES, (0.0201, 0.05, 676.0), strict=True))
@@ -67,6 +67,19 @@ def thinned(share: float) -> Callable[[Array, np.random.Generator], Array]:
         return time[kept]
 
     return stamps
+
+
+def test_rows_stamped_by_a_busy_host_have_their_torque_on_the_beat_too() -> None:
+    traces = []
+    for i, (torque, hertz) in enumerate(SETS):
+        run = sine_run(torque, hertz, seed=i)
+        late = np.random.default_rng([i, 9]).uniform(0.0, 3e-4, len(run.time_s))
+        traces.append(prepare(replace(run, time_s=run.time_s + late, torque_time_s=run.time_s + late), i))
+        assert traces[-1].scatter[1]
+    assert np.all(off_by(traces) < (1e-4, 1e-3, 1e-4))
+    use = [t.keep for t in traces]
+    found = by_output_error(traces, Structure(), START, None, use, use)
+    assert found.sigma == pytest.approx(NOISE_RAD_S, rel=0.02)
 
 
 @pytest.mark.parametrize("share", [0.01, 0.05])
