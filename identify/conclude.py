@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify import clipping, glitches, noisy_runs, persets, sampling, turned_runs
+from identify import clipping, glitches, persets, sampling
 from identify.channels import Offer
 from identify.declared_values import declared_values, kept_as_declared
 from identify.diagnosis import with_diagnosis
@@ -57,8 +57,7 @@ class Case:
     offer: Offer
     torque_free: bool
     declared: Platform
-    turned: tuple[str, ...] = ()  # runs left out for the sign of their torque
-    noisy: tuple[tuple[str, float], ...] = ()  # runs left out for their noise, and how many times the others' it is
+    left_out: tuple[str, ...] = ()  # which runs, and why, in words
 
 
 def conclude(
@@ -133,8 +132,7 @@ def _note(case: Case, after: Fitted) -> str:
     torn = glitches.told([(t.run.name, t.glitches_s) for t in case.traces])
     beyond = clipping.told([(t.run.name, *t.clipped) for t in case.traces], case.recording.axis)
     uneven = sampling.told([(t.run.name, *t.scatter) for t in case.traces])
-    gone = (turned_runs.told(case.turned), noisy_runs.told(case.noisy))
-    return ". ".join(note for note in (case.split.note, resting, *gone, torn, beyond, uneven) if note)
+    return ". ".join(note for note in (case.split.note, resting, *case.left_out, torn, beyond, uneven) if note)
 
 
 def _ratio(case: Case, after: Fitted, search: Search) -> float:

@@ -22,25 +22,24 @@ from identify.fits import Fits
 from identify.found import Search
 from identify.holdout import Split, pieces, split
 from identify.measures import floor_of, measure
-from identify.noisy_runs import noisy_runs
-from identify.refusals import refuse_a_moment, refuse_added_inertia, refuse_lowpass, refuse_the_idle
+from identify.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
 from identify.regression import Structure, shape_values
 from identify.results import (
     Identification,
     ParameterEstimate,
     SetResult,
 )
+from identify.runs_used import runs_used
 from identify.screen import Start, first_guess
 from identify.search import Loop
 from identify.standing_tones import TONE, standing_line, told
 from identify.too_much import too_much_for
 from identify.traces import Trace, loads_differ, one_noise, prepare
-from identify.turned_runs import turned_runs
 from identify.unseen import why_unseen
 from rig import effects
 from rig.config.identify import IdentifyConfig
 from rig.effects.base import Place
-from rig.errors import Aborted, RecordingError
+from rig.errors import Aborted
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
@@ -95,21 +94,7 @@ class _Identifier:
             [r.rate_rad_s[r.valid & np.isfinite(r.rate_rad_s)] for r in runs if r.rate_rad_s is not None]
         )
         traces = [prepare(r, i, recording.noise, full_scale=beyond) for i, r in enumerate(runs)]
-        usable = [t for t in traces if t.stretches and t.count > 40]
-        self.noisy = [] if recording.noise is not None else noisy_runs(usable)
-        for trace, times in self.noisy:
-            self.say(f"{trace.run.name} is left out: {times:.2g} times as noisy as the other runs")
-        usable = [t for t in usable if not any(t is gone for gone, _ in self.noisy)]
-        self.traces = one_noise(usable, recording.noise is not None)
-        if not self.traces:
-            raise RecordingError(
-                "no run holds a usable stretch of 40 samples: look at valid, min_rate_rad_s, from_s and to_s"
-            )
-        refuse_a_moment(self.traces)
-        self.turned = turned_runs(self.traces)
-        self.traces = [t for t in self.traces if not any(t is gone for gone in self.turned)]
-        for trace in self.turned:
-            self.say(f"{trace.run.name} is left out: its torque has the opposite sign of the other runs'")
+        self.traces, self.left_out = runs_used(traces, recording.noise is not None, recording.axis, say)
         self.torque_free = free
         refuse_the_idle(self.traces, free)
         if free:
@@ -241,8 +226,7 @@ class _Identifier:
             )  # fmt: skip
         case = Case(
             self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
-            self.declared, tuple(t.run.name for t in self.turned),
-            tuple((t.run.name, times) for t, times in self.noisy),
+            self.declared, self.left_out,
         )  # fmt: skip
         scale = self._torque_scale(after) if in_full else None
         return conclude(case, search, before, after, measured_before, measured_after, floor, per_set, joint, scale)
