@@ -57,7 +57,7 @@ def held_to_rest(free: Estimate, noise: float, refit: Refit) -> Estimate:
     ``free`` itself where the inertia does not hang on rings, where no run begins at rest, or where rest does not
     describe the runs: where they fit worse by more than the start states' share in the noise.
     """
-    if not (hangs_on_rings(free, noise) or (near(free, noise) and _is_shaken_far_below(free))):
+    if not (hangs_on_rings(free, noise) or (near(free, noise) and is_shaken_far_below(free))):
         return free
     resting = sum(may_rest(s.trace, Equations(free.platform(s.number, s.added))) for s in free.shots)
     best, before = free, np.inf
@@ -85,7 +85,7 @@ def near(fit: Estimate, noise: float) -> bool:
     return bool(fit.sigma**2 < NEAR * noise**2)
 
 
-def _is_shaken_far_below(fit: Estimate) -> bool:
+def is_shaken_far_below(fit: Estimate) -> bool:
     """Whether all torque is far below the natural frequency: a ring of noise looks like knowledge there.
 
     One that does not decay goes along with the noise of a whole run, at a frequency that tells the inertia to a

@@ -13,11 +13,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identify.at_rest import INERTIA, Refit, chi_square, hangs_on_rings, held_to_rest, inertia_std_error, values_of
+from identify.at_rest import (
+    INERTIA,
+    Refit,
+    chi_square,
+    hangs_on_rings,
+    held_to_rest,
+    inertia_std_error,
+    is_shaken_far_below,
+    near,
+    values_of,
+)
 from identify.output_error import Estimate
 from identify.parameters import Name, bounds_of, ordered
 from identify.sensitivities import jacobian
 from identify.shots import RUNAWAY, residual_at
+from identify.torque_band import highest_torque_hz
 from rig.platform import TERMS
 from rig.recording.run import Array
 
@@ -63,16 +74,12 @@ def settled(free: Estimate, noise: float, refit: Refit) -> tuple[Estimate, Valle
     The fit, and the valley: ``free`` itself and None where the inertia is known well, or far from the noise; None also
     where the torque makes the platform ring, which tells the inertia.
     """
-    fit = held_to_rest(free, noise, refit)
-    if not hangs_on_rings(fit, noise):
+    held = held_to_rest(free, noise, refit)
+    fit = _out_of_a_dent(held, noise, refit)
+    if fit is held and not hangs_on_rings(fit, noise):
         return fit, None
     bottom, valley = _bottom(fit, noise, refit)
-    if bottom is not fit:  # fitted with its inertia held: information on that is none of its own
-        columns = [
-            jacobian(s, bottom.structure, bottom.names, bottom.values)[0] for s in bottom.shots if np.any(s.weight)
-        ]
-        bottom = replace(bottom, information=np.sum([x.T @ x for x in columns], axis=0))
-    return bottom, valley
+    return bottom if bottom is fit else _informed(bottom), valley
 
 
 def widened(covariance: Array, names: tuple[Name, ...], fit: Estimate, valley: Valley) -> Array:
@@ -81,6 +88,30 @@ def widened(covariance: Array, names: tuple[Name, ...], fit: Estimate, valley: V
     slope = valley.slope[[fit.names.index(n) for n in names]]
     more = valley.std_error**2 - covariance[at, at]
     return covariance + max(more, 0.0) * np.outer(slope, slope)
+
+
+def _out_of_a_dent(fit: Estimate, noise: float, refit: Refit) -> Estimate:
+    """The fit, or one far up the valley from it where nothing but a dent that chance can make held it.
+
+    Shaken far below its resonance a platform of too little inertia and no damping rings on and on, however small the
+    ring: in that it follows the noise, and knows its inertia to a thousandth of a percent.
+    """
+    fastest = 2.0 * np.pi * max(highest_torque_hz(s.trace) for s in fit.shots)
+    if not (_rests(fit) and fastest > 0.0 and near(fit, noise) and is_shaken_far_below(fit)):
+        return fit
+    values = values_of(fit)
+    inertia = values[INERTIA]
+    most = values[("stiffness",)] / fastest**2  # it would resonate with the torque
+    looks = inertia * np.exp2(np.arange(1.0, np.log2(most / inertia)))
+    seen = [refit({**values, INERTIA: float(x)}, rests=True, held=[INERTIA], carry=fit.shots) for x in looks]
+    best = min(seen, key=lambda e: chi_square(e, noise), default=fit)
+    return _informed(best) if chi_square(best, noise) < chi_square(fit, noise) + DEEP else fit
+
+
+def _informed(fit: Estimate) -> Estimate:
+    """A fit whose inertia was held, of which it has no information of its own, with that of all its parameters."""
+    columns = [jacobian(s, fit.structure, fit.names, fit.values)[0] for s in fit.shots if np.any(s.weight)]
+    return replace(fit, information=np.sum([x.T @ x for x in columns], axis=0))
 
 
 def _bottom(fit: Estimate, noise: float, refit: Refit) -> tuple[Estimate, Valley | None]:
