@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify import clipping, glitches, persets, sampling
+from identify import clipping, coloured_noise, glitches, persets, sampling
 from identify.channels import Offer
+from identify.coloured_noise import Colour
 from identify.declared_values import declared_values, kept_as_declared
 from identify.diagnosis import with_diagnosis
 from identify.finish import Fitted, noise_of_all
@@ -58,6 +59,7 @@ class Case:
     torque_free: bool
     declared: Platform
     left_out: tuple[str, ...] = ()  # which runs, and why, in words
+    colour: Colour | None = None  # of the sensor's noise, where it is not white
 
 
 def conclude(
@@ -132,19 +134,26 @@ def _note(case: Case, after: Fitted) -> str:
     torn = glitches.told([(t.run.name, t.glitches_s) for t in case.traces])
     beyond = clipping.told([(t.run.name, *t.clipped) for t in case.traces], case.recording.axis)
     uneven = sampling.told([(t.run.name, *t.scatter) for t in case.traces])
-    return ". ".join(note for note in (case.split.note, resting, *case.left_out, torn, beyond, uneven) if note)
+    filtered = coloured_noise.told(case.colour, case.recording.axis, case.traces[0].channel)
+    return ". ".join(
+        note for note in (case.split.note, resting, filtered, *case.left_out, torn, beyond, uneven) if note
+    )
 
 
 def _ratio(case: Case, after: Fitted, search: Search) -> float:
     """Residual over sensor noise: in free run where the model can run free, else over the horizon."""
-    noise = noise_of_all(case.traces)
+    noise = noise_of_all(case.traces) * _share_of_white(case)
     if after.free_run is not None and after.sensor_limited:
         return after.sigma / noise
     free = after.free_run.sigma / noise if after.free_run is not None else np.inf
-    short = search.best.sigma / search.floor
+    short = search.best.sigma / (search.floor * _share_of_white(case))
     frictions = [e for e in after.structure.effects if effects.get(e).place is Place.FRICTION]
     # One wrong standstill throws a free run off for good; else what a free run leaves is what is missing.
     return float(free) if np.isfinite(free) and (free < STRAYED or not frictions) else float(min(free, short))
+
+
+def _share_of_white(case: Case) -> float:
+    return 1.0 if case.colour is None else case.colour.rms / case.colour.level
 
 
 def _model(case: Case, fitted: Fitted, measured: Measured, dropped: tuple[NotReported, ...]) -> ModelResult:

@@ -12,6 +12,7 @@ from identify import decay, persets, run_apart
 from identify.candidates import Candidates
 from identify.channels import offer_of, with_causes
 from identify.clipping import full_scale_of
+from identify.coloured_noise import Colour, colour_of, guess_of
 from identify.compare import Judged, horizon_s
 from identify.conclude import Case, conclude
 from identify.contribution import contributions
@@ -78,22 +79,47 @@ def identify(
     RecordingError
         Where no run holds enough usable samples.
     """
+    say = progress or (lambda text: None)
     with threadpool_limits(1):  # small matrices: a second BLAS thread only waits
-        return _Identifier(recording, declared, settings, progress or (lambda text: None)).run()
+        found = _Identifier(recording, declared, settings, say).run()
+        if found.aborted or not found.verdict.unexplained or recording.noise is not None:
+            return found
+        return _with_noise_known(
+            found, lambda colour: _Identifier(recording, declared, settings, say, colour).run(), say
+        )
+
+
+def _with_noise_known(
+    found: Identification, again: Callable[[Colour], Identification], say: Callable[[str], None]
+) -> Identification:
+    """What was found, or what is found with the noise of a sensor that filters what it measures."""
+    colour = colour_of(found)
+    if colour is None and (guess := guess_of(found)) is not None:
+        say("once more: the noise may be larger where the platform moves than above")
+        guessed = again(guess)
+        if guessed.aborted:
+            return found
+        colour = colour_of(guessed)
+    if colour is None:
+        return found
+    say("once more: what is left has the marks of noise that the sensor itself has filtered")
+    return again(colour)
 
 
 class _Identifier:
     def __init__(
-        self, recording: Recording, declared: Platform, settings: IdentifyConfig, say: Callable[[str], None]
-    ) -> None:
-        self.recording, self.declared, self.settings, self.say = recording, declared, settings, say
+        self, recording: Recording, declared: Platform, settings: IdentifyConfig, say: Callable[[str], None],
+        colour: Colour | None = None,
+    ) -> None:  # fmt: skip
+        self.recording, self.declared, self.settings, self.say, self.colour = recording, declared, settings, say, colour
         free = all(r.torque_nm is None or not np.any(r.torque_nm) for r in recording.runs)
         runs = with_causes(recording.runs, declared, settings.channels)
         runs = [replace(r, torque_nm=None, torque_time_s=None) if free else r for r in runs]
         beyond = full_scale_of(
             [r.rate_rad_s[r.valid & np.isfinite(r.rate_rad_s)] for r in runs if r.rate_rad_s is not None]
         )
-        traces = [prepare(r, i, recording.noise, full_scale=beyond) for i, r in enumerate(runs)]
+        noise = recording.noise if colour is None else colour.level
+        traces = [prepare(r, i, noise, full_scale=beyond) for i, r in enumerate(runs)]
         self.traces, self.left_out = runs_used(traces, recording.noise is not None, recording.axis, say)
         self.torque_free = free
         refuse_the_idle(self.traces, free)
@@ -213,6 +239,8 @@ class _Identifier:
         measured_before = measure(self.traces, self.split, before, cutoff)
         measured_after = measure(self.traces, self.split, after, cutoff) if changed else measured_before
         floor = floor_of(self.traces, self.split, after, cutoff, self.recording.noise is not None)
+        if self.colour is not None:
+            floor = replace(floor, holdout_rate_rms=self.colour.rms)
         per_set: tuple[SetResult, ...] = ()
         joint = None
         if in_full:
@@ -226,7 +254,7 @@ class _Identifier:
             )  # fmt: skip
         case = Case(
             self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
-            self.declared, self.left_out,
+            self.declared, self.left_out, self.colour,
         )  # fmt: skip
         scale = self._torque_scale(after) if in_full else None
         return conclude(case, search, before, after, measured_before, measured_after, floor, per_set, joint, scale)

@@ -1,0 +1,109 @@
+"""A gyro that filters what it measures: its noise is no missing effect, and hides none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from identify.coloured_noise import colour_of
+from identify.loop import identify
+from identify.results import Identification
+from rig.config.identify import IdentifyConfig
+from rig.recording.run import Array, Recording
+from tests.identify.simulated import DECLARED, NOISE_RAD_S, SETS, TRUTH, Effects, sine_run, white
+
+ONCE_MORE = "once more"
+
+
+def passed(order: int, hertz: float) -> Callable[[Array], Array]:
+    """Noise behind a Butterworth low-pass."""
+    b, a = signal.butter(order, hertz, fs=1000.0)
+    return lambda noise: np.asarray(signal.lfilter(b, a, noise))
+
+
+def recorded(colour: Callable[[Array], Array] | None, effects: Effects | None = None, seed: int = 0) -> Recording:
+    """The paper's sets, read by a gyro of that noise."""
+    runs = []
+    for i, (m, f) in enumerate(SETS):
+        run = sine_run(m, f, effects=effects, noise=1e-9 if colour else NOISE_RAD_S, seed=i)
+        assert run.rate_rad_s is not None
+        if colour:
+            noise = colour(white(len(run.rate_rad_s) + 2000, NOISE_RAD_S, 10 * seed + i))[2000:]
+            run = replace(run, rate_rad_s=run.rate_rad_s + noise)
+        runs.append(run)
+    return Recording(tuple(runs))
+
+
+def found_in(recording: Recording, candidates: list[str]) -> tuple[Identification, list[str]]:
+    said: list[str] = []
+    settings = IdentifyConfig.model_validate({"candidates": candidates})
+    return identify(recording, DECLARED, settings, said.append), said
+
+
+@pytest.mark.parametrize(("order", "hertz"), [(2, 50.0), (1, 60.0)])
+def test_noise_that_the_gyro_filters_is_no_missing_effect(order: int, hertz: float) -> None:
+    found, said = found_in(recorded(passed(order, hertz)), [])
+    assert found.accepted
+    assert any(ONCE_MORE in line for line in said)
+    colour = found.noise_floor.holdout_rate_rms
+    assert found.final.error.holdout_rate_rms == pytest.approx(colour, rel=0.06)
+    for term, truth in zip(("inertia", "damping", "stiffness"), TRUTH, strict=True):
+        estimate = found.final.parameters[term]
+        assert abs(estimate.value - truth) < 3.5 * estimate.std_error
+    assert "The sensor's noise is coloured" in found.holdout_note
+    dense = float(found.holdout_note.split("as dense as white noise of ")[1].split(" deg/s")[0])
+    assert dense == pytest.approx(0.05, rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("order", "hertz", "name", "hidden"),
+    [
+        (2, 100.0, "cubic_stiffness", {"factor": 300.0}),
+        (8, 100.0, "creep", {"stiffness": 30.0, "time": 0.1}),  # no noise where it is read: the search is far off first
+    ],
+)
+def test_an_effect_beside_such_noise_is_named(order: int, hertz: float, name: str, hidden: dict[str, float]) -> None:
+    found, _ = found_in(recorded(passed(order, hertz), {name: hidden}), [name, "quadratic_stiffness"])
+    assert found.verdict.effects == (name,)
+    assert found.accepted
+    assert found.final.effect_parameters[name][next(iter(hidden))].value == pytest.approx(
+        hidden[next(iter(hidden))], rel=0.01
+    )
+
+
+def test_an_effect_that_is_not_offered_is_no_noise() -> None:
+    found, said = found_in(recorded(passed(2, 100.0), {"cubic_stiffness": {"factor": 300.0}}), [])
+    assert found.verdict.unexplained
+    assert not found.accepted
+    assert colour_of(found) is None
+    assert not any("marks of noise" in line for line in said)
+
+
+def test_white_noise_needs_no_second_look() -> None:
+    found, said = found_in(recorded(None), [])
+    assert found.accepted
+    assert not any(ONCE_MORE in line for line in said)
+
+
+def test_noise_in_the_recorded_torque_swells_at_the_resonance_and_is_not_the_sensors() -> None:
+    runs = recorded(None).runs
+    noisy = [
+        replace(r, torque_nm=r.torque_nm + white(len(r.torque_nm), 3.0, i))
+        for i, r in enumerate(runs)
+        if r.torque_nm is not None
+    ]
+    found, said = found_in(Recording(tuple(noisy)), [])
+    assert found.verdict.unexplained
+    assert colour_of(found) is None
+    assert not any("marks of noise" in line for line in said)
+
+
+def test_two_runs_of_different_noise_have_no_colour_in_common() -> None:
+    runs = list(recorded(passed(2, 100.0)).runs[:3])
+    other = recorded(passed(2, 30.0), seed=1).runs[2]
+    found, _ = found_in(Recording((*runs[:2], replace(other, name="other"))), [])
+    assert colour_of(found) is None
