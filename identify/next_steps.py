@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from identify import torque_noise
 from identify.follow_up_wording import file_name
 from identify.residual import dependence
 from identify.results import GeneticRun, Identification, RunTraces
@@ -131,7 +132,8 @@ def _to_explain(found: Identification) -> list[str]:
     if left is not None and left.moments:
         places = joined([f"in {m.run} from {m.from_s:.2f} to {m.to_s:.2f} s" for m in left.moments])
         return [f"Most of what is left lies {places}. Leave that out with from_s or to_s, or record it again."]
-    return [*_by_what_it_goes_with(found), *_coloured(found)]
+    noisy = torque_noise.told(found)
+    return [noisy] if noisy else [*_by_what_it_goes_with(found), *_coloured(found)]
 
 
 def _coloured(found: Identification) -> list[str]:

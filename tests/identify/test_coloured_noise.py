@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,8 +10,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from identify import torque_noise
 from identify.coloured_noise import colour_of
 from identify.loop import identify
+from identify.next_steps import next_steps
 from identify.results import Identification
 from rig.config.identify import IdentifyConfig
 from rig.recording.run import Array, Recording
@@ -100,6 +103,17 @@ def test_noise_in_the_recorded_torque_swells_at_the_resonance_and_is_not_the_sen
     assert found.verdict.unexplained
     assert colour_of(found) is None
     assert not any("marks of noise" in line for line in said)
+    (advice,) = next_steps(found)
+    passed, left = re.search(
+        r"noise of 3\.\d+ N m a sample, ([\d.]+) N m below .* of the ([\d.]+) N m", advice
+    ).groups()
+    assert float(passed) == pytest.approx(float(left), rel=0.2)
+
+
+def test_what_a_clean_torque_leaves_is_not_blamed_on_its_noise() -> None:
+    found, _ = found_in(recorded(None, {"cubic_stiffness": {"factor": 300.0}}), [])
+    assert found.verdict.unexplained
+    assert torque_noise.told(found) == ""
 
 
 def test_two_runs_of_different_noise_have_no_colour_in_common() -> None:
