@@ -11,8 +11,8 @@ from identify.wording import number
 ENOUGH = 0.5  # of what is left, that it has to make
 TOLD = (
     "The recorded {torque} carries noise of {noise} {unit} a sample, {passed} {unit} below {cutoff:g} Hz, of the "
-    "{left} {unit} that are left there. Record the {torque} that the drive was asked for instead, or measure it with less "
-    "noise: until then nothing small shows beside that."
+    "{left} {unit} that are left there. Record the {torque} that the drive was asked for instead, or measure it with "
+    "less noise: until then nothing small shows beside that."
 )
 
 
