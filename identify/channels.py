@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from identify.channel_readings import table_of
 from identify.results import Candidate
 from identify.traces import UPSAMPLING, Trace
-from identify.wording import number, plain
+from identify.wording import joined, number, plain
 from rig import effects
 from rig.channels import Channel
 from rig.config.channels import ChannelConfig
@@ -129,8 +129,11 @@ def _torque_of_an_ampere(channel: Channel, runs: Sequence[Run]) -> float:
     return float(np.median(torque[plain] / x[plain])) if plain.any() else 0.0
 
 
-def offer_of(traces: Sequence[Trace], declared: Platform) -> Offer:
-    """Which effects of channels may be tried on these runs, and why the others may not."""
+def offer_of(traces: Sequence[Trace], declared: Platform, asked: Iterable[str] = ()) -> Offer:
+    """Which effects of channels may be tried on these runs, and why the others may not.
+
+    ``asked`` are the names in ``identify.channels``, which the runs need not have.
+    """
     channels: dict[str, Channel] = {}
     for trace in traces:
         channels |= trace.run.causes
@@ -147,6 +150,10 @@ def offer_of(traces: Sequence[Trace], declared: Platform) -> Offer:
                 idle.append((name, reason))
             else:
                 refused.append(Candidate(name, 0, 0.0, None, f"{REFUSED}{reason}"))
+    there = joined(sorted({n for t in traces for n in t.run.channels})) or "none"
+    for name in (n for n in asked if n not in channels):
+        status = f"{REFUSED}no run has a channel {name!r}; there are: {there} (recorded.columns.channels)"
+        refused.extend(Candidate(effect, 0, 0.0, None, status) for effect in effects.of_channel(name))
     return Offer(tuple(candidates), tuple(refused), tuple(idle))
 
 

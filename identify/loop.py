@@ -126,7 +126,7 @@ class _Identifier:
         if free:
             refuse_added_inertia(self.traces)
         self.split: Split = split(self.traces, settings.holdout)
-        offer = offer_of(self.traces, declared)
+        offer = offer_of(self.traces, declared, settings.channels)
         unseen = tuple((n, why) for n in declared.effects if (why := why_unseen(n, self.traces)))
         self.offer = replace(offer, idle=(*offer.idle, *unseen))
         still = {name for name, _ in self.offer.idle}

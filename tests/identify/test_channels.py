@@ -242,6 +242,16 @@ def test_a_channel_that_stands_still_or_is_missing_in_a_run_is_no_cause() -> Non
     assert "cold.csv does not have x" in both[1]["x_gain"]
 
 
+def test_a_channel_that_no_run_has_is_told_with_those_there_are() -> None:
+    asked = IdentifyConfig.model_validate({"channels": {"wnding": {"kind": "temperature"}}}).channels
+    runs = with_causes([swing({"winding": 23.0 + TIME**2}, {})], Platform(J, C, K), asked)
+    offer = offer_of([prepare(r, i) for i, r in enumerate(runs)], Platform(J, C, K), asked)
+    assert offer.candidates == ()
+    assert {c.status for c in offer.refused} == {
+        "refused: no run has a channel 'wnding'; there are: winding (recorded.columns.channels)"
+    }
+
+
 def test_a_declared_effect_of_a_channel_that_stands_still_is_set_aside_with_a_reason() -> None:
     model = ModelConfig.model_validate({
         "channels": {"x": {"kind": "temperature", "reference": 21.0}}, "effects": {"x_gain": {"slope": -0.01}}
