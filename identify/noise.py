@@ -14,6 +14,9 @@ LOWER = 0.8  # of the periodogram's values
 LOWER_MEAN = (1.0 - (1.0 - LOWER) * (1.0 - np.log(1.0 - LOWER))) / LOWER  # of an exponential distribution, its mean one
 SCATTER = 1.55  # of ``noise_of`` over the root of the number of samples, as a share of itself
 
+LEAST_LEVELS = 8  # of a channel, for its steps to be seen
+SAME, WHOLE = 1e-12, 0.02  # of the largest value, and of a step: as near as a file's digits bring them
+
 ALIKE = 3.0  # standard errors by which two readings of one noise may differ
 
 
@@ -36,6 +39,24 @@ def noise_of(values: Array, band: tuple[float, float] = UPPER) -> float:
     power = np.sort(spectrum[upper] / gain[upper])
     level = np.mean(power[: round(LOWER * len(power))]) / LOWER_MEAN
     return float(np.sqrt(level / (0.375 * len(d))))
+
+
+def rounding_of(values: Array) -> float:
+    """Standard deviation of what a channel loses by its steps, step / sqrt(12); zero where it has none.
+
+    A platform at rest, or one that sticks, leaves a coarse encoder no noise to be read at all.
+    """
+    levels = np.unique(values)
+    if len(levels) < LEAST_LEVELS:
+        return 0.0
+    apart = np.diff(levels)
+    alike = float(np.max(np.abs(levels))) * SAME
+    apart = apart[apart > alike]
+    if len(apart) == 0:
+        return 0.0
+    step = float(np.min(apart))
+    steps = apart / step
+    return step / float(np.sqrt(12.0)) if np.all(np.abs(steps - np.rint(steps)) < WHOLE * steps) else 0.0
 
 
 def bandwidth_of(values: Array, step_s: float) -> float:

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from identify.along import torque_along
 from identify.channel_readings import lost, table_of
 from identify.glitches import glitches
-from identify.noise import bandwidth_of, least_of, noise_of
+from identify.noise import bandwidth_of, least_of, noise_of, rounding_of
 from identify.prefilter import held_pieces, linear_pieces, smooth_pieces
 from identify.sampling import HOLE, beat_of, sampled, torque_instants
 from rig import effects
@@ -296,6 +296,7 @@ def prepare(
     clipped = int(beyond.sum()), float(np.max(np.abs(values[beyond]), initial=0.0))
     good &= ~beyond
     time = run.time_s - run.time_s[0]
+    rounding = rounding_of(values[good])
     if channel == "rate" and run.angle_rad is not None:
         values = values - bias_beside(run, time, values, good)
     laid = sampled(beat_of(run.name, time), time, values, good)
@@ -314,11 +315,13 @@ def prepare(
         filled = np.where(torn, np.interp(grid, grid[~torn], filled[~torn]), filled)
         keep &= ~torn
     whole = filled[quiet[0] : quiet[1] + 1]
+    if noise is None:
+        noise = max(noise_of(whole), rounding)
     torque = None
     if run.torque_nm is not None and run.torque_time_s is not None:
         torque = TorqueSignal(torque_instants(run.torque_time_s, run.time_s, laid), run.torque_nm, run.torque_hold)
     trace = Trace(
-        run, channel, step, filled, keep, [], torque, noise if noise is not None else noise_of(whole),
+        run, channel, step, filled, keep, [], torque, noise,
         bandwidth_of(whole, step), number, laid.beat.offset_s, float(run.time_s[0]) + grid[torn],
         clipped, (laid.scatter_s, laid.stamps_wrong),
     )  # fmt: skip
