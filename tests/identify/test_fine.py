@@ -252,6 +252,7 @@ def test_a_decay_is_searched_however_much_it_costs(monkeypatch: pytest.MonkeyPat
     assert not offer.fits.gives_up(astray)
 
 
+@pytest.mark.slow
 def test_a_lag_that_two_slow_soft_sines_cannot_tell_from_a_delay_stands_beside_it() -> None:
     """The tangent at no lag asks for a negative damping, from which no fit of a lag finds its way."""
     slow = [

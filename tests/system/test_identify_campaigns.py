@@ -35,8 +35,15 @@ def values(model: dict[str, Any]) -> dict[str, float]:
     return {t: model["parameters"][t]["value"] for t in TERMS}
 
 
-def test_the_default_campaign_names_both_hidden_effects_and_mends_every_parameter(tmp_path: Path) -> None:
-    found, said = run(tmp_path, "rig.yaml")
+@pytest.mark.parametrize(
+    "offered",
+    [
+        "[coulomb_friction, torque_delay, presliding_friction, sensor_lag, unbalance]",
+        pytest.param("null", marks=pytest.mark.slow),  # the whole library, as the file has it
+    ],
+)
+def test_the_default_campaign_names_both_hidden_effects_and_mends_every_parameter(tmp_path: Path, offered: str) -> None:
+    found, said = run(tmp_path, "rig.yaml", "--set", f"identify.candidates={offered}")
     assert set(found["verdict"]["effects"]) == {"coulomb_friction", "torque_delay"}
     truth = {"inertia": 0.0203, "damping": 0.0447, "stiffness": 681.2}
     before, after = values(found["before"]), values(found["after"])
