@@ -67,7 +67,7 @@ def colour_of(found: Identification) -> Colour | None:
         return None
     level = float(np.max(seen.pooled[seen.moving]))
     passed = seen.pooled > PASSED * level
-    if not np.all(passed[seen.moving]) or level < FALLS * seen.pooled[0]:
+    if not np.all(passed[seen.moving]) or not np.all(seen.pooled[seen.moving] > FALLS * seen.pooled[0]):
         return None
     return Colour(float(np.sqrt(level)), _rms(seen), float(np.max(seen.top_hz[passed])))
 

@@ -103,7 +103,8 @@ def _with_noise_known(
     if colour is None:
         return found
     say("once more: what is left has the marks of noise that the sensor itself has filtered")
-    return again(colour)
+    known = again(colour)
+    return known if known.verdict.unexplained or colour_of(known) is not None else found
 
 
 class _Identifier:
