@@ -2,8 +2,8 @@
 
 The noise of a record is read high in its spectrum, where nothing moves. A gyro that is sampled faster than it passes
 has little there, so what is left of a right model seems far above its noise. Noise is told from what a model lacks by
-this: it is as dense in every run, whatever shook the platform, and nearly flat wherever the platform moves, with no
-peak at its resonance.
+this: between the harmonics of a sine, where nothing answers to it, it is as dense in every run, whatever shook the
+platform, and nearly flat wherever the platform moves, with no peak at its resonance.
 """
 
 from __future__ import annotations
@@ -14,20 +14,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from identify.noise import LOWER, LOWER_MEAN
+from identify.period import torque_period_s
 from identify.results import Identification, RunTraces
 from identify.torque_band import highest_hz
 from identify.wording import frequency, number
 from rig.recording.run import Array
 
 TOP = 0.98  # of Nyquist
-LEAST_HZ, LEAST_PERIODS = 1.0, 16  # bands end above that, and hold that many bins
+LEAST_BINS = 8  # of an octave
+REPEATS = 8  # of the torque in a run, so that there are bins between its harmonics
+BESIDE = 2.5  # bins from a harmonic, which a window spreads that far
+ELSE = 0.05  # of a period, by which another run's has to differ: what answers to a torque is alike under the same one
 SCATTER = 1.52  # of a band's density over the root of its bins, as a share of itself
 ALIKE, CLOSE = 4.0, 0.15  # standard errors, and share beyond that, by which two readings of one density may differ
 PASSED = 0.3  # of the density: what the sensor has to pass still where the platform moves
 FALLS = 1.5  # times the density at the top
 NO_FLOOR = 1e3  # the same, where a model is far off: nothing but a filter leaves so little there
 MOVES = 1.3  # times the natural frequency or the torque's
-LEAST_RUNS = 2
 LEAST_SAMPLES = 512
 
 
@@ -99,11 +102,12 @@ class _Seen(NamedTuple):
 
 
 def _seen(found: Identification) -> _Seen | None:
-    """None where too little is seen: of one run, or of motion up to where noise was read."""
-    platform = found.final.platform
-    runs = [_bands(t) for t in found.traces]
-    each = [r for r in runs if r is not None]
-    if platform is None or found.torque_free or len(each) < max(LEAST_RUNS, len(runs)):
+    """None where too little is seen: no two sines, or motion up to where noise was read."""
+    platform, periods = found.final.platform, [torque_period_s(t) for t in found.traces]
+    runs = [(p, _bands(t, p)) for t, p in zip(found.traces, periods, strict=True) if p is not None]
+    each = [r for _, r in runs if r is not None]
+    known = [p for p, r in runs if r is not None]
+    if platform is None or found.torque_free or not known or max(known) < (1.0 + ELSE) * min(known):
         return None
     several = min(len(r.bins) for r in each)
     if several < 2 or any(not np.allclose(r.top_hz[:several], each[0].top_hz[:several], rtol=0.01) for r in each):
@@ -152,8 +156,8 @@ def told(colour: Colour | None, axis: str, channel: str) -> str:
         f"{number(size if linear else math.degrees(size), 3)} {unit}" for size in (colour.level, colour.rms)
     )
     return (
-        f"The sensor's noise is coloured, alike in all runs: up to about {frequency(round(colour.flat_to_hz))} it is "
-        f"as dense as white noise of {dense}, above that less, {whole} in all. An effect is weighed against "
+        f"What is left is noise, alike in all runs and coloured: up to about {frequency(round(colour.flat_to_hz))} it "
+        f"is as dense as white noise of {dense}, above that less, {whole} in all. An effect is weighed against "
         "the first, what is left against the second"
     )
 
@@ -162,23 +166,27 @@ def _highest_torque_hz(trace: RunTraces) -> float:
     return 0.0 if trace.torque_nm is None else highest_hz(trace.torque_nm, float(np.median(np.diff(trace.time_s))))
 
 
-def _bands(trace: RunTraces) -> _Bands | None:
-    """Density of the longest stretch of what the final model leaves; blind to lines, as the noise of a record is."""
+def _bands(trace: RunTraces, period_s: float) -> _Bands | None:
+    """Density of the longest stretch of what the final model leaves, between the harmonics of its torque.
+
+    Blind to other lines, as the noise of a record is.
+    """
     left = trace.measured - trace.simulated_after
     first, last = _longest((trace.keep > 0.0) & np.isfinite(left))
     n = last - first
-    if n < LEAST_SAMPLES:
+    step = float(np.median(np.diff(trace.time_s)))
+    if n < LEAST_SAMPLES or n * step < REPEATS * period_s:
         return None
-    part, step = left[first:last], float(np.median(np.diff(trace.time_s)))
-    window = np.hanning(n)
+    part, window = left[first:last], np.hanning(n)
     power = np.abs(np.fft.rfft((part - np.mean(part)) * window)) ** 2 / float(np.sum(window**2))
     hertz = np.fft.rfftfreq(n, step)
+    between = np.abs(hertz - np.rint(hertz * period_s) / period_s) > BESIDE / (n * step)
     top = TOP * 0.5 / step
-    least = max(LEAST_HZ, LEAST_PERIODS / (n * step))
-    tops = top * np.exp2(-np.arange(max(int(np.log2(top / least)), 0)))
-    inside = [np.sort(power[(hertz > 0.5 * t) & (hertz <= t)]) for t in tops]
-    density = [float(np.mean(p[: round(LOWER * len(p))])) / LOWER_MEAN for p in inside]
-    return _Bands(tops, np.array(density), np.array([len(p) for p in inside]))
+    tops = top * np.exp2(-np.arange(int(np.log2(n))))
+    inside = [np.sort(power[between & (hertz > 0.5 * t) & (hertz <= t)]) for t in tops]
+    enough = int(np.sum(np.cumprod([len(p) >= LEAST_BINS for p in inside])))
+    density = [float(np.mean(p[: round(LOWER * len(p))])) / LOWER_MEAN for p in inside[:enough]]
+    return _Bands(tops[:enough], np.array(density), np.array([len(p) for p in inside[:enough]]))
 
 
 def _longest(use: Any) -> tuple[int, int]:

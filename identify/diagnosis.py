@@ -16,7 +16,7 @@ from identify.free_lines import free_lines, without_lines
 from identify.harmonics import Repeated, harmonics
 from identify.memory import Moved, direction_power, memory_power
 from identify.moments import moments
-from identify.period import period_of
+from identify.period import torque_period_s
 from identify.residual import EDGE_PERIODS, low_pass
 from identify.results import UNITS, Harmonics, Identification, ResidualDiagnosis, RunTraces, Share
 from rig.platform import Platform
@@ -61,7 +61,7 @@ def diagnose(
     if not np.all(total[:2] > 0.0):
         return ()
     known = torque and all(t.torque_nm is not None for t in traces)
-    periods = [_period(t) for t in traces]
+    periods = [torque_period_s(t) for t in traces]
     lines = free_lines(runs, periods, _natural_hz(sensor), sensor.lowpass_hz)
     rest = [without_lines(run, lines) for run in runs]
     repeated = harmonics(rest, periods) if known else None
@@ -154,15 +154,6 @@ def as_torque(noise: Array, channel: str, step_s: float, sensor: Sensor) -> Arra
         ramp = np.linspace(-1.0, 1.0, n)
         torque = torque - np.mean(torque) - ramp * (ramp @ torque) / (ramp @ ramp)
     return np.asarray(torque)
-
-
-def _period(trace: RunTraces) -> float | None:
-    """Of the run's torque; None where it does not repeat."""
-    if trace.frequency_hz:
-        return 1.0 / trace.frequency_hz
-    if trace.torque_nm is None or not np.any(trace.torque_nm):
-        return None
-    return period_of(trace.torque_nm, float(trace.time_s[-1] - trace.time_s[0]) / (len(trace.time_s) - 1))
 
 
 def _natural_hz(sensor: Sensor) -> float:

@@ -40,7 +40,7 @@ from identify.unseen import why_unseen
 from rig import effects
 from rig.config.identify import IdentifyConfig
 from rig.effects.base import Place
-from rig.errors import Aborted
+from rig.errors import Aborted, RecordingError
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
@@ -94,16 +94,17 @@ def _with_noise_known(
 ) -> Identification:
     """What was found, or what is found with the noise of a sensor that filters what it measures."""
     colour = colour_of(found)
-    if colour is None and (guess := guess_of(found)) is not None:
-        say("once more: the noise may be larger where the platform moves than above")
-        guessed = again(guess)
-        if guessed.aborted:
+    try:
+        if colour is None and (guess := guess_of(found)) is not None:
+            say("once more: the noise may be larger where the platform moves than above")
+            guessed = again(guess)
+            colour = None if guessed.aborted else colour_of(guessed)
+        if colour is None:
             return found
-        colour = colour_of(guessed)
-    if colour is None:
+        say("once more: what is left has the marks of noise that the sensor itself has filtered")
+        known = again(colour)
+    except RecordingError:  # too much noise for anything to be seen is none that the record has
         return found
-    say("once more: what is left has the marks of noise that the sensor itself has filtered")
-    known = again(colour)
     return known if known.verdict.unexplained or colour_of(known) is not None else found
 
 

@@ -41,22 +41,20 @@ def noise_of(values: Array, band: tuple[float, float] = UPPER) -> float:
     return float(np.sqrt(level / (0.375 * len(d))))
 
 
-def rounding_of(values: Array) -> float:
-    """Standard deviation of what a channel loses by its steps, step / sqrt(12); zero where it has none.
+def rounding_of(values: Array) -> float | None:
+    """Standard deviation of what a channel loses by its steps, step / sqrt(12); zero without steps, None if few show.
 
     A platform at rest, or one that sticks, leaves a coarse encoder no noise to be read at all.
     """
     levels = np.unique(values)
     if len(levels) < LEAST_LEVELS:
-        return 0.0
+        return None
     apart = np.diff(levels)
-    alike = float(np.max(np.abs(levels))) * SAME
-    apart = apart[apart > alike]
-    if len(apart) == 0:
-        return 0.0
-    step = float(np.min(apart))
+    apart = apart[apart > SAME * float(np.max(np.abs(levels)))]
+    step = float(np.min(apart, initial=np.inf))
     steps = apart / step
-    return step / float(np.sqrt(12.0)) if np.all(np.abs(steps - np.rint(steps)) < WHOLE * steps) else 0.0
+    whole = bool(np.all(np.abs(steps - np.rint(steps)) < WHOLE * steps))
+    return step / float(np.sqrt(12.0)) if len(apart) and whole else 0.0
 
 
 def bandwidth_of(values: Array, step_s: float) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import fft, signal
 
+from identify.results import RunTraces
 from rig.recording.run import Array
 
 STILL = 0.03  # the same at its later multiples, where noise and a slow change of amplitude add up
@@ -59,3 +60,12 @@ def _sharpened(apart: Array, lag: float) -> float | None:
             return None
         lag = place / times
     return lag
+
+
+def torque_period_s(trace: RunTraces) -> float | None:
+    """Of the run's torque; None where it does not repeat."""
+    if trace.frequency_hz:
+        return 1.0 / trace.frequency_hz
+    if trace.torque_nm is None or not np.any(trace.torque_nm):
+        return None
+    return period_of(trace.torque_nm, float(trace.time_s[-1] - trace.time_s[0]) / (len(trace.time_s) - 1))

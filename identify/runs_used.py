@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from identify import noisy_runs, still_runs, turned_runs
 from identify.refusals import refuse_a_moment
-from identify.traces import Trace, one_noise
+from identify.traces import Trace, above_steps, one_noise
 from rig.errors import RecordingError
 
 
@@ -32,6 +32,7 @@ def runs_used(traces: Sequence[Trace], noise_known: bool, axis: str, say: Callab
         Where no run holds enough usable samples.
     """
     usable = [t for t in traces if t.stretches and t.count > 40]
+    usable = usable if noise_known else above_steps(usable)
     still = still_runs.still_runs(usable)
     for trace in still:
         say(f"{trace.run.name} is left out: the platform stood still")

@@ -296,7 +296,6 @@ def prepare(
     clipped = int(beyond.sum()), float(np.max(np.abs(values[beyond]), initial=0.0))
     good &= ~beyond
     time = run.time_s - run.time_s[0]
-    rounding = rounding_of(values[good])
     if channel == "rate" and run.angle_rad is not None:
         values = values - bias_beside(run, time, values, good)
     laid = sampled(beat_of(run.name, time), time, values, good)
@@ -315,13 +314,11 @@ def prepare(
         filled = np.where(torn, np.interp(grid, grid[~torn], filled[~torn]), filled)
         keep &= ~torn
     whole = filled[quiet[0] : quiet[1] + 1]
-    if noise is None:
-        noise = max(noise_of(whole), rounding)
     torque = None
     if run.torque_nm is not None and run.torque_time_s is not None:
         torque = TorqueSignal(torque_instants(run.torque_time_s, run.time_s, laid), run.torque_nm, run.torque_hold)
     trace = Trace(
-        run, channel, step, filled, keep, [], torque, noise,
+        run, channel, step, filled, keep, [], torque, noise if noise is not None else noise_of(whole),
         bandwidth_of(whole, step), number, laid.beat.offset_s, float(run.time_s[0]) + grid[torn],
         clipped, (laid.scatter_s, laid.stamps_wrong),
     )  # fmt: skip
@@ -346,11 +343,23 @@ def prepare(
 
 def one_noise(traces: Sequence[Trace], known: bool) -> list[Trace]:
     """All runs were measured by one sensor; the quietest runs show its noise with the least of the motion in it."""
-    quietest = {}
+    traces, quietest = traces if known else above_steps(traces), {}
     for channel in ("rate", "angle"):
         found = [(t.noise, len(t.measured)) for t in traces if t.channel == channel]
         quietest[channel] = min(found, default=(0.0, 0))[0] if known else least_of(found)
     return [replace(t, noise=quietest[t.channel]) for t in traces]
+
+
+def above_steps(traces: Sequence[Trace]) -> list[Trace]:
+    """The runs with no less noise than the steps make, in which one sensor reads: a run of few steps tells none."""
+    told: dict[str, list[float]] = {"rate": [], "angle": []}
+    for t in traces:
+        values = t.run.rate_rad_s if t.channel == "rate" else t.run.angle_rad
+        assert values is not None
+        rounding = rounding_of(values[t.run.valid & np.isfinite(values)])
+        if rounding is not None:
+            told[t.channel].append(rounding)
+    return [replace(t, noise=max(t.noise, min(told[t.channel], default=0.0))) for t in traces]
 
 
 def clear_of_seam(trace: Trace, seam: int, keep: Any) -> None:

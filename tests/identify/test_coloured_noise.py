@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from identify import torque_noise
-from identify.coloured_noise import colour_of
+from identify import loop, torque_noise
+from identify.coloured_noise import Colour, colour_of
 from identify.loop import identify
 from identify.next_steps import next_steps
 from identify.results import Identification
 from rig.config.identify import IdentifyConfig
-from rig.recording.run import Array, Recording
+from rig.errors import RecordingError
+from rig.recording.run import Array, Recording, Run
 from tests.identify.simulated import DECLARED, NOISE_RAD_S, SETS, TRUTH, Effects, sine_run, white
 
 ONCE_MORE = "once more"
@@ -57,7 +58,7 @@ def test_noise_that_the_gyro_filters_is_no_missing_effect(order: int, hertz: flo
     for term, truth in zip(("inertia", "damping", "stiffness"), TRUTH, strict=True):
         estimate = found.final.parameters[term]
         assert abs(estimate.value - truth) < 3.5 * estimate.std_error
-    assert "The sensor's noise is coloured" in found.holdout_note
+    assert "What is left is noise" in found.holdout_note
     dense = float(found.holdout_note.split("as dense as white noise of ")[1].split(" deg/s")[0])
     assert dense == pytest.approx(0.05, rel=0.25)
 
@@ -117,7 +118,70 @@ def test_what_a_clean_torque_leaves_is_not_blamed_on_its_noise() -> None:
 
 
 def test_two_runs_of_different_noise_have_no_colour_in_common() -> None:
-    runs = list(recorded(passed(2, 100.0)).runs[:3])
-    other = recorded(passed(2, 30.0), seed=1).runs[2]
-    found, _ = found_in(Recording((*runs[:2], replace(other, name="other"))), [])
+    runs = recorded(passed(2, 100.0)).runs
+    other = recorded(passed(2, 50.0), seed=1).runs[4]
+    found, _ = found_in(Recording((runs[2], runs[3], other)), [])
     assert colour_of(found) is None
+
+
+def test_runs_under_one_and_the_same_sine_do_not_tell_noise_from_what_answers_to_it() -> None:
+    b = passed(2, 100.0)
+    runs = []
+    for seed in range(3):
+        run = sine_run(67.0, 6.0, noise=1e-9)
+        assert run.rate_rad_s is not None
+        noise = b(white(len(run.rate_rad_s) + 2000, NOISE_RAD_S, seed))[2000:]
+        runs.append(replace(run, name=f"run {seed}", rate_rad_s=run.rate_rad_s + noise))
+    found, said = found_in(Recording(tuple(runs)), [])
+    assert found.verdict.unexplained
+    assert not any(ONCE_MORE in line for line in said)
+
+
+def test_a_drive_whose_gain_goes_with_the_angle_is_no_noise_under_multisines() -> None:
+    """All bins of a multisine as long as its run answer to it: on a damped platform that had passed for noise."""
+    runs = [damped_multisine(seed) for seed in range(2)]
+    found, said = found_in(Recording(tuple(runs)), ["quadratic_stiffness", "coulomb_friction"])
+    assert found.verdict.unexplained
+    assert not found.accepted
+    assert not any(ONCE_MORE in line for line in said)
+
+
+def damped_multisine(seed: int) -> Run:
+    """A platform at 3.5 Hz, damped by 0.9, whose torque is 1 + 0.3 theta times the recorded one."""
+    rng = np.random.default_rng(seed)
+    inertia, own = 0.02, 2.0 * np.pi * 3.5
+    damping, stiffness = 1.8 * inertia * own, inertia * own**2
+    step = 5e-4
+    time = step * np.arange(round(10.0 / step) + 1)
+    hertz = np.arange(3, 59) / 10.0
+    phases = rng.uniform(0.0, 2.0 * np.pi, len(hertz))
+    torque = np.sum(np.sin(2.0 * np.pi * hertz[:, None] * time + phases[:, None]), axis=0)
+    torque *= 0.7 / np.std(torque)
+    state, angle, rate = np.zeros(2), np.zeros(len(time)), np.zeros(len(time))
+
+    def slope(x: Array, m: float) -> Array:
+        return np.array([x[1], (m * (1.0 + 0.3 * x[0]) - damping * x[1] - stiffness * x[0]) / inertia])
+
+    for i in range(len(time) - 1):
+        angle[i], rate[i] = state
+        middle = 0.5 * (torque[i] + torque[i + 1])
+        a = slope(state, torque[i])
+        b = slope(state + 0.5 * step * a, middle)
+        c = slope(state + 0.5 * step * b, middle)
+        state = state + step / 6.0 * (a + 2.0 * b + 2.0 * c + slope(state + step * c, torque[i + 1]))
+    angle[-1], rate[-1] = state
+    noisy = rate[::2] + white(len(rate[::2]), NOISE_RAD_S, seed)
+    return Run(
+        f"multisine {seed}", time[::2], np.ones(len(noisy), bool), rate_rad_s=noisy, torque_time_s=time[::2],
+        torque_nm=torque[::2],
+    )  # fmt: skip
+
+
+def test_a_second_look_that_sees_nothing_leaves_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, _ = found_in(recorded(passed(2, 100.0), {"cubic_stiffness": {"factor": 300.0}}), [])
+    monkeypatch.setattr(loop, "colour_of", lambda seen: Colour(1.0, 1.0, 100.0))
+
+    def refused(colour: Colour) -> Identification:
+        raise RecordingError("no run moves more than 2.2 times the sensor's noise")
+
+    assert loop._with_noise_known(found, refused, lambda text: None) is found
