@@ -9,6 +9,7 @@ platform, and nearly flat wherever the platform moves, with no peak at its reson
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from identify.period import torque_period_s
 from identify.results import Identification, RunTraces
 from identify.torque_band import highest_hz
 from identify.wording import frequency, number
+from rig.errors import RecordingError
 from rig.recording.run import Array
 
 TOP = 0.98  # of Nyquist
@@ -58,6 +60,35 @@ class _Bands(NamedTuple):
     top_hz: Array
     density: Array
     bins: Array
+
+
+def with_noise_known(
+    found: Identification, again: Callable[[Colour], Identification], say: Callable[[str], None]
+) -> Identification:
+    """What was found, or what is found with the noise of a sensor that filters what it measures.
+
+    Parameters
+    ----------
+    found
+        With something unexplained.
+    again
+        Identifies the same recording with its noise known.
+    say
+        Receives a line before each.
+    """
+    colour = colour_of(found)
+    try:
+        if colour is None and (guess := guess_of(found)) is not None:
+            say("once more: the noise may be larger where the platform moves than above")
+            guessed = again(guess)
+            colour = None if guessed.aborted else colour_of(guessed)
+        if colour is None:
+            return found
+        say("once more: what is left has the marks of noise that the sensor itself has filtered")
+        known = again(colour)
+    except RecordingError:  # too much noise for anything to be seen is none that the record has
+        return found
+    return known if known.verdict.unexplained or colour_of(known) is not None else found
 
 
 def colour_of(found: Identification) -> Colour | None:

@@ -12,7 +12,7 @@ from identify import decay, persets, run_apart
 from identify.candidates import Candidates
 from identify.channels import offer_of, with_causes
 from identify.clipping import full_scale_of
-from identify.coloured_noise import Colour, colour_of, guess_of
+from identify.coloured_noise import Colour, with_noise_known
 from identify.compare import Judged, horizon_s
 from identify.conclude import Case, conclude
 from identify.contribution import contributions
@@ -40,7 +40,7 @@ from identify.unseen import why_unseen
 from rig import effects
 from rig.config.identify import IdentifyConfig
 from rig.effects.base import Place
-from rig.errors import Aborted, RecordingError
+from rig.errors import Aborted
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
@@ -84,28 +84,9 @@ def identify(
         found = _Identifier(recording, declared, settings, say).run()
         if found.aborted or not found.verdict.unexplained or recording.noise is not None:
             return found
-        return _with_noise_known(
+        return with_noise_known(
             found, lambda colour: _Identifier(recording, declared, settings, say, colour).run(), say
         )
-
-
-def _with_noise_known(
-    found: Identification, again: Callable[[Colour], Identification], say: Callable[[str], None]
-) -> Identification:
-    """What was found, or what is found with the noise of a sensor that filters what it measures."""
-    colour = colour_of(found)
-    try:
-        if colour is None and (guess := guess_of(found)) is not None:
-            say("once more: the noise may be larger where the platform moves than above")
-            guessed = again(guess)
-            colour = None if guessed.aborted else colour_of(guessed)
-        if colour is None:
-            return found
-        say("once more: what is left has the marks of noise that the sensor itself has filtered")
-        known = again(colour)
-    except RecordingError:  # too much noise for anything to be seen is none that the record has
-        return found
-    return known if known.verdict.unexplained or colour_of(known) is not None else found
 
 
 class _Identifier:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from identify import loop, torque_noise
+from identify import coloured_noise, torque_noise
 from identify.coloured_noise import Colour, colour_of
 from identify.loop import identify
 from identify.next_steps import next_steps
@@ -179,9 +179,9 @@ def damped_multisine(seed: int) -> Run:
 
 def test_a_second_look_that_sees_nothing_leaves_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
     found, _ = found_in(recorded(passed(2, 100.0), {"cubic_stiffness": {"factor": 300.0}}), [])
-    monkeypatch.setattr(loop, "colour_of", lambda seen: Colour(1.0, 1.0, 100.0))
+    monkeypatch.setattr(coloured_noise, "colour_of", lambda seen: Colour(1.0, 1.0, 100.0))
 
     def refused(colour: Colour) -> Identification:
         raise RecordingError("no run moves more than 2.2 times the sensor's noise")
 
-    assert loop._with_noise_known(found, refused, lambda text: None) is found
+    assert coloured_noise.with_noise_known(found, refused, lambda text: None) is found
