@@ -188,8 +188,8 @@ def told(colour: Colour | None, axis: str, channel: str) -> str:
     )
     return (
         f"What is left is noise, alike in all runs and coloured: up to about {frequency(round(colour.flat_to_hz))} it "
-        f"is as dense as white noise of {dense}, above that less, {whole} in all. An effect is weighed against "
-        "the first, what is left against the second"
+        f"is as dense as white noise of {dense}, above that less, {whole} in all. Effects are weighed by that density, "
+        "the residual by the total"
     )
 
 
