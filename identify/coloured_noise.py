@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from identify.period import torque_period_s
 from identify.results import Identification, RunTraces
 from identify.torque_band import highest_hz
 from identify.wording import frequency, number
-from rig.errors import RecordingError
+from rig.errors import Aborted, RecordingError
 from rig.recording.run import Array
 
 TOP = 0.98  # of Nyquist
@@ -81,13 +82,19 @@ def with_noise_known(
         if colour is None and (guess := guess_of(found)) is not None:
             say("once more: the noise may be larger where the platform moves than above")
             guessed = again(guess)
-            colour = None if guessed.aborted else colour_of(guessed)
+            if guessed.aborted:
+                return replace(found, aborted=True)
+            colour = colour_of(guessed)
         if colour is None:
             return found
         say("once more: what is left has the marks of noise that the sensor itself has filtered")
         known = again(colour)
     except RecordingError:  # too much noise for anything to be seen is none that the record has
         return found
+    except (Aborted, KeyboardInterrupt):  # what the first look found is whole, and is not lost with the second
+        return replace(found, aborted=True)
+    if known.aborted:
+        return replace(found, aborted=True)
     return known if known.verdict.unexplained or colour_of(known) is not None else found
 
 

@@ -185,3 +185,15 @@ def test_a_second_look_that_sees_nothing_leaves_the_first(monkeypatch: pytest.Mo
         raise RecordingError("no run moves more than 2.2 times the sensor's noise")
 
     assert coloured_noise.with_noise_known(found, refused, lambda text: None) is found
+
+
+def test_who_stops_the_second_look_keeps_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, _ = found_in(recorded(passed(2, 100.0), {"cubic_stiffness": {"factor": 300.0}}), [])
+    monkeypatch.setattr(coloured_noise, "colour_of", lambda seen: Colour(1.0, 1.0, 100.0))
+
+    def interrupted(colour: Colour) -> Identification:
+        raise KeyboardInterrupt
+
+    for again in (interrupted, lambda colour: replace(found, aborted=True, traces=())):
+        kept = coloured_noise.with_noise_known(found, again, lambda text: None)
+        assert kept == replace(found, aborted=True)
