@@ -11,12 +11,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from identify.compare import start_values
-from identify.output_error import Estimate, refine
-from identify.parameters import Name
-from identify.regression import Structure
-from identify.screen import best_rho, first_guess
-from identify.traces import LEAD_IN_S, Trace, prepare
+from identify.estimate.cross_validation import start_values
+from identify.estimate.initial_guess import best_rho, first_guess
+from identify.estimate.output_error import Estimate, refine
+from identify.model.parameters import Name
+from identify.model.structure import Structure
+from identify.signals.prepare import LEAD_IN_S, prepare
+from identify.signals.trace import Trace
 from rig.recording.run import Array, Run
 
 TRUTH = {"inertia": 0.02, "damping": 0.045, "stiffness": 677.3}

@@ -29,9 +29,9 @@ from campaigns import (
 )  # fmt: skip
 from threadpoolctl import threadpool_limits
 
-from identify.identifiability import Information, information_of, together
-from identify.parameters import Name
-from identify.traces import Trace
+from identify.bounds.identifiability import Information, information_of, together
+from identify.model.parameters import Name
+from identify.signals.trace import Trace
 from rig.platform import Platform
 from rig.recording.run import Array
 

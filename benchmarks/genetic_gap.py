@@ -18,11 +18,13 @@ from campaigns import SETS, SIGMA_RAD_S, TRUTH, clean_rates, run_of, times, trac
 from scipy.optimize import minimize_scalar
 from threadpoolctl import threadpool_limits
 
-from identify.genetic import search
-from identify.persets import genetic
-from identify.regression import Regression, Structure, normal, solve
-from identify.screen import best_rho, first_guess
-from identify.traces import Trace, prepare
+from identify.estimate.initial_guess import best_rho, first_guess
+from identify.estimate.regression import Regression, normal, solve
+from identify.genetic.algorithm import search
+from identify.genetic.per_set import genetic
+from identify.model.structure import Structure
+from identify.signals.prepare import prepare
+from identify.signals.trace import Trace
 from rig.config.identify import GeneticConfig, IdentifyConfig
 from rig.dynamics import TorqueSignal, simulate
 from rig.platform import TERMS, Platform

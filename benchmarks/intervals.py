@@ -18,8 +18,8 @@ import numpy as np
 from campaigns import SIGMA_RAD_S, TRUTH, clean_rates, regression_start, structure_with, times, traces_from, white
 from threadpoolctl import threadpool_limits
 
-from identify.compare import horizon_s
-from identify.finish import by_output_error
+from identify.estimate.cross_validation import horizon_s
+from identify.estimate.final_fit import by_output_error
 from rig.recording.run import Array
 
 GYRO = Path(__file__).parents[2] / "shared/data/adis16405_gyro/gyro_counts.npz"

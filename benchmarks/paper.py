@@ -21,9 +21,10 @@ from typing import Any
 import numpy as np
 from line_chart import panel, stacked, svg
 
-from identify.identifiability import of_planned
-from identify.regression import Regression, Structure, fit
-from identify.traces import prepare
+from identify.bounds.identifiability import of_planned
+from identify.estimate.regression import Regression, fit
+from identify.model.structure import Structure
+from identify.signals.prepare import prepare
 from rig.config.excitation import PAPER_SETS
 from rig.dynamics import TorqueSignal, simulate
 from rig.excitation import PlannedSet, Sine, planned

@@ -36,8 +36,8 @@ from scipy import optimize, signal
 from scipy.interpolate import CubicSpline
 from threadpoolctl import threadpool_limits
 
-from identify.identifiability import information_of, together
-from identify.traces import Trace
+from identify.bounds.identifiability import information_of, together
+from identify.signals.trace import Trace
 from rig.platform import Platform
 from rig.recording.run import Array
 

@@ -18,7 +18,7 @@ import numpy as np
 from campaigns import SETS, SIGMA_RAD_S, TRUTH, run_of, times
 from stick_slip import StickSlip
 
-from identify.loop import identify
+from identify.pipeline import identify
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
 from rig.recording.run import Array, Recording

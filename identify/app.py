@@ -71,7 +71,7 @@ def _run_recorded(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> in
     recording = dataclasses.replace(recording, info=dict(recording.info) | provenance(loaded))
     found = _identified(desk, loaded, recording)
     if not found.aborted:
-        from identify.follow_up_rounds import limits_of
+        from identify.follow_up.rounds import limits_of
 
         allowed = limits_of(found, loaded.config.limits, found.axis == "linear")
         found = _planned(desk, loaded, recording, found, allowed, _sample_rate_hz(recording))
@@ -120,7 +120,7 @@ def _followed_up(
 
     Whatever a follow-up ends in, what stood before it stands: results are written before it is played.
     """
-    from identify.follow_up_rounds import promises_more
+    from identify.follow_up.rounds import promises_more
     from rig.preflight import allowed_peaks
 
     config = loaded.config
@@ -169,7 +169,7 @@ def _identified_again(
     desk: Desk, loaded: LoadedConfig, played: Played, found: Identification, earlier_model: Platform | None
 ) -> tuple[Played, Identification, bool]:
     """Identify from all the data; where that fails or is stopped, what was found before stands."""
-    from identify.follow_up_rounds import after_playing
+    from identify.follow_up.rounds import after_playing
     from rig.errors import Aborted, UsageError
 
     stopped: BaseException = Aborted(STOPPED_AGAIN)
@@ -196,7 +196,7 @@ def _planned(
     desk: Desk, loaded: LoadedConfig, recording: Recording, found: Identification, allowed: Peaks, rate_hz: float
 ) -> Identification:
     """With a follow-up planned, where a name has a rival; a stop on the way leaves what was found, marked aborted."""
-    from identify.follow_up import plan_follow_up, with_follow_up
+    from identify.follow_up.planner import plan_follow_up, with_follow_up
     from rig.errors import Aborted
 
     rounds = len(found.follow_up.rounds) if found.follow_up else 0
@@ -229,7 +229,7 @@ def _conclude_aborted(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, p
 
 def _identified(desk: Desk, loaded: LoadedConfig, recording: Recording) -> Identification:
     """What the recording shows. ``info``, which quotes the configuration, stays outside."""
-    from identify.loop import identify
+    from identify.pipeline import identify
 
     config = loaded.config
     blind = dataclasses.replace(recording, info={})
@@ -240,7 +240,7 @@ def _conclude(
     desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, recording: Recording, found: Identification
 ) -> int:
     """Write the results and the summary; returns 0, 1, or 130 where somebody asked to stop."""
-    from identify.summary import WIDTH, summary
+    from identify.report.summary import WIDTH, summary
     from rig.cli.exits import NOT_ACCEPTED, OK, STOPPED
 
     late = desk.stops.outstanding()  # by the loss of the terminal, or in a library that swallows what is raised
@@ -270,7 +270,7 @@ def _write(
     desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, recording: Recording, found: Identification
 ) -> None:
     """Write the results."""
-    from identify.writing import write_results
+    from identify.report.files import write_results
 
     path = folder.made()
     with desk.stops.saving():

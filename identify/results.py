@@ -287,3 +287,8 @@ class Identification:
     def final(self) -> ModelResult:
         """The model that stands at the end."""
         return self.after or self.before
+
+
+def follow_up_file_name(rounds: int) -> str:
+    """What the plan behind so many played follow-ups is called in the results folder."""
+    return "follow_up.yaml" if rounds == 0 else f"follow_up_{rounds + 1}.yaml"

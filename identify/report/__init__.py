@@ -1,5 +1,1 @@
-"""report.html: one self-contained page that shows what was measured, found and left unexplained."""
-
-from identify.report.page import report_html
-
-__all__ = ["report_html"]
+"""What the user gets: the summary on the terminal, the files of the results folder, the page."""

@@ -91,7 +91,7 @@ def recordings(known: Known) -> list[str]:
 
 def identifiability(known: Known) -> list[str]:
     """What every set alone and all together can determine about the declared platform."""
-    from identify.foresight import of_planned_campaign, of_recorded_campaign
+    from identify.bounds.planned import of_planned_campaign, of_recorded_campaign
 
     config = known.loaded.config
     if known.stage is None:

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.identifiability import planned_trace, vector_of
-from identify.output_error import refine
+from identify.bounds.identifiability import planned_trace, vector_of
+from identify.estimate.output_error import refine
 from identify.results import Errors, Identification, ModelResult, NoiseFloor, Verdict
 from rig.excitation import PlannedSet, Sine
 from rig.platform import Platform

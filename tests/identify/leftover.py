@@ -9,11 +9,11 @@ from functools import cache
 import numpy as np
 from scipy import signal
 
-from identify.diagnosis import Sensor, diagnose
-from identify.regression import Structure
-from identify.residual import motion, torque_noise_floor, torque_residual
+from identify.diagnose.diagnosis import Sensor, diagnose
+from identify.diagnose.torque_residual import motion, torque_noise_floor, torque_residual
+from identify.model.structure import Structure
 from identify.results import ResidualDiagnosis, RunTraces
-from identify.traces import UPSAMPLING, Trace
+from identify.signals.trace import UPSAMPLING, Trace
 from rig.platform import Platform
 from rig.recording.run import Array
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, Effects, campaign, traces_of

@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from identify.diagnosis import with_diagnosis
-from identify.genetic import QuadraticObjective, search
+from identify.diagnose.diagnosis import with_diagnosis
+from identify.genetic.algorithm import QuadraticObjective, search
 from identify.results import (
     Candidate,
     Errors,

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from identify.traces import Trace, prepare
+from identify.signals.prepare import prepare
+from identify.signals.trace import Trace
 from rig.dynamics import TorqueSignal, simulate
 from rig.platform import Platform
 from rig.recording.run import Array, Recording, Run

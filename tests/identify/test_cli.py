@@ -67,9 +67,9 @@ class Identifier:
 def stubbed(monkeypatch: pytest.MonkeyPatch) -> Callable[[Identification | BaseException], Identifier]:
     def stub(answer: Identification | BaseException) -> Identifier:
         identifier = Identifier(answer)
-        loop = ModuleType("identify.loop")
+        loop = ModuleType("identify.pipeline")
         loop.identify = identifier  # type: ignore[attr-defined]
-        monkeypatch.setitem(sys.modules, "identify.loop", loop)
+        monkeypatch.setitem(sys.modules, "identify.pipeline", loop)
         return identifier
 
     return stub
@@ -288,7 +288,7 @@ def test_a_disk_that_does_not_take_the_report_ends_in_130_with_the_numbers_on_it
     def full(*arguments: object) -> str:
         raise OSError(code, os.strerror(code), "report.html")
 
-    monkeypatch.setattr("identify.writing.report_html", full)
+    monkeypatch.setattr("identify.report.files.report_html", full)
     out = tmp_path / "out"
     done = command(app, write_config(tmp_path), "--out", out)
     assert done.exit_code == 130

@@ -77,17 +77,17 @@ def stub(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stub]:
     """Let the loop answer as told, and the planner plan what is given (one plan a call)."""
 
     def made(*answers: Identification | BaseException, plans: tuple[FollowUpPlan, ...] = (plan_of(),)) -> Answers:
-        loop, identifier = ModuleType("identify.loop"), Answers(*answers)
+        loop, identifier = ModuleType("identify.pipeline"), Answers(*answers)
         loop.identify = identifier  # type: ignore[attr-defined]
-        monkeypatch.setitem(sys.modules, "identify.loop", loop)
+        monkeypatch.setitem(sys.modules, "identify.pipeline", loop)
         left = list(plans)
 
         def plan(found: Identification, *_: Any) -> FollowUp | None:
             doubt = any(found.verdict.confusable_with.values())
             return FollowUp(left.pop(0) if left else None) if doubt else None
 
-        monkeypatch.setattr("identify.follow_up.plan_follow_up", plan)
-        monkeypatch.setattr("identify.follow_up_rounds.errors_on", lambda model, found, recording: found.before.error)
+        monkeypatch.setattr("identify.follow_up.planner.plan_follow_up", plan)
+        monkeypatch.setattr("identify.follow_up.rounds.errors_on", lambda model, found, recording: found.before.error)
         return identifier
 
     yield made

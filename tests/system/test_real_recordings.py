@@ -10,7 +10,7 @@ import pytest
 from scipy import optimize, signal
 from scipy.integrate import solve_ivp
 
-from identify.loop import identify
+from identify.pipeline import identify
 from identify.results import Identification
 from rig.config.load import load_config
 from rig.platform import Platform

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from identify.report import report_html
+from identify.report.page import report_html
 from tests.identify.sample import sample, unhappy
 
 if sys.platform == "win32":

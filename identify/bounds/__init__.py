@@ -1,0 +1,1 @@
+"""What the runs can determine (Cramer-Rao), before and after they are played."""

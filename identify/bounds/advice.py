@@ -1,0 +1,195 @@
+"""What runs can and cannot determine, in words that a bench engineer acts on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identify.bounds.identifiability import DELAY, Information, together
+from identify.model.parameters import Name
+from identify.wording import SYMBOLS, number, plain
+from rig import effects
+from rig.platform import TERMS
+
+WELL_KNOWN = 0.05  # relative standard error up to which a parameter counts as determined
+AIM = 0.01  # relative standard error that advice on the torque aims at
+SEPARATE = 200.0  # amplification of the model's errors beyond which inertia and stiffness are not told apart
+DETECTABLE = 1.96  # standard errors: what is smaller cannot be told from none
+DELAY_NAME: Name = (DELAY, "delay")
+_RATIOS = {("damping",): "C/J", ("stiffness",): "K/J"}
+
+
+def undetermined(name: str, missing: Sequence[str], partner: str | None = None) -> str:
+    """Advice on a run that alone does not tell some terms; ``partner`` is a run that it should be fitted with.
+
+    >>> undetermined("0.5 Hz", ["inertia", "stiffness"], "6 Hz")
+    '0.5 Hz alone cannot separate inertia from stiffness: keep the start transient or fit it with 6 Hz'
+    """
+    beside = f"fit it with {partner}" if partner else "fit it together with a set at another frequency"
+    if {"inertia", "stiffness"} <= set(missing):
+        return f"{name} alone cannot separate inertia from stiffness: keep the start transient or {beside}"
+    return f"{name} alone does not determine {' and '.join(missing)}: keep the start transient or {beside}"
+
+
+def label(name: Name, torque_free: bool = False) -> str:
+    """J, C, K (C/J, K/J without torque), "Coulomb friction level"."""
+    if len(name) == 1:
+        return _RATIOS[name] if torque_free else SYMBOLS[name[0]]
+    run = f" of run {int(name[2]) + 1}" if len(name) == 3 else ""
+    return f"{plain(name[0])} {name[1]}{run}" if name[0] != DELAY else "torque delay"
+
+
+def expected(information: Information) -> str:
+    """Expected standard errors: "J 0.0024 %, C 0.023 %, K 0.0024 %"."""
+    told = []
+    for name in information.names:
+        value, error = abs(information.values[information.names.index(name)]), information.std_error(name)
+        words = label(name, information.torque_free)
+        if not np.isfinite(error):
+            told.append(f"{words} not at all")
+        elif value == 0.0:
+            told.append(f"{words} to {number(error, 2)} {_unit(name)} (declared as 0)")
+        else:
+            told.append(f"{words} {number(100.0 * error / value, 2)} %")
+    return ", ".join(told)
+
+
+def _unit(name: Name) -> str:
+    if len(name) == 1:
+        return {"inertia": "kg m^2", "damping": "N m s/rad", "stiffness": "N m/rad"}[name[0]]
+    return next(p.unit for p in effects.get(name[0]).parameters if p.name == name[1]).replace("*", " ")
+
+
+def weak(information: Information) -> list[Name]:
+    """Parameters that are not determined: too uncertain, or for J and K, moved at will by errors of the model."""
+    out = []
+    for i, name in enumerate(information.names):
+        if information.values[i] == 0.0:
+            if not np.isfinite(information.std_error(name)):
+                out.append(name)
+        elif information.relative(name) > WELL_KNOWN or _entangled(information, name):
+            out.append(name)
+    return out
+
+
+def _entangled(information: Information, name: Name) -> bool:
+    pair = {("inertia",), ("stiffness",)}
+    if name not in pair or not pair <= set(information.names) or information.torque_free:
+        return False
+    stiffness = information.values[information.names.index(("stiffness",))]
+    return bool(stiffness != 0.0 and max(information.amplification(n) for n in pair) > SEPARATE)
+
+
+def below_noise(information: Information) -> bool:
+    """Whether the motion is quieter than the sensor and nothing that is not zero comes out well."""
+    errors = [information.relative(n) for i, n in enumerate(information.names) if information.values[i] != 0.0]
+    return information.loudness < 1.0 and all(e > WELL_KNOWN for e in errors)
+
+
+def of_set(information: Information, others: Sequence[Information] = ()) -> str:
+    """One sentence on one set; ``others`` are the sets that it could be fitted with."""
+    i = information
+    if i.torque_free:
+        return f"{i.name}: without torque only ratios show, {expected(i)} expected; for J, C and K record the torque"
+    if below_noise(i):
+        worst = max(i.relative(n) for k, n in enumerate(i.names) if i.values[k] != 0.0)
+        told = f"its motion is {number(i.loudness, 2)} times the sensor's noise, and nothing comes out well"
+        cure = (
+            f"about {number(worst / AIM, 2)} times the torque would give {100 * AIM:g} %" if worst < 1e6 else "raise it"
+        )
+        return f"{i.name}: below the noise: {told} ({expected(i)}); {cure}"
+    if not weak(i):
+        return f"{i.name}: {expected(i)} expected{_about_zeros(i)}"
+    return f"{of_weak_set(i, others)} ({expected(i)} expected){_about_zeros(i)}"
+
+
+def of_weak_set(information: Information, others: Sequence[Information] = ()) -> str:
+    """What a set alone does not determine, and which other set it should be fitted with."""
+    missing = weak(information)
+    terms = [n[0] for n in missing if n[0] in TERMS]
+    if not terms:
+        return f"{information.name} alone leaves effects open"
+    told = undetermined(information.name, terms, _partner(information, missing, others))
+    rest = [label(n) for n in missing if n[0] not in TERMS]
+    return told + (f"; {' and '.join(rest)} need another set" if rest else "")
+
+
+def _about_zeros(information: Information) -> str:
+    told = ""
+    for k, name in enumerate(information.names):
+        if information.values[k] == 0.0 and name in {("damping",), ("stiffness",)}:
+            least = DETECTABLE * information.std_error(name)
+            if np.isfinite(least):
+                told += (
+                    f"; {name[0]} is declared as 0: below {number(least, 2)} {_unit(name)} it cannot be told from none"
+                )
+    return told
+
+
+def _partner(information: Information, missing: Sequence[Name], others: Sequence[Information]) -> str | None:
+    """The other set beside which all that is missing here is determined best; none where no set does."""
+    best, found = np.inf, None
+    for other in others:
+        if other.name == information.name or other.names != information.names or other.torque_free:
+            continue
+        both = information + other
+        left = weak(both)
+        worst = max(both.relative(n) for n in missing)
+        if not any(n in left for n in missing) and worst < best:
+            best, found = worst, other.name
+    return found
+
+
+def of_campaign(each: Sequence[Information]) -> str:
+    """One sentence on all sets together."""
+    total = together(each)
+    if total.torque_free:
+        return (
+            f"all sets together: {expected(total)} expected; J, C and K themselves stay unknown without torque "
+            "(record it, or repeat the decay with a known inertia mounted)"
+        )
+    told = f"all sets together: {expected(total)} expected{_about_zeros(total)}; {_figures(total)}"
+    missing = weak(total)
+    if missing:
+        told += f"; NOT determined: {' and '.join(label(n) for n in missing)}. {cure(total)}"
+    return told
+
+
+def _figures(total: Information) -> str:
+    """Rank, condition and the strongest correlation."""
+    p = len(total.names)
+    told = f"rank {total.rank} of {p}, condition {number(total.condition, 2)}"
+    if p < 2:
+        return told
+    size = np.abs(total.correlation - np.eye(p))
+    i, k = np.unravel_index(int(np.argmax(size)), size.shape)
+    names = f"{label(total.names[min(i, k)])} and {label(total.names[max(i, k)])}"
+    return f"{told}, strongest correlation {number(float(total.correlation[i, k]), 3)} ({names})"
+
+
+def cure(total: Information) -> str:
+    """What to add to a campaign that leaves something open."""
+    missing = weak(total)
+    if below_noise(total):
+        return "Raise the torque."
+    if ("inertia",) in missing and ("stiffness",) in missing:
+        return "Add a set at another frequency, or let a set start at once (soft_start_s: 0), so that it rings."
+    return "Add a set at another frequency, a multisine, or more torque."
+
+
+def of_delay(each: Sequence[Information]) -> str:
+    """Whether a torque delay, which every record may hold, can be told from damping; ``each`` with the delay."""
+    total = together(each)
+    if total.torque_free or DELAY_NAME not in total.names or ("damping",) not in total.names:
+        return ""
+    error = total.std_error(DELAY_NAME)
+    bent = total.relative(("damping",))
+    if below_noise(total):
+        return ""
+    if not np.isfinite(error) or bent > WELL_KNOWN:
+        return (
+            "an unknown torque delay cannot be told from damping here, and a delay bends C most of all: "
+            "add sets at other frequencies, or one that starts at once"
+        )
+    return f"an unknown torque delay would be told to {number(1e6 * error, 2)} us, C then to {number(100 * bent, 2)} %"

@@ -1,0 +1,54 @@
+"""Whether damping may be no more than a delay or a lag that nobody declared: far below the resonance one is the other.
+
+A torque that comes late by a short time t lags by w t, and so does the motion of a damped spring whose C is K t.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identify.bounds.identifiability import information_of, together, with_delay
+from identify.signals.torque_band import highest_torque_hz
+from identify.signals.trace import Trace
+from identify.wording import number
+from rig.platform import Platform
+
+SLOW = 0.5  # of the natural frequency: faster sets tell one from the other
+LAGS = ("torque_delay", "actuator_lag", "sensor_lag")
+LATE_S = 1e-3  # the example in the sentence
+FIRM = 1e-4  # relative standard error of the inertia: what tells that so well tells damping from a delay as well
+WORTH_SAYING = 0.02  # relative standard error of C beside an unknown delay
+
+
+def lag_for_damping(platform: Platform, inertia_std_error: float, traces: Sequence[Trace], axis: str) -> str:
+    """What to say of C, in a sentence; empty where the runs tell damping from a delay, or a lag is in the model.
+
+    Parameters
+    ----------
+    platform
+        The final model.
+    inertia_std_error
+        One standard error of its inertia.
+    traces
+        The runs that fitted it.
+    """
+    inertia, stiffness = platform.inertia_kg_m2, platform.stiffness_nm_rad
+    asked = "damping" in platform.terms and platform.damping_nm_s_rad > 0.0 and not set(LAGS) & set(platform.effects)
+    if not asked or not (inertia > 0.0 and stiffness > 0.0) or any(t.torque is None for t in traces):
+        return ""
+    natural_hz = float(np.sqrt(stiffness / inertia)) / (2.0 * np.pi)
+    if inertia_std_error < FIRM * inertia or not all(highest_torque_hz(t) < SLOW * natural_hz for t in traces):
+        return ""
+    with np.errstate(all="ignore"):
+        late = together([information_of(t, with_delay(platform), len(traces)) for t in traces])
+    if not late.relative(("damping",)) > WORTH_SAYING:
+        return ""
+    unit = "N s/m" if axis == "linear" else "N m s/rad"
+    return (
+        "Sets this slow cannot tell damping from a delay or a lag of the drive or the gyro: each "
+        f"{1e3 * LATE_S:g} ms of it that nobody declared is {number(stiffness * LATE_S, 2)} {unit} of the "
+        f"{number(platform.damping_nm_s_rad, 3)} that C is here. A set near the resonance at {number(natural_hz, 2)} "
+        "Hz, or one that starts at once, tells them apart."
+    )

@@ -1,0 +1,293 @@
+"""From fits to what is told: parameters with units and intervals, what is not determined, verdict, acceptance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identify.bounds.damping_or_lag import lag_for_damping
+from identify.bounds.undetermined import of_another_run, open_phases, undetermined
+from identify.conclude.declared_values import declared_values, kept_as_declared
+from identify.conclude.error_figures import Measured
+from identify.conclude.next_steps import opposite_signs, unexplained_reason
+from identify.conclude.verdict import sentences_of
+from identify.diagnose.diagnosis import with_diagnosis
+from identify.estimate.final_fit import Fitted, noise_of_all
+from identify.genetic.per_set import KEYS
+from identify.model.parameters import Name, platform_of
+from identify.model.structure import Structure
+from identify.results import (
+    UNITS,
+    GeneticRun,
+    Identification,
+    ModelResult,
+    NoiseFloor,
+    NotReported,
+    ParameterEstimate,
+    RunTraces,
+    SetResult,
+    Verdict,
+)
+from identify.rivals import coloured_noise
+from identify.rivals.coloured_noise import Colour
+from identify.runs import clipping
+from identify.runs.holdout import Split
+from identify.runs.measured_channels import Offer
+from identify.runs.sign_convention import SENTENCE
+from identify.select.search_state import Search
+from identify.signals import glitches, resampling
+from identify.signals.trace import UPSAMPLING, Trace, loads_differ
+from rig import effects
+from rig.config.identify import IdentifyConfig
+from rig.effects.base import Place
+from rig.platform import Platform
+from rig.recording.run import Recording
+
+STRAYED = 3.0  # times the sensor's noise: a free run with friction may have gone astray
+UNEXPLAINED = 1.1  # times the noise floor in free run: above it, something is left that no effect here explains
+TORQUE_FREE = {"damping": ("damping_over_inertia", "1/s"), "stiffness": ("stiffness_over_inertia", "1/s^2")}
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is identified: the recording, the declared structure, and how it was laid out for the fits."""
+
+    recording: Recording
+    structure: Structure
+    settings: IdentifyConfig
+    traces: Sequence[Trace]
+    split: Split
+    offer: Offer
+    torque_free: bool
+    declared: Platform
+    left_out: tuple[str, ...] = ()  # which runs, and why, in words
+    colour: Colour | None = None  # of the sensor's noise, where it is not white
+
+
+def conclude(
+    case: Case, search: Search, before: Fitted, after: Fitted, measured_before: Measured, measured_after: Measured,
+    floor: NoiseFloor, per_set: tuple[SetResult, ...], joint: GeneticRun | None,
+    torque_scale: ParameterEstimate | None = None,
+) -> Identification:  # fmt: skip
+    """The identification, of what the search found and the two final fits (the same where nothing changed)."""
+    changed = after.structure != case.structure
+    idle = tuple(NotReported(n, why) for n, why in case.offer.idle)
+    declared = {*case.structure.terms, *case.structure.effects}  # what the search itself took up and gave up is no news
+    dropped = (*idle, *(NotReported(n, why) for n, why in search.dropped if n in declared))
+    result_before = _model(case, before, measured_before, idle)
+    result_after = _model(case, after, measured_after, dropped) if changed else None
+    if result_after is not None:
+        result_after = _to_build_on(case, after, result_after)
+    else:
+        result_before = _to_build_on(case, before, result_before)
+    final = result_after or result_before
+    ratio = _ratio(case, after, search)
+    unexplained = ratio > UNEXPLAINED
+    verdict = Verdict(
+        effects=tuple(e for e in search.best.structure.effects if e not in case.structure.effects),
+        confusable_with=search.rivals,
+        never_separable=inseparable(search.best.structure, max(t.travel_deg for t in case.traces)),
+        unexplained_fraction=_fraction(measured_before, measured_after, floor) if unexplained else 0.0,
+        unexplained=unexplained,
+        candidates=(*search.candidates, *case.offer.refused),
+        sentences=(),
+        rival_models=search.rival_models,
+        contribution=search.contribution,
+        left_open=search.left_open,
+        tells_apart=search.tells_apart,
+    )
+    reasons = []
+    searched = [g for g in (*(s.genetic for s in per_set), joint) if g is not None]
+    reasons += [
+        f"{g.name}: the objective {g.objective:.4g} stays above J_dec {g.j_dec:.4g} after {g.restarts} repeats"
+        for g in searched if after.sensor_limited and not g.accepted
+    ]  # fmt: skip
+    reasons += [f"{x.name} is not determined: {x.reason}" for x in final.not_determined]
+    reference, per_set = _against_reference(case, per_set)
+    found = Identification(
+        accepted=not reasons and not unexplained, reasons=(), axis=case.recording.axis, before=result_before,
+        verdict=verdict, after=result_after, noise_floor=floor, per_set=per_set, joint=joint,
+        traces=_series(case, measured_before, measured_after), holdout_note=_note(case, after),
+        max_error_percent=reference, torque_free=case.torque_free, torque_scale=torque_scale,
+        scale_shows=loads_differ(case.traces),
+    )  # fmt: skip
+    if unexplained:
+        reasons.insert(0, unexplained_reason(ratio, found))
+    if opposite_signs(found):
+        reasons.insert(0, SENTENCE)
+    found = replace(found, accepted=not reasons, reasons=tuple(reasons))
+    said = (*sentences_of(found), *_about_damping(case, after, final))
+    return with_diagnosis(replace(found, verdict=replace(verdict, sentences=said)))
+
+
+def _about_damping(case: Case, after: Fitted, final: ModelResult) -> tuple[str, ...]:
+    name = ("inertia",)
+    if final.platform is None or name not in after.names:
+        return ()
+    fitted = [t for t in case.traces if t.number in _runs_fitted(case)]
+    told = lag_for_damping(final.platform, after.std_error(name), fitted, case.recording.axis)
+    return (told,) if told else ()
+
+
+def _note(case: Case, after: Fitted) -> str:
+    """What was held out, what was left out, and what was taken for granted."""
+    rests = after.free_run is not None and any(s.rests for s in after.free_run.shots)
+    resting = "J hardly shows in these runs: those that begin at rest are taken to do so exactly" if rests else ""
+    torn = glitches.told([(t.run.name, t.glitches_s) for t in case.traces])
+    beyond = clipping.told([(t.run.name, *t.clipped) for t in case.traces], case.recording.axis)
+    uneven = resampling.told([(t.run.name, *t.scatter) for t in case.traces])
+    filtered = coloured_noise.told(case.colour, case.recording.axis, case.traces[0].channel)
+    return ". ".join(
+        note for note in (case.split.note, resting, filtered, *case.left_out, torn, beyond, uneven) if note
+    )
+
+
+def _ratio(case: Case, after: Fitted, search: Search) -> float:
+    """Residual over sensor noise: in free run where the model can run free, else over the horizon."""
+    noise = noise_of_all(case.traces) * _share_of_white(case)
+    if after.free_run is not None and after.sensor_limited:
+        return after.sigma / noise
+    free = after.free_run.sigma / noise if after.free_run is not None else np.inf
+    short = search.best.sigma / (search.floor * _share_of_white(case))
+    frictions = [e for e in after.structure.effects if effects.get(e).place is Place.FRICTION]
+    # One wrong standstill throws a free run off for good; else what a free run leaves is what is missing.
+    return float(free) if np.isfinite(free) and (free < STRAYED or not frictions) else float(min(free, short))
+
+
+def _share_of_white(case: Case) -> float:
+    return 1.0 if case.colour is None else case.colour.rms / case.colour.level
+
+
+def _model(case: Case, fitted: Fitted, measured: Measured, dropped: tuple[NotReported, ...]) -> ModelResult:
+    parameters: dict[str, ParameterEstimate] = {}
+    of_effects: dict[str, dict[str, ParameterEstimate]] = {e: {} for e in fitted.structure.effects}
+    lost, open_ = _lost(case, fitted), open_phases(fitted)
+    for name in fitted.names:
+        if name in lost or of_another_run(name, _runs_fitted(case)):
+            continue
+        value, error = fitted.values[name], open_.get(name, fitted.std_error(name))
+        estimate = ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), _unit(case, name))
+        if len(name) == 1:
+            parameters[_label(case, name)] = estimate
+        else:
+            key = name[1] if len(name) == 2 else f"{name[1]}_run_{int(name[2]) + 1}"
+            of_effects[name[0]][key] = estimate
+    missing = tuple(NotReported(_label(case, name), why) for name, why in lost.items())
+    platform = _platform(case, fitted, fitted.values)
+    return ModelResult(parameters, of_effects, measured.errors, dropped, missing, _correlation(fitted), platform)
+
+
+def _platform(case: Case, fitted: Fitted, values: Mapping[Name, float]) -> Platform:
+    """As it stood in the first run that a fit looked at."""
+    run = min(_runs_fitted(case), default=0)
+    return platform_of(fitted.structure, tuple(values), np.array(list(values.values())), run)
+
+
+def _runs_fitted(case: Case) -> set[int]:
+    return {t.number for t, m in zip(case.traces, case.split.final, strict=True) if np.any(m)}
+
+
+def _lost(case: Case, fitted: Fitted) -> dict[Name, str]:
+    return undetermined(fitted, _runs_fitted(case), len(case.traces) == 1)
+
+
+def _label(case: Case, name: Name) -> str:
+    """As the tables call a parameter."""
+    if len(name) > 1:
+        return ".".join(name)
+    return TORQUE_FREE[name[0]][0] if case.torque_free else name[0]
+
+
+def _unit(case: Case, name: Name) -> str:
+    if len(name) == 1:
+        return TORQUE_FREE[name[0]][1] if case.torque_free else UNITS[case.recording.axis][name[0]]
+    effect = effects.get(name[0])
+    parameter = next(p for p in effect.parameters if p.name == name[1])
+    unit = parameter.unit + ("/(kg*m^2)" if case.torque_free and effect.per_inertia(parameter) else "")
+    if case.recording.axis == "linear":
+        unit = unit.replace("kg*m^2", "kg").replace("N*m", "N").replace("rad", "m")
+    return unit
+
+
+def _to_build_on(case: Case, fitted: Fitted, model: ModelResult) -> ModelResult:
+    """The final model with declared numbers where the data say nothing, as far as it replays the runs with them."""
+    lost, declared = _lost(case, fitted), declared_values(case.declared, case.torque_free)
+    values = kept_as_declared(case.traces, case.split.final, fitted, lost, declared)
+    missing = tuple(
+        replace(told, as_declared=name in declared and values[name] == declared[name])
+        for name, told in zip(lost, model.not_determined, strict=True)
+    )
+    return replace(model, not_determined=missing, platform=_platform(case, fitted, values))
+
+
+def _against_reference(
+    case: Case, per_set: tuple[SetResult, ...]
+) -> tuple[dict[str, float] | None, tuple[SetResult, ...]]:
+    """Max_Error of Eq. 15 over the sets, and each set's own."""
+    known = case.settings.reference
+    if known is None:
+        return None, per_set
+    out: dict[str, float] = {}
+    sets = []
+    for one in per_set:
+        parameters = dict(one.parameters)
+        for term, key in KEYS.items():
+            reference = getattr(known, key)
+            if reference and term in parameters:
+                error = 100.0 * abs(parameters[term].value - reference) / reference
+                parameters[term] = replace(parameters[term], max_error_percent=error)
+                out[term] = max(out.get(term, 0.0), error)
+        sets.append(replace(one, parameters=parameters))
+    return out, tuple(sets)
+
+
+def _series(case: Case, before: Measured, after: Measured) -> tuple[RunTraces, ...]:
+    out = []
+    for i, trace in enumerate(case.traces):
+        angle, rate, _, torque, _ = trace.fine
+        first, last = before.torque[i], after.torque[i]
+        out.append(
+            RunTraces(
+                trace.run.name, trace.start_s + trace.step_s * np.arange(len(trace.measured)), trace.measured,
+                trace.channel, trace.keep.astype(float), before.simulated[i], after.simulated[i],
+                None if first is None else first.residual, None if last is None else last.residual,
+                angle[::UPSAMPLING], rate[::UPSAMPLING], None if trace.torque is None else torque[::UPSAMPLING],
+                case.split.judge[i].astype(float), trace.run.frequency_hz,
+            )
+        )  # fmt: skip
+    return tuple(out)
+
+
+def _correlation(fitted: Fitted) -> dict[str, float]:
+    size = np.sqrt(np.maximum(np.diag(fitted.covariance), 1e-300))
+    out = {}
+    for i in range(len(fitted.names)):
+        for k in range(i):
+            value = float(fitted.covariance[i, k] / (size[i] * size[k]))
+            if abs(value) > 0.9:
+                out[f"{'.'.join(fitted.names[k])}, {'.'.join(fitted.names[i])}"] = value
+    return out
+
+
+def inseparable(structure: Structure, travel_deg: float) -> dict[str, str]:
+    """The rivals of what is in the model that no data within the travel of these runs can exclude."""
+    out = {}
+    for name in structure.effects:
+        for rival in effects.get(name).never_separable or {}:
+            if why := effects.get(name).alike(rival, travel_deg):
+                out[f"{name} / {rival}"] = why
+    return out
+
+
+def _fraction(before: Measured, after: Measured, floor: NoiseFloor) -> float:
+    """Share of the squared residual above the noise floor that is left: of the torque, or of a decay's free run."""
+    a, b = after.errors.residual_rms_torque, before.errors.residual_rms_torque
+    f = floor.residual_rms_torque
+    if a is None or b is None:
+        a, b, f = after.errors.holdout_rate_rms, before.errors.holdout_rate_rms, floor.holdout_rate_rms
+    if a is None or b is None or f is None:
+        return 0.0
+    excess = b * b - f * f
+    return float(np.clip((a * a - f * f) / excess, 0.0, 1.0)) if excess > 0.01 * f * f else 0.0

@@ -1,0 +1,55 @@
+"""What stands in the model where the data say nothing: the declared number, if the model replays the runs with it.
+
+A single steady sine tells K - J w^2, and neither J nor K. The declared pair may contradict that, and the pair at
+which a fit happens to stop means nothing. So each number that is not determined goes back to its declared value and
+the rest is fitted beside it; where the runs are no longer replayed then, the fit's number stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from identify.estimate.final_fit import Fitted
+from identify.estimate.output_error import refine
+from identify.model.parameters import Name
+from identify.signals.trace import Trace
+from rig import effects
+from rig.platform import TERMS, Platform
+
+STEPS = 12
+CHANCE = 9.0  # rise of chi square, three standard errors, by which a declared number does not contradict the runs
+
+
+def declared_values(declared: Platform, torque_free: bool) -> dict[Name, float]:
+    """The declared numbers as a fit names them; without torque per unit of the declared inertia."""
+    scale = 1.0 / declared.inertia_kg_m2 if torque_free else 1.0
+    jck = (declared.inertia_kg_m2, declared.damping_nm_s_rad, declared.stiffness_nm_rad)
+    out: dict[Name, float] = {(t,): scale * v for t, v in zip(TERMS, jck, strict=True) if t in declared.terms}
+    for name, given in declared.effects.items():
+        effect = effects.get(name)
+        for parameter, value in zip(effect.parameters, effect.values(given), strict=True):
+            out[(name, parameter.name)] = value * (scale if effect.per_inertia(parameter) else 1.0)
+    return out
+
+
+def kept_as_declared(
+    traces: Sequence[Trace], use: Sequence[Any], fitted: Fitted, lost: Iterable[Name], declared: Mapping[Name, float]
+) -> dict[Name, float]:
+    """The values of a model, those of ``lost`` as declared where that replays the runs; others are fitted beside them.
+
+    Far from the sensor's noise nothing says what replays the runs, and all stays as it was fitted.
+    """
+    asked = [name for name in lost if name in declared]
+    values = dict(fitted.values)
+    if not asked or not fitted.sensor_limited:
+        return values
+    held: list[Name] = [("inertia",)] if all(t.torque is None for t in traces) else []
+    free = refine(traces, fitted.structure, values, None, STEPS, use, fixed=held)
+    for name in asked:
+        start = {**values, name: declared[name]}
+        trial = refine(traces, fitted.structure, start, None, STEPS, use, fixed=[*held, name])
+        if (trial.sigma**2 - free.sigma**2) * free.count < CHANCE * free.sigma**2:
+            held.append(name)
+            values = dict(zip(trial.names, trial.values.tolist(), strict=True))
+    return values

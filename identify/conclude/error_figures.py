@@ -1,0 +1,88 @@
+"""The figures that stand before and after: errors in torque and in free run, and the floor below them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from identify.diagnose.torque_residual import TorqueResidual, relative, torque_noise_floor, torque_residual
+from identify.estimate.final_fit import Fitted, noise_of_all
+from identify.genetic.per_set import linear_traces
+from identify.model.structure import Structure
+from identify.results import Errors, NoiseFloor
+from identify.runs.holdout import Split
+from identify.signals.trace import Trace
+from rig.recording.run import Array
+
+EDGE_PERIODS = 3.0  # of the cut-off, left out at both ends of a run
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One model's errors, with the series behind them."""
+
+    errors: Errors
+    torque: list[TorqueResidual | None]
+    simulated: list[Array]
+
+
+def measure(traces: Sequence[Trace], split: Split, fitted: Fitted, cutoff_hz: float) -> Measured:
+    """Errors of a fitted model on the samples of the final fit and on the held-out ones."""
+    structure, along = fitted.structure, traces
+    if fitted.sensor_limited:  # friction along the model's own motion knows when it sticks; a noisy sign does not
+        structure, along = Structure(structure.terms), linear_traces(traces, fitted)
+    parts = [torque_residual(t, structure, fitted.values, cutoff_hz) for t in along]
+    inside = [_inside(t, cutoff_hz) for t in traces]
+    everything = relative(parts, [m & i for m, i in zip(split.everything, inside, strict=True)])
+    held = relative(parts, [m & i for m, i in zip(split.judge, inside, strict=True)])
+    if fitted.free_run is None:
+        simulated = [np.full(len(t.measured), np.nan) for t in traces]
+        rms = fit = None
+    else:
+        simulated = fitted.free_run.simulated()
+        rms, fit = _free_run(traces, split, simulated)
+    errors = Errors(
+        residual_rms_torque=everything[0] if everything else None,
+        holdout_rate_rms=rms,
+        holdout_fit_percent=fit,
+        residual_torque_relative=everything[1] if everything else None,
+        holdout_torque_relative=held[1] if held else None,
+        lowpass_hz=cutoff_hz if everything else None,
+    )
+    return Measured(errors, parts, simulated)
+
+
+def _inside(trace: Trace, cutoff_hz: float) -> Any:
+    """Samples far enough from the ends of the run for a zero-phase filter to have settled, (n,)."""
+    edge = int(np.ceil(EDGE_PERIODS / (cutoff_hz * trace.step_s)))
+    out = np.ones(len(trace.measured), dtype=bool)
+    if len(out) > 20 * edge:
+        out[:edge] = out[-edge:] = False
+    return out
+
+
+def _free_run(traces: Sequence[Trace], split: Split, simulated: Sequence[Array]) -> tuple[float | None, float | None]:
+    error, signal = [], []
+    for trace, mask, y in zip(traces, split.judge, simulated, strict=True):
+        error.append((trace.measured - y)[mask])
+        signal.append(trace.measured[mask] - (np.mean(trace.measured[mask]) if np.any(mask) else 0.0))
+    e, s = np.concatenate(error), np.concatenate(signal)
+    if len(e) == 0 or not np.all(np.isfinite(e)):
+        return None, None
+    return float(np.sqrt(np.mean(e**2))), float(
+        100.0 * (1.0 - np.linalg.norm(e) / max(float(np.linalg.norm(s)), 1e-300))
+    )
+
+
+def floor_of(traces: Sequence[Trace], split: Split, fitted: Fitted, cutoff_hz: float, given: bool) -> NoiseFloor:
+    """What the sensor's noise alone leaves."""
+    masks = split.everything
+    torque = torque_noise_floor(traces, fitted.values, cutoff_hz, masks)
+    return NoiseFloor(
+        residual_rms_torque=None if np.isnan(torque) else torque,
+        holdout_rate_rms=noise_of_all(traces),
+        source="given" if given else "estimated",
+    )

@@ -1,0 +1,142 @@
+"""The verdict in sentences: what was missing, how sure that is, what it did to J, C and K."""
+
+from __future__ import annotations
+
+from identify.bounds.advice import WELL_KNOWN
+from identify.conclude.next_steps import opposite_signs, to_determine, torque_free
+from identify.results import Identification
+from identify.runs.measured_channels import REFUSED
+from identify.runs.sign_convention import SENTENCE
+from identify.wording import (
+    SYMBOLS,
+    capital,
+    half_interval,
+    joined,
+    number,
+    percent,
+    plain,
+    readable,
+    title,
+    told_apart,
+    unit,
+    value_of,
+    without,
+)  # fmt: skip
+from rig import effects
+from rig.platform import TERMS
+
+SHOWN = 4  # numbers of an effect in a sentence
+SHOWN_PERCENT = 0.05  # a change below that is not worth a sentence
+
+
+def sentences_of(found: Identification) -> tuple[str, ...]:
+    """One finding a sentence, the most important first."""
+    out: list[str] = [f"{capital(SENTENCE)}."] if not found.accepted and opposite_signs(found) else []
+    for name in found.verdict.effects:
+        out.append(_named(found, name))
+    if not found.verdict.effects:
+        why = "what was found is no effect of the platform, or may be none." if found.verdict.left_open else ""
+        out.append(
+            "No effect is named: "
+            + (why or "none of those tried explains the residual." if found.verdict.unexplained
+               else "the declared model reaches the noise floor.")
+        )  # fmt: skip
+    out += [found.verdict.left_open] if found.verdict.left_open else []
+    out += _bent(found)
+    if found.torque_scale is not None and "torque_scale" not in found.verdict.effects:
+        scale = found.torque_scale
+        off = abs(scale.value - 1.0) > 1.96 * scale.std_error
+        out.append(
+            f"From the known added inertia the torque on the shaft is {number(scale.value, 5)} +- "
+            f"{number(1.96 * scale.std_error, 2)} of the recorded one"
+            + ("; J, C and K are that much larger or smaller." if off else ": the torque scale is right.")
+        )
+    out += _known_badly(found)
+    out += _unseen_scale(found)
+    if found.verdict.unexplained:
+        out.append(
+            f"{number(100.0 * found.verdict.unexplained_fraction, 2)} % of the residual above the noise floor stays "
+            "unexplained; the plots show what it depends on."
+        )
+    if found.after is not None:
+        out += [f"{capital(plain(d.name))} was left out of the refit: {d.reason}." for d in found.after.dropped]
+    refused = [c.status for c in found.verdict.candidates if c.status.startswith(REFUSED)]
+    out += [f"Not looked at as a cause: {status.removeprefix(REFUSED)}." for status in dict.fromkeys(refused)]
+    for name in found.verdict.effects:
+        read = effects.get(name).reads
+        if read is not None and not read.nature.from_zero:
+            out.append(f"{capital(plain(name))} counts from {number(read.reference, 5)}: J, C and K are those there.")
+        elif read is not None and read.kind == "current":
+            out.append(f"{capital(plain(read.name))} counts {number(read.factor, 5)} N m for an ampere.")
+    out += [
+        f"{capital(joined([plain(n) for n in pair.split(' / ')]))} cannot be told apart: {why}."
+        for pair, why in found.verdict.never_separable.items()
+    ]
+    return tuple(out)
+
+
+def _unseen_scale(found: Identification) -> list[str]:
+    """That a scale of the torque is part of J, C and K, where no run carries a known inertia that would show it."""
+    given = [SYMBOLS[name] for name in TERMS if name in found.final.parameters]
+    if found.scale_shows or not given:
+        return []
+    torque, kind = ("force", "mass") if found.axis == "linear" else ("torque", "inertia")
+    makes = "larger or smaller alike" if len(given) > 1 else "larger or smaller"
+    return [
+        f"A {torque} or sensor scale that is off makes {joined(given)} {makes}, and nothing in these runs can show "
+        f"it: only further runs with a known added {kind} (added_inertia_kg_m2) do."
+    ]
+
+
+def _known_badly(found: Identification) -> list[str]:
+    """J, C and K that are given and yet say little, with what would tell more."""
+    given = found.final.parameters
+    wide = [name for name, p in given.items() if p.value and p.std_error > WELL_KNOWN * abs(p.value)]
+    if not wide or not found.accepted:
+        return []  # what else is wrong comes first
+    each = [
+        f"{title(n, found.axis)} to {number(100.0 * half_interval(given[n]) / abs(given[n].value), 2)} %" for n in wide
+    ]
+    return [f"Known badly: {joined(each)}. {to_determine(wide, torque_free(found))}"]
+
+
+def _named(found: Identification, name: str) -> str:
+    values = (found.after or found.before).effect_parameters.get(name, {})
+    ordered = sorted(values.items(), key=lambda item: "_run_" in item[0])  # what every run has of its own comes last
+    shown = {k.replace("_", " "): readable(v) for k, v in ordered[:SHOWN]}
+    numbers = ", ".join(f"{k} {value_of(v)} {unit(v.unit)}".removesuffix(" 1") for k, v in shown.items())
+    rivals = found.verdict.confusable_with.get(name, ())
+    text = f"The model lacked {plain(name)} ({numbers})."
+    if name in found.verdict.contribution:
+        text += f" {without(found.verdict.contribution[name])}"
+    if rivals:
+        separate = effects.get(name).separated_by
+        text += f" These data cannot exclude {' or '.join(plain(r) for r in rivals)}"
+        text += f"; {told_apart(separate)}." if separate else "."
+    return text
+
+
+def _bent(found: Identification) -> list[str]:
+    """What the change of the model did to each parameter, in one sentence that names the change."""
+    if found.after is None or (found.verdict.unexplained and not found.verdict.effects):
+        return []  # of two wrong models neither says what the other did
+    moved = []
+    for name, before in found.before.parameters.items():
+        after = found.after.parameters.get(name)
+        if after is None or after.value == 0.0:
+            continue
+        off = 100.0 * (before.value / after.value - 1.0)
+        if abs(off) >= SHOWN_PERCENT:
+            way = "high" if off > 0 else "low"
+            moved.append(f"{title(name, found.axis)} came out {percent(abs(off)).lstrip('+')} too {way}")
+    return [f"{_change(found)}, {joined(moved)}."] if moved else []
+
+
+def _change(found: Identification) -> str:
+    """The model as declared against the final one: "Without Coulomb friction and torque delay"."""
+    added = [plain(name) for name in found.verdict.effects]
+    if added:
+        return f"Without {joined(added)} in the model"
+    before = {*found.before.parameters, *found.before.effect_parameters}
+    dropped = [plain(item.name) for item in found.after.dropped if item.name in before] if found.after else []
+    return f"With {joined(dropped)} in the model" if dropped else "In the model as declared"

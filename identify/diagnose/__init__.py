@@ -1,0 +1,1 @@
+"""What the residual depends on: motion, time, frequency, history."""

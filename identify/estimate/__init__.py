@@ -1,0 +1,1 @@
+"""Parameters from signals: regression, output error, profile likelihood, the final fit."""

@@ -1,0 +1,101 @@
+"""A fitted model on samples that did not fit it: only what belongs to a run is found there, its start states and bias.
+
+Gains that an effect has in every run anew (a disturbance's phase) are of that kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from identify.estimate.output_error import Estimate, refine, shots_for
+from identify.model.parameters import Name, equations_of, names_of
+from identify.model.structure import Structure
+from identify.signals.trace import Trace
+from identify.simulate.sensitivities import linearise
+from identify.simulate.shots import RUNAWAY, Shots, losses_of, moved, predict
+from rig.recording.run import Array
+
+SETTLE = 6  # rounds in which start states are fitted at fixed parameters
+OWN_STEPS = 6  # in which the gains that a run has of its own are fitted at fixed parameters
+
+
+def evaluate(
+    estimate: Estimate,
+    traces: Sequence[Trace],
+    use: Sequence[Any] | None = None,
+    shot_s: float | None = None,
+    coarse: bool = False,
+    finer: int = 1,
+    own_gains: bool = True,
+) -> Estimate:
+    """The same parameters on other samples: start states and biases are fitted there, and what a run has of its own.
+
+    ``own_gains`` False takes gains that no fit knows for nothing, which a tone pays for that fits one run alone.
+    """
+    if own_gains:
+        estimate = _with_own_gains(estimate, traces, use, shot_s, coarse, finer)
+    names, x, structure = estimate.names, estimate.values, estimate.structure
+    shots = shots_for(traces, structure, names, x, shot_s, use, None, coarse, finer)
+    with ThreadPoolExecutor(2) as workers:
+        fitted = list(workers.map(lambda s: settled(s, structure, names, x), shots))
+    rss = sum(float(np.sum(losses)) for _, losses in fitted)
+    count = sum(int(np.sum(s.weight)) for s, _ in fitted)
+    sigma = float(np.sqrt(rss / max(count, 1)))
+    return Estimate(structure, names, x, sigma, count, np.zeros((len(x),) * 2), tuple(s for s, _ in fitted), True)
+
+
+def _with_own_gains(
+    estimate: Estimate, traces: Sequence[Trace], use: Sequence[Any] | None, shot_s: float | None, coarse: bool,
+    finer: int,
+) -> Estimate:  # fmt: skip
+    """The same, with the gains that runs have of their own (a disturbance's phase) fitted where no fit knew them.
+
+    A run that was held out has them as it has a start state: a model without them would be judged by its luck.
+    """
+    structure = estimate.structure
+    values = dict(zip(estimate.names, estimate.values.tolist(), strict=True))
+    runs = {str(t.number) for t in traces}
+    unknown = runs - {n[2] for n, v in values.items() if len(n) == 3 and v != 0.0}
+    names = names_of(structure, 1 + max(t.number for t in traces))
+    own = [n for n in names if len(n) == 3 and n[2] in unknown]
+    if not own:
+        return estimate
+    asked = [i for i, t in enumerate(traces) if str(t.number) in unknown]
+    fixed = [n for n in names if n not in own]
+    few = None if use is None else [use[i] for i in asked]
+    fitted = refine(
+        [traces[i] for i in asked], structure, values, shot_s, OWN_STEPS, few, fixed=fixed, coarse=coarse, finer=finer
+    )  # fmt: skip
+    values |= {n: v for n, v in zip(fitted.names, fitted.values.tolist(), strict=True) if n in own}
+    return replace(estimate, names=tuple(values), values=np.array(list(values.values())))
+
+
+@RUNAWAY
+def settled(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> tuple[Shots, Array]:
+    """Start states and bias of one run at fixed parameters; every shot keeps what is best for itself."""
+    still = np.ones(len(x), dtype=bool)
+    equations = equations_of(structure, names, x, s.number, s.added)
+    losses = losses_of(s, s.trace.measured - predict(s, equations, s.starts, s.bias))
+    share = np.ones(len(s.first))  # of the full step that each shot dares
+    for _ in range(SETTLE):
+        part = linearise(s, structure, names, x, np.ones(len(x)), still, np.inf)
+        step, bias = part.back(np.zeros(len(x)))
+        trial = moved(s, (step * share[:, None], bias))
+        new = losses_of(trial, trial.trace.measured - predict(trial, equations, trial.starts, trial.bias))
+        worse = ~(new <= losses)
+        stuck = bool(np.all(worse)) or np.sum(np.where(worse, losses, new)) > np.sum(losses) * (1.0 - 1e-4)
+        if stuck and (np.min(share) < 0.2 or not np.any(worse)):
+            break
+        share = np.where(worse, 0.3 * share, np.minimum(1.0, 2.0 * share))
+        trial.starts[worse] = s.starts[worse]
+        kept = losses_of(trial, trial.trace.measured - predict(trial, equations, trial.starts, trial.bias))
+        if np.sum(kept) > np.sum(losses):
+            trial.bias = s.bias
+            kept = losses_of(trial, trial.trace.measured - predict(trial, equations, trial.starts, trial.bias))
+        s, losses = trial, kept
+    return s, losses

@@ -1,0 +1,256 @@
+"""The final fit of one model on all samples, with uncertainties that hold for coloured residuals too."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import signal
+from scipy.linalg import block_diag
+
+from identify.estimate.cross_validation import start_values
+from identify.estimate.evaluation import evaluate
+from identify.estimate.grid_refinement import sharpened
+from identify.estimate.initial_guess import Start, best_rho
+from identify.estimate.initial_state_sensitivity import least_std_errors
+from identify.estimate.output_error import Estimate, refine
+from identify.estimate.profile_likelihood import settled, widened
+from identify.estimate.regression import Regression, Solution, residuals
+from identify.model.parameters import Name
+from identify.model.structure import Structure
+from identify.signals.trace import Trace
+from identify.simulate.sensitivities import jacobian
+from identify.simulate.shots import Shots
+from rig.recording.run import Array
+
+NEAR_FLOOR = 1.3  # times the sensor's noise: close enough for a free run over the whole set
+FEW_NOISES = 5.0  # times the noise that a free run leaves: disturbed moments, not a wrong model
+STEPS = 12  # of a fit
+FREER = 0.95  # of the free-run error
+BLOCKS_PER_RUN = 20
+SEGMENT = 256  # samples of a stretch whose spectrum is averaged
+SINGULAR = 1e-11  # smallest over largest eigenvalue of the scaled information
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """One model with its uncertainty.
+
+    Attributes
+    ----------
+    sigma
+        Root mean square residual of the fit, in units of the measured channel.
+    free_run
+        The model simulated over the whole of each run, start states fitted; None where it runs away.
+    sensor_limited
+        The free run leaves no more than the sensor's noise.
+    determined
+        Parameters that the data determine (False along directions of the information that are empty).
+    """
+
+    structure: Structure
+    values: dict[Name, float]
+    covariance: Array
+    names: tuple[Name, ...]
+    sigma: float
+    free_run: Estimate | None
+    sensor_limited: bool
+    determined: tuple[bool, ...]
+    method: str
+
+    def std_error(self, name: Name) -> float:
+        """One standard error."""
+        i = self.names.index(name)
+        return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+
+
+def noise_of_all(traces: Sequence[Trace]) -> float:
+    """The sensor's noise, pooled over the runs."""
+    return float(np.sqrt(np.mean([t.noise**2 for t in traces])))
+
+
+def by_regression(
+    traces: Sequence[Trace], structure: Structure, shapes: Mapping[str, tuple[float, ...]], start: Start,
+    use: Sequence[Any], everything: Sequence[Any], shape_errors: Mapping[Name, float],
+) -> Fitted:  # fmt: skip
+    """A model that stays far from the data: white-residual regression at its best filter.
+
+    ``shape_errors`` are the standard errors of shape parameters, which the regression takes as given.
+    """
+    solution = best_rho(traces, structure, shapes, start, use)
+    runs = 1 + max(t.number for t in traces)
+    values = start_values(solution, shapes, runs)
+    covariance, determined = _regression_covariance(traces, solution, use)
+    free = _free_run(traces, structure, values, everything)
+    values = _own_gains_of(free, values)
+    limited = free is not None and free.sigma < NEAR_FLOOR * noise_of_all(traces)
+    found = [n for n in values if len(n) > 1 and n not in solution.labels and n in shape_errors]
+    names = (*solution.labels, *found)
+    covariance = block_diag(covariance, np.diag([shape_errors[n] ** 2 for n in found])) if found else covariance
+    determined = (*determined, *(bool(np.isfinite(shape_errors[n])) for n in found))
+    return Fitted(structure, values, covariance, names, solution.rms, free, limited, determined, "regression")
+
+
+def _free_run(
+    traces: Sequence[Trace], structure: Structure, values: Mapping[Name, float], use: Sequence[Any]
+) -> Estimate | None:
+    names = tuple(values)
+    held = Estimate(structure, names, np.array(list(values.values())), np.inf, 0, np.zeros((0, 0)), (), True)
+    free = evaluate(held, traces, use)
+    return free if np.isfinite(free.sigma) else None
+
+
+def _own_gains_of(free: Estimate | None, values: Mapping[Name, float]) -> dict[Name, float]:
+    """Values with the gains that runs have of their own as the free run found them: no fit knew those held out."""
+    if free is None:
+        return dict(values)
+    return {**values, **{n: v for n, v in zip(free.names, free.values.tolist(), strict=True) if len(n) == 3}}
+
+
+def by_output_error(
+    traces: Sequence[Trace], structure: Structure, start: Mapping[Name, float], horizon: float,
+    use: Sequence[Any], everything: Sequence[Any],
+) -> Fitted:  # fmt: skip
+    """Output error from a short horizon to the whole run, as far as the model can be trusted."""
+    torque_free = all(t.torque is None for t in traces)
+    fixed = [("inertia",)] if torque_free else []
+    noise = noise_of_all(traces)
+
+    def refit(
+        values: Mapping[Name, float], *, rests: bool = False, held: Sequence[Name] = (),
+        carry: Sequence[Shots] | None = None,
+    ) -> Estimate:  # fmt: skip
+        return refine(traces, structure, values, None, STEPS, use, carry, [*fixed, *held], rests=rests)
+
+    at_once, valley = settled(refit(start), noise, refit)
+    best = at_once
+    straight = best.sigma <= NEAR_FLOOR * noise  # the search came close enough: no ladder of horizons needed
+    if not straight:
+        best = refine(traces, structure, start, horizon, STEPS, use, fixed=fixed)
+    whole_runs = [at_once]
+    for longer in () if straight else (4.0 * horizon, None):
+        values = dict(zip(best.names, best.values.tolist(), strict=True))
+        trial = refine(traces, structure, values, longer, STEPS, use, fixed=fixed)
+        whole_runs += [trial] if longer is None else []
+        if trial.sigma <= NEAR_FLOOR * noise:
+            best = trial
+    # Only the model itself leads a decay astray, and near the noise a few disturbed moments do: whole runs decide.
+    if not straight and (torque_free or at_once.sigma < FEW_NOISES * noise):
+        held = _free_run(traces, structure, dict(zip(best.names, best.values.tolist(), strict=True)), use)
+        if held is None or at_once.sigma < FREER * held.sigma:
+            best = at_once
+    values = dict(zip(best.names, best.values.tolist(), strict=True))
+    whole = best if any(best is w for w in whole_runs) else None
+    free_names = tuple(n for n in best.names if n not in fixed)
+    covariance, determined = _output_covariance(best, free_names)
+    if valley is not None and best is at_once:
+        covariance = widened(covariance, free_names, best, valley)
+    if whole is not None and whole.sigma <= NEAR_FLOOR * noise:
+        best = whole = sharpened(whole, traces, use, fixed)
+        values = dict(zip(best.names, best.values.tolist(), strict=True))
+    same = all(np.array_equal(u, e) for u, e in zip(use, everything, strict=True))
+    free = whole if whole is not None and same else _free_run(traces, structure, values, everything)
+    values = _own_gains_of(free, values)
+    limited = whole is not None and whole.sigma <= NEAR_FLOOR * noise
+    method = "output error over whole runs" if whole is not None else f"output error over {horizon:.3g} s"
+    return Fitted(structure, values, covariance, free_names, best.sigma, free, limited, determined, method)
+
+
+def _inverse(information: Array) -> tuple[Array, tuple[bool, ...]]:
+    """Inverse of an information matrix and which parameters it determines."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    power, axes = np.linalg.eigh(information / np.outer(scale, scale))
+    empty = power < SINGULAR * max(power[-1], 1e-300)
+    inverse = axes[:, ~empty] @ np.diag(1.0 / power[~empty]) @ axes[:, ~empty].T
+    touched = np.any(np.abs(axes[:, empty]) > 0.05, axis=1) if np.any(empty) else np.zeros(len(scale), dtype=bool)
+    dead = np.diag(information) <= 1e-290
+    return inverse / np.outer(scale, scale), tuple(bool(x) for x in ~(touched | dead))
+
+
+def _sandwich(parts: Sequence[tuple[Array, Array]], sigma: float) -> tuple[Array, Any]:
+    """Covariance from every run's columns (m, p) and residual (m,): plain where the residual is white.
+
+    Where it is coloured, scores of blocks carry what changes along a run, but are few; the residual's spectrum
+    uses every sample, but takes the colour for the same all along. Each parameter gets the larger of the two.
+    """
+    information = np.sum([x.T @ x for x, _ in parts], axis=0)
+    inverse, determined = _inverse(information)
+    plain = inverse * sigma**2
+    blocks = [
+        x[part].T @ r[part]
+        for x, r in parts for part in np.array_split(np.arange(len(r)), min(BLOCKS_PER_RUN, max(len(r) // 50, 1)))
+    ]  # fmt: skip
+    scores = np.array(blocks)
+    m = len(scores)
+    if is_white([r for _, r in parts]) or m < 3 * len(information):
+        return plain, determined
+    by_blocks = inverse @ (scores.T @ scores * m / (m - 1.0)) @ inverse
+    by_spectrum = inverse @ np.sum([_coloured(x, r) for x, r in parts], axis=0) @ inverse
+    ratio = np.diag(by_spectrum) / np.maximum(np.diag(by_blocks), 1e-300)
+    wider = np.sqrt(np.maximum(1.0, ratio))
+    return by_blocks * np.outer(wider, wider), determined
+
+
+def _coloured(columns: Array, residual: Array) -> Array:
+    """Variance of the scores of one run where its residual is stationary, (p, p): columns weighed by its spectrum."""
+    n = len(residual)
+    f, power = signal.welch(residual, nperseg=min(n, SEGMENT), detrend=False)
+    transformed = np.fft.rfft(columns, 2 * n, axis=0)
+    level = np.interp(np.fft.rfftfreq(2 * n), f[1:-1], 0.5 * power[1:-1])  # two-sided
+    weight = level * np.where(np.arange(n + 1) % n == 0, 1.0, 2.0) / (2 * n)
+    return np.asarray(np.real(np.conj(transformed).T @ (transformed * weight[:, None])))
+
+
+def is_white(series: Sequence[Array]) -> bool:
+    """Whether the first autocorrelations of a residual are no larger than chance makes them."""
+    num, den, count = np.zeros(8), 0.0, 0
+    for values in series:
+        if len(values) < 9:
+            continue
+        r = values - np.mean(values)
+        num += np.array([float(r[k:] @ r[:-k]) for k in range(1, 9)])
+        den += float(r @ r)
+        count += len(r)
+    rho = num / max(den, 1e-300)
+    return bool(np.all(np.abs(rho) < 4.0 / np.sqrt(max(count, 1)) + 0.01))
+
+
+def _output_covariance(estimate: Estimate, names: tuple[Name, ...]) -> tuple[Array, tuple[bool, ...]]:
+    keep = [estimate.names.index(n) for n in names]
+    parts = []
+    for shots in estimate.shots:
+        if not np.any(shots.weight):
+            continue
+        columns, residual = jacobian(shots, estimate.structure, estimate.names, estimate.values)
+        parts.append((columns[:, keep], residual))
+    sigma = _rms(parts, len(names) + 2 * sum(len(s.first) for s in estimate.shots))
+    covariance, determined = _sandwich(parts, sigma)
+    if len(estimate.shots) > 1:
+        return covariance, determined
+    # A single run has nothing beside it that tells what its ring may only seem to tell.
+    least = least_std_errors(estimate.shots[0], estimate, names, sigma)
+    wider = np.maximum(1.0, least / np.sqrt(np.maximum(np.diag(covariance), 1e-300)))
+    return covariance * np.outer(wider, wider), determined
+
+
+def _regression_covariance(
+    traces: Sequence[Trace], solution: Solution, use: Sequence[Any]
+) -> tuple[Array, tuple[bool, ...]]:
+    regression = Regression(traces, solution.structure)
+    blocks = regression.blocks(solution.denominator, solution.shapes)
+    p = len(solution.labels)
+    parts = []
+    for block, whole in zip(blocks, residuals(blocks, solution.values), strict=True):
+        mask = use[block.trace][block.rows]
+        if not np.any(mask):
+            continue
+        parts.append((block.projected[mask][:, :p], whole[mask]))
+    return _sandwich(parts, _rms(parts, p))
+
+
+def _rms(parts: Sequence[tuple[Array, Array]], fitted: int) -> float:
+    """Root mean square residual, ``fitted`` degrees of freedom taken off."""
+    count = sum(len(r) for _, r in parts)
+    return float(np.sqrt(sum(float(r @ r) for _, r in parts) / max(count - fitted, 1)))

@@ -1,0 +1,1 @@
+"""The excitation that separates two effects which the data leave alike."""

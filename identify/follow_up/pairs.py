@@ -1,0 +1,117 @@
+"""Which names have a rival that more data could exclude, and the models of both as the finished model has them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identify.bounds.identifiability import vector_of
+from identify.estimate.evaluation import evaluate
+from identify.estimate.output_error import Estimate, refine
+from identify.follow_up.separation import Way, prior_of
+from identify.results import Identification, Unparted
+from identify.signals.trace import Trace
+from rig import effects
+from rig.platform import TERMS, Platform
+
+MOST_PAIRS = 4
+EXCLUDED = 25.0  # chi square by which the data have excluded a rival already
+REFIT = 10  # iterations in which a rival is fitted into the finished model
+
+
+@dataclass(frozen=True)
+class Pair:
+    """An effect and its rival, each in the finished model, and the directions in which data have to decide."""
+
+    effect: str
+    rival: str
+    models: tuple[Platform, Platform]
+    ways: tuple[Way, ...]
+
+
+def never_reason(effect: str, rival: str, travel_deg: float) -> str:
+    """Why no excitation within the allowed travel can tell two effects apart; empty where some can."""
+    read = [c.name for c in (effects.get(effect).reads, effects.get(rival).reads) if c is not None]
+    if read:
+        return f"no torque makes {' and '.join(read)} change: play a run in which that changes by itself"
+    return effects.get(effect).alike(rival, travel_deg) or effects.get(rival).alike(effect, travel_deg)
+
+
+def pairs_of(
+    found: Identification, traces: Sequence[Trace], noise: float, travel_deg: float
+) -> tuple[list[Pair], list[Unparted]]:
+    """The pairs to part, and those for which nothing can be planned within a travel."""
+    pairs: list[Pair] = []
+    without: list[Unparted] = []
+    final = found.final.platform
+    for effect, rivals in found.verdict.confusable_with.items():
+        for rival in rivals:
+            why = never_reason(effect, rival, travel_deg)
+            model = found.verdict.rival_models.get(effect, {}).get(rival)
+            if why:
+                without.append(Unparted(effect, rival, why))
+            elif final is None or model is None or effect not in final.effects:
+                without.append(Unparted(effect, rival, "there is no fitted model of it to plan with"))
+            elif len(pairs) == MOST_PAIRS:
+                without.append(Unparted(effect, rival, f"the {MOST_PAIRS} pairs before it come first"))
+            else:
+                placed = _in_place(final, effect, rival, model, traces, noise)
+                if placed is None:
+                    why = "in the finished model the data so far exclude the rival already"
+                    without.append(Unparted(effect, rival, why))
+                else:
+                    pairs.append(
+                        Pair(effect, rival, (final, placed), _ways(final, placed, effect, rival, traces, noise))
+                    )
+    return pairs, without
+
+
+def _ways(
+    named: Platform, other: Platform, effect: str, rival: str, traces: Sequence[Trace], noise: float
+) -> tuple[Way, ...]:
+    """Where both have as many parameters either may be the truth, and the other has to fail.
+
+    One with more parameters may pass for the simpler without being true: that is for their penalty to decide. So
+    the data have to show only that the simpler cannot pass for the richer.
+    """
+    sizes = len(effects.get(effect).parameters), len(effects.get(rival).parameters)
+    out = []
+    if sizes[0] <= sizes[1]:
+        out.append(Way(other, named, prior_of(named, traces, noise)))
+    if sizes[1] <= sizes[0]:
+        out.append(Way(named, other, prior_of(other, traces, noise)))
+    return tuple(out)
+
+
+def _in_place(
+    final: Platform, effect: str, rival: str, model: Platform, traces: Sequence[Trace], noise: float
+) -> Platform | None:
+    """The rival in the place of the effect in the finished model; None where the data exclude it there."""
+    wanted = tuple(rival if e == effect else e for e in final.effects)
+    if set(model.effects) == set(wanted):
+        return model
+    terms = tuple(t for t in TERMS if t in (*final.terms, *model.terms))
+    held = {e: model.effects[rival] if e == rival else final.effects[e] for e in wanted}
+    swapped = replace(final, effects=held, terms=terms)
+    structure, names, values = vector_of(swapped, 1 + max(t.number for t in traces))
+    start = dict(zip(names, values.tolist(), strict=True))
+    fitted = refine(traces, structure, start, None, REFIT, coarse=True, tolerance=1e-3)
+    if not np.isfinite(fitted.sigma):
+        return None
+    worse = (fitted.sigma**2 - _sigma(final, traces) ** 2) * fitted.count / noise**2
+    return None if worse > EXCLUDED else fitted.platform()
+
+
+def _sigma(platform: Platform, traces: Sequence[Trace]) -> float:
+    """Root mean square that a platform leaves of recorded runs in free run."""
+    return free_run(platform, traces).sigma
+
+
+def free_run(platform: Platform, traces: Sequence[Trace]) -> Estimate:
+    """A platform in free run over recorded runs: start states and bias fitted, and what belongs to single runs."""
+    structure, names, values = vector_of(platform, 1 + max(t.number for t in traces))
+    shared = [i for i, n in enumerate(names) if len(n) < 3]
+    names, values = tuple(names[i] for i in shared), values[shared]
+    return evaluate(Estimate(structure, names, values, np.inf, 0, np.zeros((0, 0)), (), True), traces)

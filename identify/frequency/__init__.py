@@ -1,0 +1,1 @@
+"""Frequency responses, measured and of the model."""

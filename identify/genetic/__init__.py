@@ -1,0 +1,1 @@
+"""The genetic algorithm of the paper, and its table of one fit a set."""

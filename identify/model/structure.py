@@ -1,0 +1,49 @@
+"""Which terms and effects a model has, whatever their values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from rig import effects
+from rig.platform import TERMS
+
+Shapes = Mapping[str, tuple[float, ...]]
+Label = tuple[str, ...]
+UNIT = {"inertia": -3, "damping": -2, "stiffness": -1}
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Which terms and effects a model has, whatever their values."""
+
+    terms: tuple[str, ...] = TERMS
+    effects: tuple[str, ...] = ()
+
+    def plus(self, name: str) -> Structure:
+        """With one effect more."""
+        return replace(self, effects=(*self.effects, name))
+
+    def minus(self, name: str) -> Structure:
+        """With one effect or term less."""
+        return replace(
+            self,
+            terms=tuple(t for t in self.terms if t != name),
+            effects=tuple(e for e in self.effects if e != name),
+        )
+
+    def labels(self, runs: int) -> tuple[Label, ...]:
+        """What the columns of the regression are called; a gain per run has the run's number behind it."""
+        out: list[Label] = [(t,) for t in TERMS if t in self.terms]
+        for name in self.effects:
+            for parameter in effects.get(name).parameters:
+                if parameter.linear and parameter.per_run:
+                    out += [(name, parameter.name, str(r)) for r in range(runs)]
+                elif parameter.linear:
+                    out.append((name, parameter.name))
+        return tuple(out)
+
+
+def shape_values(name: str, values: Mapping[str, float]) -> tuple[float, ...]:
+    """Shape parameters of an effect in declared order."""
+    return tuple(float(values[p.name]) for p in effects.get(name).parameters if not p.linear)

@@ -1,0 +1,328 @@
+"""One recording in, one identification out: fit, residual, effect, refit, verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from identify.conclude.conclusion import Case, conclude
+from identify.conclude.declared_values import declared_values
+from identify.conclude.error_figures import floor_of, measure
+from identify.estimate.cross_validation import Judged, horizon_s
+from identify.estimate.final_fit import Fitted, by_output_error, by_regression, noise_of_all
+from identify.estimate.initial_guess import Start, first_guess
+from identify.genetic.per_set import each_set
+from identify.model.structure import Structure, shape_values
+from identify.results import (
+    Identification,
+    ParameterEstimate,
+    SetResult,
+)
+from identify.rivals import run_heterogeneity
+from identify.rivals.coloured_noise import Colour, with_noise_known
+from identify.rivals.tone_origin import TONE, standing_line, told
+from identify.rivals.whiteness_test import too_much_for
+from identify.runs.clipping import full_scale_of
+from identify.runs.holdout import Split, pieces, split
+from identify.runs.measured_channels import offer_of, with_causes
+from identify.runs.observability import why_unseen
+from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
+from identify.runs.usable import runs_used
+from identify.select import decay_search
+from identify.select.candidates import Candidates
+from identify.select.contribution import contributions
+from identify.select.fitter import Fits
+from identify.select.free_run_search import FineSearch
+from identify.select.search_state import Search
+from identify.select.short_horizon_search import Loop
+from identify.signals.prepare import one_noise, prepare
+from identify.signals.trace import Trace, loads_differ
+from rig import effects
+from rig.config.identify import IdentifyConfig
+from rig.effects.base import Place
+from rig.errors import Aborted
+from rig.platform import TERMS, Platform
+from rig.recording.run import Recording
+
+TWICE_THE_NOISE = 2.0
+MUCH_CLOSER = 0.5  # times the free-run error of the other fit
+STOPPED = "stopped before the search was through: what is missing may still be unnamed"
+NOTHING_YET = (
+    "The search was stopped before it was through: of what the declared model lacks nothing can be said yet. Run it "
+    "again on this recording."
+)
+SHOWS = 5.0  # standard errors from zero at which whole runs show damping
+
+
+def identify(
+    recording: Recording,
+    declared: Platform,
+    settings: IdentifyConfig,
+    progress: Callable[[str], None] | None = None,
+) -> Identification:
+    """Estimate J, C, K, find what the declared model lacks, and say what is left.
+
+    Parameters
+    ----------
+    recording
+        The runs; nothing else of their origin is known here.
+    declared
+        The model as declared: its terms and effects are fitted, its values are only the centre of the
+        genetic algorithm's search range.
+    settings
+        The ``identify`` section.
+    progress
+        Receives a line now and then.
+
+    Raises
+    ------
+    RecordingError
+        Where no run holds enough usable samples.
+    """
+    say = progress or (lambda text: None)
+    with threadpool_limits(1):  # small matrices: a second BLAS thread only waits
+        found = _Identifier(recording, declared, settings, say).run()
+        if found.aborted or not found.verdict.unexplained or recording.noise is not None:
+            return found
+        return with_noise_known(
+            found, lambda colour: _Identifier(recording, declared, settings, say, colour).run(), say
+        )
+
+
+class _Identifier:
+    def __init__(
+        self, recording: Recording, declared: Platform, settings: IdentifyConfig, say: Callable[[str], None],
+        colour: Colour | None = None,
+    ) -> None:  # fmt: skip
+        self.recording, self.declared, self.settings, self.say, self.colour = recording, declared, settings, say, colour
+        free = all(r.torque_nm is None or not np.any(r.torque_nm) for r in recording.runs)
+        runs = with_causes(recording.runs, declared, settings.channels)
+        runs = [replace(r, torque_nm=None, torque_time_s=None) if free else r for r in runs]
+        beyond = full_scale_of(
+            [r.rate_rad_s[r.valid & np.isfinite(r.rate_rad_s)] for r in runs if r.rate_rad_s is not None]
+        )
+        noise = recording.noise if colour is None else colour.level
+        traces = [prepare(r, i, noise, full_scale=beyond) for i, r in enumerate(runs)]
+        self.traces, self.left_out = runs_used(traces, recording.noise is not None, recording.axis, say)
+        self.torque_free = free
+        refuse_the_idle(self.traces, free)
+        if free:
+            refuse_added_inertia(self.traces)
+        self.split: Split = split(self.traces, settings.holdout)
+        offer = offer_of(self.traces, declared, settings.channels)
+        unseen = tuple((n, why) for n in declared.effects if (why := why_unseen(n, self.traces)))
+        self.offer = replace(offer, idle=(*offer.idle, *unseen))
+        still = {name for name, _ in self.offer.idle}
+        names = tuple(n for n in declared.effects if n not in still)
+        self.structure = Structure(declared.terms, names)
+        self.start: Start = first_guess(self.traces, Structure(declared.terms))
+        refuse_lowpass(self.traces, settings.lowpass_hz)
+        if settings.lowpass_hz is not None:
+            self.start = replace(self.start, cutoff_hz=settings.lowpass_hz)
+
+    def run(self) -> Identification:
+        """The whole way; where somebody stops it in the middle, what there is so far."""
+        shapes = {n: shape_values(n, _plain(self.declared, n)) for n in self.structure.effects}
+        horizon = horizon_s(self.start.platform, self.traces)
+        traces, parts = self._searched()
+        fitting = pieces(traces, parts.fit, 3.0 * horizon)
+        judging = pieces(traces, parts.judge, 3.0 * horizon, 5_000)
+        asked = self.settings.candidates
+        allowed = [
+            n for n in (effects.known() if asked is None else asked)
+            if effects.get(n).reads is None or n in self.offer.candidates
+        ]  # fmt: skip
+        loop = Loop(fitting, judging, self.start, allowed, self.say, traces)
+        d = self.declared
+        try:
+            self.say("fitting the declared model")
+            nominal = (d.inertia_kg_m2, d.damping_nm_s_rad, d.stiffness_nm_rad)
+            on_offer = Candidates(traces, parts, allowed, self.structure.effects)
+            fine = FineSearch(on_offer, self.say, declared_values(d, self.torque_free))
+
+            def take_over(found: Search) -> bool:
+                over = self.torque_free and decay_search.take_over(on_offer, found, self.say)
+                if over and found.best.sigma > decay_search.STILL_COARSE * on_offer.fits.noise:
+                    return True  # whole runs have had their say, and the noise is not what is left
+                return fine.take_over(found) or over
+
+            search = loop.run(self.structure, shapes, nominal, take_over)
+            had = search.best.structure.effects
+            search.drop_a_bad_lot()
+            if search.best.structure.effects != had:
+                self.say(f"not named: {', '.join(had)}; together they leave too much for any of them to be believed")
+            before = self._before(search)
+            after = self._after(search) if search.best.structure != self.structure else before
+            after = self._doubted(search, on_offer.fits, before, after)
+            named = [e for e in after.structure.effects if e not in self.structure.effects]
+            on_offer.fits.horizon, start = search.horizon, search.base.values()
+            search.contribution = contributions(on_offer.fits, after.structure, after.values, named, start)
+            return self._report(search, before, after)
+        except (Aborted, KeyboardInterrupt):
+            if loop.so_far is None:
+                raise
+            self.say("stopped: reporting what there is")
+            search = loop.so_far
+            found = self._report(search, self._regressed(search.base), self._regressed(search.best), in_full=False)
+            if not found.verdict.effects:  # the search may have been about to name what this model lacks
+                found = replace(found, verdict=replace(found.verdict, sentences=(NOTHING_YET,)))
+            return replace(found, aborted=True, accepted=False, reasons=(STOPPED,))
+
+    def _doubted(self, search: Search, fits: Fits, before: Fitted, after: Fitted) -> Fitted:
+        """The final fit, or another one where something else may pass for what was found."""
+        line = standing_line(after, self.traces) if TONE not in self.structure.effects else None
+        apart = self._apart(search, fits, after) if line is None or line.of_torque else None
+        if apart is not None:
+            search.leave_open("", run_heterogeneity.told(apart, self.recording.axis == "linear"), search.base)
+            self.say("not named: the runs do not agree, and that alone would explain as much")
+        elif line is not None:
+            words = told(line, self.recording.axis, self.traces[0].channel)
+            search.leave_open(TONE, words, self._until(search, fits, TONE))
+            self.say(f"not named: {TONE}; it may as well be a line of the sensor's own")
+        elif too_much_for(after, self.structure.effects):
+            search.take_all_back()
+            self.say("not named: three effects of which one can follow anything, and they leave more than noise")
+        else:
+            return after
+        return self._after(search) if search.best.structure != self.structure else before
+
+    def _apart(self, search: Search, fits: Fits, after: Fitted) -> run_heterogeneity.RunsApart | None:
+        """What would explain all that the declared model leaves, if it is likelier than what was named."""
+        apart = run_heterogeneity.runs_apart(fits, self.structure, search.base.values())
+        if apart is None or after.structure == self.structure:
+            return apart
+        named = fits.whole(after.structure, after.values)
+        return apart if named is None or run_heterogeneity.as_likely(apart, named) else None
+
+    @staticmethod
+    def _until(search: Search, fits: Fits, name: str) -> Judged:
+        """The model of what was found before an effect; the declared one where that is nothing."""
+        best, base = search.best.structure, search.base.structure
+        found = best.effects[: best.effects.index(name)]
+        start = {**search.base.values(), **{n: v for n, v in search.best.values().items() if n[0] in (*TERMS, *found)}}
+        fitted = None if set(found) <= set(base.effects) else fits.whole(replace(base, effects=found), start)
+        return search.base if fitted is None else fitted.judged()
+
+    def _searched(self) -> tuple[list[Trace], Split]:
+        """What the search looks at: of a slow decay that was sampled fast only every so manyth sample."""
+        runs = [t.run for t in self.traces]
+        j, _, k = self.start.platform
+        few = decay_search.thinned(runs, float(np.sqrt(max(k / j, 0.0)) / (2.0 * np.pi))) if self.torque_free else runs
+        if all(a is b for a, b in zip(few, runs, strict=True)):
+            return self.traces, self.split
+        noise = self.recording.noise
+        prepared = [prepare(r, t.number, noise) for r, t in zip(few, self.traces, strict=True)]
+        traces = one_noise(prepared, noise is not None)
+        return traces, split(traces, self.settings.holdout)
+
+    def _report(self, search: Search, before: Fitted, after: Fitted, in_full: bool = True) -> Identification:
+        changed = after.structure != self.structure
+        after = after if changed else before
+        cutoff = self.start.cutoff_hz
+        measured_before = measure(self.traces, self.split, before, cutoff)
+        measured_after = measure(self.traces, self.split, after, cutoff) if changed else measured_before
+        floor = floor_of(self.traces, self.split, after, cutoff, self.recording.noise is not None)
+        if self.colour is not None:
+            floor = replace(floor, holdout_rate_rms=self.colour.rms)
+        per_set: tuple[SetResult, ...] = ()
+        joint = None
+        if in_full:
+            self.say("each set for itself")
+            d = self.declared
+            centre = {
+                "inertia": d.inertia_kg_m2, "damping": d.damping_nm_s_rad, "stiffness": d.stiffness_nm_rad
+            }  # fmt: skip
+            per_set, joint = each_set(
+                self.traces, after, self.start, centre, self.settings, self.recording.axis
+            )  # fmt: skip
+        case = Case(
+            self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
+            self.declared, self.left_out, self.colour,
+        )  # fmt: skip
+        scale = self._torque_scale(after) if in_full else None
+        return conclude(case, search, before, after, measured_before, measured_after, floor, per_set, joint, scale)
+
+    def _torque_scale(self, fitted: Fitted) -> ParameterEstimate | None:
+        """The shaft's torque over the recorded one, where a known inertia was added for some of the runs."""
+        name = ("torque_scale", "scale")
+        if not fitted.sensor_limited or not loads_differ(self.traces):
+            return None
+        if name not in fitted.names:
+            fitted = by_output_error(
+                self.traces, fitted.structure.plus("torque_scale"), {**fitted.values, name: 1.0}, 1.0,
+                self.split.final, self.split.everything,
+            )  # fmt: skip
+        value, error = fitted.values[name], fitted.std_error(name)
+        if not np.isfinite(error) or not fitted.determined[fitted.names.index(name)]:
+            return None
+        return ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), "1")
+
+    def _before(self, search: Search) -> Fitted:
+        # A decay is judged by its free run, which the regression does not look at.
+        if self.torque_free or search.base.sigma < 2.0 * search.floor or self.structure.effects:
+            return by_output_error(
+                self.traces, self.structure, search.base.values(), search.horizon,
+                self.split.final, self.split.everything,
+            )  # fmt: skip
+        return self._regressed(search.base)
+
+    def _after(self, search: Search) -> Fitted:
+        """Output error where the model runs free at the sensor's noise; else regression in torque units.
+
+        Far above the sensor's noise the rest is a torque that nothing here describes, and what it adds to a
+        prediction grows with the horizon; weighed as a torque it does the least harm to the parameters.
+        """
+        structure = search.best.structure
+        self.say(f"final fit with {', '.join(structure.effects) or 'fewer terms'}")
+        fitted = by_output_error(
+            self.traces, structure, search.best.values(), search.horizon,
+            self.split.final, self.split.everything,
+        )  # fmt: skip
+        if fitted.sensor_limited:
+            return self._with_dropped_damping(search, fitted)
+        if self.torque_free:
+            return fitted
+        if fitted.sigma < TWICE_THE_NOISE * noise_of_all(self.traces):
+            return fitted  # over its horizon the model is right: what throws a free run off is a moment, not a torque
+        regressed = self._regressed(search.best)
+        runs = fitted.free_run, regressed.free_run
+        if all(r is not None for r in runs) and runs[0].sigma < MUCH_CLOSER * runs[1].sigma:  # type: ignore[union-attr]
+            return fitted  # a few disturbed seconds keep it from the noise; a torque's weights lead far astray
+        return regressed
+
+    def _regressed(self, best: Judged) -> Fitted:
+        return by_regression(
+            self.traces, best.structure, best.shapes(), self.start, self.split.final, self.split.everything,
+            best.std_errors(),
+        )  # fmt: skip
+
+    def _with_dropped_damping(self, search: Search, fitted: Fitted) -> Fitted:
+        """The same with damping, where whole runs show what a few periods of the held-out part could not.
+
+        Beside a lag or a delay always: at a few tones below the resonance both turn the phase alike, and without the
+        one the other would be told far more closely than the runs know it.
+        """
+        terms = (*fitted.structure.terms, "damping")
+        if "damping" in fitted.structure.terms or "damping" not in self.declared.terms:
+            return fitted
+        structure = replace(fitted.structure, terms=tuple(t for t in TERMS if t in terms))
+        start = {**fitted.values, ("damping",): 0.0}
+        fuller = by_output_error(
+            self.traces, structure, start, search.horizon, self.split.final, self.split.everything
+        )  # fmt: skip
+        damping, error = fuller.values[("damping",)], fuller.std_error(("damping",))
+        late = any(effects.get(e).place in (Place.DRIVE, Place.SENSOR) for e in fitted.structure.effects)
+        shows = damping > 0.0 if late else damping > SHOWS * error
+        if not fuller.sensor_limited or not shows:
+            return fitted
+        search.dropped[:] = [d for d in search.dropped if d[0] != "damping"]
+        self.say(f"took damping back: {damping:.4g} +- {error:.2g} over whole runs")
+        return fuller
+
+
+def _plain(declared: Platform, name: str) -> dict[str, float]:
+    effect = effects.get(name)
+    return dict(zip((p.name for p in effect.parameters), effect.values(declared.effects[name]), strict=True))

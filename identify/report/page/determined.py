@@ -1,0 +1,53 @@
+"""What the data could determine beside what came out, set by set and together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identify.bounds.achieved import Told
+from identify.report.page.markup import Markup, Piece, element, join, table
+from identify.wording import SYMBOLS, capital, number
+
+RATIOS = {"damping": "damping_over_inertia", "stiffness": "stiffness_over_inertia"}
+
+
+def determined_table(told: Sequence[Told]) -> Markup:
+    """Rank, condition, bound and standard error of each parameter, and what follows; nothing without entries."""
+    if not told:
+        return Markup("")
+    names = list(dict.fromkeys(n for one in told for n in one.expected))
+    ratios = "inertia" not in names
+    symbols = [SYMBOLS[RATIOS[n]] if ratios else SYMBOLS[n] for n in names]
+    head: list[Piece] = ["set", "rank", "condition"]
+    head += [join([symbol, element("small", " bound / reached (%)")]) for symbol in symbols]
+    rows: list[list[Piece]] = []
+    for one in told:
+        row: list[Piece] = [one.name, f"{one.rank} of {one.parameters}", _condition(one.condition)]
+        row += [_pair(one.expected.get(n), one.achieved.get(n)) for n in names]
+        rows.append([*row, capital(one.sentence)])
+    caption = (
+        "One standard error, in percent of the value. Bound: the least that the sensor's noise allows on the samples "
+        "recorded, at the values found (Cramer-Rao, start state and bias unknown; a set alone with the effects known). "
+        "Reached: as reported. Rank: combinations of parameters that show at all. Condition: 1 is best; in the "
+        "hundreds, small errors of the model move one parameter at the cost of another."
+    )
+    made = table([*head, "what it says"], rows, caption, words=(len(head),))
+    return join([element("h3", "What the data could determine, and what came out"), made])
+
+
+def _condition(value: float) -> str:
+    return number(value, 2) if np.isfinite(value) else "singular"
+
+
+def _pair(bound: float | None, reached: float | None) -> str:
+    return f"{_percent(bound)} / {_percent(reached)}"
+
+
+def _percent(relative: float | None) -> str:
+    if relative is None:
+        return "-"
+    if not np.isfinite(relative):
+        return "none"
+    return "< 1e-5" if relative < 1e-7 else number(100.0 * relative, 2)

@@ -1,0 +1,231 @@
+"""The page as a whole: the verdict in words first, then what stands behind it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from identify.bounds.achieved import hindsight
+from identify.conclude.expected_delay import delay_lines
+from identify.conclude.next_steps import next_steps
+from identify.diagnose.wording import diagnosis_sentences
+from identify.follow_up.wording import lines as follow_up_lines
+from identify.report.page.convergence import convergence_figure, convergence_table
+from identify.report.page.determined import determined_table
+from identify.report.page.document import Gallery, document
+from identify.report.page.estimates import estimates_figure
+from identify.report.page.markup import Markup, Piece, bullets, element, join, paragraph, section
+from identify.report.page.motion import RUNS, motion_figures
+from identify.report.page.residual import residual_figures
+from identify.report.page.response import response_figure
+from identify.report.page.tables import (
+    candidate_table,
+    correlation_table,
+    effect_cards,
+    error_table,
+    parameter_table,
+    set_table,
+)
+from identify.results import Identification
+from identify.wording import (
+    SYMBOLS,
+    bent_percent,
+    bent_sentences,
+    capital,
+    half_interval,
+    joined,
+    not_reported,
+    number,
+    pairs,
+    percent,
+    plain,
+    unit,
+    value_of,
+)
+from rig.recording.run import Recording
+
+KICKER = {"rotary": "Identification of an inertial stability platform", "linear": "Identification of a linear axis"}
+
+
+def report_html(identification: Identification, recording: Recording, name: str) -> str:
+    """report.html of one identification: self-contained, opens without a network.
+
+    ``name`` is the campaign's. Plots are thinned to a few thousand points a line with all peaks kept.
+    """
+    gallery = Gallery()
+    body = join(
+        [
+            _header(identification, name),
+            _verdict(identification, recording, gallery),
+            _errors(identification, gallery),
+            _candidates(identification),
+            _response(identification, recording, gallery),
+            _sets(identification, recording, gallery),
+            _motion(identification, gallery),
+            _origin(recording),
+        ]
+    )
+    return document(f"{name}: identification", body, gallery.figures)
+
+
+def _header(identification: Identification, name: str) -> Markup:
+    if identification.aborted:
+        badge, state = "ABORTED: what was recorded until then", "bad"
+    else:
+        badge, state = ("ACCEPTED", "good") if identification.accepted else ("NOT ACCEPTED", "bad")
+    return element(
+        "header",
+        element("p", KICKER[identification.axis], class_="kicker"),
+        element("h1", name),
+        element("p", badge, class_=f"badge {state}"),
+    )
+
+
+def _verdict(identification: Identification, recording: Recording, gallery: Gallery) -> Markup:
+    verdict, final = identification.verdict, identification.final
+    steps = next_steps(identification)
+    reasons = [
+        element(
+            "div",
+            element("h3", "Why not, and what to run next"),
+            bullets(identification.reasons),
+            *([element("h3", "Next"), bullets(steps)] if steps else []),
+            class_="next",
+        )
+    ]
+    missing = not_reported(final.dropped), not_reported(final.not_determined)
+    return section(
+        "verdict",
+        "What was found",
+        element("div", *[paragraph(sentence) for sentence in verdict.sentences], class_="sentences"),
+        *(reasons if identification.reasons or steps else []),
+        _tiles(identification),
+        parameter_table(identification),
+        _titled("Torque delay", delay_lines(identification, recording.info)),
+        _titled("What this did to the declared model", bent_sentences(identification)),
+        _titled("Dropped, since the data do not support it", missing[0]),
+        _titled("Not determined by these data", missing[1]),
+        gallery.place(estimates_figure(identification)),
+        effect_cards(identification),
+        correlation_table(final.correlation),
+    )
+
+
+def _titled(heading: str, lines: Sequence[Piece]) -> Markup:
+    return join([element("h3", heading), bullets(lines)]) if lines else Markup("")
+
+
+def _tiles(identification: Identification) -> Markup:
+    bent, tiles = bent_percent(identification), []
+    for name, found in identification.final.parameters.items():
+        half = half_interval(found)
+        before = f"declared model alone: {percent(bent[name])}" if name in bent else ""
+        tiles.append(
+            element(
+                "div",
+                element("span", SYMBOLS.get(name, plain(name)), class_="symbol"),
+                element("span", value_of(found), element("small", f" {unit(found.unit)}"), class_="value"),
+                element("span", f"± {number(half, 2)} (95 %)" if math.isfinite(half) else "", class_="half"),
+                element("span", before, class_="bent"),
+                class_="tile",
+            )
+        )
+    return element("div", *tiles, class_="tiles")
+
+
+def _errors(identification: Identification, gallery: Gallery) -> Markup:
+    share = identification.verdict.unexplained_fraction
+    state = (
+        f"Unexplained: the residual stays significantly above the noise floor ({number(100.0 * share, 2)} % of it)."
+        if identification.verdict.unexplained
+        else "The residual is at the noise floor: nothing significant is left unexplained."
+    )
+    figures = [gallery.place(figure) for figure in residual_figures(identification)]
+    return section(
+        "residual",
+        "What is left unexplained",
+        paragraph(state),
+        error_table(identification),
+        paragraph(capital(identification.holdout_note), class_="note"),
+        *_where_it_lives(identification),
+        *figures,
+    )
+
+
+def _where_it_lives(identification: Identification) -> list[Markup]:
+    """What the residual holds in words, before and after, so that one sees what went away."""
+    found = {"declared model": identification.residual_before, "final model": identification.residual_after}
+    return [
+        _titled(f"Where it lives: {name}", diagnosis_sentences(one, identification.axis))
+        for name, one in found.items() if one is not None
+    ]  # fmt: skip
+
+
+def _candidates(identification: Identification) -> Markup:
+    verdict = identification.verdict
+    never = [
+        capital(f"{joined([plain(n) for n in names.split(' / ')])}: {why}")
+        for names, why in verdict.never_separable.items()
+    ]
+    return section(
+        "candidates",
+        "What was tried",
+        candidate_table(verdict.candidates, identification.noise_floor.holdout_rate_rms),
+        _titled("Confusable on these data", pairs(verdict.confusable_with)),
+        _titled("Not to be told apart by any torque and rate", never),
+        _titled("Follow-up", follow_up_lines(identification.follow_up) if identification.follow_up else ()),
+    )
+
+
+def _sets(identification: Identification, recording: Recording, gallery: Gallery) -> Markup:
+    determined = determined_table(hindsight(identification, recording))
+    if not identification.per_set and identification.joint is None:
+        return section("sets", "What the data could determine", determined) if determined.html else determined
+    return section(
+        "sets",
+        "Set by set, and the genetic algorithm",
+        set_table(identification) if identification.per_set else Markup(""),
+        determined,
+        gallery.place(convergence_figure(identification)),
+        convergence_table(identification),
+    )
+
+
+def _response(identification: Identification, recording: Recording, gallery: Gallery) -> Markup:
+    figure = response_figure(identification, recording)
+    return Markup("") if figure is None else section("response", "Frequency response", gallery.place(figure))
+
+
+def _motion(identification: Identification, gallery: Gallery) -> Markup:
+    figures = [gallery.place(figure) for figure in motion_figures(identification)]
+    total = len(identification.traces)
+    note = f"The {RUNS} of {total} runs with the largest error; recording.h5 has all." if total > RUNS else ""
+    hint = "Drag to zoom, double-click to see all, click a name in the legend to hide or show it."
+    return section("motion", "Measured and simulated", paragraph(f"{note} {hint}".strip(), class_="note"), *figures)
+
+
+def _origin(recording: Recording) -> Markup:
+    """Where the recording came from, as it says itself."""
+    rows, long = [], []
+    for key, value in _flat(recording.info).items():
+        if "\n" in value or len(value) > 300:
+            long.append(element("details", element("summary", key), element("pre", value)))
+        else:
+            rows.append(element("tr", element("th", key, scope="row"), element("td", value)))
+    lengths = f"{len(recording.runs)} runs, {sum(len(run.time_s) for run in recording.runs)} samples"
+    rows.insert(0, element("tr", element("th", "recording", scope="row"), element("td", lengths)))
+    return section("origin", "Where this comes from", element("table", element("tbody", *rows), class_="plain"), *long)
+
+
+def _flat(info: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
+    out: dict[str, str] = {}
+    for key, value in info.items():
+        name = f"{prefix}{key}".replace("_", " ")
+        if isinstance(value, Mapping):
+            out |= _flat(value, f"{name}: ")
+        elif isinstance(value, list | tuple):
+            out[name] = ", ".join(str(item) for item in value)
+        elif value is not None:
+            out[name] = str(value)
+    return {name: text for name, text in out.items() if text}

@@ -1,0 +1,185 @@
+"""The summary on the terminal: what a person reads aloud when a campaign is over."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich import box
+from rich.console import Console, Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from identify.conclude.expected_delay import delay_lines
+from identify.conclude.next_steps import next_steps
+from identify.follow_up.wording import lines as follow_up_lines
+from identify.results import Identification, ParameterEstimate
+from identify.wording import (
+    SYMBOLS,
+    bent_percent,
+    bent_sentences,
+    capital,
+    errors_in_turn,
+    not_reported,
+    number,
+    pairs,
+    percent,
+    plain,
+    printable,
+    readable,
+    title,
+    unit,
+    value_of,
+    with_interval,
+)
+
+WIDTH = 96
+# Rules of plain dashes: a log file and a Windows console show them as they are.
+RULES = box.Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
+
+
+NO_INFO: Mapping[str, Any] = {}
+
+
+def summary(
+    identification: Identification, width: int = WIDTH, colour: bool = False, info: Mapping[str, Any] = NO_INFO
+) -> str:
+    """The whole summary as text of at most ``width`` columns; with ``colour`` in ANSI colours, for a terminal.
+
+    ``info`` is what the recording says of itself.
+    """
+    console = Console(
+        file=io.StringIO(),
+        width=width,
+        force_terminal=colour,
+        color_system="standard" if colour else None,
+        highlight=False,
+        markup=False,
+        emoji=False,
+        legacy_windows=False,
+    )
+    with console.capture() as captured:
+        console.print(_whole(identification, info))
+    return "\n".join(line.rstrip() for line in captured.get().splitlines()) + "\n"
+
+
+def _whole(identification: Identification, info: Mapping[str, Any]) -> Group:
+    final, verdict = identification.final, identification.verdict
+    floor = identification.noise_floor
+    note = printable(capital(identification.holdout_note))
+    parts: list[RenderableType] = [
+        *_listed("Verdict", verdict.sentences, bullet=""),
+        Text(),
+        _parameters(identification),
+        Text(),
+        _errors(identification),
+        Padding(Text(f"The noise floor is {floor.source}. {note}"), (0, 0, 0, 2)),
+        *_listed("Torque delay", delay_lines(identification, info), bullet=""),
+        *_listed("What this did to the declared model", bent_sentences(identification)),
+        *_listed("Dropped, since the data do not support it", not_reported(final.dropped)),
+        *_listed("Not determined by these data", not_reported(final.not_determined)),
+        *_listed("Confusable on these data", pairs(verdict.confusable_with)),
+        *_listed("Follow-up", follow_up_lines(identification.follow_up) if identification.follow_up else ()),
+    ]
+    if identification.per_set:
+        parts += [Text(), _sets(identification)]
+    return Group(*parts, Text(), *_outcome(identification))
+
+
+def _listed(heading: str, lines: Sequence[str], bullet: str = "- ") -> list[RenderableType]:
+    if not lines:
+        return []
+    body = [Padding(Text(printable(f"{bullet}{line}")), (0, 0, 0, 2)) for line in lines]
+    return [Text(), Text(heading, style="bold"), *body]
+
+
+def _outcome(identification: Identification) -> list[RenderableType]:
+    if identification.aborted:
+        head = Text("ABORTED: this is what the samples recorded until then say.", style="bold red")
+    elif identification.accepted:
+        head = Text("ACCEPTED", style="bold green")
+    else:
+        head = Text("NOT ACCEPTED", style="bold red")
+    why = [Padding(Text(printable(f"- {reason}")), (0, 0, 0, 2)) for reason in identification.reasons]
+    return [head, *why, *_listed("What to run next", next_steps(identification))]
+
+
+def _table(heading: str, columns: Sequence[str], words: Sequence[int] = (0,)) -> Table:
+    made = Table(
+        title=heading,
+        title_justify="left",
+        title_style="bold",
+        box=RULES,
+        pad_edge=False,
+        show_edge=False,
+        padding=(0, 1, 0, 0),
+    )
+    for i, column in enumerate(columns):
+        made.add_column(column, justify="left" if i in words else "right", overflow="fold")
+    return made
+
+
+def _parameters(identification: Identification) -> Table:
+    before, after, bent = identification.before, identification.after, bent_percent(identification)
+    names = list(dict.fromkeys([*before.parameters, *(after.parameters if after else ())]))
+    head = ["", "declared model", *(["off by", "final model"] if after else []), "unit"]
+    table = _table("Parameters, with 95 % intervals", head, words=(0, len(head) - 1))
+    for name in names:
+        first, last = before.parameters.get(name), (after or before).parameters.get(name)
+        more = [percent(bent.get(name)), _estimate(last)] if after else []
+        shown = last or first
+        table.add_row(title(name, identification.axis), _estimate(first), *more, unit(shown.unit) if shown else "")
+    for effect, parameters in (after or before).effect_parameters.items():
+        for name, found in parameters.items():
+            earlier = before.effect_parameters.get(effect, {}).get(name)
+            shown = found if earlier is not None and readable(earlier).unit != readable(found).unit else readable(found)
+            first = earlier if earlier is None or shown is found else readable(earlier)
+            more = ["", _estimate(shown)] if after else []
+            table.add_row(f"{plain(effect)}, {name.replace('_', ' ')}", _estimate(first), *more, unit(shown.unit))
+    return table
+
+
+def _estimate(estimate: ParameterEstimate | None) -> str:
+    return "-" if estimate is None else with_interval(estimate)
+
+
+def _errors(identification: Identification) -> Table:
+    models = errors_in_turn(identification)
+    floor = identification.noise_floor
+    linear = identification.axis == "linear"
+    angle = bool(identification.traces) and identification.traces[0].channel == "angle"
+    channel = ("position" if linear else "angle") if angle else ("speed" if linear else "rate")
+    channel_unit = {"rate": "rad/s", "angle": "rad", "speed": "m/s", "position": "m"}[channel]
+    torque, torque_unit = ("force", "N") if linear else ("torque", "N·m")
+    kinds: list[tuple[str, str, float | None, str]] = [
+        (f"held-out {channel}, free run", "holdout_rate_rms", floor.holdout_rate_rms, channel_unit),
+        ("held-out fit", "holdout_fit_percent", None, "%"),
+        (f"{torque} residual", "residual_rms_torque", floor.residual_rms_torque, torque_unit),
+        (f"{torque} residual / {torque}, held out", "holdout_torque_relative", None, ""),
+    ]
+    head = ["", *models, "noise floor", "unit"]
+    table = _table("Error", head, words=(0, len(head) - 1))
+    for words, key, least, its_unit in kinds:
+        values = [getattr(error, key) for error in models.values()]
+        if any(value is not None for value in values):
+            table.add_row(words, *[number(value) for value in values], number(least), its_unit)
+    return table
+
+
+def _sets(identification: Identification) -> Table:
+    """Each set for itself; Max_Error (Eq. 15) below where the truth was given."""
+    sets = identification.per_set
+    names = list(dict.fromkeys(name for one in sets for name in one.parameters))
+    table = _table("Each set for itself", ["set", *[SYMBOLS.get(n, plain(n)) for n in names], "J < J_dec", "repeats"])
+    for one in sets:
+        values = [value_of(one.parameters[n]) if n in one.parameters else "undetermined" for n in names]
+        table.add_row(printable(one.name), *values, "yes" if one.accepted else "NO", str(one.restarts))
+    scatter = identification.set_scatter
+    if scatter:
+        table.add_row("set to set", *[number(scatter[n], 2) if n in scatter else "-" for n in names], "", "")
+    totals = identification.max_error_percent
+    if totals:
+        table.add_row("Max_Error", *[f"{number(totals[n], 2)} %" if n in totals else "-" for n in names], "", "")
+    return table

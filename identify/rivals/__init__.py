@@ -1,0 +1,1 @@
+"""What else than an effect of the platform may explain the residual."""

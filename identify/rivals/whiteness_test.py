@@ -1,0 +1,50 @@
+"""Three effects of which one can follow anything: believed only where nothing but white noise is left.
+
+Unequal end stops once came to 1.025 of the noise's variance as gravity, a gap and cogging together, a spring that
+relaxes twice as creep, cogging and presliding. What a wrong set of shapes leaves lies where the platform moves; noise
+is as large above. Set side by side in one spectrum, that shows far sooner than in the sum, and needs no reading of the
+noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identify.estimate.final_fit import Fitted
+from rig import effects
+
+SO_MANY = 3  # effects beside those declared
+BANDS = (0.05, 0.1, 0.2, 0.4)  # of Nyquist: where a platform may move
+ABOVE = (0.5, 0.98)  # of Nyquist: where it does not
+COLOURED = 5.0  # standard errors by which a band may stand out
+
+
+def too_much_for(fitted: Fitted, declared: Sequence[str]) -> bool:
+    """Whether what was found beside the declared effects is more than a residual like this one supports."""
+    found = [e for e in fitted.structure.effects if e not in declared]
+    if len(found) < SO_MANY or not any(effects.get(e).resembles_much for e in found):
+        return False
+    return not fitted.sensor_limited or coloured(fitted) > COLOURED
+
+
+def coloured(fitted: Fitted) -> float:
+    """By how many standard errors the power of the free run's residual stands out low in the spectrum."""
+    if fitted.free_run is None:
+        return float("inf")
+    low, count, high, beside = np.zeros(len(BANDS)), np.zeros(len(BANDS)), 0.0, 0
+    for shots, residual in zip(fitted.free_run.shots, fitted.free_run.residuals(), strict=True):
+        if not np.any(shots.weight):
+            continue
+        left = np.where(shots.weight, residual - np.mean(residual[shots.weight]), 0.0)
+        power = np.abs(np.fft.rfft(left)) ** 2
+        f = np.arange(len(power)) / len(power)
+        for i, top in enumerate(BANDS):
+            inside = (f > 0.0) & (f < top)
+            low[i] += float(np.sum(power[inside]))
+            count[i] += int(np.sum(inside))
+        outside = (f > ABOVE[0]) & (f < ABOVE[1])
+        high, beside = high + float(np.sum(power[outside])), beside + int(np.sum(outside))
+    ratio = (low / np.maximum(count, 1)) / (high / max(beside, 1))
+    return float(np.max((ratio - 1.0) / np.sqrt(1.0 / np.maximum(count, 1) + 1.0 / max(beside, 1))))

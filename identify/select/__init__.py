@@ -1,0 +1,1 @@
+"""Which effects are named: fits compared, evidence, the searches."""

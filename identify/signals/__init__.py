@@ -1,0 +1,1 @@
+"""Recordings become signals: an even grid, the noise, filters, glitches, missing samples."""

@@ -1,0 +1,247 @@
+"""A run made ready for the fit: uniform time, the measured channel, smoothed motion, usable stretches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from scipy import signal
+from scipy.interpolate import CubicSpline
+
+from identify.model.effect_torque import torque_along
+from identify.signals.channel_readings import table_of
+from identify.signals.prefilter import held_pieces, linear_pieces, smooth_pieces
+from rig import effects
+from rig.channels import Channel
+from rig.dynamics import TorqueSignal
+from rig.dynamics.equations import MAX_SUBSTEPS, slots
+from rig.dynamics.filters import run_filter
+from rig.dynamics.native import addresses
+from rig.dynamics.polynomials import Polynomials
+from rig.effects.base import Effect, Place
+from rig.recording.run import Array, Run
+
+UPSAMPLING = 4  # nonlinear torques have corners between samples
+SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than it tells
+LEAD_S = 0.1
+STRAIGHT = 0.1  # of the sensor's noise
+MOST_BIAS_RAD_S = 0.05  # of a gyro: what its integral runs away faster with is the motion itself
+STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
+
+
+@dataclass
+class Trace:
+    """One run on a uniform grid of n samples.
+
+    Attributes
+    ----------
+    channel
+        "rate" (gyro) or "angle" (encoder): what is predicted, and whose noise is white.
+    measured
+        Shape (n,): that channel, small gaps bridged (they carry no weight).
+    keep
+        Shape (n,): samples that count.
+    stretches
+        First and last sample of each contiguous usable stretch; its start state is free.
+    """
+
+    run: Run
+    channel: Literal["rate", "angle"]
+    step_s: float
+    measured: Array
+    keep: Any
+    stretches: list[tuple[int, int]]
+    torque: TorqueSignal | None
+    noise: float
+    cutoff_hz: float  # of the zero-phase low-pass behind ``fine``
+    number: int = 0  # which run of the recording
+    offset_s: float = 0.0  # of the first sample from the start of the run
+    glitches_s: Array = field(default_factory=lambda: np.zeros(0))  # times of samples left out as such
+    clipped: tuple[int, float] = (0, 0.0)  # samples left out because the gyro stood at its largest rate, and that
+    scatter: tuple[float, bool] = (0.0, False)  # of the time stamps about an even beat in s; whether they are wrong
+    motion: tuple[Array, Array, Array, Array, float] | None = None  # of a piece: cut out of the whole run's
+    _series: dict[Any, Any] = field(default_factory=dict)
+    _tables: dict[Channel, tuple[Array, float]] = field(default_factory=dict)  # shared by the pieces of a run
+
+    @property
+    def start_s(self) -> float:
+        """Time stamp of the first sample."""
+        return float(self.run.time_s[0]) + self.offset_s
+
+    def piece(self, first: int, last: int) -> Trace:
+        """Samples first..last as a trace of their own."""
+        angle, rate, time, torque, left = self.fine
+        fine = slice(first * UPSAMPLING, last * UPSAMPLING + 1)
+        inside = [(max(a, first) - first, min(b, last) - first) for a, b in self.stretches]
+        kept = [(a, b) for a, b in inside if b - a + 1 >= SHORTEST_STRETCH]
+        return replace(
+            self,
+            measured=self.measured[first : last + 1],
+            keep=self.keep[first : last + 1],
+            stretches=kept,
+            offset_s=self.offset_s + first * self.step_s,
+            motion=(angle[fine], rate[fine], time[fine], torque[fine], left),
+            _series={},
+        )
+
+    def table(self, channel: Channel) -> tuple[Array, float]:
+        """What a channel does from the start of the run, finer than the samples, and the entries a second."""
+        if channel not in self._tables:
+            self._tables[channel] = table_of(self.run, channel, self.step_s)
+        return self._tables[channel]
+
+    @property
+    def biased(self) -> bool:
+        """Whether the channel may carry an unknown constant: a gyro alone; an encoder beside it would show it."""
+        return self.channel == "rate" and self.run.angle_rad is None
+
+    @property
+    def travel_deg(self) -> float:
+        """How far the platform goes to either side of where it mostly is, what a gyro's bias adds left out."""
+        angle, time = self.fine[0][::UPSAMPLING], self.fine[2][::UPSAMPLING]
+        slopes = [0.0]
+        if self.biased and len(angle) > 2:
+            slope = float(np.polynomial.Polynomial.fit(time, angle, 1).convert().coef[-1])
+            slopes.append(min(max(slope, -MOST_BIAS_RAD_S), MOST_BIAS_RAD_S))
+        level = [angle - slope * time for slope in slopes]  # an even swing may have a slope of its own
+        return float(np.degrees(min(np.max(np.abs(x - np.median(x)), initial=0.0) for x in level)))
+
+    @property
+    def count(self) -> int:
+        """Number of samples that count."""
+        return int(np.sum(self.keep))
+
+    @cached_property
+    def measured_pieces(self) -> Array:
+        """The measured channel as a cubic spline."""
+        return smooth_pieces(self.measured, self.step_s)
+
+    @cached_property
+    def fine(self) -> tuple[Array, Array, Array, Array, float]:
+        """Angle, rate, time and torque, upsampled and smoothed, and the noise left in the rate."""
+        if self.motion is not None:
+            return self.motion
+        nyquist = 0.5 / self.step_s
+        wn = self.cutoff_hz / nyquist
+        y = self.measured
+        if wn < 0.8:
+            sos = signal.butter(3, wn, output="sos")
+            y = signal.sosfiltfilt(sos, y, padlen=min(len(y) - 1, int(10.0 / wn)))
+        t = self.step_s * np.arange(len(y))
+        fine_t = self.step_s / UPSAMPLING * np.arange((len(y) - 1) * UPSAMPLING + 1)
+        spline = CubicSpline(t, y)
+        if self.channel == "rate":
+            angle, rate = Polynomials(spline.antiderivative())(fine_t), Polynomials(spline)(fine_t)
+            left = self.noise * np.sqrt(min(1.0, wn))
+            if self.run.angle_rad is not None:
+                encoder = np.interp(t + self.start_s, self.run.time_s, self.run.angle_rad)
+                angle = angle + np.median(encoder - angle[::UPSAMPLING])
+        else:
+            angle, rate = Polynomials(spline)(fine_t), Polynomials(spline.derivative())(fine_t)
+            left = self.noise * 2.0 * np.pi * self.cutoff_hz / np.sqrt(3.0) * np.sqrt(min(1.0, wn))
+        torque = np.zeros_like(fine_t) if self.torque is None else self.torque.at(fine_t + self.start_s)
+        return angle, rate, fine_t + self.offset_s, torque, float(left)
+
+    @cached_property
+    def straight_s(self) -> float:
+        """Longest step over which the rate runs straight, within a tenth of the sensor's noise.
+
+        A gyro's filter takes it for straight between two instants of the simulation; a sine is not.
+        """
+        rate = self.fine[1]
+        bend = np.diff(rate, 2) / (self.step_s / UPSAMPLING) ** 2
+        return float(np.sqrt(8.0 * STRAIGHT * self.noise / max(float(np.sqrt(np.mean(bend**2))), 1e-300)))
+
+    def torque_pieces(self, drive: tuple[tuple[str, tuple[float, ...]], ...]) -> tuple[Array, int] | None:
+        """Torque behind the given drive effects as polynomials, and how many of them a sample holds."""
+        if self.torque is None:
+            return None
+        key = ("torque", drive)
+        if key not in self._series:
+            self._series[key] = self._make_torque(drive)
+        return self._series[key]
+
+    def _make_torque(self, drive: tuple[tuple[str, tuple[float, ...]], ...]) -> tuple[Array, int]:
+        assert self.torque is not None
+        n = len(self.measured)
+        start = self.start_s
+        held = self.torque.hold == "zero_order"
+        if not drive and not held:
+            return smooth_pieces(self.torque.at(start + self.step_s * np.arange(n)), self.step_s), 1
+        # A value held for less than a fine step keeps its own step: means over several lose what rings.
+        upsampling = UPSAMPLING
+        if held:
+            upsampling = int(np.clip(round(self.step_s / self.torque.shortest_s), UPSAMPLING, MAX_SUBSTEPS))
+        fine = self.step_s / upsampling
+        count = (n - 1) * upsampling
+        lead = int(min(LEAD_S, self.offset_s) / fine)  # a drive with memory has seen what came before a piece
+        x = self.torque.on_half_steps(start - lead * fine, fine, count + 1 + lead).copy()  # the filters work in place
+        for name, values in drive:
+            effect = effects.get(name)
+            size = effect.filter_states(fine, values) if effect.filter_states else 0
+            run_filter(
+                addresses([effect.kernel]), x, fine, np.zeros(size), np.array([0, size]),
+                np.array(values), np.array([0, len(values)]),
+            )  # fmt: skip
+        return (held_pieces(x[lead : lead + count]) if held else linear_pieces(x[lead:], fine)), upsampling
+
+    def effect_pieces(self, effect: Effect, shape: tuple[float, ...], unit: int) -> Array | None:
+        """Torque of an effect with one linear parameter (or J, C, K: unit -3, -2, -1) at one, the rest at zero.
+
+        ``shape`` are the values of its shape parameters in declared order. None where that torque is zero.
+        """
+        key = (effect.name, shape, unit)
+        if key not in self._series:
+            if len(self._series) > 400:
+                self._series.clear()
+            self._series[key] = self._make_effect(effect, shape, unit)
+        return self._series[key]
+
+    def _make_effect(self, effect: Effect, shape: tuple[float, ...], unit: int) -> Array | None:
+        angle, rate, time, torque, left = self.fine
+        p = np.zeros(3 + len(effect.parameters))
+        shapes = iter(shape)
+        for i, parameter in enumerate(effect.parameters):
+            p[3 + i] = (1.0 if i == unit else 0.0) if parameter.linear else next(shapes)
+        if unit < 0:
+            p[3 + unit] = 1.0
+        if effect.reads is not None:
+            p = np.append(p, slots(effect.reads, self)[1])
+        z = np.array(
+            effect.rest_state(angle[0], rate[0]) if effect.rest_state else np.zeros(effect.states), dtype=float
+        )
+        fine = self.step_s / UPSAMPLING
+        substeps = 1
+        if effect.states and effect.fastest_rad_s:
+            full = (1.0, 0.0, 0.0, *(v if v else 1e-12 for v in p[3 : 3 + len(effect.parameters)]))
+            substeps = int(np.clip(np.ceil(fine * effect.fastest_rad_s(full) / STEP_PHASE_RAD), 1, 8))
+        out = np.empty_like(angle)
+        torque_along(
+            effect.kernel.address, angle, rate, time, torque, fine, z, substeps, p,
+            effect.place is Place.FRICTION, max(2.0 * left, 1e-12), out,
+        )  # fmt: skip
+        if not np.any(out):
+            return None
+        return linear_pieces(np.nan_to_num(out, posinf=0.0, neginf=0.0), fine)
+
+
+def loads_differ(traces: Sequence[Trace]) -> bool:
+    """Whether a known inertia was mounted for some of the runs."""
+    return len({t.run.added_inertia_kg_m2 for t in traces}) > 1
+
+
+def clear_of_seam(trace: Trace, seam: int, keep: Any) -> None:
+    """Take the samples in which the gyro's own average mixes both sides of a seam out of ``keep``, in place."""
+    run = trace.run
+    if trace.channel == "rate" and run.rate_corner_hz and run.rate_delay_s:
+        reach = int(np.ceil(run.rate_delay_s / trace.step_s + 0.5))  # a model averages over two fine steps besides
+        keep[max(0, seam - reach) : seam + reach] = False
+
+
+def _gaps(flags: Any) -> list[tuple[int, int]]:
+    """First and last index of every stretch of False."""
+    edges = np.diff(np.concatenate([[1], np.asarray(flags, dtype=np.int8), [1]]))
+    return list(zip(np.nonzero(edges == -1)[0].tolist(), (np.nonzero(edges == 1)[0] - 1).tolist(), strict=True))

@@ -1,0 +1,1 @@
+"""Runs simulated from a parameter vector, with the sensitivities to every parameter."""

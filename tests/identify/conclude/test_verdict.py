@@ -1,0 +1,108 @@
+"""The verdict in sentences."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from identify.conclude.conclusion import inseparable
+from identify.conclude.verdict import sentences_of
+from identify.model.structure import Structure
+from identify.results import NotReported
+from tests.identify.sample import estimate, sample
+
+FOUND, _ = sample(1.0)
+
+
+def test_each_effect_is_named_with_its_numbers_and_units_in_the_order_of_finding() -> None:
+    first, second, *_ = sentences_of(FOUND)
+    assert "Coulomb friction" in first
+    assert "N·m" in first
+    assert "torque delay" in second
+    assert "0.60030 ms)" in second
+
+
+def test_what_the_missing_effect_did_to_each_parameter_is_said_with_its_direction() -> None:
+    said = " ".join(sentences_of(FOUND))
+    assert "Without Coulomb friction and torque delay in the model, rotary inertia J came out" in said
+    assert "damping C came out 822 % too high" in said
+
+
+def test_a_term_that_was_dropped_is_named_where_nothing_was_added() -> None:
+    assert FOUND.after is not None
+    dropped = replace(FOUND.after, dropped=(NotReported("stiffness", "it came out negative"),))
+    said = sentences_of(replace(FOUND, verdict=replace(FOUND.verdict, effects=()), after=dropped))
+    assert any(s.startswith("With stiffness in the model, ") for s in said)
+
+
+def test_of_two_wrong_models_neither_is_said_to_have_bent_the_other() -> None:
+    verdict = replace(FOUND.verdict, effects=(), unexplained=True)
+    assert not any("came out" in s for s in sentences_of(replace(FOUND, verdict=verdict)))
+
+
+def test_a_rival_is_named_with_what_would_separate_it() -> None:
+    verdict = replace(FOUND.verdict, confusable_with={"coulomb_friction": ("stribeck_friction",)})
+    said = sentences_of(replace(FOUND, verdict=verdict))[0]
+    assert "cannot exclude Stribeck friction" in said
+    assert "slow ramp" in said
+
+
+def test_opposite_signs_are_the_first_thing_said() -> None:
+    turned = tuple(replace(t, torque_nm=-t.torque_nm) for t in FOUND.traces if t.torque_nm is not None)
+    first, *_ = sentences_of(replace(FOUND, accepted=False, traces=turned))
+    assert first.startswith("Torque and rate have opposite sign conventions")
+    assert not any("sign conventions" in s for s in sentences_of(replace(FOUND, accepted=False)))
+
+
+def test_nothing_found_is_said_as_plainly_whether_the_floor_is_reached_or_not() -> None:
+    empty = replace(FOUND.verdict, effects=(), unexplained=False)
+    assert "reaches the noise floor" in sentences_of(replace(FOUND, verdict=empty, after=None))[0]
+    lost = replace(empty, unexplained=True, unexplained_fraction=0.42)
+    said = sentences_of(replace(FOUND, verdict=lost, after=None))
+    assert "none of those tried" in said[0]
+    assert any("42 %" in s for s in said)
+
+
+def test_a_scale_that_nothing_shows_is_said_once_where_no_known_inertia_was_added() -> None:
+    (said,) = [s for s in sentences_of(FOUND) if "scale" in s]
+    assert "J, C and K larger or smaller alike" in said
+    assert "added_inertia_kg_m2" in said
+    assert not any("scale" in s for s in sentences_of(replace(FOUND, scale_shows=True)))
+
+
+def test_a_scale_that_was_found_is_said_with_what_it_means() -> None:
+    scaled = replace(FOUND, scale_shows=True, torque_scale=estimate(1.07, 0.001, "1"))
+    (said,) = [s for s in sentences_of(scaled) if "1.0700" in s]
+    assert "that much larger or smaller" in said
+
+
+def test_without_torque_there_is_no_scale_to_speak_of() -> None:
+    assert FOUND.after is not None
+    names = {"damping": "damping_over_inertia", "stiffness": "stiffness_over_inertia"}
+    ratios = {names[k]: v for k, v in FOUND.after.parameters.items() if k in names}
+    said = sentences_of(replace(FOUND, after=replace(FOUND.after, parameters=ratios)))
+    assert not any("scale" in s for s in said)
+
+
+@pytest.mark.parametrize(("travel_deg", "told"), [(9.0, True), (57.0, False)])
+def test_gravity_and_a_bent_spring_are_inseparable_in_small_swings_alone(travel_deg: float, told: bool) -> None:
+    never = inseparable(Structure(effects=("unbalance", "actuator_lag")), travel_deg)
+    assert ("unbalance / cubic_stiffness" in never) == ("unbalance / quadratic_stiffness" in never) == told
+    assert "actuator_lag / sensor_lag" in never
+
+
+def test_what_can_never_be_told_apart_is_said_with_the_reason() -> None:
+    verdict = replace(FOUND.verdict, never_separable={"actuator_lag / sensor_lag": "they answer alike"})
+    said = sentences_of(replace(FOUND, verdict=verdict))[-1]
+    assert "cannot be told apart" in said
+    assert "they answer alike" in said
+
+
+def test_a_parameter_that_is_known_badly_is_said_with_what_would_tell_it() -> None:
+    assert FOUND.after is not None
+    assert not any("Known badly" in s for s in sentences_of(FOUND))
+    wide = replace(FOUND.after, parameters={**FOUND.after.parameters, "inertia": estimate(0.02, 0.002)})
+    said = [s for s in sentences_of(replace(FOUND, after=wide)) if "Known badly" in s]
+    assert said[0].startswith("Known badly: rotary inertia J to 20 %. To determine inertia: add a set at another")
+    assert not any("Known badly" in s for s in sentences_of(replace(FOUND, after=wide, accepted=False)))

@@ -1,0 +1,68 @@
+"""The terminal summary: complete, narrow, plain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from identify.report.summary import summary
+from tests.identify.sample import sample, unhappy
+
+
+def test_a_person_hears_verdict_parameters_errors_sets_and_outcome() -> None:
+    said = summary(sample(2.0)[0])
+    for words in (
+        "Coulomb friction is missing: 1.1998 N·m",
+        "0.04470120 ± 1.2e-06",
+        "+822 %",
+        "held-out rate, free run",
+        "0.0008727",
+        "Damping C: the declared model alone reads it 822 % too high.",
+        "Presliding friction would explain these data about as well as Coulomb friction.",
+        "undetermined",
+        "Max_Error",
+    ):
+        assert words in said, words
+    assert said.rstrip().endswith("ACCEPTED")
+    assert "NOT ACCEPTED" not in said
+
+
+def test_what_was_dropped_or_not_determined_is_said_with_its_reason_and_what_to_do() -> None:
+    said = summary(unhappy())
+    for words in (
+        "Damping: its interval spans zero",
+        "Stiffness over inertia: no run returns to rest: record one that does",
+        "ABORTED",
+        "Next: run `free_decay` for 20 s from 5 deg.",
+        "held-out position, free run",
+    ):
+        assert words in said, words
+
+
+def test_a_campaign_that_fails_says_so_last() -> None:
+    said = summary(replace(unhappy(), aborted=False))
+    assert said.index("NOT ACCEPTED") < said.index("Next: run")
+
+
+@pytest.mark.parametrize("width", [80, 96])
+def test_no_line_is_wider_than_asked(width: int) -> None:
+    for identification in (sample(2.0)[0], unhappy()):
+        assert max(len(line) for line in summary(identification, width).splitlines()) <= width
+
+
+def test_without_a_terminal_there_is_no_colour_and_with_one_there_is() -> None:
+    assert "\x1b" not in summary(sample(2.0)[0])
+    assert "\x1b" in summary(sample(2.0)[0], colour=True)
+
+
+def test_a_name_cannot_steer_the_terminal() -> None:
+    found = sample(2.0)[0]
+    evil = replace(found.per_set[0], name="\x1b[2J\x07run")
+    said = summary(replace(found, per_set=(evil,), reasons=("\x1b[31m",)))
+    assert "\x1b" not in said
+    assert "?[2J?run" in said
+
+
+def test_it_fits_an_encoding_of_a_plain_windows_console() -> None:
+    assert summary(sample(2.0)[0]).encode("cp1252")

@@ -1,0 +1,200 @@
+"""A gyro that filters what it measures: its noise is no missing effect, and hides none."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from identify.conclude.next_steps import next_steps
+from identify.diagnose import torque_noise
+from identify.pipeline import identify
+from identify.results import Identification
+from identify.rivals import coloured_noise
+from identify.rivals.coloured_noise import Colour, colour_of
+from rig.config.identify import IdentifyConfig
+from rig.errors import RecordingError
+from rig.recording.run import Array, Recording, Run
+from tests.identify.simulated import DECLARED, NOISE_RAD_S, SETS, TRUTH, Effects, sine_run, white
+
+ONCE_MORE = "once more"
+
+
+def passed(order: int, hertz: float) -> Callable[[Array], Array]:
+    """Noise behind a Butterworth low-pass."""
+    b, a = signal.butter(order, hertz, fs=1000.0)
+    return lambda noise: np.asarray(signal.lfilter(b, a, noise))
+
+
+def recorded(colour: Callable[[Array], Array] | None, effects: Effects | None = None, seed: int = 0) -> Recording:
+    """The paper's sets, read by a gyro of that noise."""
+    runs = []
+    for i, (m, f) in enumerate(SETS):
+        run = sine_run(m, f, effects=effects, noise=1e-9 if colour else NOISE_RAD_S, seed=i)
+        assert run.rate_rad_s is not None
+        if colour:
+            noise = colour(white(len(run.rate_rad_s) + 2000, NOISE_RAD_S, 10 * seed + i))[2000:]
+            run = replace(run, rate_rad_s=run.rate_rad_s + noise)
+        runs.append(run)
+    return Recording(tuple(runs))
+
+
+def found_in(recording: Recording, candidates: list[str]) -> tuple[Identification, list[str]]:
+    said: list[str] = []
+    settings = IdentifyConfig.model_validate({"candidates": candidates})
+    return identify(recording, DECLARED, settings, said.append), said
+
+
+@pytest.mark.parametrize(("order", "hertz"), [(2, 50.0), (1, 60.0)])
+def test_noise_that_the_gyro_filters_is_no_missing_effect(order: int, hertz: float) -> None:
+    found, said = found_in(recorded(passed(order, hertz)), [])
+    assert found.accepted
+    assert any(ONCE_MORE in line for line in said)
+    colour = found.noise_floor.holdout_rate_rms
+    assert found.final.error.holdout_rate_rms == pytest.approx(colour, rel=0.06)
+    for term, truth in zip(("inertia", "damping", "stiffness"), TRUTH, strict=True):
+        estimate = found.final.parameters[term]
+        assert abs(estimate.value - truth) < 3.5 * estimate.std_error
+    assert "What is left is noise" in found.holdout_note
+    dense = float(found.holdout_note.split("as dense as white noise of ")[1].split(" deg/s")[0])
+    assert dense == pytest.approx(0.05, rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("order", "hertz", "name", "hidden"),
+    [
+        (2, 100.0, "cubic_stiffness", {"factor": 300.0}),
+        (8, 100.0, "creep", {"stiffness": 30.0, "time": 0.1}),  # no noise where it is read: the search is far off first
+    ],
+)
+def test_an_effect_beside_such_noise_is_named(order: int, hertz: float, name: str, hidden: dict[str, float]) -> None:
+    found, _ = found_in(recorded(passed(order, hertz), {name: hidden}), [name, "quadratic_stiffness"])
+    assert found.verdict.effects == (name,)
+    assert found.accepted
+    assert found.final.effect_parameters[name][next(iter(hidden))].value == pytest.approx(
+        hidden[next(iter(hidden))], rel=0.01
+    )
+
+
+def test_an_effect_that_is_not_offered_is_no_noise() -> None:
+    found, said = found_in(recorded(passed(2, 100.0), {"cubic_stiffness": {"factor": 300.0}}), [])
+    assert found.verdict.unexplained
+    assert not found.accepted
+    assert colour_of(found) is None
+    assert not any("marks of noise" in line for line in said)
+
+
+def test_white_noise_needs_no_second_look() -> None:
+    found, said = found_in(recorded(None), [])
+    assert found.accepted
+    assert not any(ONCE_MORE in line for line in said)
+
+
+def test_noise_in_the_recorded_torque_swells_at_the_resonance_and_is_not_the_sensors() -> None:
+    runs = recorded(None).runs
+    noisy = [
+        replace(r, torque_nm=r.torque_nm + white(len(r.torque_nm), 3.0, i))
+        for i, r in enumerate(runs)
+        if r.torque_nm is not None
+    ]
+    found, said = found_in(Recording(tuple(noisy)), [])
+    assert found.verdict.unexplained
+    assert colour_of(found) is None
+    assert not any("marks of noise" in line for line in said)
+    (advice,) = next_steps(found)
+    passed, left = re.search(
+        r"noise of 3\.\d+ N m a sample, ([\d.]+) N m below .* of the ([\d.]+) N m", advice
+    ).groups()
+    assert float(passed) == pytest.approx(float(left), rel=0.2)
+
+
+def test_what_a_clean_torque_leaves_is_not_blamed_on_its_noise() -> None:
+    found, _ = found_in(recorded(None, {"cubic_stiffness": {"factor": 300.0}}), [])
+    assert found.verdict.unexplained
+    assert torque_noise.told(found) == ""
+
+
+def test_two_runs_of_different_noise_have_no_colour_in_common() -> None:
+    runs = recorded(passed(2, 100.0)).runs
+    other = recorded(passed(2, 50.0), seed=1).runs[4]
+    found, _ = found_in(Recording((runs[2], runs[3], other)), [])
+    assert colour_of(found) is None
+
+
+def test_runs_under_one_and_the_same_sine_do_not_tell_noise_from_what_answers_to_it() -> None:
+    b = passed(2, 100.0)
+    runs = []
+    for seed in range(3):
+        run = sine_run(67.0, 6.0, noise=1e-9)
+        assert run.rate_rad_s is not None
+        noise = b(white(len(run.rate_rad_s) + 2000, NOISE_RAD_S, seed))[2000:]
+        runs.append(replace(run, name=f"run {seed}", rate_rad_s=run.rate_rad_s + noise))
+    found, said = found_in(Recording(tuple(runs)), [])
+    assert found.verdict.unexplained
+    assert not any(ONCE_MORE in line for line in said)
+
+
+def test_a_drive_whose_gain_goes_with_the_angle_is_no_noise_under_multisines() -> None:
+    """All bins of a multisine as long as its run answer to it: on a damped platform that had passed for noise."""
+    runs = [damped_multisine(seed) for seed in range(2)]
+    found, said = found_in(Recording(tuple(runs)), ["quadratic_stiffness", "coulomb_friction"])
+    assert found.verdict.unexplained
+    assert not found.accepted
+    assert not any(ONCE_MORE in line for line in said)
+
+
+def damped_multisine(seed: int) -> Run:
+    """A platform at 3.5 Hz, damped by 0.9, whose torque is 1 + 0.3 theta times the recorded one."""
+    rng = np.random.default_rng(seed)
+    inertia, own = 0.02, 2.0 * np.pi * 3.5
+    damping, stiffness = 1.8 * inertia * own, inertia * own**2
+    step = 5e-4
+    time = step * np.arange(round(10.0 / step) + 1)
+    hertz = np.arange(3, 59) / 10.0
+    phases = rng.uniform(0.0, 2.0 * np.pi, len(hertz))
+    torque = np.sum(np.sin(2.0 * np.pi * hertz[:, None] * time + phases[:, None]), axis=0)
+    torque *= 0.7 / np.std(torque)
+    state, angle, rate = np.zeros(2), np.zeros(len(time)), np.zeros(len(time))
+
+    def slope(x: Array, m: float) -> Array:
+        return np.array([x[1], (m * (1.0 + 0.3 * x[0]) - damping * x[1] - stiffness * x[0]) / inertia])
+
+    for i in range(len(time) - 1):
+        angle[i], rate[i] = state
+        middle = 0.5 * (torque[i] + torque[i + 1])
+        a = slope(state, torque[i])
+        b = slope(state + 0.5 * step * a, middle)
+        c = slope(state + 0.5 * step * b, middle)
+        state = state + step / 6.0 * (a + 2.0 * b + 2.0 * c + slope(state + step * c, torque[i + 1]))
+    angle[-1], rate[-1] = state
+    noisy = rate[::2] + white(len(rate[::2]), NOISE_RAD_S, seed)
+    return Run(
+        f"multisine {seed}", time[::2], np.ones(len(noisy), bool), rate_rad_s=noisy, torque_time_s=time[::2],
+        torque_nm=torque[::2],
+    )  # fmt: skip
+
+
+def test_a_second_look_that_sees_nothing_leaves_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, _ = found_in(recorded(passed(2, 100.0), {"cubic_stiffness": {"factor": 300.0}}), [])
+    monkeypatch.setattr(coloured_noise, "colour_of", lambda seen: Colour(1.0, 1.0, 100.0))
+
+    def refused(colour: Colour) -> Identification:
+        raise RecordingError("no run moves more than 2.2 times the sensor's noise")
+
+    assert coloured_noise.with_noise_known(found, refused, lambda text: None) is found
+
+
+def test_who_stops_the_second_look_keeps_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, _ = found_in(recorded(passed(2, 100.0), {"cubic_stiffness": {"factor": 300.0}}), [])
+    monkeypatch.setattr(coloured_noise, "colour_of", lambda seen: Colour(1.0, 1.0, 100.0))
+
+    def interrupted(colour: Colour) -> Identification:
+        raise KeyboardInterrupt
+
+    for again in (interrupted, lambda colour: replace(found, aborted=True, traces=())):
+        kept = coloured_noise.with_noise_known(found, again, lambda text: None)
+        assert kept == replace(found, aborted=True)

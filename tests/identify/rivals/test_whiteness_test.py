@@ -1,0 +1,54 @@
+"""Three effects of which one can follow anything need a residual that is nothing but noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identify.estimate.final_fit import Fitted, by_output_error
+from identify.model.structure import Structure
+from identify.rivals.whiteness_test import COLOURED, coloured, too_much_for
+from rig.platform import TERMS
+from rig.recording.run import Array, Recording
+from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
+
+LINE = 0.3 * NOISE_RAD_S * np.sin(2.0 * np.pi * 17.3e-3 * np.arange(2001))
+
+
+def fitted(left: Array | None = None) -> Fitted:
+    """J, C and K fitted to a clean campaign whose gyro also shows ``left``."""
+    recording = campaign(duration_s=2.0)
+    if left is not None:
+        runs = (replace(r, rate_rad_s=r.rate_rad_s + left) for r in recording.runs if r.rate_rad_s is not None)
+        recording = Recording(tuple(runs))
+    traces = traces_of(recording)
+    use = [t.keep for t in traces]
+    start = {(name,): value for name, value in zip(TERMS, TRUTH, strict=True)}
+    return by_output_error(traces, Structure(TERMS), start, 0.2, use, use)  # type: ignore[arg-type]
+
+
+def named(fit: Fitted, *names: str) -> Fitted:
+    return replace(fit, structure=Structure(TERMS, names))
+
+
+def test_white_noise_is_not_coloured_and_a_twentieth_of_its_power_low_down_is() -> None:
+    assert abs(coloured(fitted())) < COLOURED
+    assert coloured(fitted(LINE)) > COLOURED
+
+
+@pytest.mark.parametrize(
+    ("names", "declared", "too_much"),
+    [
+        (("unbalance", "backlash", "cogging"), (), True),
+        (("unbalance", "backlash", "cogging"), ("backlash",), False),
+        (("unbalance", "coulomb_friction", "quadratic_damping"), (), False),
+        (("unbalance", "cogging"), (), False),
+    ],
+)
+def test_only_three_of_which_one_follows_anything_are_asked(
+    names: tuple[str, ...], declared: tuple[str, ...], too_much: bool
+) -> None:
+    assert too_much_for(named(fitted(LINE), *names), declared) == too_much
+    assert not too_much_for(named(fitted(), *names), declared)

@@ -1,0 +1,45 @@
+"""What the sensors cannot show is set aside with its reason, declared or not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from identify.pipeline import identify
+from identify.runs.observability import why_unseen
+from rig.config.identify import IdentifyConfig
+from rig.platform import Platform
+from rig.recording.run import Recording
+from tests.identify.simulated import TRUTH, campaign, decay_run, traces_of
+
+NONE = IdentifyConfig.model_validate({"candidates": []})
+TWO = ((111.0, 1.0), (67.0, 6.0))
+
+
+def test_behind_a_gyro_alone_a_constant_torque_is_unseen_and_beside_an_encoder_it_is_not() -> None:
+    gyro = campaign(sets=TWO, duration_s=1.0)
+    both = replace(gyro, runs=tuple(replace(run, angle_rad=0.0 * run.time_s) for run in gyro.runs))
+    assert "angle of rest" in why_unseen("torque_offset", traces_of(gyro))
+    assert why_unseen("torque_offset", traces_of(both)) == ""
+
+
+def test_where_no_torque_was_applied_no_drive_shows() -> None:
+    free = traces_of(Recording((decay_run(Platform(1.0, 0.1, 40.0)),)))
+    assert "no torque was applied" in why_unseen("actuator_lag", free)
+    assert why_unseen("coulomb_friction", free) == ""
+
+
+@pytest.mark.parametrize("declared", [{"torque_offset": {"level": 0.5}}, {"rate_bias": {"bias": 0.01}}])
+def test_what_is_declared_and_unseen_is_set_aside_and_the_rest_identified(
+    declared: dict[str, dict[str, float]],
+) -> None:
+    found = identify(campaign(sets=TWO, duration_s=2.0), Platform(*TRUTH, declared), NONE)
+    assert found.accepted
+    assert [item.name for item in found.final.dropped] == list(declared)
+    assert found.final.parameters["inertia"].value == pytest.approx(TRUTH[0], rel=1e-3)
+
+
+def test_no_candidates_means_none() -> None:
+    found = identify(campaign({"coulomb_friction": {"level": 1.0}}, sets=TWO, duration_s=2.0), Platform(*TRUTH), NONE)
+    assert not found.verdict.candidates and found.verdict.unexplained
