@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identify.pipeline import identify
-from identify.runs.noisy import noisy_runs, told
+from identify.runs.noisy import describe_noisy_runs, noisy_runs
 from rig.config.identify import IdentifyConfig
 from rig.recording.run import Array, Recording
 from tests.identify.simulated import DECLARED, NOISE_RAD_S, SETS, campaign, sine_run, traces_of, white
@@ -56,4 +56,4 @@ def test_a_clean_campaign_with_a_noisy_run_is_accepted_without_it_and_says_so() 
 
 
 def test_nothing_is_told_where_nothing_was_left_out() -> None:
-    assert told([]) == ""
+    assert describe_noisy_runs([]) == ""

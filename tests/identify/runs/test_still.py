@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from identify.pipeline import identify
-from identify.runs.still import still_runs, told
+from identify.runs.still import describe_still_runs, still_runs
 from rig.config.identify import IdentifyConfig
 from rig.recording.run import Recording
 from tests.identify.simulated import DECLARED, NOISE_RAD_S, campaign, sine_run, traces_of, white
@@ -20,8 +20,8 @@ def test_a_run_that_friction_held_is_told_apart_from_those_that_moved() -> None:
     traces = traces_of(Recording(runs))
     found = still_runs(traces)
     assert [t.number for t in found] == [1]
-    assert "3 Hz (5 N m)" in told(found, "rotary").replace("5.00", "5")
-    assert told([], "rotary") == ""
+    assert "3 Hz (5 N m)" in describe_still_runs(found, "rotary").replace("5.00", "5")
+    assert describe_still_runs([], "rotary") == ""
 
 
 def test_what_goes_along_with_the_torque_below_the_noise_has_moved() -> None:
