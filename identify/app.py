@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rig.recording.run import Recording
 
 app = new_app("")
-STOPPED_AGAIN = "stopped while all the data were identified: these are the results without the follow-up"
+STOPPED_AGAIN = "stopped during identification with all data: these are the results without the follow-up"
 
 
 @app.command()
@@ -180,7 +180,7 @@ def _identified_again(
     except (Aborted, KeyboardInterrupt) as error:
         stopped = error
     except UsageError as error:
-        return played, _noted(found, f"the follow-up was played, but is of no use: {error}"), False
+        return played, _noted(found, f"the follow-up was played but could not be used: {error}"), False
     return dataclasses.replace(played, cause=stopped), _noted(found, STOPPED_AGAIN, aborted=True), False
 
 
@@ -202,7 +202,7 @@ def _planned(
     rounds = len(found.follow_up.rounds) if found.follow_up else 0
     prefix = "follow-up" if rounds == 0 else f"follow-up {rounds + 1}"
     if any(found.verdict.confusable_with.values()):
-        desk.terminal.note("planning what would part the rivals")
+        desk.terminal.note("planning an excitation that separates the rivals")
     try:
         planned = plan_follow_up(
             found, dataclasses.replace(recording, info={}), allowed, rate_hz, loaded.config.excitation.rest_s, prefix

@@ -49,10 +49,9 @@ from rig.recording.run import Recording
 
 TWICE_THE_NOISE = 2.0
 MUCH_CLOSER = 0.5  # times the free-run error of the other fit
-STOPPED = "stopped before the search was through: what is missing may still be unnamed"
+STOPPED = "the search was interrupted; missing effects are not yet determined"
 NOTHING_YET = (
-    "The search was stopped before it was through: of what the declared model lacks nothing can be said yet. Run it "
-    "again on this recording."
+    "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
 )
 SHOWS = 5.0  # standard errors from zero at which whole runs show damping
 
@@ -153,7 +152,7 @@ class _Identifier:
             had = search.best.structure.effects
             search.drop_a_bad_lot()
             if search.best.structure.effects != had:
-                self.say(f"not named: {', '.join(had)}; together they leave too much for any of them to be believed")
+                self.say(f"rejected: {', '.join(had)}; together they still leave too much unexplained")
             before = self._before(search)
             after = self._after(search) if search.best.structure != self.structure else before
             after = self._doubted(search, on_offer.fits, before, after)
@@ -164,7 +163,7 @@ class _Identifier:
         except (Aborted, KeyboardInterrupt):
             if loop.so_far is None:
                 raise
-            self.say("stopped: reporting what there is")
+            self.say("stopped: reporting what was found so far")
             search = loop.so_far
             found = self._report(search, self._regressed(search.base), self._regressed(search.best), in_full=False)
             if not found.verdict.effects:  # the search may have been about to name what this model lacks
@@ -177,14 +176,14 @@ class _Identifier:
         apart = self._apart(search, fits, after) if line is None or line.of_torque else None
         if apart is not None:
             search.leave_open("", run_heterogeneity.told(apart, self.recording.axis == "linear"), search.base)
-            self.say("not named: the runs do not agree, and that alone would explain as much")
+            self.say("no effect is named: the runs disagree with each other, and that alone explains as much")
         elif line is not None:
             words = told(line, self.recording.axis, self.traces[0].channel)
             search.leave_open(TONE, words, self._until(search, fits, TONE))
-            self.say(f"not named: {TONE}; it may as well be a line of the sensor's own")
+            self.say(f"not named: {TONE}; the line may come from the sensor itself")
         elif too_much_for(after, self.structure.effects):
             search.take_all_back()
-            self.say("not named: three effects of which one can follow anything, and they leave more than noise")
+            self.say("no effect is named: three flexible effects still leave more than noise")
         else:
             return after
         return self._after(search) if search.best.structure != self.structure else before
@@ -230,7 +229,7 @@ class _Identifier:
         per_set: tuple[SetResult, ...] = ()
         joint = None
         if in_full:
-            self.say("each set for itself")
+            self.say("fitting each set separately")
             d = self.declared
             centre = {
                 "inertia": d.inertia_kg_m2, "damping": d.damping_nm_s_rad, "stiffness": d.stiffness_nm_rad
@@ -319,7 +318,7 @@ class _Identifier:
         if not fuller.sensor_limited or not shows:
             return fitted
         search.dropped[:] = [d for d in search.dropped if d[0] != "damping"]
-        self.say(f"took damping back: {damping:.4g} +- {error:.2g} over whole runs")
+        self.say(f"restored damping: {damping:.4g} +- {error:.2g} over whole runs")
         return fuller
 
 

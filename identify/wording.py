@@ -148,7 +148,7 @@ def bent_sentences(identification: Identification) -> list[str]:
     said = []
     for name, off in bent:
         if abs(off) < UNCHANGED_PERCENT:
-            said.append(f"{capital(title(name, identification.axis))}: the same with and without what was added.")
+            said.append(f"{capital(title(name, identification.axis))}: unchanged by the added effects.")
             continue
         before, after = (model.parameters[name] for model in (identification.before, identification.final))
         within = abs(before.value - after.value) <= 2.0 * math.hypot(before.std_error, after.std_error)
@@ -156,7 +156,8 @@ def bent_sentences(identification: Identification) -> list[str]:
         note = " (within its uncertainty)" if within else ""
         way = "high" if off > 0 else "low"
         said.append(
-            f"{capital(title(name, identification.axis))}: the declared model alone reads it {size} too {way}{note}."
+            f"{capital(title(name, identification.axis))}: "
+            f"fitted without the missing effects it is {size} too {way}{note}."
         )
     return said
 
@@ -169,7 +170,7 @@ def frequency(value: float | None) -> str:
 def pairs(several: Mapping[str, Sequence[str]]) -> list[str]:
     """What a name can be confused with, one sentence each; names without a rival are left out."""
     return [
-        capital(f"{' or '.join(plain(r) for r in rivals)} would explain these data about as well as {plain(name)}.")
+        capital(f"{' or '.join(plain(r) for r in rivals)} explains these data about as well as {plain(name)}.")
         for name, rivals in several.items()
         if rivals
     ]
@@ -182,12 +183,12 @@ def not_reported(several: Sequence[NotReported]) -> list[str]:
 
 def without(times: float) -> str:
     """What an effect contributes: the held-out error without it over the one with it."""
-    return f"Without it, all else fitted anew, the held-out error is {number(times, 3)} times as large."
+    return f"Without it, even after refitting, the error on held-out data is {number(times, 3)} times larger."
 
 
 def told_apart(how: str) -> str:
     """What separates an effect from its rivals, as part of a sentence: "what tells it from a delay: ..."."""
-    return f"what tells it {how}" if how.startswith("from ") else f"to separate: {how}"
+    return f"to distinguish it {how}" if how.startswith("from ") else f"to separate them: {how}"
 
 
 def joined(words: Sequence[str]) -> str:

@@ -115,18 +115,18 @@ def _sentence(
         return advice.cure(information) if whole else advice.of_weak_set(information, others)
     lost = [symbols[n] for n in expected if n not in achieved]
     if lost:
-        return f"shows {joined(lost)} in principle, but what the model leaves unexplained covers it: find that first"
+        return f"{joined(lost)} could be determined here, but the unexplained residual hides it: find its cause first"
     far = {n: achieved[n] / expected[n] for n in achieved if expected[n] > 0.0 and achieved[n] > FAR * expected[n]}
     narrow = [n for n in achieved if achieved[n] < NARROW * expected[n]]
     if not far and narrow:
         told = joined([f"{symbols[n]} {_percent(expected[n])}" for n in narrow])
-        return f"the interval is narrower than the sensor allows: take {told} as one standard error"
+        return f"the interval is narrower than the sensor allows: use {told} as the standard error"
     if not far:
-        return "as good as the sensor allows: only more torque, more time or a quieter sensor improve it"
+        return "at the sensor's limit: only more torque, more time or a quieter sensor would improve it"
     worst = max(far, key=lambda n: far[n])
     return (
-        f"the sensor would allow {symbols[worst]} to {_percent(expected[worst])}, the fit reaches "
-        f"{_percent(achieved[worst])}: what the model leaves unexplained is the limit, not the sensor"
+        f"the sensor allows {symbols[worst]} to within {_percent(expected[worst])}, the fit reaches "
+        f"{_percent(achieved[worst])}: the limit is the unexplained residual, not the sensor"
     )
 
 

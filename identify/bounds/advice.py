@@ -47,11 +47,11 @@ def expected(information: Information) -> str:
         value, error = abs(information.values[information.names.index(name)]), information.std_error(name)
         words = label(name, information.torque_free)
         if not np.isfinite(error):
-            told.append(f"{words} not at all")
+            told.append(f"{words} not determined")
         elif value == 0.0:
-            told.append(f"{words} to {number(error, 2)} {_unit(name)} (declared as 0)")
+            told.append(f"{words} +-{number(error, 2)} {_unit(name)} (declared as 0)")
         else:
-            told.append(f"{words} {number(100.0 * error / value, 2)} %")
+            told.append(f"{words} +-{number(100.0 * error / value, 2)} %")
     return ", ".join(told)
 
 
@@ -91,17 +91,20 @@ def of_set(information: Information, others: Sequence[Information] = ()) -> str:
     """One sentence on one set; ``others`` are the sets that it could be fitted with."""
     i = information
     if i.torque_free:
-        return f"{i.name}: without torque only ratios show, {expected(i)} expected; for J, C and K record the torque"
+        ratios = f"without torque only ratios can be determined; expected {expected(i)}"
+        return f"{i.name}: {ratios}. Record the torque to get J, C and K"
     if below_noise(i):
         worst = max(i.relative(n) for k, n in enumerate(i.names) if i.values[k] != 0.0)
-        told = f"its motion is {number(i.loudness, 2)} times the sensor's noise, and nothing comes out well"
+        told = f"the motion is {number(i.loudness, 2)} times the sensor's noise: too small to determine anything"
         cure = (
-            f"about {number(worst / AIM, 2)} times the torque would give {100 * AIM:g} %" if worst < 1e6 else "raise it"
+            f"about {number(worst / AIM, 2)} times the torque would give {100 * AIM:g} %"
+            if worst < 1e6
+            else "raise the torque"
         )
         return f"{i.name}: below the noise: {told} ({expected(i)}); {cure}"
     if not weak(i):
-        return f"{i.name}: {expected(i)} expected{_about_zeros(i)}"
-    return f"{of_weak_set(i, others)} ({expected(i)} expected){_about_zeros(i)}"
+        return f"{i.name}: expected {expected(i)}{_about_zeros(i)}"
+    return f"{of_weak_set(i, others)} (expected {expected(i)}){_about_zeros(i)}"
 
 
 def of_weak_set(information: Information, others: Sequence[Information] = ()) -> str:
@@ -109,7 +112,7 @@ def of_weak_set(information: Information, others: Sequence[Information] = ()) ->
     missing = weak(information)
     terms = [n[0] for n in missing if n[0] in TERMS]
     if not terms:
-        return f"{information.name} alone leaves effects open"
+        return f"{information.name} alone does not determine every effect"
     told = undetermined(information.name, terms, _partner(information, missing, others))
     rest = [label(n) for n in missing if n[0] not in TERMS]
     return told + (f"; {' and '.join(rest)} need another set" if rest else "")
@@ -121,9 +124,8 @@ def _about_zeros(information: Information) -> str:
         if information.values[k] == 0.0 and name in {("damping",), ("stiffness",)}:
             least = DETECTABLE * information.std_error(name)
             if np.isfinite(least):
-                told += (
-                    f"; {name[0]} is declared as 0: below {number(least, 2)} {_unit(name)} it cannot be told from none"
-                )
+                bound = f"{number(least, 2)} {_unit(name)}"
+                told += f"; {name[0]} is declared as 0: below {bound} it cannot be distinguished from zero"
     return told
 
 
@@ -146,10 +148,10 @@ def of_campaign(each: Sequence[Information]) -> str:
     total = together(each)
     if total.torque_free:
         return (
-            f"all sets together: {expected(total)} expected; J, C and K themselves stay unknown without torque "
+            f"all sets together: expected {expected(total)}. Without torque J, C and K themselves stay unknown "
             "(record it, or repeat the decay with a known inertia mounted)"
         )
-    told = f"all sets together: {expected(total)} expected{_about_zeros(total)}; {_figures(total)}"
+    told = f"all sets together: expected {expected(total)}{_about_zeros(total)}; {_figures(total)}"
     missing = weak(total)
     if missing:
         told += f"; NOT determined: {' and '.join(label(n) for n in missing)}. {cure(total)}"
@@ -174,7 +176,7 @@ def cure(total: Information) -> str:
     if below_noise(total):
         return "Raise the torque."
     if ("inertia",) in missing and ("stiffness",) in missing:
-        return "Add a set at another frequency, or let a set start at once (soft_start_s: 0), so that it rings."
+        return "Add a set at another frequency, or start a set abruptly (soft_start_s: 0) so that the platform rings."
     return "Add a set at another frequency, a multisine, or more torque."
 
 
@@ -189,7 +191,7 @@ def of_delay(each: Sequence[Information]) -> str:
         return ""
     if not np.isfinite(error) or bent > WELL_KNOWN:
         return (
-            "an unknown torque delay cannot be told from damping here, and a delay bends C most of all: "
-            "add sets at other frequencies, or one that starts at once"
+            "a torque delay cannot be separated from damping here, and an undeclared delay biases C: "
+            "add sets at other frequencies, or one that starts abruptly"
         )
-    return f"an unknown torque delay would be told to {number(1e6 * error, 2)} us, C then to {number(100 * bent, 2)} %"
+    return f"if the delay is also fitted: delay +-{number(1e6 * error, 2)} us, C +-{number(100 * bent, 2)} %"

@@ -37,7 +37,7 @@ def of_planned_campaign(
         return []
     noise = noise_rad_s or ASSUMED_NOISE_RAD_S
     late = of_planned(with_delay(platform), sets, sample_rate_hz, noise)
-    told = "" if noise_rad_s else ", assumed since the gyro does not say"
+    told = "" if noise_rad_s else " (assumed: not declared)"
     basis = (
         f"for the declared values (one standard error), gyro noise {math.degrees(noise):.3g} deg/s a sample{told}, "
         f"{sample_rate_hz:g} Hz"
@@ -47,7 +47,7 @@ def of_planned_campaign(
 
 def _lines(late: Sequence[Information], delay_declared: bool) -> list[str]:
     usable = [i for i in late if np.all(np.isfinite(i.matrix))]
-    wild = [f"{i.name}: the declared model runs away, nothing can be said" for i in late if i not in usable]
+    wild = [f"{i.name}: the declared model is unstable; nothing can be predicted" for i in late if i not in usable]
     if not usable:
         return wild
     plain = usable if delay_declared else [i.without(advice.DELAY_NAME) for i in usable]
@@ -68,7 +68,7 @@ def of_recorded_campaign(recording: Recording, declared: Platform) -> list[str]:
     structure = Structure(declared.terms)
     found = _quick(traces, structure)
     if found is None:
-        return ["the declared terms do not fit these runs closely enough to say beforehand: identify-run will"]
+        return ["the declared terms do not fit these runs closely enough for a prediction; identify-run will tell"]
     platform = Platform(*found, terms=declared.terms)
     late = [information_of(t, with_delay(platform) if t.torque is not None else platform, len(traces)) for t in traces]
     if any(i.torque_free for i in late) and not all(i.torque_free for i in late):

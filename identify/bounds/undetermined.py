@@ -27,7 +27,7 @@ def undetermined(fitted: Fitted, runs: Set[int], alone: bool) -> dict[Name, str]
         tied = _tied_to_nothing(fitted, i, alone) if term else ""
         wide = term and (not np.isfinite(error) or error > WIDE * abs(value))
         if tied:
-            out[name] = f"it is tied to {tied}, which the data do not determine"
+            out[name] = f"only a combination with {tied} is determined"
         elif not fitted.determined[i] or wide:
             out[name] = _why(value, error, fitted.determined[i])
     return out
@@ -61,7 +61,9 @@ def of_another_run(name: Name, runs: Set[int]) -> bool:
 def _why(value: float, error: float, determined: bool) -> str:
     if not determined:
         return "these runs hold no information on it; add a set at another frequency or keep the start transient"
-    return f"its standard error {error:.3g} is more than half of its value {value:.3g}; excite it more or for longer"
+    return (
+        f"its standard error {error:.3g} is more than half of its value {value:.3g}; use more torque or a longer record"
+    )
 
 
 def _tied_to_nothing(fitted: Fitted, i: int, alone: bool) -> str:

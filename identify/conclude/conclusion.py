@@ -101,7 +101,7 @@ def conclude(
     reasons = []
     searched = [g for g in (*(s.genetic for s in per_set), joint) if g is not None]
     reasons += [
-        f"{g.name}: the objective {g.objective:.4g} stays above J_dec {g.j_dec:.4g} after {g.restarts} repeats"
+        f"{g.name}: the objective {g.objective:.4g} is still above J_dec {g.j_dec:.4g} after {g.restarts} repeats"
         for g in searched if after.sensor_limited and not g.accepted
     ]  # fmt: skip
     reasons += [f"{x.name} is not determined: {x.reason}" for x in final.not_determined]
@@ -134,7 +134,9 @@ def _about_damping(case: Case, after: Fitted, final: ModelResult) -> tuple[str, 
 def _note(case: Case, after: Fitted) -> str:
     """What was held out, what was left out, and what was taken for granted."""
     rests = after.free_run is not None and any(s.rests for s in after.free_run.shots)
-    resting = "J hardly shows in these runs: those that begin at rest are taken to do so exactly" if rests else ""
+    resting = (
+        "these runs hardly determine J: runs that begin at rest are assumed to begin exactly at rest" if rests else ""
+    )
     torn = glitches.told([(t.run.name, t.glitches_s) for t in case.traces])
     beyond = clipping.told([(t.run.name, *t.clipped) for t in case.traces], case.recording.axis)
     uneven = resampling.told([(t.run.name, *t.scatter) for t in case.traces])

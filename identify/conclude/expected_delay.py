@@ -40,5 +40,8 @@ def _difference(found: ParameterEstimate | None, expected_s: float) -> tuple[str
         return ()
     beyond_ms = 1e3 * (found.value - expected_s)
     if beyond_ms > 0.0:
-        return (f"{number(beyond_ms, 3)} ms of it lie where no driver can see: bus, amplifier or sensor.",)
+        return (
+            f"{number(beyond_ms, 3)} ms is not explained by known device delays: "
+            "look at the bus, the amplifier and the sensor.",
+        )
     return (f"Their corrections are {number(-beyond_ms, 3)} ms too large: check the filter that the gyro is set to.",)

@@ -35,15 +35,15 @@ RELEASED_RUN = {  # the same without a motor
 }
 LINEAR = {"rate": "speed", "angle": "position", "torque": "force"}
 OTHERWISE = (
-    "The rest goes with none of rate, angle, torque and time: look in the residual's spectrum and the frequency "
+    "The residual depends on none of rate, angle, torque and time: look in its spectrum and the frequency "
     "response for where it sits; add a multisine (0.5 Hz to beyond the resonance) if none was played, and one run with "
     "zero torque and the drive enabled."
 )
 
 
 RELEASED = (
-    "The rest goes with neither rate nor angle nor time: release the platform from other angles, record each until it "
-    "rests, and play a campaign with torque: a decay shows ratios only, and few of its causes."
+    "The residual depends on neither rate nor angle nor time: release the platform from other angles, record each "
+    "until it rests, and play a campaign with torque: a decay shows ratios only, and few of its causes."
 )
 COLOURED = (
     "The noise floor is estimated from the fastest changes alone: where the sensor's own noise is slower than that "
@@ -101,9 +101,9 @@ def unexplained_reason(ratio: float, found: Identification) -> str:
         share = f"{percent(100.0 - error.holdout_fit_percent).lstrip('+')} of the motion"
     size = f"{number(ratio, 3)} times the sensor's noise"
     told = f"{share} ({size})" if share else size
-    acts = "something acts that none of the effects tried describes"
+    acts = "none of the effects tried describes it"
     if found.verdict.left_open:
-        acts = "what the verdict leaves open stands in it"
+        acts = "part of it is what the verdict leaves open"
     return f"the model leaves {told} unexplained: {acts}"
 
 
@@ -119,8 +119,8 @@ def to_determine(several: Sequence[str], decays: bool) -> str:
         return f"To determine {names}: release the platform from a larger angle and record until it rests."
     return (
         f"To determine {names}: add a set at another frequency or a multisine (0.5 Hz to beyond the resonance), let it "
-        "start at once (soft_start_s: 0) so that the platform rings, and raise the torque as far as the limits allow; "
-        "`rig check` says beforehand what each set will give."
+        "start abruptly (soft_start_s: 0) so that the platform rings, and raise the torque as far as the limits allow; "
+        "`rig check` predicts what each set will determine."
     )
 
 
@@ -130,7 +130,7 @@ def _to_explain(found: Identification) -> list[str]:
     left = found.residual_before if found.after is None else found.residual_after
     if left is not None and left.moments:
         places = joined([f"in {m.run} from {m.from_s:.2f} to {m.to_s:.2f} s" for m in left.moments])
-        return [f"Most of what is left lies {places}. Leave that out with from_s or to_s, or record it again."]
+        return [f"Most of the residual lies {places}. Leave that out with from_s or to_s, or record it again."]
     noisy = torque_noise.told(found)
     return [noisy] if noisy else [*_by_what_it_goes_with(found), *_coloured(found)]
 

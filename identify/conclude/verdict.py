@@ -35,11 +35,11 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
     for name in found.verdict.effects:
         out.append(_named(found, name))
     if not found.verdict.effects:
-        why = "what was found is no effect of the platform, or may be none." if found.verdict.left_open else ""
+        why = "what was found may not be an effect of the platform." if found.verdict.left_open else ""
         out.append(
             "No effect is named: "
-            + (why or "none of those tried explains the residual." if found.verdict.unexplained
-               else "the declared model reaches the noise floor.")
+            + (why or "no candidate explains the residual." if found.verdict.unexplained
+               else "the declared model already reaches the noise floor.")
         )  # fmt: skip
     out += [found.verdict.left_open] if found.verdict.left_open else []
     out += _bent(found)
@@ -55,21 +55,23 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
     out += _unseen_scale(found)
     if found.verdict.unexplained:
         out.append(
-            f"{number(100.0 * found.verdict.unexplained_fraction, 2)} % of the residual above the noise floor stays "
+            f"{number(100.0 * found.verdict.unexplained_fraction, 2)} % of the residual above the noise floor is "
             "unexplained; the plots show what it depends on."
         )
     if found.after is not None:
-        out += [f"{capital(plain(d.name))} was left out of the refit: {d.reason}." for d in found.after.dropped]
+        out += [f"{capital(plain(d.name))} was dropped: {d.reason}." for d in found.after.dropped]
     refused = [c.status for c in found.verdict.candidates if c.status.startswith(REFUSED)]
-    out += [f"Not looked at as a cause: {status.removeprefix(REFUSED)}." for status in dict.fromkeys(refused)]
+    out += [f"Not considered as a cause: {status.removeprefix(REFUSED)}." for status in dict.fromkeys(refused)]
     for name in found.verdict.effects:
         read = effects.get(name).reads
         if read is not None and not read.nature.from_zero:
-            out.append(f"{capital(plain(name))} counts from {number(read.reference, 5)}: J, C and K are those there.")
+            out.append(
+                f"{capital(plain(name))} is relative to {number(read.reference, 5)}: J, C and K are the values there."
+            )
         elif read is not None and read.kind == "current":
             out.append(f"{capital(plain(read.name))} counts {number(read.factor, 5)} N m for an ampere.")
     out += [
-        f"{capital(joined([plain(n) for n in pair.split(' / ')]))} cannot be told apart: {why}."
+        f"{capital(joined([plain(n) for n in pair.split(' / ')]))} cannot be separated: {why}."
         for pair, why in found.verdict.never_separable.items()
     ]
     return tuple(out)
@@ -83,8 +85,8 @@ def _unseen_scale(found: Identification) -> list[str]:
     torque, kind = ("force", "mass") if found.axis == "linear" else ("torque", "inertia")
     makes = "larger or smaller alike" if len(given) > 1 else "larger or smaller"
     return [
-        f"A {torque} or sensor scale that is off makes {joined(given)} {makes}, and nothing in these runs can show "
-        f"it: only further runs with a known added {kind} (added_inertia_kg_m2) do."
+        f"A scale error of the {torque} or the sensor makes {joined(given)} {makes} and cannot be seen in these runs; "
+        f"runs with a known added {kind} (added_inertia_kg_m2) show it."
     ]
 
 
@@ -95,9 +97,9 @@ def _known_badly(found: Identification) -> list[str]:
     if not wide or not found.accepted:
         return []  # what else is wrong comes first
     each = [
-        f"{title(n, found.axis)} to {number(100.0 * half_interval(given[n]) / abs(given[n].value), 2)} %" for n in wide
+        f"{title(n, found.axis)} +-{number(100.0 * half_interval(given[n]) / abs(given[n].value), 2)} %" for n in wide
     ]
-    return [f"Known badly: {joined(each)}. {to_determine(wide, torque_free(found))}"]
+    return [f"Poorly determined: {joined(each)}. {to_determine(wide, torque_free(found))}"]
 
 
 def _named(found: Identification, name: str) -> str:
@@ -128,7 +130,7 @@ def _bent(found: Identification) -> list[str]:
         off = 100.0 * (before.value / after.value - 1.0)
         if abs(off) >= SHOWN_PERCENT:
             way = "high" if off > 0 else "low"
-            moved.append(f"{title(name, found.axis)} came out {percent(abs(off)).lstrip('+')} too {way}")
+            moved.append(f"{title(name, found.axis)} is {percent(abs(off)).lstrip('+')} too {way}")
     return [f"{_change(found)}, {joined(moved)}."] if moved else []
 
 

@@ -11,10 +11,11 @@ WORTH, WORTH_OF_PAST = 0.02, 0.1  # shares of the residual's power below which n
 AT_THE_NOISE = 1.3  # times the noise floor
 TWIN = {"angle": "position", "rate": "speed", "torque": "force"}  # on a linear axis
 LINEAR = (
-    "what repeats at the played frequency alone is linear: a delay, a lag, creep, a second mode, a spring that drifts"
+    "a residual at the excitation frequency alone has a linear cause: "
+    "a delay, a lag, creep, a second mode, a drifting spring"
 )
-ODD = "odd harmonics come from what acts alike on both sides of rest: friction, a cubic spring, a gap, a limited drive"
-EVEN = "even harmonics come from what differs from side to side: a one-sided or quadratic spring, unbalance, an offset"
+ODD = "odd harmonics come from causes that are symmetric about rest: friction, a cubic spring, backlash, saturation"
+EVEN = "even harmonics come from asymmetric causes: a one-sided or quadratic spring, unbalance, an offset"
 
 
 def diagnosis_sentences(found: ResidualDiagnosis, axis: str) -> tuple[str, ...]:
@@ -40,7 +41,7 @@ def _level(found: ResidualDiagnosis, more: bool) -> str:
     if over is None:
         return ""
     if not more and over < AT_THE_NOISE:
-        return f"{what} is at the sensor's noise ({number(over, 3)} times), and nothing in it stands out of that."
+        return f"{what} is at the sensor's noise ({number(over, 3)} times), and no structure stands out of it."
     looked_for = "harmonics, free lines, direction or memory" if found.direction is not None else "free lines"
     rest = "" if more else f"; it shows no {looked_for}"
     return f"{what} is {number(over, 3)} times what the sensor's noise leaves{rest}."
@@ -71,7 +72,7 @@ def _line(line: FreeLine, found: ResidualDiagnosis) -> str:
     runs = f", in {line.runs} runs" if line.runs > 1 else ""
     return (
         f"A line at {number(line.frequency_hz, 4)} Hz, not locked to the excitation of any set: "
-        f"{number(line.size, 2)} {unit(found.unit)}{runs}. Look for what turns or hums at that frequency."
+        f"{number(line.size, 2)} {unit(found.unit)}{runs}. Look for a machine that turns or vibrates at that frequency."
     )
 
 
@@ -88,8 +89,8 @@ def _memory(share: Share | None) -> list[str]:
     if share is None or not told(share, WORTH_OF_PAST):
         return []
     return [
-        f"{_percent(share.share)} of it hangs on what came before, and on no function of the present angle, rate and "
-        "torque: hysteresis, creep, or a second mode."
+        f"{_percent(share.share)} of it depends on the past and not on the present angle, rate and torque: "
+        "hysteresis, creep or a second mode."
     ]
 
 
@@ -99,8 +100,8 @@ def _moments(found: Sequence[Moment]) -> list[str]:
     places = [f"{m.run} from {m.from_s:.2f} to {m.to_s:.2f} s ({_percent(m.share)})" for m in found]
     share = _percent(sum(m.share for m in found))
     return [
-        f"{share} of it lies in {joined(places)}: something happened there that happens at no other time (a touch, a "
-        "slip, the way a run began). Leave it out with from_s or to_s, or record the run again."
+        f"{share} of it lies in {joined(places)}: something happened there and at no other time (a touch, "
+        "a slip, the start of a run). Leave it out with from_s or to_s, or record the run again."
     ]
 
 

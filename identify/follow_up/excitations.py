@@ -76,8 +76,8 @@ def shapes(natural_hz: float, sample_rate_hz: float) -> tuple[Shape, ...]:
     out = [_sine(f * natural_hz, length, words) for f, words in (*TONES, *ABOVE) if f * natural_hz < top]
     out.append(_sine(0.31 * natural_hz, SLOW_S, "a long sine", (1.0,)))
     for low, high, words in (
-        (0.02, 0.5, "many slow tones at once"), (0.1, 2.0, "many tones around resonance"),
-        (1.2, 3.0, "many tones above resonance"),
+        (0.02, 0.5, "a slow multisine"), (0.1, 2.0, "a multisine around resonance"),
+        (1.2, 3.0, "a multisine above resonance"),
     ):  # fmt: skip
         if low * natural_hz < 0.5 * top:
             out.append(_multisine(low * natural_hz, min(high * natural_hz, top), 2.0 * length, words))

@@ -76,7 +76,7 @@ def plan_follow_up(
     if not any(found.verdict.confusable_with.values()):
         return None
     if any(run.torque_nm is None or not np.any(run.torque_nm) for run in recording.runs):
-        why = "no torque was recorded, so none can be planned: record a decay from another amplitude"
+        why = "without a recorded torque no excitation can be planned: record a decay from another amplitude"
         return FollowUp(None, tuple(Unparted(e, r, why) for e, rivals in _all(found) for r in rivals))
     traces = usable_traces(recording)
     if not traces:
@@ -140,10 +140,10 @@ def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table, least
 def _too_little(pair: Pair, reached: float) -> str:
     """Why a pair has no part in the plan."""
     cure = effects.get(pair.effect).separated_by
-    told = f" (what would tell it {cure})" if cure.startswith("from ") else ""
+    told = f" (to distinguish it {cure})" if cure.startswith("from ") else ""
     return (
-        f"no excitation within the limits parts them: the best leaves chi square {number(reached, 2)}, "
-        f"{LEAST:g} are needed{told}"
+        f"no excitation within the limits separates them: the best reaches a chi-square of {number(reached, 2)}, "
+        f"{LEAST:g} is needed{told}"
     )
 
 

@@ -19,8 +19,8 @@ PLENTY = 10_000.0  # chi square beyond which nobody asks how much
 def why_of(partings: Sequence[Parting], sets: Sequence[Candidate]) -> str:
     """One sentence: what the sets are, and what they part."""
     words = joined(list(dict.fromkeys(c.words for c in sets)))
-    parts = "parts" if len({c.words for c in sets}) == 1 else "part"
-    told = joined([f"{plain(p.effect)} from {plain(p.rival)} (expected chi square {size(p)})" for p in partings])
+    parts = "separates" if len({c.words for c in sets}) == 1 else "separate"
+    told = joined([f"{plain(p.effect)} from {plain(p.rival)} (expected chi-square {size(p)})" for p in partings])
     return f"{capital(words)} {parts} {told}."
 
 
@@ -41,7 +41,7 @@ def verdict_sentences(follow_up: FollowUp, told: Collection[str] = ()) -> list[s
     """
     out = []
     if follow_up.plan is not None:
-        out.append(f"To part what these data cannot: {_lower(follow_up.plan.why)}")
+        out.append(f"To separate what these data cannot: {_lower(follow_up.plan.why)}")
     out += [
         f"No follow-up for {plain(one.effect)} and {plain(one.rival)}: {one.reason}."
         for one in follow_up.unparted
@@ -60,8 +60,8 @@ def lines(follow_up: FollowUp) -> list[str]:
     for n, one in enumerate(follow_up.rounds, 1):
         head = "Played" if len(follow_up.rounds) == 1 else f"Played, {n}"
         out.append(f"{head}: {_lower(one.plan.why)}")
-        out += [f"{capital(plain(a))} and {plain(b)} are told apart now." for a, b in one.separated]
-        out += [f"{capital(plain(a))} and {plain(b)} are still open." for a, b in one.open]
+        out += [f"{capital(plain(a))} and {plain(b)} can be distinguished now." for a, b in one.separated]
+        out += [f"{capital(plain(a))} and {plain(b)} still cannot be distinguished." for a, b in one.open]
     if follow_up.plan is not None:
         out.append(
             f"{follow_up_file_name(len(follow_up.rounds))} ({follow_up.plan.duration_s:.0f} s): "

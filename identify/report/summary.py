@@ -77,10 +77,10 @@ def _whole(identification: Identification, info: Mapping[str, Any]) -> Group:
         _errors(identification),
         Padding(Text(f"The noise floor is {floor.source}. {note}"), (0, 0, 0, 2)),
         *_listed("Torque delay", delay_lines(identification, info), bullet=""),
-        *_listed("What this did to the declared model", bent_sentences(identification)),
-        *_listed("Dropped, since the data do not support it", not_reported(final.dropped)),
+        *_listed("What the missing effects did to the fit", bent_sentences(identification)),
+        *_listed("Dropped: not supported by the data", not_reported(final.dropped)),
         *_listed("Not determined by these data", not_reported(final.not_determined)),
-        *_listed("Confusable on these data", pairs(verdict.confusable_with)),
+        *_listed("Cannot be distinguished on these data", pairs(verdict.confusable_with)),
         *_listed("Follow-up", follow_up_lines(identification.follow_up) if identification.follow_up else ()),
     ]
     if identification.per_set:
@@ -169,10 +169,12 @@ def _errors(identification: Identification) -> Table:
 
 
 def _sets(identification: Identification) -> Table:
-    """Each set for itself; Max_Error (Eq. 15) below where the truth was given."""
+    """Each set fitted separately; Max_Error (Eq. 15) below where the truth was given."""
     sets = identification.per_set
     names = list(dict.fromkeys(name for one in sets for name in one.parameters))
-    table = _table("Each set for itself", ["set", *[SYMBOLS.get(n, plain(n)) for n in names], "J < J_dec", "repeats"])
+    table = _table(
+        "Each set fitted separately", ["set", *[SYMBOLS.get(n, plain(n)) for n in names], "J < J_dec", "repeats"]
+    )
     for one in sets:
         values = [value_of(one.parameters[n]) if n in one.parameters else "undetermined" for n in names]
         table.add_row(printable(one.name), *values, "yes" if one.accepted else "NO", str(one.restarts))

@@ -80,14 +80,14 @@ def with_noise_known(
     colour = colour_of(found)
     try:
         if colour is None and (guess := guess_of(found)) is not None:
-            say("once more: the noise may be larger where the platform moves than above")
+            say("repeating with coloured noise: the sensor noise may be larger at the frequencies of the motion")
             guessed = again(guess)
             if guessed.aborted:
                 return replace(found, aborted=True)
             colour = colour_of(guessed)
         if colour is None:
             return found
-        say("once more: what is left has the marks of noise that the sensor itself has filtered")
+        say("repeating with coloured noise: the residual looks like noise that the sensor has filtered")
         known = again(colour)
     except RecordingError:  # too much noise for anything to be seen is none that the record has
         return found

@@ -113,7 +113,7 @@ def told(apart: RunsApart, linear: bool) -> tuple[str, str]:
     ]
     runs = joined(list(dict.fromkeys(run for run, _, _ in apart.changes)))
     return (
-        f"The runs do not agree, and no effect of the platform is needed for that: a {what} that was "
+        f"The runs disagree with each other, and no effect of the platform is needed to explain it: a {what} that was "
         f"{joined(parts)} than recorded explains all that the declared model leaves."
     ), (
         f"Compare {runs} with the other runs: the amplifier's gain and limits, and how torque and rate are stamped "

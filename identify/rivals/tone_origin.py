@@ -148,8 +148,8 @@ def told(line: Line, axis: str, channel: str = "rate") -> tuple[str, str]:
         one, what = len(line.only) == 1, "force" if linear else "torque"
         return (
             f"{name} is no disturbance: {'that run has' if one else 'those runs have'} a {what} of that frequency, and "
-            f"the others are silent there. The platform got {torque} more or less there than was recorded, or at "
-            "another moment."
+            f"the others are silent there. There the applied {what} differed from the recorded one by {torque}, or "
+            "came at another moment."
         ), DIFFERS.format(runs=joined(line.only))
     why = (
         "It stood in its steady motion when the runs began, and then both look the same."

@@ -40,8 +40,8 @@ def split(traces: Sequence[Trace], share: float | Literal["auto"] = "auto") -> S
         none = [np.zeros(len(k), dtype=bool) for k in keep]
         fit = [n if d else k for k, n, d in zip(keep, none, declared, strict=True)]
         judge = [k if d else n for k, n, d in zip(keep, none, declared, strict=True)]
-        alone = "nothing is fitted there but start states, biases and the phase of disturbances"
-        return Split(fit, judge, fit, f"held out as declared: {names}; {alone}")
+        alone = "only start states, biases and the phase of disturbances are fitted there"
+        return Split(fit, judge, fit, f"Held out as declared: {names}; {alone}")
     fit, judge = [], []
     some_free = any(t.run.use == "auto" for t in traces)
     blocks, chosen = _blocks(share)
@@ -54,10 +54,10 @@ def split(traces: Sequence[Trace], share: float | Literal["auto"] = "auto") -> S
         judging = np.isin(block, chosen)
         fit.append(trace.keep & ~judging)
         judge.append(trace.keep & judging)
-    who = "chosen here" if share == "auto" else f"as asked (identify.holdout: {share:g})"
+    who = "" if share == "auto" else f" (identify.holdout: {share:g})"
     note = (
-        f"{who}: of each run cut in {blocks}, {_told(chosen)} the candidates and the errors below; "
-        "their start states are fitted, and the final parameters are refitted on all samples"
+        f"Each run is split into {blocks} blocks; {_held_out(chosen)} held out{who} to compare candidates and to "
+        "measure the errors below. Start states are fitted there; the final parameters are refitted on all samples"
     )
     return Split(fit, judge, [t.keep.copy() for t in traces], note)
 
@@ -70,10 +70,10 @@ def _blocks(share: float | Literal["auto"]) -> tuple[int, tuple[int, ...]]:
     return FINE_BLOCKS, tuple(1 + int((i + 0.5) * FINE_BLOCKS / count) for i in range(count))
 
 
-def _told(blocks: Sequence[int]) -> str:
+def _held_out(blocks: Sequence[int]) -> str:
     if len(blocks) == 1:
-        return f"block {blocks[0]} judges"
-    return f"blocks {', '.join(str(b) for b in blocks[:-1])} and {blocks[-1]} judge"
+        return f"block {blocks[0]} is"
+    return f"blocks {', '.join(str(b) for b in blocks[:-1])} and {blocks[-1]} are"
 
 
 def pieces(traces: Sequence[Trace], masks: Sequence[Any], shortest_s: float, enough: int = ENOUGH) -> list[Trace]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.signals.channel_readings import table_of
 from identify.results import Candidate
+from identify.signals.channel_readings import table_of
 from identify.signals.trace import UPSAMPLING, Trace
 from identify.wording import joined, number, plain
 from rig import effects
@@ -56,7 +56,7 @@ def with_causes(runs: Sequence[Run], declared: Platform, asked: Mapping[str, Cha
     declared
         The declared model: where it reads a channel, its reference stands.
     asked
-        ``identify.runs.measured_channels``.
+        ``identify.channels``.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def _torque_of_an_ampere(channel: Channel, runs: Sequence[Run]) -> float:
 def offer_of(traces: Sequence[Trace], declared: Platform, asked: Iterable[str] = ()) -> Offer:
     """Which effects of channels may be tried on these runs, and why the others may not.
 
-    ``asked`` are the names in ``identify.runs.measured_channels``, which the runs need not have.
+    ``asked`` are the names in ``identify.channels``, which the runs need not have.
     """
     channels: dict[str, Channel] = {}
     for trace in traces:

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify.signals.low_pass import low_pass
 from identify.results import RunTraces
+from identify.signals.low_pass import low_pass
 from rig.recording.run import Array
 
 CLEARLY = 4.0  # standard errors from zero

@@ -9,8 +9,8 @@ from identify.runs.noisy import describe_noisy_runs, noisy_runs
 from identify.runs.refusals import refuse_a_moment
 from identify.runs.sign_consistency import describe_reversed_runs, reversed_runs
 from identify.runs.still import describe_still_runs, still_runs
-from identify.signals.trace import Trace
 from identify.signals.prepare import above_steps, one_noise
+from identify.signals.trace import Trace
 from rig.errors import RecordingError
 
 

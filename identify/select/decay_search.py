@@ -147,7 +147,7 @@ class _Decay:
                     tried[rival] = self._bare(swapped)
             chosen = _chosen(tried) or name
             if chosen != name:
-                self.say(f"{chosen} in the place of {name}, now that the others are there")
+                self.say(f"replaced {name} by {chosen}: it fits better beside the other effects")
                 mine = {n: v for n, v in now.values().items() if n[0] in (name, "stiffness")}
                 self.rivals[chosen] = {**self.rivals.pop(name, {}), name: mine}
             self._note(chosen, tried)
@@ -181,7 +181,7 @@ class _Decay:
         found.rivals = {n: tuple(self.alike.get(n, {})) for n in named}
         found.rival_models = {n: {r: w.estimate.platform() for r, w in self.alike.get(n, {}).items()} for n in named}
         found.dropped = [
-            (t, "the finished model runs free as well without it")
+            (t, "the free-run error is as small without it")
             for t in found.base.structure.terms if t not in now.structure.terms
         ]  # fmt: skip
 

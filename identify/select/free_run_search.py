@@ -96,7 +96,7 @@ class FineSearch:
                 started = other(trial, begin)
                 through = started is not None and self._rounds(trial, started)
         if not through:
-            self.say("taken back: what was added does not come down to the sensor's noise together")
+            self.say("rejected: together these effects still do not explain the data")
             return False
         found.best, found.floor, found.free_running = trial.best, trial.floor, True
         found.base = self.twin or found.base
@@ -132,7 +132,9 @@ class FineSearch:
         round_ = 1 + max((c.round for c in found.candidates), default=0)
         held = float(np.sqrt(large.held / max(large.held_count, 1))) * self.noise
         found.candidates.append(Candidate(name, round_, 0.0, held, "added"))
-        self.say(f"added {name}: free-run error {large.estimate.sigma:.3g}; without it the model runs astray")
+        self.say(
+            f"added {name}: free-run error {large.estimate.sigma:.3g}; without it the simulation diverges from the data"
+        )
         return large
 
     def _large_beside(self, found: Search, now: Whole) -> Whole | None:
@@ -159,7 +161,7 @@ class FineSearch:
             if len(now.structure.effects) >= most and now.level > ENDS_NEAR:
                 return False  # more than that are not believed, and each round costs more than the one before
             if self.on_offer.fits.gives_up(now):
-                self.say("no more is tried over whole runs: nothing of all that was comes near the sensor's noise")
+                self.say("search over whole runs ended: no candidate comes near the sensor's noise")
                 return False
             chosen = self._round(found, now, round_)
             if chosen is None:
@@ -256,7 +258,7 @@ class FineSearch:
                 waiting += [n for n in added[-1:] if n != name and n not in waiting]  # chosen beside the one that goes
                 added.pop()
             if chosen != name:
-                self.say(f"{chosen} in the place of {name}, now that the others are there")
+                self.say(f"replaced {name} by {chosen}: it fits better beside the other effects")
             now = tried[chosen]
             found.rivals.pop(name, None)
             found.rival_models.pop(name, None)

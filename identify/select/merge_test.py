@@ -43,7 +43,7 @@ def one_for_two(offer: Candidates, found: Search, now: Whole, say: Callable[[str
             alone = offer.fits.whole(swapped.minus(other), {n: v for n, v in both.values().items() if n[0] != other})
             if alone is None or alone.penalised > now.penalised + RIVAL * now.level:
                 continue
-            say(f"{twin} in the place of {name} and {other}: it does what both do")
+            say(f"{twin} replaces {name} and {other}: it explains what both explain")
             for gone in (name, other):
                 found.rivals.pop(gone, None)
                 found.rival_models.pop(gone, None)

@@ -69,7 +69,7 @@ class Pruning:
             fuller = self.fits.whole(structure, {**now.values(), (name,): 0.0})
             if fuller is not None and worth(name, fuller, now):
                 found.dropped[:] = [d for d in found.dropped if d[0] != name]
-                self.say(f"took {name} back: free-run error {now.estimate.sigma:.4g} -> {fuller.estimate.sigma:.4g}")
+                self.say(f"restored {name}: free-run error {now.estimate.sigma:.4g} -> {fuller.estimate.sigma:.4g}")
                 now = fuller
         return now
 

@@ -78,7 +78,7 @@ class Search:
         """Name nothing: the declared model is what there is."""
         kept = self.base.structure.effects
         self.candidates = [
-            replace(c, status="best of a bad lot") if c.status == "added" and c.effect not in kept else c
+            replace(c, status="rejected with the others") if c.status == "added" and c.effect not in kept else c
             for c in self.candidates
         ]  # fmt: skip
         self.best, self.rivals, self.rival_models, self.dropped = self.base, {}, {}, []
@@ -90,7 +90,7 @@ class Search:
         ``without`` is the model of what was found before it.
         """
         gone = [e for e in self.best.structure.effects if e not in without.structure.effects]
-        status = {e: "left open" if e == name else "found beside what is left open" for e in gone}
+        status = {e: "left open" if e == name else "found together with an open effect" for e in gone}
         self.candidates = [
             replace(c, status=status[c.effect]) if c.status == "added" and c.effect in status else c
             for c in self.candidates

@@ -240,7 +240,7 @@ class Loop:
             if stiffness <= 0.0
             else f"its period would be longer than the {longest:.3g} s record"
         )
-        found.dropped.append(("stiffness", f"{why}, and the finished model predicts as well without it"))
+        found.dropped.append(("stiffness", f"{why}, and the final model predicts as well without it"))
 
     def _worth_adding(self, now: Judged, name: str, new: Judged, floor: float) -> bool:
         """Whether an effect lowers the held-out error clearly, by enough, and with parameters that stand out."""
@@ -323,7 +323,7 @@ class Loop:
             if missed and with_it.strength(name) > STRONG:
                 found.best = with_it
                 found.dropped = [d for d in found.dropped if d[0] != name]
-                self.say(f"took {name} back: held-out error {now.sigma:.4g} -> {with_it.sigma:.4g}")
+                self.say(f"restored {name}: held-out error {now.sigma:.4g} -> {with_it.sigma:.4g}")
 
     def _missed(self, without: Judged, full: Judged, floor: float) -> bool:
         """Whether leaving a term out costs a clear part of the accuracy."""

@@ -23,7 +23,7 @@ from rig.platform import Platform
 
 NOBODY_AGREED = (  # the same whether it was asked, could not be, or is a replay: results are compared
     "it is not played: identify.follow_up is ask, and nobody said yes (without a terminal nobody can be asked); "
-    "identify.follow_up.planner: auto plays it (real torque needs --yes as well)"
+    "identify.follow_up: auto plays it (real torque needs --yes as well)"
 )
 QUESTION = "Play this follow-up now? Type yes to play it: "
 NEXT_SEED = 1_000_003  # a simulated gyro must not repeat its noise

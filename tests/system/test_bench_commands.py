@@ -28,7 +28,7 @@ SHORT = (
     "{torque_nm: 20, frequency_hz: 6, duration_s: 1.5}]",
     "excitation.rest_s=0.5", "bench.settle_s=2", "limits.missed_ticks=200", "limits.stale_gyro_ms=500",
     "limits.rate_deg_s=1000", "bench.amplifier.settings.drive_heartbeat_ms=1000",
-    "identify.candidates=[coulomb_friction]", "identify.genetic.algorithm.generations=5",
+    "identify.candidates=[coulomb_friction]", "identify.genetic.generations=5",
 )  # fmt: skip
 PLAYED_WITHOUT_A_STALL = 4  # attempts: a stall of 50 ms is rightly a trip, and not what is looked at here
 

@@ -144,7 +144,7 @@ FREE_TEXT = (
     "name", "backend", "model", "model.effects_from", "simulated.platform", "bench.gyroscope.device",
     "bench.gyroscope.port", "bench.gyroscope.settings.x", "bench.amplifier.device", "bench.amplifier.can.interface",
     "bench.amplifier.can.channel", "bench.amplifier.can.options.x", "bench.amplifier.settings.eds", "bench.replay",
-    "identify.select.candidates", "recorded.runs", "recorded.columns.time", "excitation", "nonsense",
+    "identify.candidates", "recorded.runs", "recorded.columns.time", "excitation", "nonsense",
 )  # fmt: skip
 
 

@@ -51,7 +51,7 @@ def embedded(value: Any) -> str:
 
 def document(title: str, body: Markup, figures: Mapping[str, Any]) -> str:
     """The whole file: the sections in it, the figures as data, plotly and this package's style and script."""
-    own = files("identify.report")
+    own = files("identify.report.page")
     return "\n".join(
         [
             "<!DOCTYPE html>",

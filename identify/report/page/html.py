@@ -71,7 +71,7 @@ def report_html(identification: Identification, recording: Recording, name: str)
 
 def _header(identification: Identification, name: str) -> Markup:
     if identification.aborted:
-        badge, state = "ABORTED: what was recorded until then", "bad"
+        badge, state = "ABORTED: based on what was recorded until then", "bad"
     else:
         badge, state = ("ACCEPTED", "good") if identification.accepted else ("NOT ACCEPTED", "bad")
     return element(
@@ -103,8 +103,8 @@ def _verdict(identification: Identification, recording: Recording, gallery: Gall
         _tiles(identification),
         parameter_table(identification),
         _titled("Torque delay", delay_lines(identification, recording.info)),
-        _titled("What this did to the declared model", bent_sentences(identification)),
-        _titled("Dropped, since the data do not support it", missing[0]),
+        _titled("What the missing effects did to the fit", bent_sentences(identification)),
+        _titled("Dropped: not supported by the data", missing[0]),
         _titled("Not determined by these data", missing[1]),
         gallery.place(estimates_figure(identification)),
         effect_cards(identification),
@@ -120,7 +120,7 @@ def _tiles(identification: Identification) -> Markup:
     bent, tiles = bent_percent(identification), []
     for name, found in identification.final.parameters.items():
         half = half_interval(found)
-        before = f"declared model alone: {percent(bent[name])}" if name in bent else ""
+        before = f"without the missing effects: {percent(bent[name])}" if name in bent else ""
         tiles.append(
             element(
                 "div",
@@ -139,7 +139,7 @@ def _errors(identification: Identification, gallery: Gallery) -> Markup:
     state = (
         f"Unexplained: the residual stays significantly above the noise floor ({number(100.0 * share, 2)} % of it)."
         if identification.verdict.unexplained
-        else "The residual is at the noise floor: nothing significant is left unexplained."
+        else "The residual is at the noise floor: nothing significant is unexplained."
     )
     figures = [gallery.place(figure) for figure in residual_figures(identification)]
     return section(
@@ -157,7 +157,7 @@ def _where_it_lives(identification: Identification) -> list[Markup]:
     """What the residual holds in words, before and after, so that one sees what went away."""
     found = {"declared model": identification.residual_before, "final model": identification.residual_after}
     return [
-        _titled(f"Where it lives: {name}", diagnosis_sentences(one, identification.axis))
+        _titled(f"What the residual contains: {name}", diagnosis_sentences(one, identification.axis))
         for name, one in found.items() if one is not None
     ]  # fmt: skip
 
@@ -172,8 +172,8 @@ def _candidates(identification: Identification) -> Markup:
         "candidates",
         "What was tried",
         candidate_table(verdict.candidates, identification.noise_floor.holdout_rate_rms),
-        _titled("Confusable on these data", pairs(verdict.confusable_with)),
-        _titled("Not to be told apart by any torque and rate", never),
+        _titled("Cannot be distinguished on these data", pairs(verdict.confusable_with)),
+        _titled("Cannot be separated by any torque and rate", never),
         _titled("Follow-up", follow_up_lines(identification.follow_up) if identification.follow_up else ()),
     )
 
@@ -215,7 +215,7 @@ def _origin(recording: Recording) -> Markup:
             rows.append(element("tr", element("th", key, scope="row"), element("td", value)))
     lengths = f"{len(recording.runs)} runs, {sum(len(run.time_s) for run in recording.runs)} samples"
     rows.insert(0, element("tr", element("th", "recording", scope="row"), element("td", lengths)))
-    return section("origin", "Where this comes from", element("table", element("tbody", *rows), class_="plain"), *long)
+    return section("origin", "Origin of the data", element("table", element("tbody", *rows), class_="plain"), *long)
 
 
 def _flat(info: Mapping[str, Any], prefix: str = "") -> dict[str, str]:

@@ -59,14 +59,14 @@ def _run(identification: Identification, trace: RunTraces) -> Figure:
             *line(time, trace.simulated_before, POINTS), "declared model", BEFORE, visible="legendonly" if two else True
         ),
     ]
-    panels = [Panel("", axis(name, unit)), Panel("", axis("error", unit), "measured less the declared model")]
+    panels = [Panel("", axis(name, unit)), Panel("", axis("error", unit), "measured minus the declared model")]
     before = left_over(trace, trace.simulated_before)
     drawn.append(lines(*line(time, before, POINTS), "error, declared model", BEFORE, 2, width=0.9, showlegend=False))
     if two:
         after = left_over(trace, trace.simulated_after)
         drawn.append(lines(*line(time, trace.simulated_after, POINTS), "final model", AFTER, width=1.0))
         drawn.append(lines(*line(time, after, POINTS), "error, final model", AFTER, 3, width=0.9, showlegend=False))
-        panels.append(Panel("", axis("error", unit), "measured less the final model"))
+        panels.append(Panel("", axis("error", unit), "measured minus the final model"))
     last = len(panels)
     panels[-1] = Panel("time since the start of the run (s)", panels[-1].y_title, panels[-1].title)
     layout = grid(panels, shared_x=True, gap=0.1)

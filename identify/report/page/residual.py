@@ -106,7 +106,7 @@ def _against_time(identification: Identification) -> Figure:
         for start, trace in zip(starts, traces, strict=False):
             x, y = line(start + trace.time_s - trace.time_s[0], _residual(trace, which, torque, cutoff), budget)
             drawn.append(lines(x, y, NAMES[which], COLORS[which], panel, width=0.9))
-    panels = [Panel("runs laid end to end (s)", title) for which in models]
+    panels = [Panel("runs one after the other (s)", title) for which in models]
     layout = grid(panels, shared_x=True, gap=0.12)
     many = len(traces) > 8
     for start, trace in zip(starts, [] if many else traces, strict=False):
@@ -116,7 +116,7 @@ def _against_time(identification: Identification) -> Figure:
         layout["shapes"] = [level(sign * 2.0 * floor, FLOOR, p) for sign in (-1, 1) for p in range(1, len(models) + 1)]
     return Figure(
         label="Residual against time, before and after",
-        caption="Mind the scales: each panel has its own. Dashed green: twice the noise floor."
+        caption="Each panel has its own scale. Dashed green: twice the noise floor."
         + _lowpass_note(identification, torque),
         traces=once_in_legend(drawn),
         layout=layout,
@@ -145,7 +145,7 @@ def _against(
     return Figure(
         label=f"Residual against {name}, before and after",
         caption=f"Residual against {name}: a sample of the points and their mean. Where the mean leaves zero, "
-        f"something depends on the {name} that the model lacks.",
+        f"the model lacks something that depends on the {name}.",
         traces=drawn,
         layout=grid(panels, columns=len(models), gap=0.1) | {"showlegend": False},
         height=300,

@@ -44,11 +44,11 @@ def parameter_table(identification: Identification) -> Markup:
         rows.append([*row, _unit_of(name, before, after)])
     rows += _effect_rows(before, after)
     head = ["", "declared model", "95 % interval"]
-    head += ["final model", "95 % interval", "declared model is off by"] if after else []
+    head += ["final model", "95 % interval", "fitted without them: off by"] if after else []
     return table(
         [*head, "unit"],
         rows,
-        "Fitted to all samples not declared held out. Declared model: its own terms alone, without what was added.",
+        "Fitted to all samples not declared held out. Declared model: only its own terms, without the added effects.",
     )
 
 
@@ -131,8 +131,8 @@ def candidate_table(candidates: Sequence[Candidate], floor: float) -> Markup:
     ]
     more = f" The best {ROWS} of {len(order)}; result.json has all." if len(order) > ROWS else ""
     caption = (
-        "What was tried, on the model as it then stood. Delta BIC: negative is better. Held-out error in units of the "
-        f"measured channel; the noise floor is {number(floor)}.{more}"
+        "Candidates tried, each added to the model of that round. Delta BIC: negative is better. Held-out error in "
+        f"units of the measured channel; the noise floor is {number(floor)}.{more}"
     )
     tried = table(
         ["effect", "round", "delta BIC", "held-out error", "times the floor", "outcome"], rows, caption, words=(4, 5)
@@ -182,7 +182,7 @@ def set_table(identification: Identification) -> Markup:
     if totals:
         shown: list[Piece] = [f"{number(totals[n], 2)} %" if n in totals else "-" for n in names]
         rows.append(["Max_Error (Eq. 15)", "", *shown, "", "", "", "against identify.reference"])
-    caption = "Each set for itself, with the effects of the final model. Plus or minus: half the 95 % interval."
+    caption = "Each set fitted separately, with the effects of the final model. Plus or minus: half the 95 % interval."
     if not any(one.frequency_hz is not None and frequency(one.frequency_hz) != one.name for one in sets):
         head.pop(1)  # the name says it already
         for row in rows:
@@ -232,7 +232,7 @@ def _card(identification: Identification, name: str) -> Markup:
     rivals = verdict.confusable_with.get(name, ())
     if rivals:
         parted = f" {capital(told_apart(effect.separated_by))}." if effect.separated_by else ""
-        lines.append(f"On these data hard to tell from {', '.join(plain(r) for r in rivals)}.{parted}")
+        lines.append(f"On these data hard to distinguish from {', '.join(plain(r) for r in rivals)}.{parted}")
     return element(
         "article",
         element("h3", capital(plain(name))),

@@ -81,7 +81,7 @@ def test_the_share_that_somebody_asks_for_judges_and_never_a_runs_start(share: f
     found = split([trace], share)
     assert found.judge[0].mean() == pytest.approx(share, abs=0.01)
     assert not found.judge[0][:150].any()
-    assert f"identify.runs.holdout: {share:g}" in found.note
+    assert f"identify.holdout: {share:g}" in found.note
 
 
 def test_a_disturbance_is_named_where_whole_runs_are_held_out_whose_phase_no_fit_knows() -> None:

@@ -80,10 +80,10 @@ def test_an_alias_may_be_used(tmp_path: Path) -> None:
 
 
 def test_set_replaces_one_key_and_makes_missing_sections(tmp_path: Path) -> None:
-    loaded = load(tmp_path, SMALLEST, "identify.genetic.algorithm.population=500", "recorded.runs.0.use=fit")
+    loaded = load(tmp_path, SMALLEST, "identify.genetic.population=500", "recorded.runs.0.use=fit")
     assert loaded.config.identify.genetic.population == 500
     assert loaded.config.recorded is not None and loaded.config.recorded.runs[0].use == "fit"
-    assert loaded.overrides == ("identify.genetic.algorithm.population=500", "recorded.runs.0.use=fit")
+    assert loaded.overrides == ("identify.genetic.population=500", "recorded.runs.0.use=fit")
 
 
 def test_set_takes_yaml_values(tmp_path: Path) -> None:
@@ -103,7 +103,7 @@ def test_set_mends_what_is_wrong_in_the_file(tmp_path: Path) -> None:
     [
         ("identify.seed", "has to be KEY=VALUE", "--set identify.genetic.population=500"),
         ("=3", "has to be KEY=VALUE", "e.g."),
-        ("identify.genetic.algorithm.populaton=5", "unknown key 'populaton'", "did you mean 'population'"),
+        ("identify.genetic.populaton=5", "unknown key 'populaton'", "did you mean 'population'"),
         ("identify.seed=many", "'many' is not allowed", "whole number"),
         ("recorded.runs.3.use=fit", "a list of 1", "from 0 to 0"),
         ("recorded.runs.first.use=fit", "a list of 1", "from 0 to 0"),
