@@ -22,7 +22,7 @@ for _name in ("SIGHUP", "SIGTERM"):
 WITH_DEADLINES = (
     "drivers/amplifiers",
     "drivers/test_",
-    "rig/cli",
+    "commands/",
     "rig/config/test_malformed",
     "rig/recording/test_flushing",
     "rig/recording/test_journal",

@@ -20,7 +20,7 @@ from rig.recording.hdf5 import read_recording_h5
 from rig.recording.journal_reader import read_journal
 
 SIZE_MIB = 2  # full a second or two into the set
-RIG = (sys.executable, "-c", "from rig.cli import main; main()")
+RIG = (sys.executable, "-c", "from commands.rig import main; main()")
 
 
 @pytest.fixture

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 import rig.recording.steady as steady_module
+from commands.campaign.campaign_part import Part
 from drivers.capture import TICK, Capture, read_capture
 from drivers.capture_account import account_of
-from rig.cli.parts import Part
 from rig.recording.journal import Journal
 from rig.recording.journal_reader import read_journal
 from rig.recording.steady import RESERVED_BYTES, SteadyFile, missing_of, opened, record, tail_of, whole

@@ -1,0 +1,139 @@
+"""The command `rig`: check, devices, play, emulate, recover, export."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from commands.campaign.context import Desk, Options, at_desk
+from commands.terminal.exit_codes import conclude
+from commands.terminal.options import (
+    ConfigFile,
+    DryRun,
+    Emulate,
+    Out,
+    Overrides,
+    Quiet,
+    Resume,
+    Seed,
+    Version,
+    Yes,
+    new_app,
+)
+
+app = new_app("Prepare, check and play a campaign on the rig. To identify from it: identify-run.")
+
+
+@app.callback()
+def rig(version: Version = False) -> None:
+    """Prepare, check and play a campaign on the rig. To identify from it: identify-run."""
+
+
+@app.command()
+def check(config: ConfigFile, emulate: Emulate = False, overrides: Overrides = None) -> None:
+    """Validate CONFIG, forecast every set, contact the devices without torque; say what is wrong and its cure."""
+
+    def command(desk: Desk) -> int:
+        loaded = desk.options.load()
+        from commands.rig.check import run_checks
+
+        return run_checks(desk, loaded)
+
+    raise typer.Exit(at_desk(Options(config, emulate=emulate, overrides=tuple(overrides or ())), command))
+
+
+@app.command()
+def devices() -> None:
+    """List the serial ports and CAN adapters of this machine."""
+
+    def command() -> int:
+        from commands.rig.devices import device_lines
+
+        sys.stdout.write("\n".join(device_lines()) + "\n")
+        return 0
+
+    raise typer.Exit(conclude(command))
+
+
+@app.command()
+def play(
+    config: ConfigFile,
+    out: Out = None,
+    dry_run: DryRun = False,
+    emulate: Emulate = False,
+    yes: Yes = False,
+    overrides: Overrides = None,
+    seed: Seed = None,
+    quiet: Quiet = False,
+    resume: Resume = None,
+) -> None:
+    """Play and record only."""
+
+    def command(desk: Desk) -> int:
+        loaded = desk.options.load()
+        from commands.rig.play import play_only
+
+        return play_only(desk, loaded)
+
+    options = Options(config, out, dry_run, emulate, yes, tuple(overrides or ()), seed, quiet, resume)
+    raise typer.Exit(at_desk(options, command))
+
+
+@app.command()
+def recover(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="The results folder of a campaign.", show_default=False)
+    ],
+) -> None:
+    """Mend what a kill or a power cut left of a results folder; nothing that stands there is changed."""
+
+    def command() -> int:
+        from commands.rig.recover import recover_folder
+
+        return recover_folder(folder)
+
+    raise typer.Exit(conclude(command))
+
+
+@app.command()
+def export(
+    source: Annotated[
+        Path, typer.Argument(metavar="FROM", help="A results folder, recording.h5 or journal.", show_default=False)
+    ],
+    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, npz; of the CAN log: blf, asc, mf4.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="A folder that does not exist yet. Default: FROM/export_FORMAT/")
+    ] = None,
+) -> None:
+    """Write a recording for other programs, every digit kept, with a rig.yaml that reads it back."""
+
+    def command() -> int:
+        from commands.rig.export import export_recording
+
+        return export_recording(source, to, out)
+
+    raise typer.Exit(conclude(command))
+
+
+@app.command()
+def emulate(config: ConfigFile, overrides: Overrides = None) -> None:
+    """Emulate the devices of CONFIG's `bench` section at wire level until Ctrl-C; JSON lines say what they do.
+
+    JSON lines on standard input let faults take hold: {"fault": "gyro_silent", "lasts_s": 0.2}.
+    """
+
+    def command() -> int:
+        from commands.campaign.backends import require_emulators
+
+        require_emulators()
+        from sim_backend.emulators.process import run_emulators
+
+        requests = sys.stdin.fileno() if sys.stdin is not None and not sys.stdin.closed else None
+        options = Options(config, emulate=True, overrides=tuple(overrides or ()))
+        run_emulators(options.load().config, requests)
+        return 0
+
+    raise typer.Exit(conclude(command))

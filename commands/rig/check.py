@@ -1,0 +1,163 @@
+"""`rig check`: everything that can be known to be wrong before a campaign, said at once with its cure.
+
+Each check is one function from what is known to lines for the operator; one that fails raises, and the others
+still speak. A further check is a function and a place in ``CHECKS``.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from commands.campaign.backends import BACKENDS, RECORDED, Stage, backend_name
+from commands.campaign.context import Desk
+from commands.campaign.limit_locations import with_places
+from commands.terminal.display import plain
+from commands.terminal.exit_codes import OK
+from rig.config.load import LoadedConfig
+from rig.errors import Aborted, PreflightRefusal, RecordingError, RigError
+from rig.interface import Torque
+from rig.preflight import Prediction, playable_of, predict_all
+
+NO_SCALE = (
+    "forecast for a platform of unit inertia (model.inertia_unknown): how far a torque moves the real one nobody can "
+    "tell before its inertia is declared"
+)
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the checks look at. ``stage`` is None where nothing is played."""
+
+    loaded: LoadedConfig
+    stage: Stage | None
+
+    @cached_property
+    def predictions(self) -> tuple[Prediction, ...]:
+        """What every set of the campaign would do."""
+        config, rig = self.loaded.config, self.stage.rig if self.stage else None
+        assert rig is not None
+        scale, key = rig.rate_full_scale_rad_s, rig.rate_full_scale_key
+        return predict_all(config.model.platform(), config.excitation, config.limits, scale, key)
+
+
+Check = Callable[[Known], list[str]]
+
+
+def configuration(known: Known) -> list[str]:
+    """That the file is sound: it would not have been loaded otherwise."""
+    config = known.loaded.config
+    return [f"configuration {plain(str(known.loaded.path))}: sound (backend {config.backend})"]
+
+
+def forecast(known: Known) -> list[str]:
+    """Travel, rate and torque of every set. Raises PreflightRefusal where one may not be played."""
+    if known.stage is None:
+        return []
+    config = known.loaded.config
+    try:
+        playable_of(known.predictions, config.model.platform(), config.excitation)
+    except PreflightRefusal as error:
+        raise with_places(error, known.loaded) from None
+    doubt = [NO_SCALE] if config.model.inertia_unknown else []
+    return doubt + [
+        f"forecast {plain(p.sentence())}" + ("" if p.passes else f", scaled to {100 * p.scale:.1f} % as asked")
+        for p in known.predictions
+    ]
+
+
+def recordings(known: Known) -> list[str]:
+    """That every recording can be read and trusted. Raises RecordingError."""
+    if known.stage is not None:
+        return []
+    from rig.recording.load import read_recording
+
+    lines = []
+    for run in read_recording(known.loaded).runs:
+        channels = [name for name, values in (("rate", run.rate_rad_s), ("angle", run.angle_rad)) if values is not None]
+        torque = "with torque" if run.torque_nm is not None else "without torque (free decay)"
+        lines.append(
+            f"recording {plain(run.name)}: {len(run.time_s)} samples of {' and '.join(channels)} over "
+            f"{run.duration_s:.3g} s, {int((~run.valid).sum())} invalid, {torque}, use: {run.use}"
+        )
+    return lines
+
+
+def identifiability(known: Known) -> list[str]:
+    """What every set alone and all together can determine about the declared platform."""
+    from identify.foresight import of_planned_campaign, of_recorded_campaign
+
+    config = known.loaded.config
+    if known.stage is None:
+        from rig.recording.load import read_recording
+
+        try:
+            recording = read_recording(known.loaded)
+        except RecordingError:  # said by the check before
+            return []
+        lines = of_recorded_campaign(recording, config.model.platform())
+    else:
+        rig = known.stage.rig
+        platform = config.model.platform()
+        # A set that would break a limit is refused by the forecast; here it speaks at the torque that passes.
+        sets = [p.planned.scaled(p.scale) for p in known.predictions if p.scale > 0.0]
+        lines = of_planned_campaign(platform, sets, config.excitation.sample_rate_hz, rig.noise_rad_s)
+    return [f"identifiability {plain(line)}" for line in lines]
+
+
+def contact(known: Known) -> list[str]:
+    """That every device answers, without torque. Raises DeviceFault that lists all that do not."""
+    stage = known.stage
+    if stage is None or stage.rig.statement().torque is Torque.SIMULATED:
+        return []
+    with stage.rig.opened():
+        account = stage.account()
+    return [f"device {line}" for line in _account_lines(account)]
+
+
+def _account_lines(account: Mapping[str, Any]) -> Iterator[str]:
+    bench = account.get("bench", {})
+    yield plain(str(account.get("gyroscope", "gyroscope: answered")))
+    for note in (*bench.get("gyro", {}).get("said", ()), *bench.get("amplifier_notes", ())):
+        yield plain(str(note))
+    if bench.get("real_time"):
+        yield f"this computer: {plain(bench['real_time'])}"
+
+
+CHECKS: tuple[Check, ...] = (configuration, recordings, forecast, identifiability, contact)
+
+
+def run_checks(desk: Desk, loaded: LoadedConfig) -> int:
+    """Run all checks; lines go to stdout, what is wrong to stderr. Returns the exit code of the first fault."""
+    code = OK
+    with tempfile.TemporaryDirectory() as scratch, _known(desk, loaded, Path(scratch)) as known:
+        for check in CHECKS:
+            try:
+                lines = check(known)
+            except Aborted:
+                raise
+            except RigError as error:
+                found = desk.say_error(error)
+                code = code or found
+                continue
+            sys.stdout.writelines(f"{line}\n" for line in lines)
+            sys.stdout.flush()
+    if code == OK:
+        sys.stdout.write("All checks passed; nothing was moved.\n")
+    return code
+
+
+@contextmanager
+def _known(desk: Desk, loaded: LoadedConfig, scratch: Path) -> Iterator[Known]:
+    name = backend_name(loaded.config, False, desk.options.emulate)
+    if name == RECORDED:
+        yield Known(loaded, None)
+        return
+    with BACKENDS[name](loaded, scratch / "raw") as stage:
+        yield Known(loaded, stage)
