@@ -23,12 +23,12 @@ from rig.clock import MonotonicClock
 from rig.config.load import load_config
 from rig.config.root import Config
 from rig.guard import Guard
-from rig.guard_motion import motion_checks
+from rig.guard.motion import motion_checks
 from rig.interface import Torque
-from rig.lateness import Lateness
 from rig.preflight import plan
-from rig.rehearsal import rehearse
 from rig.sequencer import Sequencer
+from rig.sequencer.lateness import Lateness
+from rig.sequencer.warm_up import rehearse
 from sim_backend.emulators.launch import Emulators, on_emulated_ports, started
 
 P99_9 = 0.999

@@ -17,11 +17,11 @@ import numpy as np
 from drivers.capture import CLOCK, MARK
 from drivers.replay import ReplayRig
 from rig.errors import RecordingError
-from rig.hindsight import better_times
 from rig.interface import GyroSample, LowPass, TorqueSample
 from rig.recording.restamped import NO_RESTAMPS, Restamps, restamped
 from rig.recording.rows import increasing, on_samples
 from rig.recording.run import Array, Recording, Run
+from rig.sequencer.time_corrections import better_times
 
 BEFORE_S = 1e-6  # rounding of time stamps at the start of a set
 

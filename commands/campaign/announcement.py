@@ -12,8 +12,8 @@ from rig.config.root import Config
 from rig.errors import UsageError
 from rig.excitation import PlannedSet
 from rig.interface import Statement, Torque
-from rig.probe import Probe
 from rig.sequencer import SETTLE_S, TAIL_S
+from rig.sequencer.probe import Probe
 
 RULE = "=" * 78
 QUESTION = "REAL torque will be applied. Is everybody clear of the machine? Type yes to start: "

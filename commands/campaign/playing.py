@@ -28,15 +28,15 @@ from rig.config.load import LoadedConfig
 from rig.errors import Aborted, PreflightRefusal, RigError, UsageError
 from rig.excitation import PlannedSet
 from rig.guard import Guard
-from rig.guard_motion import motion_checks
+from rig.guard.motion import motion_checks
 from rig.interface import Rig, Torque
 from rig.preflight import plan
-from rig.probe import Probe
-from rig.recorder import SetStatistics
 from rig.recording.journal import Journal
 from rig.recording.run import Recording
-from rig.rehearsal import rehearse
 from rig.sequencer import Sequencer
+from rig.sequencer.probe import Probe
+from rig.sequencer.recorder import SetStatistics
+from rig.sequencer.warm_up import rehearse
 
 
 class Tally(SetBars):

@@ -13,12 +13,12 @@ from commands.campaign.provenance import provenance
 from commands.campaign.results_folder import RECORDING_FILE, ResultsFolder
 from rig.config.load import LoadedConfig
 from rig.errors import RigError
-from rig.recorder import SetStatistics
 from rig.recording.hdf5 import write_recording_h5
 from rig.recording.journal import JournalError
 from rig.recording.journal_reader import JournalContents, read_journal, recording_from_journal
 from rig.recording.results import joined
 from rig.recording.run import Recording
+from rig.sequencer.recorder import SetStatistics
 
 WIRE_LOGS = ("gyro.bin", "can.log")  # beside a raw capture; empty where no device could be reached
 

@@ -15,8 +15,8 @@ from queue import SimpleQueue
 from typing import TextIO
 
 from rig.excitation import PlannedSet
-from rig.recorder import SetStatistics
 from rig.sequencer import Observer, Progress
+from rig.sequencer.recorder import SetStatistics
 
 BAR_WIDTH = 24
 MOST_WAITING = 50  # lines; a terminal that takes none loses bars, not memory

@@ -8,9 +8,9 @@ import time
 
 from commands.terminal.display import LOST, SetBars, Terminal, plain
 from rig.excitation import Sine, planned
-from rig.lateness import Lateness
-from rig.recorder import SetStatistics
 from rig.sequencer import Progress
+from rig.sequencer.lateness import Lateness
+from rig.sequencer.recorder import SetStatistics
 
 SET = planned((Sine(torque_nm=10, frequency_hz=5, duration_s=0.5),))[0]
 PROGRESS = Progress("5 Hz", 0.25, 0.5, 2e-4, 1, 3, 9.5)

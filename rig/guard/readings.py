@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from rig.config.limits import LimitsConfig
-from rig.guard_base import Check, Tick, Trip
+from rig.guard.base import Check, Tick, Trip
 
 LONGEST_WITHOUT_S = 0.1  # an encoder may have no reading for so long
 

@@ -10,11 +10,11 @@ import numpy as np
 from rig.excitation import PlannedSet
 from rig.guard import Tick
 from rig.interface import LowPass
-from rig.lateness import Lateness
 from rig.recording.journal import Journal
 from rig.recording.restamped import BEGUN_S, NO_RESTAMPS, Restamps, restamped
 from rig.recording.rows import increasing, on_samples
 from rig.recording.run import Array, Run, TorqueHold
+from rig.sequencer.lateness import Lateness
 
 HAND_OVER_S = 0.02  # between hand-overs to the journal, which buffers again: together far below 100 ms
 EDGE_S = 1e-6  # rounding of time stamps at the ends of a set

@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from rig.lateness import CLASS_RATIO, Lateness
+from rig.sequencer.lateness import CLASS_RATIO, Lateness
 
 LATE_S = np.random.default_rng(3).lognormal(math.log(5e-5), 1.2, 20_000)
 

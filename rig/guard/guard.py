@@ -10,8 +10,8 @@ import math
 from collections.abc import Sequence
 
 from rig.config.limits import LimitsConfig
-from rig.guard_base import Check, Rest, Tick, Trip
-from rig.guard_readings import READINGS
+from rig.guard.base import Check, Rest, Tick, Trip
+from rig.guard.readings import READINGS
 
 __all__ = ["CHECKS", "Check", "Guard", "Rest", "Tick", "Trip"]
 

@@ -12,11 +12,11 @@ import pytest
 from rig.config.limits import LimitsConfig
 from rig.excitation import PlannedSet
 from rig.guard import Guard
-from rig.guard_base import Rest, Tick
-from rig.guard_motion import motion_checks
+from rig.guard.base import Rest, Tick
+from rig.guard.motion import motion_checks
 from rig.interface import GyroSample, TorqueSample
 from rig.platform import Platform
-from rig.rehearsal import rehearse
+from rig.sequencer.warm_up import rehearse
 
 LIMITS = LimitsConfig(travel_deg=10, rate_deg_s=400, torque_nm=150)
 DECLARED = Platform(0.02, 0.06, 680.0)
@@ -26,8 +26,8 @@ SETS: list[PlannedSet] = []
 FAULTS = """
 import resource
 from rig import realtime
-from rig.rehearsal import rehearse
-from tests.rig.test_rehearsal import DECLARED, LIMITS, SETS, moving_ticks, new_guard
+from rig.sequencer.warm_up import rehearse
+from tests.rig.sequencer.test_warm_up import DECLARED, LIMITS, SETS, moving_ticks, new_guard
 rehearse(new_guard(), DECLARED, SETS, 1000.0)
 guard, ticks = new_guard(), moving_ticks()
 grant = realtime.acquire(0, lock_memory=True)

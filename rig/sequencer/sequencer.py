@@ -20,14 +20,14 @@ from rig.clock import Clock
 from rig.errors import Aborted, DeviceFault, RigError, SafetyTrip
 from rig.excitation import PlannedSet
 from rig.guard import Guard, Rest, Tick, Trip
-from rig.hindsight import better_times
 from rig.interface import Rig
-from rig.observer import Observer, Progress
-from rig.probe import Probe
-from rig.recorder import SetRecorder, SetStatistics
 from rig.recording.journal import Journal
 from rig.recording.restamped import NO_RESTAMPS
 from rig.recording.run import Recording
+from rig.sequencer.observer import Observer, Progress
+from rig.sequencer.probe import Probe
+from rig.sequencer.recorder import SetRecorder, SetStatistics
+from rig.sequencer.time_corrections import better_times
 
 __all__ = ["Campaign", "Observer", "Progress", "Sequencer"]
 

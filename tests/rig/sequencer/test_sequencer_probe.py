@@ -14,11 +14,11 @@ from rig.errors import SafetyTrip
 from rig.excitation import Sine
 from rig.excitation.planned import planned
 from rig.guard import Guard
-from rig.guard_motion import motion_checks
+from rig.guard.motion import motion_checks
 from rig.interface import Exchange, GyroSample, TorqueSample
 from rig.platform import Platform
-from rig.probe import Probe
 from rig.sequencer import Campaign, Observer, Sequencer
+from rig.sequencer.probe import Probe
 from sim_backend.simulated import SimulatedRig
 from tests.rig.scripted import ScriptedRig
 

@@ -13,9 +13,9 @@ from rig.config.root import Config
 from rig.errors import SafetyTrip
 from rig.excitation import Sine
 from rig.excitation.planned import PlannedSet, planned
-from rig.guard_base import Rest, Tick
+from rig.guard.base import Rest, Tick
 from rig.platform import Platform
-from rig.probe import Probe
+from rig.sequencer.probe import Probe
 from sim_backend.simulated import SimulatedRig
 
 DECLARED = Platform(0.0185, 0.06, 650.0)

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rig.config.limits import LimitsConfig
-from rig.guard_base import Check, Rest, Tick, TorquePast, Trip
+from rig.guard.base import Check, Rest, Tick, TorquePast, Trip
 from rig.platform import Platform
 from rig.recording.run import Array
 

@@ -14,7 +14,7 @@ from rig.config.load import load_config
 from rig.config.root import Config
 from rig.errors import RigError, SafetyTrip
 from rig.guard import Guard
-from rig.guard_motion import motion_checks
+from rig.guard.motion import motion_checks
 from rig.interface import Exchange, GyroSample
 from rig.platform import Platform
 from rig.preflight import plan

@@ -16,7 +16,7 @@ from rig.config.limits import LimitsConfig
 from rig.errors import PreflightRefusal
 from rig.excitation import PlannedSet, planned
 from rig.platform import Platform
-from rig.walk import Chain, Forecast, Peaks, largest, stays_where_it_is_left
+from rig.preflight.forecast import Chain, Forecast, Peaks, largest, stays_where_it_is_left
 
 LEAST_TOLD_DEG = 0.005
 LIMIT_KEYS = ("limits.travel_deg", "limits.rate_deg_s", "limits.torque_nm")

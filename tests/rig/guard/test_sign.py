@@ -8,7 +8,7 @@ import pytest
 
 from rig.errors import SafetyTrip
 from rig.platform import Platform
-from tests.rig.test_guard_motion import DECLARED, RUBBING, USUAL, campaign, played, when
+from tests.rig.guard.test_motion import DECLARED, RUBBING, USUAL, campaign, played, when
 
 SETTLE_S = 0.5  # of zero torque before the set
 LIMITS = {"torque_nm": 150}

@@ -3,7 +3,7 @@
 What is declared may be wrong by a factor of two in inertia and stiffness, and may lack any friction, play or delay;
 a lightly damped resonance is no fault. So nothing here compares with a predicted rate. Held on to is only what holds
 for every platform that cannot make energy of its own: its rate does not step, the work done on it from rest is not
-negative, and it does not stand still under any torque. What those leave open of the sign, ``guard_sign`` decides.
+negative, and it does not stand still under any torque. What those leave open of the sign, ``rig.guard.sign`` decides.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from collections import deque
 from collections.abc import Sequence
 
 from rig.config.limits import LimitsConfig
-from rig.guard_base import Check, Rest, Tick, TorquePast, Trip
-from rig.guard_sign import TurnedSign
+from rig.guard.base import Check, Rest, Tick, TorquePast, Trip
+from rig.guard.sign import TurnedSign
 from rig.platform import Platform
 
 NOISE_SIGMAS = 8.0

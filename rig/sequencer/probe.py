@@ -25,7 +25,7 @@ from rig.config.bench import ProbeConfig
 from rig.config.limits import LimitsConfig
 from rig.errors import SafetyTrip
 from rig.excitation import PlannedSet
-from rig.guard_base import Rest, Tick
+from rig.guard.base import Rest, Tick
 from rig.platform import Platform
 from rig.recording.run import Array
 

@@ -16,10 +16,10 @@ from rig.errors import Aborted, DeviceFault, SafetyTrip
 from rig.excitation import ExcitationSet, PlannedSet, Sine, planned
 from rig.guard import Guard
 from rig.interface import Exchange, GyroSample, TorqueSample
-from rig.recorder import SetStatistics
 from rig.recording.journal import Journal
 from rig.recording.journal_reader import read_journal, recording_from_journal
 from rig.sequencer import SETTLE_S, Observer, Progress, Sequencer
+from rig.sequencer.recorder import SetStatistics
 from tests.rig.scripted import ScriptedRig
 
 ONE = Sine(torque_nm=10, frequency_hz=5, duration_s=0.5)

@@ -14,10 +14,10 @@ import numpy as np
 
 from rig.excitation import PlannedSet
 from rig.guard import Guard
-from rig.guard_base import Rest, Tick
+from rig.guard.base import Rest, Tick
 from rig.interface import GyroSample, TorqueSample
 from rig.platform import Platform
-from rig.probe import inertia_of
+from rig.sequencer.probe import inertia_of
 
 LENGTH_S = 0.5  # every check has given a verdict by then
 FREQUENCY_HZ = 5.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rig.excitation import PlannedSet
-from rig.recorder import SetStatistics
+from rig.sequencer.recorder import SetStatistics
 
 
 class Progress(NamedTuple):
