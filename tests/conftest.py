@@ -21,7 +21,12 @@ for _name in ("SIGHUP", "SIGTERM"):
 # Tests with deadlines of their own, by the beginning of their path: beside another one they would be late.
 WITH_DEADLINES = (
     "drivers/amplifiers",
+    "drivers/capture",
+    "drivers/gyroscopes/test_gyro_line",
+    "drivers/replay",
     "drivers/test_",
+    "drivers/timing",
+    "drivers/transport",
     "commands/",
     "rig/config/test_malformed",
     "rig/recording/test_flushing",

@@ -14,13 +14,13 @@ from drivers.amplifiers.cia402_status import DriveStatus
 from drivers.amplifiers.moteus import decode_registers
 from drivers.amplifiers.torque_clock import TorqueClock
 from drivers.amplifiers.vesc import decode_status
-from drivers.can_link import Heard
-from drivers.capture import pack_frame, unpack_frame
+from drivers.capture.wire_capture import pack_frame, unpack_frame
 from drivers.codecs import cia402, lawicel, odrive_cansimple
 from drivers.codecs.lawicel import CanFrame, LawicelDecoder
 from drivers.gyroscopes import make_gyroscope
-from drivers.hindsight import LARGEST_CORRECTION_S
-from drivers.source_clock import SourceClock
+from drivers.timing.retiming import LARGEST_CORRECTION_S
+from drivers.timing.source_clock import SourceClock
+from drivers.transport.can_link import Heard
 from rig.config.bench import AmplifierConfig, CanConfig, GyroscopeConfig
 from rig.errors import DeviceFault
 

@@ -127,7 +127,7 @@ def _bench_section(config: Config) -> BenchConfig:
 
 def _capture_of(folder: Path, named: str) -> Path:
     """The capture in a results folder, in its raw folder, or named itself; raises ConfigError where there is none."""
-    from drivers.capture import FILE_NAME
+    from drivers.capture.wire_capture import FILE_NAME
 
     for base in (folder / named, Path(named)):
         for path in (base / "raw" / FILE_NAME, base / FILE_NAME, base):

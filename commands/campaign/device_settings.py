@@ -68,7 +68,7 @@ def _refused(
 
 
 def _bus_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
-    from drivers.can_link import bus_faults
+    from drivers.transport.can_link import bus_faults
 
     given = _at(data, CAN)
     config, is_whole = _as_far_as_sound(given, CanConfig) if isinstance(given, dict) else (None, False)
@@ -79,7 +79,7 @@ def _bus_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
 
 def _url_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     """A gyroscope's port that is a URL; the adapter's is told with its bus."""
-    from drivers.ports import url_fault
+    from drivers.transport.ports import url_fault
 
     port = _at(data, GYRO_PORT)
     fault = url_fault(port) if isinstance(port, str) else None
@@ -88,7 +88,7 @@ def _url_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _port_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
-    from drivers.ports import is_same_port
+    from drivers.transport.ports import is_same_port
 
     gyro, channel = _at(data, GYRO_PORT), _at(data, CAN_CHANNEL)
     for path, value, section in ((GYRO_PORT, gyro, GyroscopeConfig), (CAN_CHANNEL, channel, CanConfig)):

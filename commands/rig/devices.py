@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from commands.terminal.display import plain
-from drivers.latency import latency_told
+from drivers.transport.usb_latency import latency_told
 
 NO_ADAPTERS = ("virtual", "udp_multicast", "serial")  # offered by python-can everywhere; nothing is plugged in
 Lister = Callable[[], list[Any]]

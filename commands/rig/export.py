@@ -45,7 +45,7 @@ def _made(folder: Path) -> None:
 
 
 def _can_logs(home: Path, wanted: str, folder: Path) -> Iterator[str]:
-    from drivers.can_export import check_installed, write_can_log
+    from drivers.capture.can_export import check_installed, write_can_log
 
     check_installed(wanted)
     captures = sorted(home.glob(f"raw/**/{CAPTURE_FILE}"))

@@ -50,7 +50,7 @@ def recover_folder(folder: Path) -> int:
 
 def _captures(folder: Path) -> Iterator[str]:
     """A line for every raw capture; what a campaign writes beside it at its end is written where it is missing."""
-    from drivers.capture_account import account_of, export_if_missing
+    from drivers.capture.account import account_of, export_if_missing
 
     for path in _capture_files(folder):
         name = path.relative_to(folder)
@@ -66,8 +66,8 @@ def _captures(folder: Path) -> Iterator[str]:
 
 def _out_of_captures(folder: Path, without: RecordingError) -> Recovery:
     """Where no journal has a sample: what the drivers make of the raw captures. Raises RecordingError."""
-    from drivers.capture_account import account_of
-    from drivers.recall import recall
+    from drivers.capture.account import account_of
+    from drivers.replay.recording import recall
     from rig.recording.hdf5 import write_recording_h5
     from rig.recording.recover import Recovery
     from rig.recording.results import RECORDING_FILE, RECOVERED_FILE, free_name

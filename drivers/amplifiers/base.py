@@ -5,10 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
-from drivers.bounded import FirstAndLast
-from drivers.can_link import CanLink, Heard
+from drivers.bounded_log import FirstAndLast
 from drivers.codecs.lawicel import CanFrame
-from drivers.hindsight import Hindsight
+from drivers.timing.retiming import Hindsight
+from drivers.transport.can_link import CanLink, Heard
 from rig.config.bench import AmplifierConfig
 from rig.interface import TorqueSample
 

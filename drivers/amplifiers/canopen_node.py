@@ -9,9 +9,9 @@ from typing import Any
 import canopen
 from canopen.sdo import SdoAbortedError, SdoClient, SdoCommunicationError
 
-from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
-from drivers.ports import MOST_QUOTED
+from drivers.transport.can_link import CanLink, Heard
+from drivers.transport.ports import MOST_QUOTED
 from rig.errors import ConfigError, DeviceFault
 
 MAX_EDS_BYTES = 4 << 20  # the largest of the trade have one

@@ -23,13 +23,13 @@ from drivers.amplifiers.cia402_setup import (
 )
 from drivers.amplifiers.cia402_status import NMT_OPERATIONAL, DriveStatus
 from drivers.amplifiers.torque_clock import TorqueClock
-from drivers.bounded import FirstAndLast
-from drivers.can_link import CanLink, Heard
+from drivers.bounded_log import FirstAndLast
 from drivers.codecs import cia402
 from drivers.codecs.cia402 import State
 from drivers.codecs.lawicel import CanFrame
-from drivers.hindsight import Hindsight
 from drivers.settings import read_settings
+from drivers.timing.retiming import Hindsight
+from drivers.transport.can_link import CanLink, Heard
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 from rig.interface import TorqueSample

@@ -11,10 +11,10 @@ from pydantic import Field
 
 from drivers.amplifiers.canopen_node import RemoteObjects, read_dictionary
 from drivers.amplifiers.cia402_plan import DrivePlan, ModeWish, plan_drive, standard_dictionary
-from drivers.can_link import CanLink
 from drivers.codecs import cia402
 from drivers.codecs.lawicel import CanFrame
 from drivers.settings import Settings
+from drivers.transport.can_link import CanLink
 from rig.errors import ConfigError, DeviceFault
 
 NMT_START, NMT_PRE_OPERATIONAL = 0x01, 0x80

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from drivers.bounded import FirstAndLast
-from drivers.can_link import Heard
+from drivers.bounded_log import FirstAndLast
 from drivers.codecs import cia402
 from drivers.codecs.cia402 import State
+from drivers.transport.can_link import Heard
 from rig.errors import DeviceFault
 
 NMT_OPERATIONAL = 0x05

@@ -13,11 +13,11 @@ from typing import Annotated
 from pydantic import Field
 
 from drivers.amplifiers.base import Amplifier
-from drivers.can_link import CanLink, Heard
 from drivers.codecs import odrive_cansimple as wire
 from drivers.codecs.lawicel import CanFrame
 from drivers.codecs.odrive_cansimple import Command
 from drivers.settings import Settings, read_settings
+from drivers.transport.can_link import CanLink, Heard
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 

@@ -12,8 +12,8 @@ import math
 import statistics
 from collections import deque
 
-from drivers.hindsight import OWN_LINE, Hindsight
-from drivers.source_clock import SourceClock
+from drivers.timing.retiming import OWN_LINE, Hindsight
+from drivers.timing.source_clock import SourceClock
 
 BLOCK_S = 0.25
 BLOCKS_KEPT = 240

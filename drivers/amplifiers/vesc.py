@@ -14,9 +14,9 @@ from typing import Annotated
 from pydantic import Field
 
 from drivers.amplifiers.base import Amplifier
-from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
 from drivers.settings import Settings, read_settings
+from drivers.transport.can_link import CanLink, Heard
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 

@@ -12,10 +12,10 @@ from abc import ABC, abstractmethod
 from collections import deque
 from typing import NamedTuple
 
-from drivers.bounded import FirstAndLast
+from drivers.bounded_log import FirstAndLast
 from drivers.codecs.framing import Matcher, StreamFramer
-from drivers.hindsight import Hindsight
-from drivers.source_clock import SourceClock
+from drivers.timing.retiming import Hindsight
+from drivers.timing.source_clock import SourceClock
 from rig.config.bench import GyroscopeConfig
 from rig.errors import ConfigError
 from rig.interface import GyroSample, LowPass

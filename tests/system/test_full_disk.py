@@ -15,7 +15,7 @@ if sys.platform != "linux":
     pytest.skip("a small disk is made by mounting one", allow_module_level=True)
 
 from benchmarks.emulated import OFF, SHORT, Devices, Host, recovered
-from drivers.capture import TICK, read_capture
+from drivers.capture.wire_capture import TICK, read_capture
 from rig.recording.hdf5 import read_recording_h5
 from rig.recording.journal_reader import read_journal
 

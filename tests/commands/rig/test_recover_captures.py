@@ -14,7 +14,7 @@ from rig.recording.hdf5 import read_recording_h5
 from rig.recording.journal import Journal
 from rig.recording.load import read_recording
 from tests.commands.support import command
-from tests.drivers import test_capture_and_replay as wires
+from tests.drivers.replay import test_capture_and_replay as wires
 
 bench = wires.bench
 

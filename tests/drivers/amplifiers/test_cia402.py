@@ -1,11 +1,11 @@
 import pytest
 
-import drivers.can_link
+import drivers.transport.can_link
 from drivers.amplifiers import make_amplifier
-from drivers.can_link import CanLink
 from drivers.codecs import cia402
 from drivers.codecs.cia402 import State
 from drivers.codecs.lawicel import CanFrame
+from drivers.transport.can_link import CanLink
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 from sim_backend.emulators.drive import Cia402Drive
@@ -14,7 +14,7 @@ from tests.drivers.emulated_bus import EmulatedBus, FakeTime
 
 @pytest.fixture(autouse=True)
 def no_sleeping(monkeypatch):
-    monkeypatch.setattr(drivers.can_link.time, "sleep", lambda s: None)
+    monkeypatch.setattr(drivers.transport.can_link.time, "sleep", lambda s: None)
 
 
 class Bench:

@@ -4,10 +4,10 @@ import struct
 import can
 import pytest
 
-import drivers.can_link
+import drivers.transport.can_link
 from drivers.amplifiers import make_amplifier, moteus, vesc
-from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
+from drivers.transport.can_link import CanLink, Heard
 from rig.config.bench import AmplifierConfig, CanConfig
 from rig.errors import ConfigError, DeviceFault
 from sim_backend.emulators.odrive import OdriveAxis
@@ -19,7 +19,7 @@ MOTEUS_REPLIES = [v for v in vectors("mjbots") if v["hex"].startswith("24")]
 
 @pytest.fixture(autouse=True)
 def no_sleeping(monkeypatch):
-    monkeypatch.setattr(drivers.can_link.time, "sleep", lambda s: None)
+    monkeypatch.setattr(drivers.transport.can_link.time, "sleep", lambda s: None)
 
 
 class Bench:

@@ -15,8 +15,8 @@ import pytest
 
 import rig.recording.steady as steady_module
 from commands.campaign.campaign_part import Part
-from drivers.capture import TICK, Capture, read_capture
-from drivers.capture_account import account_of
+from drivers.capture.account import account_of
+from drivers.capture.wire_capture import TICK, Capture, read_capture
 from rig.recording.journal import Journal
 from rig.recording.journal_reader import read_journal
 from rig.recording.steady import RESERVED_BYTES, SteadyFile, missing_of, opened, record, tail_of, whole
@@ -223,7 +223,7 @@ import sys, threading, time
 from collections import defaultdict
 from pathlib import Path
 import rig.recording.steady as steady
-from drivers.capture import Capture
+from drivers.capture.wire_capture import Capture
 from rig.recording.journal import Journal
 
 held, write = defaultdict(threading.Lock), steady._write_all
