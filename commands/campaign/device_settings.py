@@ -109,7 +109,7 @@ def _injected_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     given = _at(data, FAULTS)
     if not isinstance(given, list) or not given:
         return
-    from sim_backend.emulators.faults import FAULTS as KNOWN
+    from sim_backend.emulators.faults.schedule import FAULTS as KNOWN
 
     for n, one in enumerate(given):
         name = one.get("fault") if isinstance(one, dict) else None

@@ -20,10 +20,10 @@ from rig.errors import ConfigError
 from sim_backend.emulators.adapter import LawicelAdapter
 from sim_backend.emulators.device import EmulatedDrive, Event
 from sim_backend.emulators.drive import Cia402Drive
-from sim_backend.emulators.faults import Faults
+from sim_backend.emulators.faults.schedule import Faults
 from sim_backend.emulators.gyro import GYROS, AnyGyro, GyroSettings, flat_low_pass
+from sim_backend.emulators.late_arrivals import TOLD_S, Arrivals
 from sim_backend.emulators.odrive import OdriveAxis
-from sim_backend.emulators.overslept import TOLD_S, Arrivals
 from sim_backend.emulators.pty_port import PtyPort
 from sim_backend.emulators.socket_port import SocketListener
 from sim_backend.emulators.world import World

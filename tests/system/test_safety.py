@@ -14,7 +14,7 @@ if sys.platform == "win32":
 from benchmarks.fault_cases import CASES
 from benchmarks.faults import undisturbed
 from benchmarks.kills import one_kill
-from sim_backend.emulators.fault_kinds import FAULTS
+from sim_backend.emulators.faults.kinds import FAULTS
 
 
 @pytest.mark.slow

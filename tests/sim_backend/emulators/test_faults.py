@@ -10,9 +10,9 @@ import pytest
 from drivers.codecs import stim300
 from rig.config.bench import InjectedFault
 from rig.errors import ConfigError
-from sim_backend.emulators.fault_kinds import FAULTS
-from sim_backend.emulators.faults import Faults
-from sim_backend.emulators.requests import FaultRequests
+from sim_backend.emulators.faults.kinds import FAULTS
+from sim_backend.emulators.faults.requests import FaultRequests
+from sim_backend.emulators.faults.schedule import Faults
 
 DATAGRAM = stim300.encode_datagram(stim300.Datagram(0x90, (0, 0, 1234), 0, 7, 506))
 BENCH = SimpleNamespace(freeze_gyro=lambda frozen: None)

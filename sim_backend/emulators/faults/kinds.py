@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from sim_backend.emulators import drive_faults as drive
-from sim_backend.emulators import gyro_faults as gyro
-from sim_backend.emulators.fault_base import Fault
+from sim_backend.emulators.faults import drive, gyro
+from sim_backend.emulators.faults.base import Fault
 
 FAULTS: dict[str, type[Fault]] = {
     "gyro_unplugged": gyro.GyroUnplugged,

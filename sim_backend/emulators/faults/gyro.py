@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from sim_backend.emulators.fault_base import Bench, Fault
+from sim_backend.emulators.faults.base import Bench, Fault
 
 STIM300_INTEGRITY = 0b1000_0000
 

@@ -8,7 +8,7 @@ import time
 from drivers.codecs import cia402
 from drivers.codecs.cia402 import encode_emergency
 from drivers.codecs.lawicel import CanFrame
-from sim_backend.emulators.fault_base import Bench, Fault
+from sim_backend.emulators.faults.base import Bench, Fault
 
 NMT_STOP, NMT_PRE_OPERATIONAL = 0x02, 0x80
 HOST_BEAT_LINE, DRIVE_BEAT_HEAD = b"t77F", b"t7"

@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from sim_backend.emulators.overslept import Arrivals
+from sim_backend.emulators.late_arrivals import Arrivals
 
 TICK = b"t2014AAAA\rt0800\r"
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from rig.config.bench import InjectedFault
 from rig.errors import ConfigError
-from sim_backend.emulators.fault_base import Bench, Fault
-from sim_backend.emulators.fault_kinds import FAULTS
+from sim_backend.emulators.faults.base import Bench, Fault
+from sim_backend.emulators.faults.kinds import FAULTS
 
 
 @dataclass
