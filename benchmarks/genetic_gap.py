@@ -23,10 +23,10 @@ from identify.persets import genetic
 from identify.regression import Regression, Structure, normal, solve
 from identify.screen import best_rho, first_guess
 from identify.traces import Trace, prepare
+from rig.arrays import Array
 from rig.config.identify import GeneticConfig, IdentifyConfig
 from rig.dynamics import TorqueSignal, simulate
 from rig.platform import TERMS, Platform
-from rig.recording.run import Array
 
 SECOND = GeneticConfig(population=500, generations=600, crossover_probability=0.8, mutation_probability=0.05)
 SMALL = GeneticConfig(population=24, generations=40, mutation_probability=0.5)  # one gene, a simulation's worth each

@@ -16,11 +16,12 @@ import numpy as np
 
 from drivers.capture.wire_capture import CLOCK, MARK
 from drivers.replay.rig import ReplayRig
+from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.interface import GyroSample, LowPass, TorqueSample
 from rig.recording.restamped import NO_RESTAMPS, Restamps, restamped
 from rig.recording.rows import increasing, on_samples
-from rig.recording.run import Array, Recording, Run
+from rig.recording.run import Recording, Run
 from rig.sequencer.time_corrections import better_times
 
 BEFORE_S = 1e-6  # rounding of time stamps at the start of a set

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
+from rig.arrays import Array
 
 DRIFT_LIMIT = 1e-3
 TRIMS = 2
@@ -17,13 +16,13 @@ MIDDLE_FLOOR_S = 5e-6
 MIDDLE_DEVIATIONS = 2.5
 
 
-def _half_span_slope(x: Numbers, y: Numbers) -> float:
+def _half_span_slope(x: Array, y: Array) -> float:
     """Median slope across half the span: a start that a few outliers cannot pull."""
     half = len(x) // 2
     return float(np.median((y[len(x) - half :] - y[:half]) / (x[len(x) - half :] - x[:half])))
 
 
-def _least_squares(x: Numbers, y: Numbers) -> tuple[float, float]:
+def _least_squares(x: Array, y: Array) -> tuple[float, float]:
     """Slope, within what a clock may drift, and value at x = 0."""
     mean_x, mean_y = float(x.mean()), float(y.mean())
     centred = x - mean_x
@@ -32,7 +31,7 @@ def _least_squares(x: Numbers, y: Numbers) -> tuple[float, float]:
     return slope, mean_y - slope * mean_x
 
 
-def lower_line(x: Numbers, y: Numbers) -> tuple[float, float]:
+def lower_line(x: Array, y: Array) -> tuple[float, float]:
     """Slope and value at x = 0 of the line through the lower half of points that can only be too high.
 
     Parameters
@@ -52,7 +51,7 @@ def lower_line(x: Numbers, y: Numbers) -> tuple[float, float]:
     return slope, level
 
 
-def middle_line(x: Numbers, y: Numbers) -> tuple[float, float]:
+def middle_line(x: Array, y: Array) -> tuple[float, float]:
     """Slope and value at x = 0 of the line through points that scatter to both sides, outliers left out.
 
     Parameters

@@ -18,8 +18,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from drivers.timing.line_fit import Numbers, lower_line, middle_line
+from drivers.timing.line_fit import lower_line, middle_line
 from drivers.timing.source_clock import BLOCK_S, SourceClock
+from rig.arrays import Array
 
 WINDOW_S = 60.0  # on either side of a set
 LONGEST_LINE_S = 60.0  # longer sets get a line a minute, joined: no crystal runs straight for ever
@@ -53,8 +54,8 @@ class Restamped:
     """Of one set: what ``recorded_s`` says is ``refined_s`` in truth; shape (n,) each, both strictly increasing."""
 
     start_s: float
-    recorded_s: Numbers
-    refined_s: Numbers
+    recorded_s: Array
+    refined_s: Array
 
 
 class Hindsight:
@@ -192,9 +193,9 @@ class Hindsight:
 class _Readings:
     """Fast readings of all blocks: shape (n,) each, ``way_s`` None where only answers are known."""
 
-    source_s: Numbers
-    late_s: Numbers
-    way_s: Numbers | None
+    source_s: Array
+    late_s: Array
+    way_s: Array | None
 
     @property
     def most_late_s(self) -> float:
@@ -203,7 +204,7 @@ class _Readings:
             return 0.0
         return 0.5 * max(0.0, float(np.median(self.way_s[self.way_s <= np.quantile(self.way_s, FAST_WAYS)])))
 
-    def offsets(self, at_s: Numbers) -> Numbers | None:
+    def offsets(self, at_s: Array) -> Array | None:
         """Host less source time at these source times, in order; None where too little is known."""
         first, last = float(at_s[0]), float(at_s[-1])
         if last - first <= LONGEST_LINE_S:
@@ -227,7 +228,7 @@ class _Readings:
         return middle_line(x[fast], late_s[fast] - 0.5 * way_s[fast])
 
 
-def _fast(late_s: Numbers, share: float) -> int:
+def _fast(late_s: Array, share: float) -> int:
     """Index of a reading that only this share of the others precedes."""
     rank = int(share * (len(late_s) - 1))
     return int(np.argpartition(late_s, rank)[rank])

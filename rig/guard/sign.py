@@ -18,10 +18,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.config.limits import LimitsConfig
 from rig.guard.base import Check, Rest, Tick, TorquePast, Trip
 from rig.platform import Platform
-from rig.recording.run import Array
 
 CORNER_RAD_S = 2.0 * math.pi * 20.0  # of each of the three stages: little of what a lag of the drive turns is left
 DELAYS_S = (0.0, 0.003, 0.006)

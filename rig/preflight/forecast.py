@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.dynamics import Equations, Grid, TorqueSignal
 from rig.excitation import PlannedSet
 from rig.platform import Platform
-from rig.recording.run import Array
 
 PEAK_RATE_HZ = 4000.0  # the crest of a 29 Hz ring read at 4 kHz is low by 0.03 %
 COAST_RATE_HZ = 200.0

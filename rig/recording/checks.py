@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rig.arrays import Array, Mask
 from rig.errors import RecordingError
 from rig.recording.consistency import check_angle_against_rate, check_time_unit
 from rig.recording.readers.base import Table
-from rig.recording.run import Array, Run, TorqueHold, Use
+from rig.recording.run import Run, TorqueHold, Use
 
 MIN_SAMPLES = 40  # in a row, fewer tell nothing of two states, three parameters and the noise
 # No torque, rate, angle or time of a machine in SI units comes near; squares of it would overflow.
@@ -32,7 +32,7 @@ def missing_column(table: Table, quantity: str, names: Sequence[str], *, mapped:
     return RecordingError(f"{table.path}: has no column {wanted}{hint} (it has: {there}): {cure}")
 
 
-def check_samples(table: Table, columns: Mapping[str, Array]) -> NDArray[np.bool_]:
+def check_samples(table: Table, columns: Mapping[str, Array]) -> Mask:
     """Check lengths and numbers of the columns as stored; gives the mask of valid samples, shape (n,).
 
     Raises RecordingError.

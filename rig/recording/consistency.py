@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.errors import RecordingError
-from rig.recording.run import Array, Run
+from rig.recording.run import Run
 
 # d(angle)/dt over rate -> what that factor usually means, and the cure.
 _KNOWN_FACTORS = (

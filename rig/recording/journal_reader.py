@@ -18,6 +18,7 @@ from typing import Any, BinaryIO, Literal
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.recording.journal import (
     BLOCK,
@@ -33,7 +34,7 @@ from rig.recording.journal import (
 )
 from rig.recording.restamped import BEGUN_S, NO_RESTAMPS, Restamps, restamped, restamps_of
 from rig.recording.rows import increasing, on_samples
-from rig.recording.run import Array, Recording, Run, printable
+from rig.recording.run import Recording, Run, printable
 from rig.recording.steady import opened
 
 RUN_META = (

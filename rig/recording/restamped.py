@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rig.recording.run import Array
+from rig.arrays import Array
 
 BEGUN_S = "begun_s"
 EVENT_KEY = "restamped"

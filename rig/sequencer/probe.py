@@ -21,13 +21,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
+from rig.arrays import Array
 from rig.config.bench import ProbeConfig
 from rig.config.limits import LimitsConfig
 from rig.errors import SafetyTrip
 from rig.excitation import PlannedSet
 from rig.guard.base import Rest, Tick
 from rig.platform import Platform
-from rig.recording.run import Array
 
 SHORTEST_S, LONGEST_S = 0.01, 0.1
 PERIOD_SHARE = 0.5  # of the declared period of the ring: the length of a pulse

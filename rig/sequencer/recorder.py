@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.excitation import PlannedSet
 from rig.guard import Tick
 from rig.interface import LowPass
 from rig.recording.journal import Journal
 from rig.recording.restamped import BEGUN_S, NO_RESTAMPS, Restamps, restamped
 from rig.recording.rows import increasing, on_samples
-from rig.recording.run import Array, Run, TorqueHold
+from rig.recording.run import Run, TorqueHold
 from rig.sequencer.lateness import Lateness
 
 HAND_OVER_S = 0.02  # between hand-overs to the journal, which buffers again: together far below 100 ms

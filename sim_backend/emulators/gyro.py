@@ -10,7 +10,7 @@ import numpy as np
 
 from drivers.codecs import stim300, vectornav
 from drivers.codecs.stim300_special import Stim300Configuration, encode_configuration, encode_serial_number
-from rig.recording.run import Array
+from rig.arrays import Array
 
 AXES = "xyz"
 BITS_PER_BYTE = 10
