@@ -14,7 +14,7 @@ from rig.channels import Channel
 from rig.config.simulated import SimulatedConfig
 from rig.errors import ConfigError, DeviceFault
 from rig.interface import Exchange, GyroSample, Rig, Statement, Torque, TorqueOfTime, TorqueSample
-from rig.recording.run import TorqueHold
+from rig.signals import TorqueHold
 from sim_backend import amplifier
 from sim_backend.gyroscope import Gyroscope
 from sim_backend.plant import SENSED, Plant

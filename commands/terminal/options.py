@@ -44,7 +44,7 @@ def new_app(help_text: str) -> typer.Typer:
 def show_version(wanted: bool) -> None:
     """Print the version and leave."""
     if wanted:
-        from commands.campaign.provenance import version
+        from commands.terminal.version import version
 
         typer.echo(f"isp-rig {version()}")
         raise typer.Exit

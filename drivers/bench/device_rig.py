@@ -5,7 +5,7 @@ from __future__ import annotations
 from drivers.bench.retiming import Restamping
 from drivers.gyroscopes.base import Gyroscope
 from rig.interface import Correction, ExpectedDelay, LowPass, Rig
-from rig.recording.run import TorqueHold
+from rig.signals import TorqueHold
 
 
 class RigOnDevices(Rig):

@@ -10,7 +10,7 @@ from scipy.interpolate import make_interp_spline
 
 from rig.arrays import Array
 from rig.dynamics.polynomials import Polynomials
-from rig.recording.run import TorqueHold
+from rig.signals import TorqueHold
 
 KEPT = 6  # readings between the samples: every fit to a run asks for one of a few
 

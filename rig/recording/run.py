@@ -8,9 +8,8 @@ from typing import Any, Literal
 
 from rig.arrays import Array, Mask
 from rig.channels import Channel
+from rig.signals import TorqueHold, Use
 
-TorqueHold = Literal["band_limited", "zero_order"]
-Use = Literal["auto", "fit", "holdout"]
 LONGEST_NAME = 200
 
 

@@ -14,8 +14,9 @@ from rig.interface import LowPass
 from rig.recording.journal import Journal
 from rig.recording.restamped import BEGUN_S, NO_RESTAMPS, Restamps, restamped
 from rig.recording.rows import increasing, on_samples
-from rig.recording.run import Run, TorqueHold
+from rig.recording.run import Run
 from rig.sequencer.lateness import Lateness
+from rig.signals import TorqueHold
 
 HAND_OVER_S = 0.02  # between hand-overs to the journal, which buffers again: together far below 100 ms
 EDGE_S = 1e-6  # rounding of time stamps at the ends of a set
