@@ -1,26 +1,24 @@
-"""Before anything moves: what is about to happen, said loudly, and the question before real torque."""
+"""Before anything moves: what is about to happen, said loudly."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from commands.terminal.display import plain
 from rig.config.root import Config
-from rig.errors import UsageError
 from rig.excitation import PlannedSet
 from rig.interface import Statement, Torque
 from rig.sequencer import SETTLE_S, TAIL_S
 from rig.sequencer.probe import Probe
 
 RULE = "=" * 78
-QUESTION = "REAL torque will be applied. Is everybody clear of the machine? Type yes to start: "
 PEAK_STEP_S = 1e-3
 
 
-def opening(statement: Statement, config: Config, sets: Sequence[PlannedSet], folder: Path) -> str:
+def announcement(statement: Statement, config: Config, sets: Sequence[PlannedSet], folder: Path) -> str:
     """The opening statement of a campaign that is played."""
     limits = config.limits
     lines = [RULE, f"  {plain(str(statement))}", RULE]
@@ -34,7 +32,7 @@ def opening(statement: Statement, config: Config, sets: Sequence[PlannedSet], fo
     return "\n".join(lines)
 
 
-def opening_recorded(files: int, runs: int, folder: Path) -> str:
+def recorded_announcement(files: int, runs: int, folder: Path) -> str:
     """The opening statement where nothing is played."""
     told = f"Torque is RECORDED: nothing moves; {runs} run(s) read from {files} file(s)"
     return "\n".join([RULE, f"  {told}", RULE, f"results   {plain(str(folder))}"])
@@ -66,35 +64,3 @@ def _time(statement: Statement, config: Config, sets: Sequence[PlannedSet]) -> s
         return f"{seconds:.0f} s of the rig's time, simulated in a few seconds; then the identification"
     settle_s = config.bench.settle_s if config.bench is not None else 0.0
     return f"{seconds + settle_s:.0f} s on the bench; then the identification"
-
-
-def ask_consent(statement: Statement, yes: bool, is_terminal: bool, ask: Callable[[str], str]) -> None:
-    """Return where torque may be applied.
-
-    Parameters
-    ----------
-    yes
-        Whether --yes was given.
-    is_terminal
-        Whether somebody can answer.
-    ask
-        Puts the question and returns the answer; EOFError where none comes.
-
-    Raises
-    ------
-    UsageError
-        Where it may not; nothing was moved.
-    """
-    if statement.torque is not Torque.REAL or yes:
-        return
-    if not is_terminal:
-        raise UsageError(
-            "this campaign applies REAL torque and nobody can be asked without a terminal: give --yes if the "
-            "machine is clear, or try --dry-run or --emulate first. Nothing was moved."
-        )
-    try:
-        answer = ask(QUESTION)
-    except EOFError:
-        answer = ""
-    if answer.strip().lower() not in ("yes", "y"):
-        raise UsageError("not started: the answer was not yes. Nothing was moved.")

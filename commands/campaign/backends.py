@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 RECORDED = "recorded"
 EMULATED = "emulated"
 SIMULATED = "simulated"
-REPORTED = ("drive_torque_nm", "sent_torque_nm")  # further channels of a bench whose drive reports its torque
+BENCH_CHANNELS = ("drive_torque_nm", "sent_torque_nm")  # further channels of a bench whose drive reports its torque
 
 
-def no_account() -> dict[str, Any]:
+def no_device_report() -> dict[str, Any]:
     """Of a rig that has nothing to tell about itself."""
     return {}
 
@@ -39,7 +39,7 @@ class Stage:
 
     rig: Rig
     clock: Clock
-    account: Callable[[], dict[str, Any]] = no_account
+    account: Callable[[], dict[str, Any]] = no_device_report
 
 
 Backend = Callable[[LoadedConfig, Path], AbstractContextManager[Stage]]
@@ -111,11 +111,11 @@ def _require_channels(config: Config) -> None:
 
     for name in config.model.effects:
         read = effects.get(name).reads
-        if read is not None and read.name not in REPORTED:
+        if read is not None and read.name not in BENCH_CHANNELS:
             raise ConfigError(
                 f"model.effects.{name} reads the channel {read.name!r}, which the bench does not report (it reports "
-                f"{' and '.join(REPORTED)}): take {name} out of the model, or record {read.name} beside the bench and "
-                "identify with backend: recorded"
+                f"{' and '.join(BENCH_CHANNELS)}): take {name} out of the model, or record {read.name} beside the "
+                "bench and identify with backend: recorded"
             )
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from commands.campaign.announcement import ask_consent
+from commands.campaign.consent import ask_consent
 from commands.campaign.results_folder import JOURNAL_FILE, RAW_FOLDER
 from rig.interface import Statement
 from rig.recording.run import Recording
@@ -16,7 +16,7 @@ from rig.recording.steady import tail_of
 
 
 @dataclass(frozen=True)
-class Played:
+class PlayedCampaign:
     """What came of a campaign.
 
     Parameters
@@ -43,14 +43,14 @@ class Played:
     read_back: bool = True
 
     @property
-    def fit_to_identify(self) -> Recording:
+    def complete_runs(self) -> Recording:
         """The whole runs: a run that was cut short may end in the fault that cut it."""
         runs = tuple(run for run in self.recording.runs if run.name in self.whole)
         return dataclasses.replace(self.recording, runs=runs)
 
 
 @dataclass(frozen=True)
-class Part:
+class CampaignPart:
     """One part of a campaign: what its files are called, what stands in the folder already, who is asked.
 
     ``earlier`` is what was played before: into the same folder, where its recording is kept and added to, or into
@@ -59,7 +59,7 @@ class Part:
 
     journal: str = JOURNAL_FILE
     raw: str = RAW_FOLDER
-    earlier: Played | None = None
+    earlier: PlayedCampaign | None = None
     consent: Callable[[Statement, bool, bool, Callable[[str], str]], None] = ask_consent
     brought: tuple[tuple[Path, str], ...] = ()
     resumes: Path | None = None
@@ -77,4 +77,4 @@ class Part:
                 shutil.copyfile(tail_of(source), tail_of(path / name), follow_symlinks=False)
 
 
-ALL_OF_IT = Part()
+WHOLE_CAMPAIGN = CampaignPart()

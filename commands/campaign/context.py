@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from commands.terminal.exit_codes import conclude, report, say
+from commands.terminal.exit_codes import report, run_to_exit_code, say
 from commands.terminal.stop_requests import StopRequests
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class Options:
 
 
 @dataclass
-class Desk:
+class CommandContext:
     """One command at work."""
 
     options: Options
@@ -61,29 +61,31 @@ class Desk:
         self.folder = ResultsFolder(self.options.out, name, datetime.now(UTC))
         return self.folder
 
-    def evidence(self) -> Path | None:
+    def existing_path(self) -> Path | None:
         """The results folder as far as there is one."""
-        return self.folder.evidence() if self.folder is not None else None
+        return self.folder.existing_path() if self.folder is not None else None
 
     def say_error(self, error: BaseException) -> int:
         """Say on stderr what went wrong, without ending here; returns the exit code it stands for."""
-        self.terminal.settle()
-        return report(error, self.evidence())
+        self.terminal.flush()
+        return report(error, self.existing_path())
 
 
-def at_desk(options: Options, command: Callable[[Desk], int]) -> int:
+def run_command(options: Options, command: Callable[[CommandContext], int]) -> int:
     """Run a command with signals heeded; returns the exit code. Never raises."""
     stops = StopRequests()
-    desk: Desk | None = None
+    context: CommandContext | None = None
 
     def work() -> int:
-        nonlocal desk
-        with stops.heeded():
+        nonlocal context
+        with stops.handling_signals():
             from commands.terminal.display import Terminal
 
-            desk = Desk(options, Terminal(sys.stderr, options.quiet), stops)
-            stops.tell, desk.terminal.on_loss = desk.terminal.tell, stops.request
-            with desk.terminal.writing():
-                return command(desk)
+            context = CommandContext(options, Terminal(sys.stderr, options.quiet), stops)
+            stops.show, context.terminal.on_loss = context.terminal.show, stops.request
+            with context.terminal.writing():
+                return command(context)
 
-    return conclude(work, lambda: desk.evidence() if desk is not None else None, lambda: stops.reason)
+    return run_to_exit_code(
+        work, lambda: context.existing_path() if context is not None else None, lambda: stops.reason
+    )

@@ -9,21 +9,21 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from commands.campaign.announcement import duration_s
-from commands.campaign.campaign_part import Part
+from commands.campaign.campaign_part import CampaignPart
 from commands.terminal.display import plain
 from rig.config.root import Config
 from rig.errors import Aborted
 from rig.excitation import PlannedSet
 from rig.interface import Statement, Torque
 
-LEAST_BYTES = 768 * 1024  # what the journal and the raw capture take before the first set, their reserves included
+START_BYTES = 768 * 1024  # what the journal and the raw capture take before the first set, their reserves included
 RESULTS_BYTES = 8_000_000  # the report and what stands beside it
 # A tick, as an emulated bench of 1 kHz wrote it: the journal and recording.h5, and raw/ with its exports.
 TICK_BYTES, RAW_TICK_BYTES = 220, 330
 MEGABYTE = 1e6
 
 
-def bytes_needed(config: Config, statement: Statement, sets: Sequence[PlannedSet], part: Part) -> float:
+def estimated_bytes(config: Config, statement: Statement, sets: Sequence[PlannedSet], part: CampaignPart) -> float:
     """About how many bytes a campaign writes in all."""
     is_bench = statement.torque is not Torque.SIMULATED and config.bench is not None
     bench = config.bench if is_bench else None
@@ -33,7 +33,7 @@ def bytes_needed(config: Config, statement: Statement, sets: Sequence[PlannedSet
     return RESULTS_BYTES + seconds * config.excitation.sample_rate_hz * a_tick + brought
 
 
-def scarce_room(folder: Path, needed_bytes: float) -> str:
+def disk_space_warning(folder: Path, needed_bytes: float) -> str:
     """What to say of the room that there is for ``folder``; empty where it is enough.
 
     Raises
@@ -50,10 +50,10 @@ def scarce_room(folder: Path, needed_bytes: float) -> str:
         return ""
     about = f"{needed_bytes / MEGABYTE:.0f} MB"
     left = f"{free / MEGABYTE:.3g} MB are free in {plain(str(there))}"
-    if free < LEAST_BYTES:
+    if free < START_BYTES:
         raise Aborted(
             f"{os.strerror(errno.ENOSPC)}: {left}, this campaign writes about {about} and begins with "
-            f"{LEAST_BYTES / MEGABYTE:.2g} MB: make room or choose another --out. Nothing was moved."
+            f"{START_BYTES / MEGABYTE:.2g} MB: make room or choose another --out. Nothing was moved."
         )
     if free < needed_bytes:
         return (

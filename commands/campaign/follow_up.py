@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from commands.campaign.announcement import ask_consent
 from commands.campaign.backends import backend_name
-from commands.campaign.campaign_part import Part, Played
-from commands.campaign.context import Desk
+from commands.campaign.campaign_part import CampaignPart, PlayedCampaign
+from commands.campaign.consent import ask_consent
+from commands.campaign.context import CommandContext
 from commands.campaign.playing import play
 from commands.campaign.results_folder import RAW_FOLDER, ResultsFolder
 from rig.config.excitation import ExcitationConfig
@@ -30,9 +30,15 @@ NEXT_SEED = 1_000_003  # a simulated gyro must not repeat its noise
 
 
 def play_follow_up(
-    desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, earlier: Played, excitation: Mapping[str, Any],
-    model: Platform | None, number: int, why: str,
-) -> Played:  # fmt: skip
+    context: CommandContext,
+    loaded: LoadedConfig,
+    folder: ResultsFolder,
+    earlier: PlayedCampaign,
+    excitation: Mapping[str, Any],
+    model: Platform | None,
+    number: int,
+    why: str,
+) -> PlayedCampaign:
     """Play a further excitation into the same folder; returns all runs of the campaign so far.
 
     Parameters
@@ -50,23 +56,23 @@ def play_follow_up(
         Where it may not be played: nothing was moved, and nothing of what stands in the folder is touched.
     """
     mode = loaded.config.identify.follow_up
-    refusal = _refusal(desk, loaded)
+    refusal = _refusal(context, loaded)
     if refusal:
         raise UsageError(refusal)
-    desk.terminal.tell(f"Follow-up {number}: {why}")
-    if mode == "ask" and desk.options.quiet:
-        desk.terminal.insist(f"Follow-up {number}: {why}")  # nobody can answer a question without its reason
+    context.terminal.show(f"Follow-up {number}: {why}")
+    if mode == "ask" and context.options.quiet:
+        context.terminal.show_always(f"Follow-up {number}: {why}")  # nobody can answer a question without its reason
     name = "follow_up" if number == 1 else f"follow_up_{number}"
-    part = Part(f"{name}.journal", f"{RAW_FOLDER}/{name}", earlier, _consent(mode))
-    return play(desk, _configured(loaded, excitation, model, number), folder, part)
+    part = CampaignPart(f"{name}.journal", f"{RAW_FOLDER}/{name}", earlier, _consent(mode))
+    return play(context, _configured(loaded, excitation, model, number), folder, part)
 
 
-def _refusal(desk: Desk, loaded: LoadedConfig) -> str:
+def _refusal(context: CommandContext, loaded: LoadedConfig) -> str:
     """Why no follow-up is played, before anything is asked; empty where one may be."""
     config = loaded.config
     if config.identify.follow_up == "never":
         return "it is not played: identify.follow_up is never"
-    backend = backend_name(config, desk.options.dry_run, desk.options.emulate)
+    backend = backend_name(config, context.options.dry_run, context.options.emulate)
     replayed = backend == "bench" and config.bench is not None and config.bench.replay is not None
     if config.identify.follow_up == "ask" and (replayed or not _somebody_there()):
         return NOBODY_AGREED

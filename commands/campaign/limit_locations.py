@@ -13,7 +13,7 @@ from rig.config.yaml_text import parse
 from rig.errors import ConfigError, PreflightRefusal
 
 
-def with_places(error: PreflightRefusal, loaded: LoadedConfig) -> PreflightRefusal:
+def with_locations(error: PreflightRefusal, loaded: LoadedConfig) -> PreflightRefusal:
     """The same refusal, saying file, line, key and value of every limit that it speaks of."""
     document = parse(loaded.text, str(loaded.path))
     for override in loaded.overrides:

@@ -13,17 +13,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from commands.campaign.announcement import opening
+from commands.campaign.announcement import announcement
 from commands.campaign.backends import BACKENDS, EMULATED, Stage, backend_name
-from commands.campaign.campaign_part import ALL_OF_IT, Part, Played
-from commands.campaign.context import Desk
-from commands.campaign.disk_space import bytes_needed, scarce_room
-from commands.campaign.limit_locations import with_places
+from commands.campaign.campaign_part import WHOLE_CAMPAIGN, CampaignPart, PlayedCampaign
+from commands.campaign.context import CommandContext
+from commands.campaign.disk_space import disk_space_warning, estimated_bytes
+from commands.campaign.limit_locations import with_locations
 from commands.campaign.provenance import provenance
 from commands.campaign.results_folder import ResultsFolder
 from commands.campaign.saving import figures, save
-from commands.terminal.display import SetBars, Terminal, forget_typed_ahead
-from commands.terminal.exit_codes import as_known
+from commands.terminal.display import SetBars, Terminal, discard_typed_ahead
+from commands.terminal.exit_codes import as_rig_error
 from rig.config.load import LoadedConfig
 from rig.errors import Aborted, PreflightRefusal, RigError, UsageError
 from rig.excitation import PlannedSet
@@ -39,7 +39,7 @@ from rig.sequencer.recorder import SetStatistics
 from rig.sequencer.warm_up import rehearse
 
 
-class Tally(SetBars):
+class SetLog(SetBars):
     """Shows the sets, and remembers how each went."""
 
     def __init__(self, terminal: Terminal) -> None:
@@ -57,24 +57,26 @@ class Tally(SetBars):
         return frozenset(s.name for s in self.statistics if s.complete)
 
 
-def play(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, part: Part = ALL_OF_IT) -> Played:
+def play(
+    context: CommandContext, loaded: LoadedConfig, folder: ResultsFolder, part: CampaignPart = WHOLE_CAMPAIGN
+) -> PlayedCampaign:
     """Play the campaign of ``loaded`` on the backend that was asked for and save its recording.
 
     Raises UsageError, with nothing moved or written, where it may not be played.
     """
-    options, config = desk.options, loaded.config
+    options, config = context.options, loaded.config
     backend = backend_name(config, options.dry_run, options.emulate)
     if backend not in BACKENDS:
         raise UsageError(
             f"backend: {backend} has nothing to play: give --dry-run, or a `simulated` or `bench` backend."
         )
     if backend == EMULATED:
-        desk.terminal.tell("Starting the emulated devices ...")
+        context.terminal.show("Starting the emulated devices ...")
     with BACKENDS[backend](loaded, folder.path / part.raw) as stage:
         every = planned_sets(stage.rig, loaded)
         sets = tuple(planned for planned in every if planned.name not in part.done)
-        _open(desk, stage, loaded, sets, folder.path, part)
-        return _record(desk, stage, loaded, sets, folder, part, [planned.name for planned in every])
+        _open(context, stage, loaded, sets, folder.path, part)
+        return _record(context, stage, loaded, sets, folder, part, [planned.name for planned in every])
 
 
 def planned_sets(rig: Rig, loaded: LoadedConfig) -> tuple[PlannedSet, ...]:
@@ -84,23 +86,30 @@ def planned_sets(rig: Rig, loaded: LoadedConfig) -> tuple[PlannedSet, ...]:
     try:
         return plan(config.model.platform(), config.excitation, config.limits, scale, key)
     except PreflightRefusal as error:
-        raise with_places(error, loaded) from None
+        raise with_locations(error, loaded) from None
 
 
-def _open(desk: Desk, stage: Stage, loaded: LoadedConfig, sets: Sequence[PlannedSet], path: Path, part: Part) -> None:
+def _open(
+    context: CommandContext,
+    stage: Stage,
+    loaded: LoadedConfig,
+    sets: Sequence[PlannedSet],
+    path: Path,
+    part: CampaignPart,
+) -> None:
     statement = stage.rig.statement()
-    loudly = desk.terminal.insist if statement.torque is Torque.REAL else desk.terminal.tell
-    loudly(opening(statement, loaded.config, sets, path))
-    scarce = scarce_room(path, bytes_needed(loaded.config, statement, sets, part))
+    loudly = context.terminal.show_always if statement.torque is Torque.REAL else context.terminal.show
+    loudly(announcement(statement, loaded.config, sets, path))
+    scarce = disk_space_warning(path, estimated_bytes(loaded.config, statement, sets, part))
     if scarce:
-        desk.terminal.insist(scarce)
-    desk.terminal.settle()
-    part.consent(statement, desk.options.yes, sys.stdin is not None and sys.stdin.isatty(), _ask)
+        context.terminal.show_always(scarce)
+    context.terminal.flush()
+    part.consent(statement, context.options.yes, sys.stdin is not None and sys.stdin.isatty(), _ask)
 
 
 def _ask(question: str) -> str:
     """Put a question on stderr; returns the line that was typed after it. Raises EOFError where none comes."""
-    forget_typed_ahead(sys.stdin)
+    discard_typed_ahead(sys.stdin)
     sys.stderr.write(question)
     sys.stderr.flush()
     try:
@@ -112,15 +121,15 @@ def _ask(question: str) -> str:
     return answer
 
 
-class _Recorder:
+class _CampaignRecorder:
     """One campaign while it is recorded. What came of it stays here, whatever happens on the way out."""
 
-    def __init__(self, desk: Desk, stage: Stage, loaded: LoadedConfig, sets: Sequence[PlannedSet]) -> None:
-        self.tally = Tally(desk.terminal)
+    def __init__(self, context: CommandContext, stage: Stage, loaded: LoadedConfig, sets: Sequence[PlannedSet]) -> None:
+        self.tally = SetLog(context.terminal)
         self.recording: Recording | None = None
         self.cause: BaseException | None = None
         self.verdict_s: float | None = None
-        self._desk, self._stage, self._config, self._sets = desk, stage, loaded.config, sets
+        self._context, self._stage, self._config, self._sets = context, stage, loaded.config, sets
 
     def run(self, journal: Journal) -> None:
         """Play into the journal and close it."""
@@ -149,72 +158,82 @@ class _Recorder:
             rest_s=config.excitation.rest_s,
             journal=journal,
             observer=self.tally,
-            stop=self._desk.stops.poll,
+            stop=self._context.stops.poll,
             probe=None if asked is None else Probe(asked, config.limits, platform, self._sets),
             keep_runs=in_memory,
         )
         try:
-            with self._desk.stops.playing(stage.rig.torque_off):
+            with self._context.stops.playing(stage.rig.torque_off):
                 campaign = sequencer.play(self._sets)
             self.recording = campaign.recording if in_memory else None
             self.cause = campaign.cause
             self.verdict_s = campaign.verdict_s
         except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (torque is off by now; what is there is saved)
-            self.cause = as_known(error)
+            self.cause = as_rig_error(error)
 
 
 def _record(
-    desk: Desk, stage: Stage, loaded: LoadedConfig, sets: Sequence[PlannedSet], folder: ResultsFolder, part: Part,
+    context: CommandContext,
+    stage: Stage,
+    loaded: LoadedConfig,
+    sets: Sequence[PlannedSet],
+    folder: ResultsFolder,
+    part: CampaignPart,
     every: Sequence[str],
-) -> Played:  # fmt: skip
+) -> PlayedCampaign:
     """Play, then export what the journal and the sequencer have; ``every`` names all sets of the campaign.
 
     A signal after the last tick counts too: all is saved, and the campaign ends as one that was stopped.
     """
-    path = folder.made()
+    path = folder.create()
     part.bring(path)
-    played_on = backend_name(loaded.config, desk.options.dry_run, desk.options.emulate)
+    played_on = backend_name(loaded.config, context.options.dry_run, context.options.emulate)
     info = provenance(loaded) | {"backend": str(stage.rig.statement()), "played_on": played_on}
-    recorder = _Recorder(desk, stage, loaded, sets)
+    recorder = _CampaignRecorder(context, stage, loaded, sets)
     if part.resumes is not None:
         info["resumed_from"] = str(part.resumes)
     head = {"axis": "rotary", "noise": stage.rig.noise_rad_s, "planned": [s.name for s in sets]} | info
     head["planned_in_all"] = list(every)
-    with desk.stops.deferring():
+    with context.stops.deferring():
         recorder.run(Journal.create(path / part.journal, head))
-        played = _saved(desk, stage, recorder, info, folder, part)
-    return played if played.cause is not None else replace(played, cause=_stopped_late(desk))
+        played = _saved(context, stage, recorder, info, folder, part)
+    return played if played.cause is not None else replace(played, cause=_late_stop(context))
 
 
 def _saved(
-    desk: Desk, stage: Stage, recorder: _Recorder, info: dict[str, Any], folder: ResultsFolder, part: Part
-) -> Played:
+    context: CommandContext,
+    stage: Stage,
+    recorder: _CampaignRecorder,
+    info: dict[str, Any],
+    folder: ResultsFolder,
+    part: CampaignPart,
+) -> PlayedCampaign:
     """What was played, written and told. Raises UsageError where it was refused before anything was."""
-    cause, tally = recorder.cause or _stopped_late(desk), recorder.tally
+    cause, tally = recorder.cause or _late_stop(context), recorder.tally
     if isinstance(cause, UsageError) and not tally.statistics:
-        _take_back(folder, part)
+        _discard_part(folder, part)
         raise cause
     if cause is not None:
-        desk.say_error(cause)
+        context.say_error(cause)
     info |= {"ended_utc": datetime.now(UTC).isoformat(), "aborted": str(cause) if cause else None}
     info |= {"verdict_time_s": recorder.verdict_s}
     info |= {"sets": [figures(s) for s in tally.statistics]} | stage.account()
     expected = stage.rig.expected_delay
     if expected is not None:
         info["expected_torque_delay"] = expected._asdict()
-    played = Played(Recording(()), tally.whole, cause, (part.journal,), stage.rig.rate_full_scale_rad_s)
-    return save(desk, folder.path, recorder.recording, info, played, part)
+    played = PlayedCampaign(Recording(()), tally.whole, cause, (part.journal,), stage.rig.rate_full_scale_rad_s)
+    return save(context, folder.path, recorder.recording, info, played, part)
 
 
-def _stopped_late(desk: Desk) -> Aborted | None:
+def _late_stop(context: CommandContext) -> Aborted | None:
     """The request to stop that came after the last tick, when nobody polled any more."""
-    reason = desk.stops.outstanding()
+    reason = context.stops.outstanding()
     return Aborted(f"{reason}: torque is off; what was recorded until then is kept.") if reason else None
 
 
-def _take_back(folder: ResultsFolder, part: Part) -> None:
+def _discard_part(folder: ResultsFolder, part: CampaignPart) -> None:
     """Take back what was made for a part in which nothing was played."""
     if part.earlier is None or part.resumes is not None:
-        folder.unmade()
+        folder.discard()
     else:
         (folder.path / part.journal).unlink(missing_ok=True)

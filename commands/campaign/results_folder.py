@@ -7,15 +7,15 @@ import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
-from commands.terminal.exit_codes import as_known
+from commands.terminal.exit_codes import as_rig_error
 from rig.errors import UsageError
 
 RUNS = Path("runs")
 JOURNAL_FILE = "recording.journal"
 RECORDING_FILE = "recording.h5"
 RAW_FOLDER = "raw"
-NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
-MOST_IN_A_SECOND = 1000
+DISK_FULL_ERRNOS = (errno.ENOSPC, errno.EDQUOT)
+MOST_FOLDERS_A_SECOND = 1000
 
 
 class ResultsFolder:
@@ -37,25 +37,25 @@ class ResultsFolder:
     """
 
     def __init__(self, out: Path | None, name: str, now: datetime) -> None:
-        self.is_made = False
+        self.is_created = False
         self.path = out if out is not None else _free(RUNS / f"{now.astimezone(UTC):%Y%m%dT%H%M%SZ}-{name}")
         if self.path.exists() or self.path.is_symlink():
             raise UsageError(f"--out {self.path} exists and is never overwritten: choose another folder.")
 
-    def made(self) -> Path:
+    def create(self) -> Path:
         """Make the folder, once, and return its path.
 
         Raises UsageError where it cannot be made, Aborted where that is because the disk is full.
         """
-        if not self.is_made:
+        if not self.is_created:
             try:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
                 self.path.mkdir()
             except OSError as problem:
-                if problem.errno in NO_ROOM:
-                    raise as_known(problem) from None
+                if problem.errno in DISK_FULL_ERRNOS:
+                    raise as_rig_error(problem) from None
                 raise self._cannot(problem) from None
-            self.is_made = True
+            self.is_created = True
         return self.path
 
     def _cannot(self, problem: OSError) -> UsageError:
@@ -64,18 +64,18 @@ class ResultsFolder:
             "Choose another with --out."
         )
 
-    def unmade(self) -> None:
+    def discard(self) -> None:
         """Take back a folder in which nothing was recorded, because nothing was played."""
-        if self.is_made:
+        if self.is_created:
             shutil.rmtree(self.path, ignore_errors=True)
-            self.is_made = False
+            self.is_created = False
 
-    def evidence(self) -> Path | None:
+    def existing_path(self) -> Path | None:
         """The folder as far as there is one."""
-        return self.path if self.is_made else None
+        return self.path if self.is_created else None
 
 
 def _free(path: Path) -> Path:
     """``path``, or the same with the first number behind it that is free."""
-    numbered = (path.with_name(f"{path.name}-{n}") for n in range(2, MOST_IN_A_SECOND))
+    numbered = (path.with_name(f"{path.name}-{n}") for n in range(2, MOST_FOLDERS_A_SECOND))
     return next((p for p in (path, *numbered) if not p.exists()), path)

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from commands.campaign.backends import EMULATED, RECORDED, SIMULATED, backend_name
-from commands.campaign.campaign_part import Part, Played
-from commands.campaign.context import Desk
+from commands.campaign.campaign_part import CampaignPart, PlayedCampaign
+from commands.campaign.context import CommandContext
 from commands.campaign.playing import play
 from commands.campaign.results_folder import JOURNAL_FILE, ResultsFolder
 from commands.campaign.saving import export_earlier
@@ -40,7 +40,7 @@ MAY_DIFFER = (
 
 
 @dataclass(frozen=True)
-class Unfinished:
+class UnfinishedCampaign:
     """What a results folder holds of a campaign: its journals, the runs that are whole, what was planned."""
 
     folder: Path
@@ -60,25 +60,25 @@ class Unfinished:
         return tuple(name for name in self.planned if name not in self.done)
 
 
-def play_campaign(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> Played:
+def play_campaign(context: CommandContext, loaded: LoadedConfig, folder: ResultsFolder) -> PlayedCampaign:
     """Play the campaign, or with --resume what is missing of it; raises what ``play`` raises."""
-    if desk.options.resume is None:
-        return play(desk, loaded, folder)
-    backend = backend_name(loaded.config, desk.options.dry_run, desk.options.emulate)
+    if context.options.resume is None:
+        return play(context, loaded, folder)
+    backend = backend_name(loaded.config, context.options.dry_run, context.options.emulate)
     if backend == RECORDED:
         raise UsageError("--resume: recordings are read, not played: there is nothing to resume.")
-    before = read_unfinished(desk.options.resume)
+    before = read_unfinished(context.options.resume)
     refuse_what_differs(before, loaded, backend)
     told = f"Resuming {plain(str(before.folder))}: {len(before.done)} of {len(before.planned)} set(s) are finished"
     names = tuple(f"earlier_{number}.journal" for number in range(1, len(before.journals) + 1))
-    earlier = Played(Recording(before.runs), before.done, None, names)
+    earlier = PlayedCampaign(Recording(before.runs), before.done, None, names)
     copies = tuple(zip(before.journals, names, strict=True))
-    part = Part(earlier=earlier, brought=copies, resumes=before.folder)
+    part = CampaignPart(earlier=earlier, brought=copies, resumes=before.folder)
     if not before.missing:
-        desk.terminal.tell(f"{told}; nothing is left to play.")
-        return export_earlier(desk, loaded, folder, part, before.header)
-    desk.terminal.tell(f"{told}; to play: {plain(', '.join(before.missing))}.")
-    return play(desk, _with_another_seed(loaded, len(before.journals)), folder, part)
+        context.terminal.show(f"{told}; nothing is left to play.")
+        return export_earlier(context, loaded, folder, part, before.header)
+    context.terminal.show(f"{told}; to play: {plain(', '.join(before.missing))}.")
+    return play(context, _with_another_seed(loaded, len(before.journals)), folder, part)
 
 
 def _with_another_seed(loaded: LoadedConfig, number: int) -> LoadedConfig:
@@ -88,7 +88,7 @@ def _with_another_seed(loaded: LoadedConfig, number: int) -> LoadedConfig:
     return replace(loaded, config=config)
 
 
-def read_unfinished(folder: Path) -> Unfinished:
+def read_unfinished(folder: Path) -> UnfinishedCampaign:
     """What there is in a results folder. Raises RecordingError where it holds no journal that can be read."""
     from rig.recording.journal_reader import read_journal
     from rig.recording.results import campaign_journals
@@ -106,7 +106,9 @@ def read_unfinished(folder: Path) -> Unfinished:
             f"--resume {folder}: its journal does not say what was planned (an earlier version wrote it): play anew"
         )
     runs = {run.name: run for part in contents for run in _whole(part)}
-    return Unfinished(folder, tuple(journals), tuple(runs.values()), tuple(str(name) for name in planned), header)
+    return UnfinishedCampaign(
+        folder, tuple(journals), tuple(runs.values()), tuple(str(name) for name in planned), header
+    )
 
 
 def _whole(contents: JournalContents) -> Iterator[Run]:
@@ -117,7 +119,7 @@ def _whole(contents: JournalContents) -> Iterator[Run]:
             yield run_from_journal(source)
 
 
-def refuse_what_differs(before: Unfinished, loaded: LoadedConfig, backend: str) -> None:
+def refuse_what_differs(before: UnfinishedCampaign, loaded: LoadedConfig, backend: str) -> None:
     """Raise UsageError that names every key by which the sets would not belong together."""
     was = before.header.get("played_on")
     if was != backend:

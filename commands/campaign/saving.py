@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from commands.campaign.campaign_part import Part, Played
-from commands.campaign.context import Desk
+from commands.campaign.campaign_part import CampaignPart, PlayedCampaign
+from commands.campaign.context import CommandContext
 from commands.campaign.provenance import provenance
 from commands.campaign.results_folder import RECORDING_FILE, ResultsFolder
 from rig.config.load import LoadedConfig
@@ -24,16 +24,21 @@ WIRE_LOGS = ("gyro.bin", "can.log")  # beside a raw capture; empty where no devi
 
 
 def save(
-    desk: Desk, path: Path, recording: Recording | None, info: Mapping[str, Any], played: Played, part: Part
-) -> Played:
+    context: CommandContext,
+    path: Path,
+    recording: Recording | None,
+    info: Mapping[str, Any],
+    played: PlayedCampaign,
+    part: CampaignPart,
+) -> PlayedCampaign:
     """Write recording.h5; a disk that takes no more is said, and the journals have the samples."""
     earlier = part.earlier
-    contents = _read_back(desk, path / played.journals[0])
+    contents = _read_back(context, path / played.journals[0])
     if recording is None:
         recording = recording_from_journal(contents) if contents is not None else Recording(())
     recording = dataclasses.replace(recording, info=dict(info))
     if earlier is not None:
-        before = [_read_back(desk, path / name) for name in earlier.journals]
+        before = [_read_back(context, path / name) for name in earlier.journals]
         contents = joined([c for c in (*before, contents) if c is not None])
         recording = (_added if part.resumes is None else _resumed)(earlier.recording, recording)
         played = dataclasses.replace(
@@ -43,11 +48,11 @@ def save(
         try:
             _write(path, recording, contents, anew=(path / RECORDING_FILE).exists())
         except RigError as problem:
-            desk.say_error(problem)
+            context.say_error(problem)
     return dataclasses.replace(played, recording=recording, read_back=contents is not None)
 
 
-def where_it_is(played: Played, folder: Path) -> str:
+def describe_location(played: PlayedCampaign, folder: Path) -> str:
     """Where the samples of a campaign are, or that there are none and what its folder has instead."""
     if played.recording.runs:
         return f"What was recorded is in {folder}"
@@ -71,11 +76,11 @@ def _write(path: Path, recording: Recording, contents: JournalContents | None, a
         raise JournalError(f"cannot write {path / RECORDING_FILE}: {error.strerror}; {new} has everything") from error
 
 
-def _read_back(desk: Desk, path: Path) -> JournalContents | None:
+def _read_back(context: CommandContext, path: Path) -> JournalContents | None:
     try:
         return read_journal(path)
     except RigError as problem:
-        desk.say_error(problem)
+        context.say_error(problem)
         return None
 
 
@@ -92,16 +97,16 @@ def _resumed(earlier: Recording, new: Recording) -> Recording:
 
 
 def export_earlier(
-    desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, part: Part, header: Mapping[str, Any]
-) -> Played:
+    context: CommandContext, loaded: LoadedConfig, folder: ResultsFolder, part: CampaignPart, header: Mapping[str, Any]
+) -> PlayedCampaign:
     """Make a folder of what was played before, where nothing is left to play."""
-    path = folder.made()
+    path = folder.create()
     part.bring(path)
     assert part.earlier is not None
     info = dict(header) | provenance(loaded) | {"resumed_from": str(part.resumes), "aborted": None}
-    contents = joined([c for _, name in part.brought if (c := _read_back(desk, path / name)) is not None])
+    contents = joined([c for _, name in part.brought if (c := _read_back(context, path / name)) is not None])
     recording = dataclasses.replace(part.earlier.recording, info=info, noise=header.get("noise"))
-    with desk.stops.saving():
+    with context.stops.saving():
         write_recording_h5(path / RECORDING_FILE, recording, contents)
     return dataclasses.replace(part.earlier, recording=recording)
 

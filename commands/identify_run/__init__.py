@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from commands.terminal.early_signals import end_quietly
+from commands.terminal.early_signals import end_on_signals
 
 
 def main() -> None:
     """Entry point of `identify-run`."""
-    end_quietly()
+    end_on_signals()
     from commands.identify_run.app import app
-    from commands.terminal.exit_codes import leave_warnings_to_developers
+    from commands.terminal.exit_codes import hide_library_warnings
 
-    leave_warnings_to_developers()
+    hide_library_warnings()
     app(prog_name="identify-run")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from commands.campaign.context import Desk, Options, at_desk
+from commands.campaign.context import CommandContext, Options, run_command
 from commands.terminal.options import (
     ConfigFile,
     DryRun,
@@ -25,7 +25,7 @@ from commands.terminal.options import (
 )
 
 if TYPE_CHECKING:
-    from commands.campaign.campaign_part import Played
+    from commands.campaign.campaign_part import PlayedCampaign
     from commands.campaign.results_folder import ResultsFolder
     from identify.results import Identification
     from rig.config.load import LoadedConfig
@@ -56,38 +56,38 @@ def identify_run(
     3 device fault, 4 safety trip, 70 internal error, 130 Ctrl-C.
     """
     options = Options(config, out, dry_run, emulate, yes, tuple(overrides or ()), seed, quiet, resume)
-    raise typer.Exit(at_desk(options, run))
+    raise typer.Exit(run_command(options, run))
 
 
-def run(desk: Desk) -> int:
+def run(context: CommandContext) -> int:
     """The main job; returns the exit code."""
     from commands.campaign.backends import RECORDED, backend_name
 
-    options = desk.options
+    options = context.options
     loaded = options.load()
-    folder = desk.choose_folder(loaded.config.name)
+    folder = context.choose_folder(loaded.config.name)
     if backend_name(loaded.config, options.dry_run, options.emulate) == RECORDED and options.resume is None:
-        return _run_recorded(desk, loaded, folder)
-    return _run_played(desk, loaded, folder)
+        return _run_recorded(context, loaded, folder)
+    return _run_played(context, loaded, folder)
 
 
-def _run_recorded(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> int:
+def _run_recorded(context: CommandContext, loaded: LoadedConfig, folder: ResultsFolder) -> int:
     """Nothing is written before the recordings have proved good for something."""
-    from commands.campaign.announcement import opening_recorded
+    from commands.campaign.announcement import recorded_announcement
     from commands.campaign.provenance import provenance
     from rig.recording.load import read_recording
 
     recording = read_recording(loaded)
     files = recording.info.get("files", ())
-    desk.terminal.tell(opening_recorded(len(set(files)), len(recording.runs), folder.path))
+    context.terminal.show(recorded_announcement(len(set(files)), len(recording.runs), folder.path))
     recording = dataclasses.replace(recording, info=dict(recording.info) | provenance(loaded))
-    found = _identified(desk, loaded, recording)
+    found = _identified(context, loaded, recording)
     if not found.aborted:
         from identify.follow_up_rounds import limits_of
 
         allowed = limits_of(found, loaded.config.limits, found.axis == "linear")
-        found = _planned(desk, loaded, recording, found, allowed, _sample_rate_hz(recording))
-    return _conclude(desk, loaded, folder, recording, found)
+        found = _planned(context, loaded, recording, found, allowed, _sample_rate_hz(recording))
+    return _conclude(context, loaded, folder, recording, found)
 
 
 def _sample_rate_hz(recording: Recording) -> float:
@@ -98,36 +98,38 @@ def _sample_rate_hz(recording: Recording) -> float:
     return float(f"{min(max(rate, 10.0), 20_000.0):.4g}")
 
 
-def _run_played(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder) -> int:
+def _run_played(context: CommandContext, loaded: LoadedConfig, folder: ResultsFolder) -> int:
     from commands.campaign.resume import play_campaign
-    from commands.terminal.exit_codes import NOT_ACCEPTED, code_of
+    from commands.terminal.exit_codes import NOT_ACCEPTED, exit_code_of
     from rig.errors import Aborted, UsageError
 
-    played = play_campaign(desk, loaded, folder)
+    played = play_campaign(context, loaded, folder)
     cause = played.cause
     if cause is None:
         try:
-            found = _identified(desk, loaded, played.recording)
+            found = _identified(context, loaded, played.recording)
         except (Aborted, KeyboardInterrupt):
-            desk.terminal.insist(f"Stopped before anything was identified. What was recorded is in {folder.path}")
+            context.terminal.show_always(
+                f"Stopped before anything was identified. What was recorded is in {folder.path}"
+            )
             raise
         except UsageError as error:  # the campaign was played, so this is no matter of usage any more
-            desk.say_error(error)
+            context.say_error(error)
             return NOT_ACCEPTED
         if not found.aborted:
-            played, found = _followed_up(desk, loaded, folder, played, found)
-        code = _conclude(desk, loaded, folder, played.recording, found)
-        return code if played.cause is None else code_of(played.cause)
+            played, found = _followed_up(context, loaded, folder, played, found)
+        code = _conclude(context, loaded, folder, played.recording, found)
+        return code if played.cause is None else exit_code_of(played.cause)
     try:
-        _conclude_aborted(desk, loaded, folder, played)
+        _conclude_aborted(context, loaded, folder, played)
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (what ended the campaign decides; this is said)
-        desk.say_error(error)
-    return code_of(cause)
+        context.say_error(error)
+    return exit_code_of(cause)
 
 
 def _followed_up(
-    desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, played: Played, found: Identification
-) -> tuple[Played, Identification]:
+    context: CommandContext, loaded: LoadedConfig, folder: ResultsFolder, played: PlayedCampaign, found: Identification
+) -> tuple[PlayedCampaign, Identification]:
     """Plan a follow-up where a name has a rival, play it where it may be played, identify again from all the data.
 
     Whatever a follow-up ends in, what stood before it stands: results are written before it is played.
@@ -138,24 +140,29 @@ def _followed_up(
     config = loaded.config
     allowed = allowed_peaks(config.limits, config.excitation.margin, played.rate_full_scale_rad_s)
     rate_hz, earlier_model = config.excitation.sample_rate_hz, found.final.platform
-    found = _planned(desk, loaded, played.recording, found, allowed, rate_hz)
+    found = _planned(context, loaded, played.recording, found, allowed, rate_hz)
     for number in (1, 2):
         if found.aborted or not promises_more(found):
             break
-        _write(desk, loaded, folder, played.recording, found)
-        played, found, is_new = _played_on(desk, loaded, folder, played, found, number)
+        _write(context, loaded, folder, played.recording, found)
+        played, found, is_new = _played_on(context, loaded, folder, played, found, number)
         if not is_new:
             break
-        played, found, is_new = _identified_again(desk, loaded, played, found, earlier_model)
+        played, found, is_new = _identified_again(context, loaded, played, found, earlier_model)
         if not is_new:
             break
-        found = _planned(desk, loaded, played.recording, found, allowed, rate_hz)
+        found = _planned(context, loaded, played.recording, found, allowed, rate_hz)
     return played, found
 
 
 def _played_on(
-    desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, played: Played, found: Identification, number: int
-) -> tuple[Played, Identification, bool]:
+    context: CommandContext,
+    loaded: LoadedConfig,
+    folder: ResultsFolder,
+    played: PlayedCampaign,
+    found: Identification,
+    number: int,
+) -> tuple[PlayedCampaign, Identification, bool]:
     """Play what is planned; the last of the three says whether all of it is there to identify from."""
     from commands.campaign.follow_up import play_follow_up
     from rig.errors import RigError, UsageError
@@ -164,11 +171,11 @@ def _played_on(
     if plan is None:
         return played, found, False
     try:
-        more = play_follow_up(desk, loaded, folder, played, plan.excitation, found.final.platform, number, plan.why)
+        more = play_follow_up(context, loaded, folder, played, plan.excitation, found.final.platform, number, plan.why)
     except UsageError as refused:
         return played, _noted(found, str(refused)), False
     except (RigError, KeyboardInterrupt) as error:  # before the first tick, at the question perhaps
-        desk.say_error(error)
+        context.say_error(error)
         note = f"the follow-up was not played: {str(error) or 'stopped by Ctrl-C'}"
         return dataclasses.replace(played, cause=error), _noted(found, note, aborted=True), False
     if more.cause is None:
@@ -178,15 +185,19 @@ def _played_on(
 
 
 def _identified_again(
-    desk: Desk, loaded: LoadedConfig, played: Played, found: Identification, earlier_model: Platform | None
-) -> tuple[Played, Identification, bool]:
+    context: CommandContext,
+    loaded: LoadedConfig,
+    played: PlayedCampaign,
+    found: Identification,
+    earlier_model: Platform | None,
+) -> tuple[PlayedCampaign, Identification, bool]:
     """Identify from all the data; where that fails or is stopped, what was found before stands."""
     from identify.follow_up_rounds import after_playing
     from rig.errors import Aborted, UsageError
 
     stopped: BaseException = Aborted(STOPPED_AGAIN)
     try:
-        newer = _identified(desk, loaded, played.recording)
+        newer = _identified(context, loaded, played.recording)
         if not newer.aborted:
             return played, after_playing(found, newer, earlier_model, played.recording), True
     except (Aborted, KeyboardInterrupt) as error:
@@ -205,7 +216,12 @@ def _noted(found: Identification, note: str, aborted: bool = False) -> Identific
 
 
 def _planned(
-    desk: Desk, loaded: LoadedConfig, recording: Recording, found: Identification, allowed: Peaks, rate_hz: float
+    context: CommandContext,
+    loaded: LoadedConfig,
+    recording: Recording,
+    found: Identification,
+    allowed: Peaks,
+    rate_hz: float,
 ) -> Identification:
     """With a follow-up planned, where a name has a rival; a stop on the way leaves what was found, marked aborted."""
     from identify.follow_up import plan_follow_up, with_follow_up
@@ -214,7 +230,7 @@ def _planned(
     rounds = len(found.follow_up.rounds) if found.follow_up else 0
     prefix = "follow-up" if rounds == 0 else f"follow-up {rounds + 1}"
     if any(found.verdict.confusable_with.values()):
-        desk.terminal.note("planning what would part the rivals")
+        context.terminal.note("planning what would part the rivals")
     try:
         planned = plan_follow_up(
             found, dataclasses.replace(recording, info={}), allowed, rate_hz, loaded.config.excitation.rest_s, prefix
@@ -225,67 +241,69 @@ def _planned(
     return with_follow_up(found, planned)
 
 
-def _conclude_aborted(desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, played: Played) -> None:
+def _conclude_aborted(
+    context: CommandContext, loaded: LoadedConfig, folder: ResultsFolder, played: PlayedCampaign
+) -> None:
     """Identify from the sets that came to their end, and mark it."""
-    from commands.campaign.saving import where_it_is
+    from commands.campaign.saving import describe_location
 
-    whole = played.fit_to_identify
+    whole = played.complete_runs
     if not whole.runs:
-        where = where_it_is(played, folder.path)
-        desk.terminal.insist(f"No set was complete, so nothing is identified. {where}")
+        where = describe_location(played, folder.path)
+        context.terminal.show_always(f"No set was complete, so nothing is identified. {where}")
         return
-    desk.terminal.tell(f"Identifying from the {len(whole.runs)} complete set(s); the results are marked aborted.")
-    found = dataclasses.replace(_identified(desk, loaded, whole), aborted=True)
-    _conclude(desk, loaded, folder, whole, found)
+    context.terminal.show(f"Identifying from the {len(whole.runs)} complete set(s); the results are marked aborted.")
+    found = dataclasses.replace(_identified(context, loaded, whole), aborted=True)
+    _conclude(context, loaded, folder, whole, found)
 
 
-def _identified(desk: Desk, loaded: LoadedConfig, recording: Recording) -> Identification:
+def _identified(context: CommandContext, loaded: LoadedConfig, recording: Recording) -> Identification:
     """What the recording shows. ``info``, which quotes the configuration, stays outside."""
     from identify.loop import identify
 
     config = loaded.config
     blind = dataclasses.replace(recording, info={})
-    return identify(blind, config.model.platform(), config.identify, desk.terminal.note)
+    return identify(blind, config.model.platform(), config.identify, context.terminal.note)
 
 
 def _conclude(
-    desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, recording: Recording, found: Identification
+    context: CommandContext, loaded: LoadedConfig, folder: ResultsFolder, recording: Recording, found: Identification
 ) -> int:
     """Write the results and the summary; returns 0, 1, or 130 where somebody asked to stop."""
     from commands.terminal.exit_codes import NOT_ACCEPTED, OK, STOPPED
     from identify.summary import WIDTH, summary
 
-    late = desk.stops.outstanding()  # by the loss of the terminal, or in a library that swallows what is raised
+    late = context.stops.outstanding()  # by the loss of the terminal, or in a library that swallows what is raised
     if late is not None and not found.aborted:
         found = dataclasses.replace(found, aborted=True, accepted=False, reasons=(f"{late}.", *found.reasons))
     try:
-        _write(desk, loaded, folder, recording, found)
+        _write(context, loaded, folder, recording, found)
     finally:  # a disk that does not take the results is no reason to keep them back
-        desk.terminal.settle()
-        if not desk.options.quiet:
+        context.terminal.flush()
+        if not context.options.quiet:
             is_terminal = sys.stdout.isatty()
             width = shutil.get_terminal_size().columns if is_terminal else WIDTH
-            where = f"\nResults: {folder.path}" if folder.evidence() else ""
+            where = f"\nResults: {folder.path}" if folder.existing_path() else ""
             sys.stdout.write(f"{summary(found, width, is_terminal, recording.info)}{where}\n")
     if found.accepted:
         return OK
     if found.aborted:
         kept = "" if loaded.config.backend == "recorded" else "torque is off, what was recorded is kept, "
-        desk.terminal.insist(f"Stopped: {kept}the results are marked aborted.")
+        context.terminal.show_always(f"Stopped: {kept}the results are marked aborted.")
         return STOPPED
     for reason in found.reasons:
-        desk.terminal.insist(f"Not accepted: {reason}")
+        context.terminal.show_always(f"Not accepted: {reason}")
     return NOT_ACCEPTED
 
 
 def _write(
-    desk: Desk, loaded: LoadedConfig, folder: ResultsFolder, recording: Recording, found: Identification
+    context: CommandContext, loaded: LoadedConfig, folder: ResultsFolder, recording: Recording, found: Identification
 ) -> None:
     """Write the results."""
     from identify.writing import write_results
 
-    path = folder.made()
-    with desk.stops.saving():
+    path = folder.create()
+    with context.stops.saving():
         model = loaded.config.model
         given = model.inertia_declared
         write_results(path, found, recording, model.platform(), loaded.config.name, inertia_declared=given)

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 def main() -> None:
     """Entry point of `rig`."""
-    from commands.terminal.early_signals import end_quietly
+    from commands.terminal.early_signals import end_on_signals
 
-    end_quietly()
+    end_on_signals()
     from commands.rig.app import app
-    from commands.terminal.exit_codes import leave_warnings_to_developers
+    from commands.terminal.exit_codes import hide_library_warnings
 
-    leave_warnings_to_developers()
+    hide_library_warnings()
     app(prog_name="rig")

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from commands.campaign.context import Desk, Options, at_desk
-from commands.terminal.exit_codes import conclude
+from commands.campaign.context import CommandContext, Options, run_command
+from commands.terminal.exit_codes import run_to_exit_code
 from commands.terminal.options import (
     ConfigFile,
     DryRun,
@@ -36,13 +36,13 @@ def rig(version: Version = False) -> None:
 def check(config: ConfigFile, emulate: Emulate = False, overrides: Overrides = None) -> None:
     """Validate CONFIG, forecast every set, contact the devices without torque; say what is wrong and its cure."""
 
-    def command(desk: Desk) -> int:
-        loaded = desk.options.load()
+    def command(context: CommandContext) -> int:
+        loaded = context.options.load()
         from commands.rig.check import run_checks
 
-        return run_checks(desk, loaded)
+        return run_checks(context, loaded)
 
-    raise typer.Exit(at_desk(Options(config, emulate=emulate, overrides=tuple(overrides or ())), command))
+    raise typer.Exit(run_command(Options(config, emulate=emulate, overrides=tuple(overrides or ())), command))
 
 
 @app.command()
@@ -55,7 +55,7 @@ def devices() -> None:
         sys.stdout.write("\n".join(device_lines()) + "\n")
         return 0
 
-    raise typer.Exit(conclude(command))
+    raise typer.Exit(run_to_exit_code(command))
 
 
 @app.command()
@@ -72,14 +72,14 @@ def play(
 ) -> None:
     """Play and record only."""
 
-    def command(desk: Desk) -> int:
-        loaded = desk.options.load()
+    def command(context: CommandContext) -> int:
+        loaded = context.options.load()
         from commands.rig.play import play_only
 
-        return play_only(desk, loaded)
+        return play_only(context, loaded)
 
     options = Options(config, out, dry_run, emulate, yes, tuple(overrides or ()), seed, quiet, resume)
-    raise typer.Exit(at_desk(options, command))
+    raise typer.Exit(run_command(options, command))
 
 
 @app.command()
@@ -95,7 +95,7 @@ def recover(
 
         return recover_folder(folder)
 
-    raise typer.Exit(conclude(command))
+    raise typer.Exit(run_to_exit_code(command))
 
 
 @app.command()
@@ -115,7 +115,7 @@ def export(
 
         return export_recording(source, to, out)
 
-    raise typer.Exit(conclude(command))
+    raise typer.Exit(run_to_exit_code(command))
 
 
 @app.command()
@@ -136,4 +136,4 @@ def emulate(config: ConfigFile, overrides: Overrides = None) -> None:
         run_emulators(options.load().config, requests)
         return 0
 
-    raise typer.Exit(conclude(command))
+    raise typer.Exit(run_to_exit_code(command))

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from commands.campaign.backends import BACKENDS, RECORDED, Stage, backend_name
-from commands.campaign.context import Desk
-from commands.campaign.limit_locations import with_places
+from commands.campaign.context import CommandContext
+from commands.campaign.limit_locations import with_locations
 from commands.terminal.display import plain
 from commands.terminal.exit_codes import OK
 from rig.config.load import LoadedConfig
@@ -25,7 +25,7 @@ from rig.errors import Aborted, PreflightRefusal, RecordingError, RigError
 from rig.interface import Torque
 from rig.preflight import Prediction, playable_of, predict_all
 
-NO_SCALE = (
+UNKNOWN_INERTIA_NOTE = (
     "forecast for a platform of unit inertia (model.inertia_unknown): how far a torque moves the real one nobody can "
     "tell before its inertia is declared"
 )
@@ -64,8 +64,8 @@ def forecast(known: Known) -> list[str]:
     try:
         playable_of(known.predictions, config.model.platform(), config.excitation)
     except PreflightRefusal as error:
-        raise with_places(error, known.loaded) from None
-    doubt = [NO_SCALE] if config.model.inertia_unknown else []
+        raise with_locations(error, known.loaded) from None
+    doubt = [UNKNOWN_INERTIA_NOTE] if config.model.inertia_unknown else []
     return doubt + [
         f"forecast {plain(p.sentence())}" + ("" if p.passes else f", scaled to {100 * p.scale:.1f} % as asked")
         for p in known.predictions
@@ -133,17 +133,17 @@ def _account_lines(account: Mapping[str, Any]) -> Iterator[str]:
 CHECKS: tuple[Check, ...] = (configuration, recordings, forecast, identifiability, contact)
 
 
-def run_checks(desk: Desk, loaded: LoadedConfig) -> int:
+def run_checks(context: CommandContext, loaded: LoadedConfig) -> int:
     """Run all checks; lines go to stdout, what is wrong to stderr. Returns the exit code of the first fault."""
     code = OK
-    with tempfile.TemporaryDirectory() as scratch, _known(desk, loaded, Path(scratch)) as known:
+    with tempfile.TemporaryDirectory() as scratch, _known(context, loaded, Path(scratch)) as known:
         for check in CHECKS:
             try:
                 lines = check(known)
             except Aborted:
                 raise
             except RigError as error:
-                found = desk.say_error(error)
+                found = context.say_error(error)
                 code = code or found
                 continue
             sys.stdout.writelines(f"{line}\n" for line in lines)
@@ -154,8 +154,8 @@ def run_checks(desk: Desk, loaded: LoadedConfig) -> int:
 
 
 @contextmanager
-def _known(desk: Desk, loaded: LoadedConfig, scratch: Path) -> Iterator[Known]:
-    name = backend_name(loaded.config, False, desk.options.emulate)
+def _known(context: CommandContext, loaded: LoadedConfig, scratch: Path) -> Iterator[Known]:
+    name = backend_name(loaded.config, False, context.options.emulate)
     if name == RECORDED:
         yield Known(loaded, None)
         return

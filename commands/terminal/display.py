@@ -29,7 +29,7 @@ def plain(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text)
 
 
-def forget_typed_ahead(stream: TextIO) -> None:
+def discard_typed_ahead(stream: TextIO) -> None:
     """Drop what was typed on a terminal and not read yet: it answers no question that was asked later.
 
     Nothing is dropped where ``stream`` is no terminal.
@@ -92,13 +92,13 @@ class Terminal:
                     lost = True
                     self.on_loss(LOST)
 
-    def tell(self, text: str) -> None:
+    def show(self, text: str) -> None:
         """Say something in a line of its own, unless quiet. Safe from a signal handler."""
         if not self.quiet:
             self._end_line()
             self._lines.put(text + "\n")
 
-    def insist(self, text: str) -> None:
+    def show_always(self, text: str) -> None:
         """Say something in a line of its own, even if quiet."""
         self._end_line()
         self._lines.put(text + "\n")
@@ -108,7 +108,7 @@ class Terminal:
         if self.has_bars:
             self.overwrite(text)
         else:
-            self.tell(text)
+            self.show(text)
 
     def overwrite(self, text: str) -> None:
         """Put ``text`` in the place of the line that was put here last."""
@@ -127,7 +127,7 @@ class Terminal:
             self._is_open_line = False
             self._lines.put("\r\x1b[K")
 
-    def settle(self) -> None:
+    def flush(self) -> None:
         """Wait until what was told is written, but not for ever; then others may write there."""
         self.clear_line()
         written = threading.Event()
@@ -144,7 +144,7 @@ class SetBars(Observer):
 
     def probed(self, finding: str) -> None:
         """What the probe found."""
-        self._terminal.tell(plain(finding))
+        self._terminal.show(plain(finding))
 
     def set_begins(self, planned: PlannedSet, number: int, count: int) -> None:
         """Which set it is."""
@@ -162,7 +162,7 @@ class SetBars(Observer):
         s = statistics
         told = _figures(s.late.max_s, s.missed_ticks, s.drops, s.peak_torque_nm)
         self._terminal.clear_line()
-        self._terminal.tell(f"{self._head} {_bar(1.0) if s.complete else 'CUT SHORT'} {told}")
+        self._terminal.show(f"{self._head} {_bar(1.0) if s.complete else 'CUT SHORT'} {told}")
 
 
 def _bar(part: float) -> str:

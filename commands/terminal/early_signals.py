@@ -16,55 +16,55 @@ from types import FrameType
 SIGNALS = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "the loss of its terminal", "SIGBREAK": "Ctrl-Break"}
 STOPPED = 130
 
-_ends_in: int | None = None  # the exit code, once it is known
-_is_at_work = False
+_exit_code: int | None = None  # the exit code, once it is known
+_is_accepting_aborts = False
 
 
-def heeded_signals() -> list[int]:
+def handled_signals() -> list[int]:
     """Numbers of the signals that end a command: all that there are, and SIGHUP unless it is ignored (nohup)."""
     found = [(name, getattr(signal, name, None)) for name in SIGNALS]
     ignored = signal.SIG_IGN
     return [n for name, n in found if n is not None and not (name == "SIGHUP" and signal.getsignal(n) is ignored)]
 
 
-def end_quietly() -> None:
+def end_on_signals() -> None:
     """From here on a signal ends the program without a traceback. Called once, by whatever is the program."""
-    for number in heeded_signals():
-        signal.signal(number, _heard)
+    for number in handled_signals():
+        signal.signal(number, _handle)
     atexit.register(_leave_undisturbed)
 
 
 @contextlib.contextmanager
-def at_work() -> Iterator[None]:
+def accepting_aborts() -> Iterator[None]:
     """While this holds there is somebody who catches ``Aborted``; before, nothing was begun."""
-    global _is_at_work  # noqa: PLW0603  a process has one set of signal handlers
-    _is_at_work = True
+    global _is_accepting_aborts  # noqa: PLW0603  a process has one set of signal handlers
+    _is_accepting_aborts = True
     try:
         yield
     finally:
-        _is_at_work = False
+        _is_accepting_aborts = False
 
 
-def ends_in(code: int) -> int:
+def fix_exit_code(code: int) -> int:
     """The exit code is known: a signal on the way out does not change it. Returns it."""
-    global _ends_in  # noqa: PLW0603
-    _ends_in = code
+    global _exit_code  # noqa: PLW0603
+    _exit_code = code
     return code
 
 
 def _leave_undisturbed() -> None:
     """On its way out the interpreter puts back handlers that kill; by then all is written."""
-    for number in heeded_signals():
+    for number in handled_signals():
         signal.signal(number, signal.SIG_IGN)
 
 
-def _heard(number: int, _frame: FrameType | None) -> None:
+def _handle(number: int, _frame: FrameType | None) -> None:
     name = SIGNALS[signal.Signals(number).name]
-    if _is_at_work:
+    if _is_accepting_aborts:
         from rig.errors import Aborted
 
         raise Aborted(f"Stopped by {name}.")
-    if _ends_in is None:
+    if _exit_code is None:
         with contextlib.suppress(OSError):
             os.write(2, f"Stopped by {name}: nothing was moved or written.\n".encode())
-    os._exit(STOPPED if _ends_in is None else _ends_in)
+    os._exit(STOPPED if _exit_code is None else _exit_code)

@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-from commands.terminal.early_signals import at_work, ends_in
+from commands.terminal.early_signals import accepting_aborts, fix_exit_code
 from rig.errors import Aborted, DeviceFault, RigError, SafetyTrip, UsageError
 
 OK, NOT_ACCEPTED, USAGE, INTERNAL, STOPPED = 0, 1, 2, 70, 130
@@ -28,17 +28,17 @@ HEADINGS: tuple[tuple[type[BaseException], str], ...] = (
 )
 LONGEST_WORD, LONGEST_LINE = 200, 2000  # of what is said; a file may hold a line of any length
 _LONG_WORD = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
-_NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EFBIG}
+_DISK_FULL_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EFBIG}
 Evidence = Callable[[], Path | None]  # the results folder as far as there is one
 
 
-def no_evidence() -> Path | None:
+def no_results_folder() -> Path | None:
     """For commands that make no results folder."""
     return None
 
 
-def conclude(
-    command: Callable[[], int], evidence: Evidence = no_evidence, stopped: Callable[[], str | None] = lambda: None
+def run_to_exit_code(
+    command: Callable[[], int], evidence: Evidence = no_results_folder, stopped: Callable[[], str | None] = lambda: None
 ) -> int:
     """Run ``command``; whatever it raises becomes a message on stderr and an exit code. Never raises.
 
@@ -46,36 +46,36 @@ def conclude(
     may fail of it in any way: what comes then is the stop, not a fault of the program.
     """
     try:
-        with at_work():
+        with accepting_aborts():
             code = command()
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (this is the place where all of them end)
         reason = stopped()
-        if reason is not None and code_of(as_known(error)) == INTERNAL:
+        if reason is not None and exit_code_of(as_rig_error(error)) == INTERNAL:
             _keep_traceback(error, evidence())
             error = Aborted(f"{reason}.")
         code = report(error, evidence())
-    return _flushed(ends_in(code))
+    return _flushed(fix_exit_code(code))
 
 
 def report(error: BaseException, folder: Path | None) -> int:
     """Say on stderr what went wrong and return the exit code; the traceback goes to ``folder`` only."""
-    error = as_known(error)
+    error = as_rig_error(error)
     say(message_of(error, folder))
-    return code_of(error)
+    return exit_code_of(error)
 
 
-def code_of(error: BaseException) -> int:
+def exit_code_of(error: BaseException) -> int:
     """The exit code of an error."""
     if isinstance(error, RigError):
         return error.exit_code
     return STOPPED if isinstance(error, KeyboardInterrupt) else INTERNAL
 
 
-def as_known(error: BaseException) -> BaseException:
+def as_rig_error(error: BaseException) -> BaseException:
     """A full disk, or a reader that has gone away, ends a campaign as Ctrl-C does; all else is what it is."""
     if isinstance(error, BrokenPipeError):
         return Aborted("nobody reads the output any more.")
-    if isinstance(error, OSError) and error.errno in _NO_ROOM:
+    if isinstance(error, OSError) and error.errno in _DISK_FULL_ERRNOS:
         return Aborted(
             f"cannot write {error.filename or 'the results'}: {error.strerror}. What was written until then is "
             "kept; make room or choose another --out."
@@ -108,7 +108,7 @@ def _keep_traceback(error: BaseException, folder: Path | None) -> str:
     return f" Its traceback is in {path}; please send it to the authors."
 
 
-def leave_warnings_to_developers() -> None:
+def hide_library_warnings() -> None:
     """What NumPy warns of says nothing to whoever stands at the bench; python -W shows it."""
     if not sys.warnoptions:
         warnings.simplefilter("ignore")

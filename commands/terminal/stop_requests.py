@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from enum import Enum
 from types import FrameType
 
-from commands.terminal.early_signals import SIGNALS, heeded_signals
+from commands.terminal.early_signals import SIGNALS, handled_signals
 from rig.errors import Aborted
 
 STOPPING = "Stopping: torque to zero, then saving. Ctrl-C again cuts the torque at once."
@@ -42,23 +42,23 @@ class StopRequests:
 
     def __init__(self) -> None:
         self.reason: str | None = None
-        self.tell: Callable[[str], None] = lambda text: None
+        self.show: Callable[[str], None] = lambda text: None
         self._torque_off: Callable[[], None] | None = None
         self._stage = _Stage.IDLE
-        self._is_heeded = False  # whether somebody has acted on the reason
+        self._is_acted_on = False  # whether somebody has acted on the reason
         self._lost: BaseException | None = None  # raised where nothing can be raised: it has to be raised again
 
     def poll(self) -> str | None:
         """The reason to stop, or None. Asked by the sequencer at every tick."""
         self._stage = _Stage.TICKING
-        self._is_heeded = self.reason is not None
+        self._is_acted_on = self.reason is not None
         return self.reason
 
     def outstanding(self) -> str | None:
         """The reason to stop where nobody has acted on it yet, else None. Whoever asks has to act on it."""
-        if self._is_heeded or self.reason is None:
+        if self._is_acted_on or self.reason is None:
             return None
-        self._is_heeded = True
+        self._is_acted_on = True
         return self.reason
 
     def request(self, reason: str) -> None:
@@ -95,9 +95,9 @@ class StopRequests:
             raise Aborted(f"{reason}.")
 
     @contextlib.contextmanager
-    def heeded(self) -> Iterator[None]:
+    def handling_signals(self) -> Iterator[None]:
         """Handlers in place; those from before are put back."""
-        earlier = {number: signal.signal(number, self._heard) for number in heeded_signals()}
+        earlier = {number: signal.signal(number, self._handle) for number in handled_signals()}
         hook = sys.unraisablehook
         sys.unraisablehook = lambda lost: self._again(lost.exc_value) or hook(lost)
         try:
@@ -115,7 +115,7 @@ class StopRequests:
         threading.Timer(AGAIN_S, _strike).start()
         return True
 
-    def _heard(self, number: int, _frame: FrameType | None) -> None:
+    def _handle(self, number: int, _frame: FrameType | None) -> None:
         lost, self._lost = self._lost, None
         if lost is not None:
             if self._stage is not _Stage.SAVING:
@@ -124,9 +124,9 @@ class StopRequests:
         is_first = self.reason is None
         self.request(f"Stopped by {SIGNALS[signal.Signals(number).name]}")
         if is_first and self._stage is _Stage.TICKING:
-            self.tell(STOPPING)
+            self.show(STOPPING)
         elif is_first and self._stage is _Stage.SAVING:
-            self.tell(SAVING)
+            self.show(SAVING)
         elif is_first and self._stage is _Stage.IDLE:
             raise Aborted(f"{self.reason}.")
         elif number == signal.SIGINT and not is_first:

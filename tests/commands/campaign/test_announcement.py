@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from commands.campaign.announcement import ask_consent, opening
+from commands.campaign.announcement import announcement
+from commands.campaign.consent import ask_consent
 from rig.config.root import Config
 from rig.errors import UsageError
 from rig.excitation import planned
@@ -23,7 +24,7 @@ def never(question: str) -> str:
 def test_it_names_the_kind_of_torque_the_limits_every_set_the_time_and_the_folder() -> None:
     config = Config(name="a", backend="simulated")
     sets = [s.scaled(0.5) for s in planned(config.excitation.sets)]
-    said = opening(REAL, config, sets, Path("runs/x"))
+    said = announcement(REAL, config, sets, Path("runs/x"))
     for words in ("Torque is REAL: a drive; a gyro", "travel 10 deg", "rate 400 deg/s", "torque 350 N m", "runs/x"):
         assert words in said
     assert "0.5 Hz: 10 s, up to 150.0 N m, scaled to 50.0 %" in said

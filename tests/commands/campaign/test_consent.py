@@ -16,8 +16,8 @@ if sys.platform == "win32":
 import pty
 
 from commands.campaign import playing
-from commands.campaign.announcement import QUESTION, ask_consent
-from commands.terminal.display import forget_typed_ahead
+from commands.campaign.consent import QUESTION, ask_consent
+from commands.terminal.display import discard_typed_ahead
 from rig.errors import UsageError
 from rig.interface import Statement, Torque
 
@@ -68,5 +68,5 @@ def test_a_yes_typed_after_the_question_is(terminal: int, monkeypatch: pytest.Mo
 
 def test_what_is_no_terminal_keeps_what_it_has() -> None:
     stream: TextIO = io.StringIO("yes\n")
-    forget_typed_ahead(stream)
+    discard_typed_ahead(stream)
     assert stream.read() == "yes\n"

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import pytest
 
-from commands.campaign.disk_space import LEAST_BYTES, scarce_room
+from commands.campaign.disk_space import START_BYTES, disk_space_warning
 from commands.campaign.results_folder import ResultsFolder
 from commands.rig.app import app
 from rig.errors import Aborted
@@ -51,8 +51,8 @@ def test_the_room_is_that_of_the_folder_in_which_the_results_will_be_made(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[Path] = []
-    monkeypatch.setattr(shutil, "disk_usage", lambda path: asked.append(path) or Usage(LEAST_BYTES))
-    assert str(tmp_path) in scarce_room(tmp_path / "not" / "yet", 1e7)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: asked.append(path) or Usage(START_BYTES))
+    assert str(tmp_path) in disk_space_warning(tmp_path / "not" / "yet", 1e7)
     assert asked == [tmp_path]
 
 
@@ -61,7 +61,7 @@ def test_a_file_system_that_does_not_tell_is_no_hindrance(tmp_path: Path, monkey
         raise OSError(errno.ENOSYS, "Function not implemented")
 
     monkeypatch.setattr(shutil, "disk_usage", silent)
-    assert scarce_room(tmp_path, 1e12) == ""
+    assert disk_space_warning(tmp_path, 1e12) == ""
 
 
 def test_a_folder_that_a_full_disk_does_not_take_ends_as_a_full_disk_does(
@@ -73,4 +73,4 @@ def test_a_folder_that_a_full_disk_does_not_take_ends_as_a_full_disk_does(
     folder = ResultsFolder(tmp_path / "out", "name", datetime.now(UTC))
     monkeypatch.setattr(Path, "mkdir", full)
     with pytest.raises(Aborted, match="No space left on device"):
-        folder.made()
+        folder.create()

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import pytest
 
-from commands.campaign.context import Desk, Options
+from commands.campaign.context import CommandContext, Options
 from commands.campaign.follow_up import NOBODY_AGREED, play_follow_up
 from rig.config.load import load_config
 from rig.errors import UsageError
@@ -19,9 +19,9 @@ REPLAY = ("bench.replay=somewhere",)
 def refused(monkeypatch: pytest.MonkeyPatch, terminal: bool, *overrides: str, emulate: bool = False) -> str:
     monkeypatch.setattr("commands.campaign.follow_up._somebody_there", lambda: terminal)
     nothing = cast(Any, None)
-    desk = Desk(Options(BENCH, emulate=emulate), nothing, nothing)
+    context = CommandContext(Options(BENCH, emulate=emulate), nothing, nothing)
     with pytest.raises(UsageError) as caught:
-        play_follow_up(desk, load_config(BENCH, overrides), nothing, nothing, {}, None, 1, "to part rivals")
+        play_follow_up(context, load_config(BENCH, overrides), nothing, nothing, {}, None, 1, "to part rivals")
     return str(caught.value)
 
 

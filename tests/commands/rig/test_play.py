@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commands.campaign.campaign_part import Played
-from commands.campaign.saving import where_it_is
+from commands.campaign.campaign_part import PlayedCampaign
+from commands.campaign.saving import describe_location
 from commands.rig.app import app
 from commands.terminal.exit_codes import TRACEBACK_FILE
 from rig.errors import DeviceFault
@@ -142,7 +142,7 @@ def test_a_fault_before_the_first_sample_says_that_nothing_was_recorded(
 
 
 def test_where_the_journal_cannot_be_read_back_nobody_claims_that_it_is_empty(tmp_path: Path) -> None:
-    told = where_it_is(Played(Recording(()), frozenset(), None, read_back=False), tmp_path)
+    told = describe_location(PlayedCampaign(Recording(()), frozenset(), None, read_back=False), tmp_path)
     assert "could not be read back" in told and "rig recover" in told
 
 

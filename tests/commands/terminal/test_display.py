@@ -75,8 +75,8 @@ def test_quiet_says_nothing_but_what_is_insisted_on() -> None:
     stream = io.StringIO()
     terminal = Terminal(stream, quiet=True)
     with terminal.writing():
-        terminal.tell("by the way")
-        terminal.insist("torque is REAL")
+        terminal.show("by the way")
+        terminal.show_always("torque is REAL")
     assert stream.getvalue() == "torque is REAL\n"
 
 
@@ -99,8 +99,8 @@ def test_a_terminal_that_is_gone_is_a_reason_to_stop() -> None:
     terminal = Terminal(Gone())
     terminal.on_loss = reasons.append
     with terminal.writing():
-        terminal.tell("one")
-        terminal.tell("two")
+        terminal.show("one")
+        terminal.show("two")
     assert reasons == [LOST]
 
 

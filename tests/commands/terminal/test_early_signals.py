@@ -14,7 +14,7 @@ if sys.platform == "win32":
     pytest.skip("a process cannot signal itself gently there", allow_module_level=True)
 
 from commands.terminal import early_signals
-from commands.terminal.exit_codes import conclude
+from commands.terminal.exit_codes import run_to_exit_code
 
 SLOW_IMPORT = """
 import sys, time
@@ -30,10 +30,10 @@ main()
 """
 FINISHED = """
 import time
-from commands.terminal.early_signals import end_quietly
-from commands.terminal.exit_codes import conclude
-end_quietly()
-conclude(lambda: 1)
+from commands.terminal.early_signals import end_on_signals
+from commands.terminal.exit_codes import run_to_exit_code
+end_on_signals()
+run_to_exit_code(lambda: 1)
 print("concluded", flush=True)
 time.sleep(30)
 """
@@ -66,8 +66,8 @@ def test_once_the_exit_code_is_known_a_signal_does_not_change_it() -> None:
 
 @pytest.fixture
 def heeded() -> Iterator[None]:
-    before = {number: signal.getsignal(number) for number in early_signals.heeded_signals()}
-    early_signals.end_quietly()
+    before = {number: signal.getsignal(number) for number in early_signals.handled_signals()}
+    early_signals.end_on_signals()
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
@@ -82,14 +82,14 @@ def test_a_command_that_listens_to_nothing_itself_is_stopped_with_a_message(
         os.kill(os.getpid(), getattr(signal, name))
         return 0
 
-    assert conclude(command) == 130
+    assert run_to_exit_code(command) == 130
     assert capsys.readouterr().err.startswith("Stopped by ")
 
 
 LEAVING = """
 import signal, sys, time
-from commands.terminal.early_signals import end_quietly
-end_quietly()
+from commands.terminal.early_signals import end_on_signals
+end_on_signals()
 class Last:
     def __del__(self):
         import os, signal

@@ -23,7 +23,7 @@ def raise_signal(number: int) -> None:
 @pytest.fixture
 def stops() -> Iterator[StopRequests]:
     requests = StopRequests()
-    with requests.heeded():
+    with requests.handling_signals():
         yield requests
 
 
@@ -32,7 +32,7 @@ def test_while_ticks_run_the_first_signal_becomes_the_reason_that_the_next_tick_
     stops: StopRequests, name: str
 ) -> None:
     told: list[str] = []
-    stops.tell = told.append
+    stops.show = told.append
     with stops.playing(lambda: None):
         assert stops.poll() is None
         raise_signal(getattr(signal, name))
@@ -103,7 +103,7 @@ def test_what_a_tick_has_read_is_not_raised_a_second_time(stops: StopRequests) -
 
 def test_handlers_from_before_are_put_back() -> None:
     before = signal.getsignal(signal.SIGTERM)
-    with StopRequests().heeded():
+    with StopRequests().handling_signals():
         assert signal.getsignal(signal.SIGTERM) is not before
     assert signal.getsignal(signal.SIGTERM) is before
 
