@@ -30,7 +30,7 @@ class FirstAndLast(list[T]):
             self.left_out += 1
         super().append(item)
 
-    def told(self, as_text: Callable[[T], str] = str) -> tuple[str, ...]:
+    def describe(self, as_text: Callable[[T], str] = str) -> tuple[str, ...]:
         """All that is there as text, with a line in the place of what is not."""
         texts = [as_text(item) for item in self]
         if self.left_out:

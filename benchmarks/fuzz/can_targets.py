@@ -20,7 +20,7 @@ from drivers.codecs.lawicel import CanFrame, LawicelDecoder
 from drivers.gyroscopes import make_gyroscope
 from drivers.timing.retiming import LARGEST_CORRECTION_S
 from drivers.timing.source_clock import SourceClock
-from drivers.transport.can_link import Heard
+from drivers.transport.can_link import ReceivedFrame
 from rig.config.bench import AmplifierConfig, CanConfig, GyroscopeConfig
 from rig.errors import DeviceFault
 
@@ -87,7 +87,7 @@ def frames_of(data: bytes) -> list[CanFrame]:
 
 def _drive(amplifier: Amplifier, data: bytes) -> None:
     for k, frame in enumerate(frames_of(data)):
-        amplifier.receive(Heard(k * 1e-3, frame))
+        amplifier.receive(ReceivedFrame(k * 1e-3, frame))
         actual = amplifier.actual_torque_nm
         assert actual is None or isinstance(actual, float)
         try:
@@ -144,7 +144,7 @@ def cia402_frames(data: bytes) -> int:
     status = DriveStatus(1, 0.1, "drive")
     status.begin(0.0)
     for k, frame in enumerate(frames_of(data)):
-        rest = status.receive(Heard(k * 1e-3, frame))
+        rest = status.receive(ReceivedFrame(k * 1e-3, frame))
         assert rest is None or rest == frame.data[2:]
         if len(frame.data) >= 2:
             word = int.from_bytes(frame.data[:2], "little")
@@ -173,7 +173,7 @@ def clocks(data: bytes) -> int:
     """
     source, torque = SourceClock(1e-3), TorqueClock(1e-6, 1 << 32)
     gyro = make_gyroscope(GyroscopeConfig(sample_rate_hz=2000))
-    both = (torque.hindsight, gyro.hindsight)
+    both = (torque.retiming, gyro.retiming)
     count, now_s, at = 0, 100.0, 0
     for hindsight in both:
         hindsight.begin_set(now_s)

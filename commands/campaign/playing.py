@@ -36,7 +36,7 @@ from rig.recording.run import Recording
 from rig.sequencer import Sequencer
 from rig.sequencer.probe import Probe
 from rig.sequencer.recorder import SetStatistics
-from rig.sequencer.warm_up import rehearse
+from rig.sequencer.warm_up import warm_up
 
 
 class SetLog(SetBars):
@@ -149,7 +149,7 @@ class _CampaignRecorder:
         platform, asked = config.model.platform(), stage.rig.probe
         in_memory = stage.rig.statement().torque is Torque.SIMULATED  # the bench's are in the journal, however long
         if not in_memory:
-            rehearse(self._guard(), platform, self._sets, config.excitation.sample_rate_hz)
+            warm_up(self._guard(), platform, self._sets, config.excitation.sample_rate_hz)
         sequencer = Sequencer(
             stage.rig,
             stage.clock,

@@ -23,7 +23,7 @@ from commands.terminal.exit_codes import OK
 from rig.config.load import LoadedConfig
 from rig.errors import Aborted, PreflightRefusal, RecordingError, RigError
 from rig.interface import Torque
-from rig.preflight import Prediction, playable_of, predict_all
+from rig.preflight import Prediction, playable_sets, predict_all
 
 UNKNOWN_INERTIA_NOTE = (
     "forecast for a platform of unit inertia (model.inertia_unknown): how far a torque moves the real one nobody can "
@@ -62,12 +62,12 @@ def forecast(known: Known) -> list[str]:
         return []
     config = known.loaded.config
     try:
-        playable_of(known.predictions, config.model.platform(), config.excitation)
+        playable_sets(known.predictions, config.model.platform(), config.excitation)
     except PreflightRefusal as error:
         raise with_locations(error, known.loaded) from None
     doubt = [UNKNOWN_INERTIA_NOTE] if config.model.inertia_unknown else []
     return doubt + [
-        f"forecast {plain(p.sentence())}" + ("" if p.passes else f", scaled to {100 * p.scale:.1f} % as asked")
+        f"forecast {plain(p.describe())}" + ("" if p.passes else f", scaled to {100 * p.scale:.1f} % as asked")
         for p in known.predictions
     ]
 

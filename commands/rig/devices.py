@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from commands.terminal.display import plain
-from drivers.transport.usb_latency import latency_told
+from drivers.transport.usb_latency import describe_usb_latency
 
 NO_ADAPTERS = ("virtual", "udp_multicast", "serial")  # offered by python-can everywhere; nothing is plugged in
 Lister = Callable[[], list[Any]]
@@ -54,7 +54,7 @@ def _listing(title: str, find: Lister, line: Callable[[Any], str], none: str) ->
 def _serial_line(port: Any) -> str:
     ids = f", USB {port.vid:04x}:{port.pid:04x}" if port.vid is not None and port.pid is not None else ""
     number = f", serial number {port.serial_number}" if port.serial_number else ""
-    latency = latency_told(str(port.device))
+    latency = describe_usb_latency(str(port.device))
     return f"{port.device}  {port.description or 'no description'}{ids}{number}{', ' if latency else ''}{latency}"
 
 

@@ -50,12 +50,12 @@ def recover_folder(folder: Path) -> int:
 
 def _captures(folder: Path) -> Iterator[str]:
     """A line for every raw capture; what a campaign writes beside it at its end is written where it is missing."""
-    from drivers.capture.account import account_of, export_if_missing
+    from drivers.capture.account import export_if_missing, summary_of
 
     for path in _capture_files(folder):
         name = path.relative_to(folder)
         try:
-            account = account_of(path)
+            account = summary_of(path)
         except RecordingError as error:
             yield f"{name}: lost: {error}"
             continue
@@ -66,8 +66,8 @@ def _captures(folder: Path) -> Iterator[str]:
 
 def _out_of_captures(folder: Path, without: RecordingError) -> Recovery:
     """Where no journal has a sample: what the drivers make of the raw captures. Raises RecordingError."""
-    from drivers.capture.account import account_of
-    from drivers.replay.recording import recall
+    from drivers.capture.account import summary_of
+    from drivers.replay.recording import recording_from_capture
     from rig.recording.hdf5 import write_recording_h5
     from rig.recording.recover import Recovery
     from rig.recording.results import RECORDING_FILE, RECOVERED_FILE, free_name
@@ -79,8 +79,8 @@ def _out_of_captures(folder: Path, without: RecordingError) -> Recovery:
     for path in paths:
         name = path.relative_to(folder)
         try:
-            if account_of(path).ticks:
-                recordings.append(recall(path))
+            if summary_of(path).ticks:
+                recordings.append(recording_from_capture(path))
             else:
                 lines.append(f"{name}: ends before anything was played")
         except Aborted:

@@ -10,7 +10,7 @@ import canopen
 from canopen.sdo import SdoAbortedError, SdoClient, SdoCommunicationError
 
 from drivers.codecs.lawicel import CanFrame
-from drivers.transport.can_link import CanLink, Heard
+from drivers.transport.can_link import CanLink, ReceivedFrame
 from drivers.transport.ports import MOST_QUOTED
 from rig.errors import ConfigError, DeviceFault
 
@@ -50,7 +50,7 @@ class PolledNetwork(canopen.Network):
         self._link = link
         link.listeners.append(self._hear)
 
-    def _hear(self, heard: Heard) -> None:
+    def _hear(self, heard: ReceivedFrame) -> None:
         frame = heard.frame
         if not frame.remote and not frame.extended:
             self.notify(frame.identifier, bytearray(frame.data), heard.time_s)

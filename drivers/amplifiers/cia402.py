@@ -28,8 +28,8 @@ from drivers.codecs import cia402
 from drivers.codecs.cia402 import State
 from drivers.codecs.lawicel import CanFrame
 from drivers.settings import read_settings
-from drivers.timing.retiming import Hindsight
-from drivers.transport.can_link import CanLink, Heard
+from drivers.timing.retiming import ClockRetiming
+from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 from rig.interface import TorqueSample
@@ -246,11 +246,11 @@ class Cia402(Amplifier):
         return self._agreed is not None and self._agreed.stamped
 
     @property
-    def hindsight(self) -> Hindsight | None:
+    def retiming(self) -> ClockRetiming | None:
         """Of its 0x1013."""
-        return self._clock.hindsight if self.stamps_torque else None
+        return self._clock.retiming if self.stamps_torque else None
 
-    def receive(self, heard: Heard) -> None:
+    def receive(self, heard: ReceivedFrame) -> None:
         """Status, actual torque with its time, heartbeat, emergencies."""
         values = self._status.receive(heard)
         if values is None or len(values) < 2 or self._agreed is None:
@@ -258,7 +258,7 @@ class Cia402(Amplifier):
         self._actual = int.from_bytes(values[:2], "little", signed=True)
         time_s = heard.time_s
         if self._agreed.stamped and len(values) >= 6:
-            time_s = self._clock.heard(int.from_bytes(values[2:6], "little"), heard.time_s)
+            time_s = self._clock.received(int.from_bytes(values[2:6], "little"), heard.time_s)
         self._reported.append(TorqueSample(time_s, self._in_nm(self._actual)))
 
     def _why(self) -> str:

@@ -18,7 +18,7 @@ from pydantic import Field
 from drivers.amplifiers.base import Amplifier
 from drivers.codecs.lawicel import CanFrame
 from drivers.settings import Settings, read_settings
-from drivers.transport.can_link import CanLink, Heard
+from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 
@@ -193,7 +193,7 @@ class Moteus(Amplifier):
             return None
         return self.shaft_nm(struct.unpack_from("<f", frame.data, 16)[0])
 
-    def receive(self, heard: Heard) -> None:
+    def receive(self, heard: ReceivedFrame) -> None:
         """A reply of this controller."""
         if heard.frame.identifier != self._reply_id or not heard.frame.extended:
             return

@@ -17,7 +17,7 @@ from drivers.codecs import odrive_cansimple as wire
 from drivers.codecs.lawicel import CanFrame
 from drivers.codecs.odrive_cansimple import Command
 from drivers.settings import Settings, read_settings
-from drivers.transport.can_link import CanLink, Heard
+from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 
@@ -139,7 +139,7 @@ class Odrive(Amplifier):
             return None
         return self.shaft_nm(wire.decode(Command.SET_INPUT_TORQUE, frame.data)[0])
 
-    def receive(self, heard: Heard) -> None:
+    def receive(self, heard: ReceivedFrame) -> None:
         """Heartbeat and current."""
         node, command = wire.split(heard.frame.identifier)
         if node != self.config.node or heard.frame.extended:

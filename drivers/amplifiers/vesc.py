@@ -16,7 +16,7 @@ from pydantic import Field
 from drivers.amplifiers.base import Amplifier
 from drivers.codecs.lawicel import CanFrame
 from drivers.settings import Settings, read_settings
-from drivers.transport.can_link import CanLink, Heard
+from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 
@@ -137,7 +137,7 @@ class Vesc(Amplifier):
         milliamperes: int = struct.unpack(">i", frame.data)[0]
         return self.shaft_nm(milliamperes * 1e-3 * self.settings.torque_constant_nm_a)
 
-    def receive(self, heard: Heard) -> None:
+    def receive(self, heard: ReceivedFrame) -> None:
         """Status frames."""
         frame = heard.frame
         if not frame.extended or len(frame.data) != 8:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from drivers.bench.retiming import Restamping
+from drivers.bench.retiming import BenchRetiming
 from drivers.gyroscopes.base import Gyroscope
 from rig.interface import Correction, ExpectedDelay, LowPass, Rig
 from rig.signals import TorqueHold
 
 
-class RigOnDevices(Rig):
+class DeviceRig(Rig):
     """A rig whose sensor and torque are those of drivers."""
 
     gyroscope: Gyroscope
-    _restamping: Restamping
+    _retiming: BenchRetiming
 
     @property
     def torque_hold(self) -> TorqueHold:
@@ -32,7 +32,7 @@ class RigOnDevices(Rig):
     @property
     def expected_delay(self) -> ExpectedDelay:
         """Of both roads, as far as the drivers know them."""
-        return self._restamping.expected_delay()
+        return self._retiming.expected_delay()
 
     @property
     def rate_full_scale_rad_s(self) -> float | None:
@@ -46,4 +46,4 @@ class RigOnDevices(Rig):
 
     def corrections(self) -> tuple[Correction, ...]:
         """Times that are known better now that all is played."""
-        return self._restamping.corrections()
+        return self._retiming.corrections()

@@ -77,7 +77,7 @@ class BenchDevices:
         try:
             serial = ListeningPort(open_port(port, self.gyroscope.baud), self._time)
             self.line = GyroLine(self.gyroscope, serial, self.capture, self._time)
-            self.line.greet()
+            self.line.request_identification()
         except Aborted:
             raise
         except RigError as fault:

@@ -16,9 +16,9 @@ from pathlib import Path
 
 from drivers.amplifiers import make_amplifier
 from drivers.amplifiers.base import Amplifier
-from drivers.bench.device_rig import RigOnDevices
+from drivers.bench.device_rig import DeviceRig
 from drivers.bench.devices import BenchDevices
-from drivers.bench.retiming import Restamping, takes_reported
+from drivers.bench.retiming import BenchRetiming, takes_reported
 from drivers.capture.wire_capture import Capture, export
 from drivers.gyroscopes import make_gyroscope
 from drivers.gyroscopes.gyro_line import GyroReport
@@ -47,7 +47,7 @@ class BenchReport:
     emergencies: tuple[str, ...] = ()
 
 
-class BenchRig(RigOnDevices):
+class BenchRig(DeviceRig):
     """A rig made of devices.
 
     Parameters
@@ -80,7 +80,7 @@ class BenchRig(RigOnDevices):
         self._time = clock
         self.gyroscope = make_gyroscope(config.gyroscope)
         self.amplifier: Amplifier = make_amplifier(config.amplifier)
-        self._restamping = Restamping(config.amplifier, self.gyroscope, self.amplifier)
+        self._retiming = BenchRetiming(config.amplifier, self.gyroscope, self.amplifier)
         self._capture: Capture | None = None
         self._devices: BenchDevices | None = None
         self._armed = False
@@ -170,7 +170,7 @@ class BenchRig(RigOnDevices):
         amplifier.check(now_s)
         if self._capture is not None:
             self._capture.tick(now_s, torque_nm)
-        self._restamping.tick()
+        self._retiming.tick()
         if self._capture is not None:
             self._capture.flush_if_due(now_s)
         return answer(self._config, amplifier, gyro, [TorqueSample(sent_s, nm) for nm in sent])
@@ -219,12 +219,12 @@ class BenchRig(RigOnDevices):
     def begin_set(self, torque: TorqueOfTime, start_s: float) -> None:
         """Marks the capture; the clocks keep what is needed to stamp the set anew."""
         self._mark("begin_set", {"start_s": start_s})
-        self._restamping.begin_set(start_s)
+        self._retiming.begin_set(start_s)
 
     def end_set(self) -> None:
         """Marks the capture."""
         self._mark("end_set")
-        self._restamping.end_set()
+        self._retiming.end_set()
 
     # -- account ---------------------------------------------------------------------------------
 
@@ -237,7 +237,7 @@ class BenchRig(RigOnDevices):
             devices.line.report(),
             tuple(devices.notes),
             str(self._grant) if self._grant is not None else "not open yet",
-            self.amplifier.emergencies.told(lambda one: one[1]),
+            self.amplifier.emergencies.describe(lambda one: one[1]),
         )
 
     def _mark(self, what: str, values: dict[str, object] | None = None) -> None:

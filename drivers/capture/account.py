@@ -18,7 +18,7 @@ from drivers.capture.wire_capture import (
 from rig.recording.steady import whole
 
 
-class CaptureAccount(NamedTuple):
+class CaptureSummary(NamedTuple):
     """Counts of a capture; ``cut_bytes`` at its end belong to no whole record."""
 
     gyro_bytes: int
@@ -32,7 +32,7 @@ class CaptureAccount(NamedTuple):
         return told + (f"; {self.cut_bytes} byte(s) at its end are cut" if self.cut_bytes else "; not cut")
 
 
-def account_of(path: Path) -> CaptureAccount:
+def summary_of(path: Path) -> CaptureSummary:
     """Read a capture through. Raises RecordingError where it is none."""
     gyro_bytes = frames = ticks = 0
     read = len(MAGIC)
@@ -45,10 +45,10 @@ def account_of(path: Path) -> CaptureAccount:
         first_s = entry.time_s if first_s is None else first_s
         last_s = entry.time_s
     duration_s = last_s - first_s if first_s is not None and last_s is not None else 0.0
-    return CaptureAccount(gyro_bytes, frames, ticks, duration_s, len(whole(path)) - read)
+    return CaptureSummary(gyro_bytes, frames, ticks, duration_s, len(whole(path)) - read)
 
 
-def export_if_missing(path: Path, account: CaptureAccount) -> list[Path]:
+def export_if_missing(path: Path, account: CaptureSummary) -> list[Path]:
     """gyro.bin and can.log of a campaign that was killed before it wrote them; never over a file.
 
     Raises OSError where the disk is full.

@@ -81,13 +81,13 @@ class GyroLine:
 
     def note_noise(self) -> None:
         """Take the scatter of the last two seconds as the noise: call it while nothing moves."""
-        rates = list(self.gyroscope.tally.recent_rates)
+        rates = list(self.gyroscope.counts.recent_rates)
         self._noise_deg_s = math.degrees(statistics.stdev(rates)) if len(rates) > 2 else 0.0
 
-    def greet(self) -> None:
+    def request_identification(self) -> None:
         """Discard what lay in the buffers of the system, and ask the device to introduce itself."""
         self._port.read()
-        greeting = self.gyroscope.greeting()
+        greeting = self.gyroscope.identification_request()
         if greeting:
             self._port.write(greeting)
             if self._capture is not None:
@@ -123,7 +123,7 @@ class GyroLine:
             self._raw += data
         samples = self.gyroscope.feed(data, read_at_s)
         if not self._paces or read_at_s >= self._paces[-1][0] + PACE_S:
-            self._paces.append((read_at_s, self.gyroscope.tally.received))
+            self._paces.append((read_at_s, self.gyroscope.counts.received))
         return samples
 
     def _other_rate(self) -> str:
@@ -137,7 +137,7 @@ class GyroLine:
         (first_s, first), (last_s, last) = self._paces[0], self._paces[-1]
         mean_hz = (last - first) / (last_s - first_s)
         median_hz = statistics.median((m - n) / (t - s) for (s, n), (t, m) in itertools.pairwise(self._paces))
-        wanted_hz, lost = self.gyroscope.sample_rate_hz, self.gyroscope.tally.lost
+        wanted_hz, lost = self.gyroscope.sample_rate_hz, self.gyroscope.counts.lost
         shares = (mean_hz / wanted_hz - 1.0, median_hz / wanted_hz - 1.0)
         if min(map(abs, shares)) <= RATE_TOLERANCE:
             return ""
@@ -154,22 +154,22 @@ class GyroLine:
         gyro, where = self.gyroscope, f"{self.gyroscope.label} on {self._port.name}"
         if not self._raw:
             return [f"{where}: no byte in {listened_s:.1f} s: check its supply, the cable (RS-422 pairs) and the port"]
-        tally = gyro.tally
-        if not tally.received:
+        counts = gyro.counts
+        if not counts.received:
             return [f"{where}: {gyro.explain_silence(bytes(self._raw))}"]
         found = [f"{where}: {objection}" for objection in gyro.objections()]
-        if tally.received < LEAST_SHARE_RECEIVED * gyro.sample_rate_hz * listened_s:
+        if counts.received < LEAST_SHARE_RECEIVED * gyro.sample_rate_hz * listened_s:
             found.append(
-                f"{where}: {tally.received / listened_s:.0f} samples/s instead of {gyro.sample_rate_hz:g}: set "
+                f"{where}: {counts.received / listened_s:.0f} samples/s instead of {gyro.sample_rate_hz:g}: set "
                 "bench.gyroscope.sample_rate_hz to what the device sends"
             )
         elif other_rate := self._other_rate():
             found.append(f"{where}: {other_rate}")
         if too_slow := line_too_slow(gyro.packet_bytes, gyro.sample_rate_hz, gyro.baud):
             found.append(f"{where}: {too_slow}: let the device send less in a packet, or less often, or faster")
-        rates = tally.recent_rates
+        rates = counts.recent_rates
         if not rates:
-            found.append(f"{where}: no valid sample ({tally.last_reason or 'no reason given'})")
+            found.append(f"{where}: no valid sample ({counts.last_reason or 'no reason given'})")
         elif len(rates) >= LEAST_FOR_NOISE and min(rates) == max(rates):
             found.append(
                 f"{where}: all of {len(rates)} samples read exactly {math.degrees(rates[0]):.6g} deg/s: what measures "
@@ -179,18 +179,18 @@ class GyroLine:
 
     def report(self) -> GyroReport:
         """How it has been doing."""
-        gyro, tally = self.gyroscope, self.gyroscope.tally
+        gyro, counts = self.gyroscope, self.gyroscope.counts
         span_s = self._last_s - (self._first_s or 0.0)
         return GyroReport(
             label=gyro.label,
-            received=tally.received,
-            lost=tally.lost,
-            invalid=tally.invalid,
+            received=counts.received,
+            lost=counts.lost,
+            invalid=counts.invalid,
             dropped_bytes=gyro.framer.dropped_bytes,
-            rate_hz=tally.received / span_s if span_s > 0 else 0.0,
+            rate_hz=counts.received / span_s if span_s > 0 else 0.0,
             noise_deg_s=self._noise_deg_s,
             drift_ppm=gyro.clock.drift_ppm,
-            said=gyro.said.told(),
+            said=gyro.messages.describe(),
         )
 
     def close(self) -> None:

@@ -93,14 +93,14 @@ class Stim300(Gyroscope):
         return math.radians(wire.FULL_SCALE_DEG_S)
 
     def decode(self, packet: bytes) -> Reading | None:
-        """Fast road for data; everything else goes to ``said``."""
+        """Fast road for data; everything else goes to ``messages``."""
         if packet[0] != self.settings.datagram:
             self._listen(packet)
             return None
         status = packet[10]
         valid = self._good[status]
         if not valid:
-            self.tally.last_reason = f"status byte: {wire.status_in_words(status)}"
+            self.counts.last_reason = f"status byte: {wire.status_in_words(status)}"
         at, counter_at = self._at, self._counter_at
         return Reading(
             packet[counter_at],
@@ -113,15 +113,15 @@ class Stim300(Gyroscope):
         identifier = packet[0]
         if identifier in special.CONFIGURATION_IDS:
             self.configuration = special.decode_configuration(packet)
-            self.said.append(f"{self.configuration}")
+            self.messages.append(f"{self.configuration}")
         elif identifier in special.SERIAL_NUMBER_IDS:
-            self.said.append(f"serial number {special.decode_serial_number(packet)}")
+            self.messages.append(f"serial number {special.decode_serial_number(packet)}")
         elif identifier in special.PART_NUMBER_IDS:
-            self.said.append(f"part number {special.decode_part_number(packet)}")
+            self.messages.append(f"part number {special.decode_part_number(packet)}")
         elif identifier in special.ERROR_IDS:
-            self.said.append(f"errors: {', '.join(special.decode_errors(packet)) or 'none'}")
+            self.messages.append(f"errors: {', '.join(special.decode_errors(packet)) or 'none'}")
 
-    def greeting(self) -> bytes:
+    def identification_request(self) -> bytes:
         """Ask for the Configuration datagram."""
         return special.REQUESTS["configuration"]
 

@@ -19,10 +19,10 @@ from drivers.replay.rig import ReplayRig
 from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.interface import GyroSample, LowPass, TorqueSample
-from rig.recording.restamped import NO_RESTAMPS, Restamps, restamped
+from rig.recording.retiming import NO_RETIMING, Retiming, retimed
 from rig.recording.rows import increasing, on_samples
 from rig.recording.run import Recording, Run
-from rig.sequencer.time_corrections import better_times
+from rig.sequencer.time_corrections import log_time_corrections
 
 BEFORE_S = 1e-6  # rounding of time stamps at the start of a set
 
@@ -38,16 +38,16 @@ class _Set:
     channels: tuple[str, ...] = ()
 
 
-def recall(path: Path) -> Recording:
+def recording_from_capture(path: Path) -> Recording:
     """All sets of a capture, as far as it goes, named by their order.
 
     Raises RecordingError where it holds none, and what a driver raises that cannot follow it.
     """
     try:
-        rig = _Recalled(path)
+        rig = _UncheckedReplay(path)
         with rig.opened(), rig.armed():
             sets = rig.sets()
-        better = better_times(rig, None, lambda: 0.0)
+        better = log_time_corrections(rig, None, lambda: 0.0)
         found = (_run(f"set {n}", one, rig.rate_low_pass, better) for n, one in enumerate(sets, 1))
         runs = tuple(run for run in found if run is not None)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError, struct.error) as error:
@@ -58,7 +58,7 @@ def recall(path: Path) -> Recording:
     return Recording(runs, noise=rig.noise_rad_s, info={"backend": f"raw capture {path.name}"} | expected)
 
 
-class _Recalled(ReplayRig):
+class _UncheckedReplay(ReplayRig):
     """Plays whatever was played."""
 
     def _same_campaign(self, asked_nm: float, played_nm: float) -> None:
@@ -103,7 +103,7 @@ class _Recalled(ReplayRig):
         return marks
 
 
-def _run(name: str, one: _Set, low_pass: LowPass | None, better: Mapping[float, Restamps]) -> Run | None:
+def _run(name: str, one: _Set, low_pass: LowPass | None, better: Mapping[float, Retiming]) -> Run | None:
     """As the recorder makes it; None where there are fewer than two samples."""
     samples: Array = np.array(one.gyro, dtype=float).reshape(-1, 3) - (one.start_s, 0.0, 0.0)
     torque: Array = np.array(one.torque, dtype=float).reshape(-1, 2) - (one.start_s, 0.0)
@@ -111,8 +111,8 @@ def _run(name: str, one: _Set, low_pass: LowPass | None, better: Mapping[float, 
     torque = increasing(torque[torque[:, 0] >= -BEFORE_S])
     if len(samples) < 2 or len(torque) < 1:
         return None
-    stamps = better.get(one.start_s, NO_RESTAMPS)
-    time_s = restamped(samples[:, 0].copy(), stamps.samples)
+    stamps = better.get(one.start_s, NO_RETIMING)
+    time_s = retimed(samples[:, 0].copy(), stamps.samples)
     ticks = np.array(one.ticks, dtype=float)
     ticks[:, 0] -= one.start_s
     return Run(
@@ -120,7 +120,7 @@ def _run(name: str, one: _Set, low_pass: LowPass | None, better: Mapping[float, 
         time_s=time_s,
         valid=samples[:, 2] > 0.5,
         rate_rad_s=samples[:, 1].copy(),
-        torque_time_s=restamped(torque[:, 0].copy(), stamps.torque),
+        torque_time_s=retimed(torque[:, 0].copy(), stamps.torque),
         torque_nm=torque[:, 1].copy(),
         torque_hold="zero_order",
         channels=on_samples(ticks, one.channels, 2, time_s),

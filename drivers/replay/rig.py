@@ -14,14 +14,14 @@ from typing import Any
 from pydantic import ValidationError
 
 from drivers.amplifiers import make_amplifier
-from drivers.bench.device_rig import RigOnDevices
-from drivers.bench.retiming import Restamping
+from drivers.bench.device_rig import DeviceRig
+from drivers.bench.retiming import BenchRetiming
 from drivers.bench.rig import answer
 from drivers.capture import wire_capture
 from drivers.capture.wire_capture import Entry, read_capture, unpack_frame, unpack_torque
 from drivers.codecs.lawicel import CanFrame
 from drivers.gyroscopes import make_gyroscope
-from drivers.transport.can_link import CanLink, Heard
+from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import BenchConfig, ProbeConfig
 from rig.errors import RecordingError
 from rig.interface import (
@@ -51,12 +51,12 @@ class ReplayLink(CanLink):
         """Nothing is sent."""
         return self.clock()
 
-    def poll(self) -> list[Heard]:
+    def poll(self) -> list[ReceivedFrame]:
         """The next frame of this stage of the capture."""
         frame = self._take_frame()
         if frame is None:
             return []
-        heard = Heard(self.clock(), frame)
+        heard = ReceivedFrame(self.clock(), frame)
         for listener in self.listeners:
             listener(heard)
         return [heard]
@@ -95,7 +95,7 @@ def _by_key(section: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in section.items() if key != "settings"} | settings
 
 
-class ReplayRig(RigOnDevices):
+class ReplayRig(DeviceRig):
     """A rig whose devices are a capture.
 
     Parameters
@@ -118,7 +118,7 @@ class ReplayRig(RigOnDevices):
             raise RecordingError(f"{path}: the configuration in it was changed: {error}") from None
         self.gyroscope = make_gyroscope(self.config.gyroscope)
         self.amplifier = make_amplifier(self.config.amplifier)
-        self._restamping = Restamping(self.config.amplifier, self.gyroscope, self.amplifier)
+        self._retiming = BenchRetiming(self.config.amplifier, self.gyroscope, self.amplifier)
         self.clock = ReplayClock([e.time_s for e in self._entries if e.kind == wire_capture.CLOCK])
         self._at = 0
         self._time_s = self._entries[0].time_s
@@ -194,7 +194,7 @@ class ReplayRig(RigOnDevices):
             if entry.kind == wire_capture.GYRO_READ:
                 gyro += self.gyroscope.feed(entry.payload, entry.time_s)
             elif entry.kind == wire_capture.CAN_READ:
-                self.amplifier.receive(Heard(entry.time_s, unpack_frame(entry.payload)))
+                self.amplifier.receive(ReceivedFrame(entry.time_s, unpack_frame(entry.payload)))
             elif entry.kind == wire_capture.CAN_SENT:
                 frame = unpack_frame(entry.payload)
                 self.amplifier.note_sent(entry.time_s, frame)
@@ -202,7 +202,7 @@ class ReplayRig(RigOnDevices):
                 sent += [] if nm is None else [TorqueSample(entry.time_s, nm)]
             elif entry.kind == wire_capture.TICK:
                 self._same_campaign(torque_nm, unpack_torque(entry.payload))
-                self._restamping.tick()
+                self._retiming.tick()
                 return answer(self.config, self.amplifier, gyro, sent)
         raise RecordingError(f"{self._path} ends here: the campaign that it holds was cut short")
 
@@ -216,11 +216,11 @@ class ReplayRig(RigOnDevices):
 
     def begin_set(self, torque: TorqueOfTime, start_s: float) -> None:
         """As on the bench."""
-        self._restamping.begin_set(start_s)
+        self._retiming.begin_set(start_s)
 
     def end_set(self) -> None:
         """As on the bench."""
-        self._restamping.end_set()
+        self._retiming.end_set()
 
     def torque_off(self) -> None:
         """There is no torque."""

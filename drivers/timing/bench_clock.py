@@ -42,9 +42,9 @@ class BenchClock:
 
     def now_s(self) -> float:
         """Seconds of the host."""
-        return self._told(self._time())
+        return self._recorded(self._time())
 
-    def _told(self, time_s: float) -> float:
+    def _recorded(self, time_s: float) -> float:
         if self._on_reading is not None:
             self._on_reading(time_s)
         return time_s
@@ -60,4 +60,4 @@ class BenchClock:
         now_s = self._time()
         while now_s < deadline_s:
             now_s = self._time()
-        return self._told(now_s)
+        return self._recorded(now_s)

@@ -50,7 +50,7 @@ class _Set:
 
 
 @dataclass(frozen=True)
-class Restamped:
+class RetimedSet:
     """Of one set: what ``recorded_s`` says is ``refined_s`` in truth; shape (n,) each, both strictly increasing."""
 
     start_s: float
@@ -58,7 +58,7 @@ class Restamped:
     refined_s: Array
 
 
-class Hindsight:
+class ClockRetiming:
     """Keeps what is needed to stamp the sets of a campaign anew; cheap enough for every sample.
 
     Parameters
@@ -71,9 +71,9 @@ class Hindsight:
         self._clock = clock
         self._sets: list[_Set] = []
         self._playing: _Set | None = None
-        self.forget()
+        self.reset()
 
-    def forget(self, clock: SourceClock | None = None) -> None:
+    def reset(self, clock: SourceClock | None = None) -> None:
         """The device begins to count anew: what was learnt of its clock before says nothing any more."""
         self._clock = clock or self._clock
         self._source_s, self._late_s, self._early_s = array("d"), array("d"), array("d")
@@ -124,7 +124,7 @@ class Hindsight:
         self._last = self._sure = (-math.inf, -math.inf)
         self._sure_points = 0
 
-    def stamped(self, time_s: float, source_s: float, line: int) -> None:
+    def record(self, time_s: float, source_s: float, line: int) -> None:
         """What the device dates ``source_s`` was recorded at ``time_s``.
 
         ``line`` is the number of the straight line that the running map was then, ``OWN_LINE`` for a stamp that lies
@@ -140,7 +140,7 @@ class Hindsight:
             self._line = line
         self._last = (time_s, source_s)
 
-    def settle(self) -> None:
+    def end_tick(self) -> None:
         """A tick is whole: what came until here counts. A replay has no more than whole ticks either."""
         self._whole = len(self._source_s)
         self._sure = self._last
@@ -158,7 +158,7 @@ class Hindsight:
 
     # -- hindsight -------------------------------------------------------------------------------
 
-    def refined(self, delay_s: float = 0.0) -> list[Restamped]:
+    def retimed_sets(self, delay_s: float = 0.0) -> list[RetimedSet]:
         """Every set that can be stamped anew; sets with too few readings around them are left out.
 
         Parameters
@@ -172,13 +172,13 @@ class Hindsight:
             known = _Readings(source_s[two_sided], late_s[two_sided], late_s[two_sided] - early_s[two_sided])
         else:
             known = _Readings(source_s, late_s, None)
-        found = (self._restamped(one, known, delay_s + known.most_late_s) for one in self._sets)
+        found = (self._retimed(one, known, delay_s + known.most_late_s) for one in self._sets)
         return [one for one in found if one is not None]
 
     def _kept(self) -> tuple[array[float], array[float], array[float]]:
         return self._source_s, self._late_s, self._early_s
 
-    def _restamped(self, one: _Set, known: _Readings, delay_s: float) -> Restamped | None:
+    def _retimed(self, one: _Set, known: _Readings, delay_s: float) -> RetimedSet | None:
         times_s, sources_s = np.array(one.times_s), np.array(one.sources_s)
         offset_s = known.offsets(sources_s)
         if offset_s is None:
@@ -186,7 +186,7 @@ class Hindsight:
         refined_s = sources_s + (self._base_s - delay_s + offset_s)
         if np.max(np.abs(refined_s - times_s)) > LARGEST_CORRECTION_S or np.any(np.diff(refined_s) <= 0.0):
             return None
-        return Restamped(one.start_s, times_s, refined_s)
+        return RetimedSet(one.start_s, times_s, refined_s)
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ NETWORK_INTERFACES = ("socketcand", "udp_multicast")  # they reach whatever mach
 OWN_OPTIONS = ("listen_only", "timestamps", "answer_timeout_s", "tty_baudrate")
 
 
-class Heard(NamedTuple):
+class ReceivedFrame(NamedTuple):
     """A frame that arrived, with the host time at which it was read."""
 
     time_s: float
@@ -69,7 +69,7 @@ class CanLink:
         self._errors: deque[float] = deque()
         self.record: Record | None = None
         self.idle: Callable[[], None] = lambda: None
-        self.listeners: list[Callable[[Heard], None]] = []
+        self.listeners: list[Callable[[ReceivedFrame], None]] = []
         self.on_sent: Callable[[float, CanFrame], None] = lambda time_s, frame: None
 
     def send(self, frames: Sequence[CanFrame], urgent: bool = False) -> float:
@@ -97,10 +97,10 @@ class CanLink:
             self.on_sent(now_s, frame)
         return now_s
 
-    def poll(self) -> list[Heard]:
+    def poll(self) -> list[ReceivedFrame]:
         """Frames that have arrived, handed to every listener too; never waits."""
         try:
-            heard = [Heard(*item) for item in self._take()] if self._take is not None else self._receive()
+            heard = [ReceivedFrame(*item) for item in self._take()] if self._take is not None else self._receive()
         except can.CanError as problem:
             raise DeviceFault(f"CAN on {self.name}: {problem}") from None
         for item in heard:
@@ -110,8 +110,8 @@ class CanLink:
                 listener(item)
         return heard
 
-    def _receive(self) -> list[Heard]:
-        heard: list[Heard] = []
+    def _receive(self) -> list[ReceivedFrame]:
+        heard: list[ReceivedFrame] = []
         while len(heard) < MOST_FRAMES_A_POLL:
             message = self._bus.recv(0)
             if message is None:
@@ -119,7 +119,7 @@ class CanLink:
             if message.is_error_frame:
                 self._count_error(self.clock())
             else:
-                heard.append(Heard(self.clock(), _frame(message)))
+                heard.append(ReceivedFrame(self.clock(), _frame(message)))
         return heard
 
     def _count_error(self, now_s: float) -> None:

@@ -38,8 +38,8 @@ class ListeningPort:
         self._something = threading.Event()
         self._fault: DeviceFault | None = None
         self._closing = False
-        self._ear = threading.Thread(target=self._listen, name=f"listening on {port.name}", daemon=True)
-        self._ear.start()
+        self._thread = threading.Thread(target=self._listen, name=f"listening on {port.name}", daemon=True)
+        self._thread.start()
 
     def _listen(self) -> None:
         try:
@@ -83,7 +83,7 @@ class ListeningPort:
     def close(self) -> None:
         """Stop listening and close; safe twice."""
         self._closing = True
-        self._ear.join()
+        self._thread.join()
         self._port.close()
 
 

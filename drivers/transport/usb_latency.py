@@ -8,7 +8,7 @@ USB_SERIAL = Path("/sys/bus/usb-serial/devices")
 BRISK_MS = 1
 
 
-def latency_ms(port: str, root: Path = USB_SERIAL) -> int | None:
+def usb_latency_ms(port: str, root: Path = USB_SERIAL) -> int | None:
     """The timer of a port ("/dev/ttyUSB0", or a link to it) in ms; None where there is none or nobody may know."""
     try:
         return int((root / Path(port).resolve().name / "latency_timer").read_text("ascii"))
@@ -16,9 +16,9 @@ def latency_ms(port: str, root: Path = USB_SERIAL) -> int | None:
         return None
 
 
-def latency_told(port: str, root: Path = USB_SERIAL) -> str:
+def describe_usb_latency(port: str, root: Path = USB_SERIAL) -> str:
     """What there is to say about it; empty where there is no timer."""
-    held_ms = latency_ms(port, root)
+    held_ms = usb_latency_ms(port, root)
     if held_ms is None:
         return ""
     slow = ": bytes arrive in bunches; the driver asks for 1 ms when it opens the port" if held_ms > BRISK_MS else ""

@@ -50,7 +50,7 @@ class Tick(NamedTuple):
     channels: Mapping[str, float]
 
 
-class TorquePast:
+class TorqueHistory:
     """What was commanded, by time: a gyro's samples are milliseconds older than the tick that brings them."""
 
     def __init__(self) -> None:

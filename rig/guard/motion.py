@@ -13,8 +13,8 @@ from collections import deque
 from collections.abc import Sequence
 
 from rig.config.limits import LimitsConfig
-from rig.guard.base import Check, Rest, Tick, TorquePast, Trip
-from rig.guard.sign import TurnedSign
+from rig.guard.base import Check, Rest, Tick, TorqueHistory, Trip
+from rig.guard.sign import ReversedSign
 from rig.platform import Platform
 
 NOISE_SIGMAS = 8.0
@@ -110,7 +110,7 @@ class Account:
 
     def __init__(self, delay_s: float) -> None:
         self._delay_s = delay_s
-        self._past = TorquePast()
+        self._past = TorqueHistory()
         self._work = self._best = 0.0
 
     def command(self, time_s: float, torque_nm: float) -> None:
@@ -182,7 +182,7 @@ class Standstill(Check):
         super().begin(start_s, rest)
         self._bias = rest.bias_rad_s
         self._moves = min(max(NOISE_SIGMAS * rest.noise_rad_s, MOVES_RAD_S), MOVES_MOST_RAD_S)
-        self._past = TorquePast()
+        self._past = TorqueHistory()
         self._fastest = self._peak_nm = 0.0
         self._low = self._high = 0.0
         self._beyond_s: float | None = None
@@ -228,4 +228,4 @@ def motion_checks(limits: LimitsConfig, platform: Platform) -> Sequence[Check]:
     """All of them, or none where ``limits.motion_check`` is off or no inertia is declared."""
     if not limits.motion_check or platform.inertia_kg_m2 <= 0.0:
         return ()
-    return tuple(check(limits, platform) for check in (Jump, WrongSign, TurnedSign, Standstill))
+    return tuple(check(limits, platform) for check in (Jump, WrongSign, ReversedSign, Standstill))

@@ -20,7 +20,7 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.config.limits import LimitsConfig
-from rig.guard.base import Check, Rest, Tick, TorquePast, Trip
+from rig.guard.base import Check, Rest, Tick, TorqueHistory, Trip
 from rig.platform import Platform
 
 CORNER_RAD_S = 2.0 * math.pi * 20.0  # of each of the three stages: little of what a lag of the drive turns is left
@@ -60,7 +60,7 @@ class Fit:
         return max(0.0, (whole + square) / whole)
 
 
-class TurnedSign(Check):
+class ReversedSign(Check):
     """The torque of the last moments, by the platform as declared and by the same with the rate turned round."""
 
     def __init__(self, limits: LimitsConfig, platform: Platform) -> None:
@@ -72,7 +72,7 @@ class TurnedSign(Check):
         super().begin(start_s, rest)
         self._bias = rest.bias_rad_s
         self._still = 4.0 * rest.noise_rad_s
-        self._past = TorquePast()
+        self._past = TorqueHistory()
         self._last_s: float | None = None
         self._restart(start_s)
         low, high = (1.0 / FACTOR, 0.0, 1.0 / FACTOR, 0.0), (FACTOR, math.inf, FACTOR, math.inf)

@@ -7,7 +7,7 @@ from rig.preflight.prediction import (
     model_hint,
     peaks,
     plan,
-    playable_of,
+    playable_sets,
     predict,
     predict_all,
 )
@@ -19,7 +19,7 @@ __all__ = [
     "model_hint",
     "peaks",
     "plan",
-    "playable_of",
+    "playable_sets",
     "predict",
     "predict_all",
 ]

@@ -33,7 +33,7 @@ class Peaks(NamedTuple):
         return all(value <= limit for value, limit in zip(self, allowed, strict=True))
 
 
-class Stretch(NamedTuple):
+class SetMotion(NamedTuple):
     """One set as it begins somewhere: the angle it begins at, its peaks from the origin, and how it ends."""
 
     starts_deg: float
@@ -41,7 +41,7 @@ class Stretch(NamedTuple):
     end: State
 
 
-class Forecast:
+class SetForecast:
     """One set on one platform, ready to be simulated at several amplitudes, from anywhere."""
 
     def __init__(self, platform: Platform, planned_set: PlannedSet) -> None:
@@ -51,7 +51,7 @@ class Forecast:
         substeps = self._equations.substeps(1.0 / PEAK_RATE_HZ)
         self._grid = Grid(time_s, TorqueSignal(time_s, self._torque_nm), substeps)
 
-    def play(self, scale: float, start: State = AT_ORIGIN) -> Stretch:
+    def play(self, scale: float, start: State = AT_ORIGIN) -> SetMotion:
         """The set at this amplitude, from this angle in rad and rate in rad/s."""
         with np.errstate(all="ignore"):
             motion = self._grid.scaled(scale).simulate(self._equations, start)
@@ -59,14 +59,14 @@ class Forecast:
             math.degrees(_peak(motion.angle_rad)), math.degrees(_peak(motion.rate_rad_s)),
             _peak(scale * self._torque_nm),
         )  # fmt: skip
-        return Stretch(math.degrees(start[0]), peaks, (float(motion.angle_rad[-1]), float(motion.rate_rad_s[-1])))
+        return SetMotion(math.degrees(start[0]), peaks, (float(motion.angle_rad[-1]), float(motion.rate_rad_s[-1])))
 
 
 def _peak(x: Array) -> float:
     return float(np.max(np.abs(x))) if np.all(np.isfinite(x)) else math.inf
 
 
-def stays_where_it_is_left(platform: Platform, rest_s: float) -> bool:
+def has_no_restoring_spring(platform: Platform, rest_s: float) -> bool:
     """Whether there is no spring, or one too weak to bring the platform back within a rest."""
     j, c, k = platform.inertia_kg_m2, platform.damping_nm_s_rad, platform.stiffness_nm_rad
     if k < 0.0 or c < 0.0:
@@ -74,18 +74,18 @@ def stays_where_it_is_left(platform: Platform, rest_s: float) -> bool:
     return k == 0.0 or 2.0 * math.pi * math.sqrt(j / k) > rest_s > 0.0 or c / k * SETTLED > rest_s > 0.0
 
 
-class Chain:
+class SetSequence:
     """All sets of a campaign one after the other, with a rest of free coasting between them."""
 
     def __init__(self, platform: Platform, sets: Sequence[PlannedSet], rest_s: float) -> None:
-        self._forecasts = [Forecast(platform, s) for s in sets]
+        self._forecasts = [SetForecast(platform, s) for s in sets]
         self._equations = Equations(platform)
         self._linear = not platform.effects
         count = max(2, math.ceil(rest_s * COAST_RATE_HZ) + 1)
         time_s: Array = np.arange(count) * (max(rest_s, 1e-3) / (count - 1))
         self._rest = Grid(time_s, None, self._equations.substeps(float(time_s[1])))
 
-    def play(self, scales: Sequence[float]) -> list[Stretch]:
+    def play(self, scales: Sequence[float]) -> list[SetMotion]:
         """Every set at its own amplitude."""
         state, found = AT_ORIGIN, []
         for forecast, scale in zip(self._forecasts, scales, strict=True):

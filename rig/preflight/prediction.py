@@ -16,9 +16,9 @@ from rig.config.limits import LimitsConfig
 from rig.errors import PreflightRefusal
 from rig.excitation import PlannedSet, planned
 from rig.platform import Platform
-from rig.preflight.forecast import Chain, Forecast, Peaks, largest, stays_where_it_is_left
+from rig.preflight.forecast import Peaks, SetForecast, SetSequence, has_no_restoring_spring, largest
 
-LEAST_TOLD_DEG = 0.005
+SMALLEST_REPORTED_DEG = 0.005
 LIMIT_KEYS = ("limits.travel_deg", "limits.rate_deg_s", "limits.torque_nm")
 __all__ = ["Peaks", "Prediction", "peaks", "plan", "predict", "predict_all"]
 
@@ -66,13 +66,13 @@ class Prediction:
         found = zip(self.keys, self.peaks, self.allowed, strict=True)
         return tuple(key for key, value, limit in found if not value <= limit)
 
-    def sentence(self) -> str:
+    def describe(self) -> str:
         """One line for the operator."""
         told = (
             f"{self.planned.name}: {self.peaks.torque_nm:.1f} N m would travel {self.peaks.travel_deg:.2f} deg "
             f"at up to {self.peaks.rate_deg_s:.0f} deg/s"
         )
-        if abs(self.starts_deg) >= LEAST_TOLD_DEG:
+        if abs(self.starts_deg) >= SMALLEST_REPORTED_DEG:
             told += f", beginning {self.starts_deg:.2f} deg from where the campaign began"
         if self.passes:
             return f"{told}: passes"
@@ -99,7 +99,7 @@ def _rounded_down(value: float) -> str:
 
 def peaks(platform: Platform, planned_set: PlannedSet, scale: float = 1.0) -> Peaks:
     """Largest travel, rate and torque of a set played from rest on the declared platform."""
-    return Forecast(platform, planned_set).play(scale).peaks
+    return SetForecast(platform, planned_set).play(scale).peaks
 
 
 def predict(
@@ -112,7 +112,7 @@ def predict(
     cap = planned_set.excitation.travel_cap_deg
     if cap is not None:
         allowed = allowed._replace(travel_deg=min(allowed.travel_deg, cap))
-    forecast = Forecast(platform, planned_set)
+    forecast = SetForecast(platform, planned_set)
     found = forecast.play(1.0).peaks
     if found.within(allowed):
         return Prediction(planned_set, found, allowed, 1.0, keys)
@@ -125,7 +125,7 @@ def predict(
 
 def _together(platform: Platform, alone: Sequence[Prediction], allowed: Peaks, rest_s: float) -> tuple[Prediction, ...]:
     """Sets that pass one by one, from where the ones before leave the platform: all lowered alike until they fit."""
-    chain = Chain(platform, [p.planned for p in alone], rest_s)
+    chain = SetSequence(platform, [p.planned for p in alone], rest_s)
     asked = chain.play([1.0] * len(alone))
     factor = chain.common_factor([p.scale for p in alone], allowed)
     return tuple(
@@ -155,7 +155,7 @@ def predict_all(
     clips = rate_full_scale_rad_s is not None and math.degrees(rate_full_scale_rad_s) < limits.rate_deg_s
     keys = (LIMIT_KEYS[0], full_scale_key if clips else LIMIT_KEYS[1], LIMIT_KEYS[2])
     alone = tuple(predict(platform, s, allowed, keys) for s in planned(excitation.sets))
-    if len(alone) < 2 or not stays_where_it_is_left(platform, excitation.rest_s):
+    if len(alone) < 2 or not has_no_restoring_spring(platform, excitation.rest_s):
         return alone
     return _together(platform, alone, allowed, excitation.rest_s)
 
@@ -175,10 +175,10 @@ def plan(
         Listing every set with its predicted travel and the torque that would pass.
     """
     predictions = predict_all(platform, excitation, limits, rate_full_scale_rad_s, full_scale_key)
-    return playable_of(predictions, platform, excitation)
+    return playable_sets(predictions, platform, excitation)
 
 
-def playable_of(
+def playable_sets(
     predictions: Sequence[Prediction], platform: Platform, excitation: ExcitationConfig
 ) -> tuple[PlannedSet, ...]:
     """As ``plan``, from predictions that were made before; raises PreflightRefusal alike."""
@@ -206,7 +206,7 @@ def refusal(predictions: Sequence[Prediction], platform: Platform, scaling: bool
     failing = [p for p in predictions if not p.passes]
     lines = [f"{len(failing)} of {len(predictions)} sets would break a limit; nothing was moved."]
     if not unstable_keys(platform):  # which runs away at any torque: figures of each set would say nothing
-        lines += [f"  {p.sentence()}" for p in predictions]
+        lines += [f"  {p.describe()}" for p in predictions]
     hint = model_hint(platform)
     if hint:
         lines.append(hint)

@@ -12,7 +12,7 @@ from rig.excitation import PlannedSet
 from rig.guard import Tick
 from rig.interface import LowPass
 from rig.recording.journal import Journal
-from rig.recording.restamped import BEGUN_S, NO_RESTAMPS, Restamps, restamped
+from rig.recording.retiming import BEGUN_S, NO_RETIMING, Retiming, retimed
 from rig.recording.rows import increasing, on_samples
 from rig.recording.run import Run
 from rig.sequencer.lateness import Lateness
@@ -170,7 +170,7 @@ class SetRecorder:
             self._planned.name, self._late, self.missed_ticks, self.drops, self.peak_torque_nm, complete
         )
 
-    def run(self, better: Restamps = NO_RESTAMPS) -> Run | None:
+    def run(self, better: Retiming = NO_RETIMING) -> Run | None:
         """The set as a Run, with what is known better of its times; None where fewer than two samples arrived.
 
         Time stamps that run backwards are dropped: a device that repeats itself must not spoil the record.
@@ -179,14 +179,14 @@ class SetRecorder:
         samples, commands = increasing(samples), increasing(commands)
         if len(samples) < 2 or len(commands) < 1:
             return None
-        time_s = restamped(samples[:, 0].copy(), better.samples)
+        time_s = retimed(samples[:, 0].copy(), better.samples)
         channels = on_samples(ticks, self._channel_names, 2, time_s)
         return Run(
             name=self._planned.name,
             time_s=time_s,
             valid=samples[:, 2] > 0.5,
             rate_rad_s=samples[:, 1].copy(),
-            torque_time_s=restamped(commands[:, 0].copy(), better.torque),
+            torque_time_s=retimed(commands[:, 0].copy(), better.torque),
             torque_nm=commands[:, 1].copy(),
             torque_hold=self._torque_hold,
             use=self._planned.use,

@@ -22,12 +22,12 @@ from rig.excitation import PlannedSet
 from rig.guard import Guard, Rest, Tick, Trip
 from rig.interface import Rig
 from rig.recording.journal import Journal
-from rig.recording.restamped import NO_RESTAMPS
+from rig.recording.retiming import NO_RETIMING
 from rig.recording.run import Recording
 from rig.sequencer.observer import Observer, Progress
 from rig.sequencer.probe import Probe
 from rig.sequencer.recorder import SetRecorder, SetStatistics
-from rig.sequencer.time_corrections import better_times
+from rig.sequencer.time_corrections import log_time_corrections
 
 __all__ = ["Campaign", "Observer", "Progress", "Sequencer"]
 
@@ -133,9 +133,9 @@ class Sequencer:
         if cause is not None and self._journal is not None:
             with contextlib.suppress(RigError):
                 self._journal.event(self._now_s(), str(cause), {"aborted": True, "verdict_s": self._verdict_s})
-        better = better_times(self._rig, self._journal, self._now_s)
+        better = log_time_corrections(self._rig, self._journal, self._now_s)
         info = {"backend": str(self._rig.statement()), "aborted": str(cause) if cause else None}
-        played = (one.run(better.get(one.start_s, NO_RESTAMPS)) for one in self._recorders)
+        played = (one.run(better.get(one.start_s, NO_RETIMING)) for one in self._recorders)
         runs = tuple(run for run in played if run is not None)
         recording = Recording(runs, noise=self._rig.noise_rad_s, info=info)
         return Campaign(recording, tuple(self._statistics), cause, self._verdict_s)

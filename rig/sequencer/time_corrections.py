@@ -8,16 +8,16 @@ from collections.abc import Callable, Mapping
 from rig.errors import RigError
 from rig.interface import Rig
 from rig.recording.journal import Journal
-from rig.recording.restamped import Restamps, event_values, restamps
+from rig.recording.retiming import Retiming, event_values, retiming_of
 
 
-def better_times(rig: Rig, journal: Journal | None, now_s: Callable[[], float]) -> Mapping[float, Restamps]:
+def log_time_corrections(rig: Rig, journal: Journal | None, now_s: Callable[[], float]) -> Mapping[float, Retiming]:
     """Of every set that has them, by the instant at which it began; one event each in the journal.
 
     Never raises: torque is off, and what was recorded is good without.
     """
     try:
-        found = {one.start_s: restamps(*one) for one in rig.corrections()}
+        found = {one.start_s: retiming_of(*one) for one in rig.corrections()}
     except Exception as error:  # noqa: BLE001 (nothing that goes wrong here may cost a recording)
         _tell(journal, now_s, f"the times of the samples stay as they were while playing: {error!r}", {})
         return {}

@@ -25,7 +25,7 @@ ANGLE_RAD = 1e-5
 PULSE_S = 0.05
 
 
-def rehearse(guard: Guard, platform: Platform, sets: Sequence[PlannedSet], sample_rate_hz: float) -> None:
+def warm_up(guard: Guard, platform: Platform, sets: Sequence[PlannedSet], sample_rate_hz: float) -> None:
     """Show a guard half a second of an easy motion, and the probe's arithmetic one pulse.
 
     Parameters

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-OVERSLEPT_S = 0.0015  # between two looks at the ports; more than this is the machine's doing
-TOLD_S = 0.005  # a longer pause is told, since it bears on every time measured around it
+LATE_LOOK_S = 0.0015  # between two looks at the ports; more than this is the machine's doing
+REPORTED_PAUSE_S = 0.005  # a longer pause is told, since it bears on every time measured around it
 SMOOTHING = 0.2
 
 
@@ -36,7 +36,7 @@ class Arrivals:
         """
         lines = data.count(b"\r")
         last_s, self._last_s = self._last_s, now_s
-        if now_s - before_s <= OVERSLEPT_S or lines < 2 or not self._line_every_s:
+        if now_s - before_s <= LATE_LOOK_S or lines < 2 or not self._line_every_s:
             if last_s is not None and lines:
                 every_s = (now_s - last_s) / lines
                 self._line_every_s += (SMOOTHING if self._line_every_s else 1.0) * (every_s - self._line_every_s)

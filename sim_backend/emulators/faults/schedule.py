@@ -18,7 +18,7 @@ class _Planned:
     begins_s: float
 
 
-class Faults:
+class FaultSchedule:
     """The faults of one bench: those to come, and those that have hold of it.
 
     Parameters

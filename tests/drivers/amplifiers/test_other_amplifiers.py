@@ -7,7 +7,7 @@ import pytest
 import drivers.transport.can_link
 from drivers.amplifiers import make_amplifier, moteus, vesc
 from drivers.codecs.lawicel import CanFrame
-from drivers.transport.can_link import CanLink, Heard
+from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import AmplifierConfig, CanConfig
 from rig.errors import ConfigError, DeviceFault
 from sim_backend.emulators.odrive import OdriveAxis
@@ -189,8 +189,8 @@ def test_vesc_without_a_confirmed_timeout_is_refused():
 def test_vesc_reports_its_hottest_spot_and_its_current():
     driver = make_amplifier(vesc_config())
     assert driver.readings == {}
-    driver.receive(Heard(0.0, CanFrame(9 << 8 | 11, struct.pack(">ihh", 0, 125, 0), extended=True)))
-    driver.receive(Heard(0.0, CanFrame(16 << 8 | 11, struct.pack(">hhhh", 412, 655, 0, 0), extended=True)))
+    driver.receive(ReceivedFrame(0.0, CanFrame(9 << 8 | 11, struct.pack(">ihh", 0, 125, 0), extended=True)))
+    driver.receive(ReceivedFrame(0.0, CanFrame(16 << 8 | 11, struct.pack(">hhhh", 412, 655, 0, 0), extended=True)))
     assert driver.readings == {"drive_current_a": 12.5, "drive_temperature_c": 65.5}
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import can
 import pytest
 
-from drivers.capture.account import account_of, export_if_missing
+from drivers.capture.account import export_if_missing, summary_of
 from drivers.capture.can_export import messages_of, write_can_log
 from drivers.capture.wire_capture import Capture
 from drivers.codecs.lawicel import CanFrame
@@ -66,16 +66,16 @@ def test_a_capture_cut_anywhere_is_read_to_its_last_whole_record(tmp_path: Path)
     whole = path.read_bytes()
     for cut in range(8, len(whole), 7):
         path.write_bytes(whole[:cut])
-        account = account_of(path)
+        account = summary_of(path)
         assert 0 <= account.cut_bytes < 80
         assert account.frames <= 15 and account.gyro_bytes % 4 == 0
     path.write_bytes(whole[:-30] + bytes(200))  # a hole of zeros, as a power cut leaves it
-    assert account_of(path).cut_bytes >= 170
+    assert summary_of(path).cut_bytes >= 170
 
 
 def test_what_a_kill_left_unexported_is_exported_once(tmp_path: Path) -> None:
     path = capture(tmp_path)
-    account = account_of(path)
+    account = summary_of(path)
     names = [file.name for file in export_if_missing(path, account)]
     assert names == ["gyro.bin", "can.log"]
     assert export_if_missing(path, account) == []

@@ -9,13 +9,13 @@ import pytest
 import drivers.bench.devices
 import drivers.transport.can_link
 from drivers.bench import BenchRig
-from drivers.bench.retiming import Restamping
+from drivers.bench.retiming import BenchRetiming
 from drivers.capture import wire_capture
 from drivers.capture.wire_capture import Capture, export, read_capture, unpack_frame
 from drivers.codecs import stim300
 from drivers.codecs.lawicel import CanFrame
 from drivers.replay import ReplayRig
-from drivers.replay.recording import recall
+from drivers.replay.recording import recording_from_capture
 from rig.config.bench import AmplifierConfig, BenchConfig, CanConfig, GyroscopeConfig, RealTimeConfig
 from rig.errors import Aborted, DeviceFault, RecordingError
 from rig.interface import Torque
@@ -130,7 +130,7 @@ def test_what_is_taken_off_both_roads_is_told_and_no_delay_expected(bench, sourc
     with bench.opened(), bench.armed():
         play(bench, 50)
         chosen = bench.amplifier.config.model_copy(update={"torque_source": source})
-        expected = Restamping(chosen, bench.gyroscope, bench.amplifier).expected_delay()
+        expected = BenchRetiming(chosen, bench.gyroscope, bench.amplifier).expected_delay()
     assert expected.delay_s == 0.0
     assert expected.corrections[0] == "gyro group delay 2.2 ms"
     assert expected.corrections[-1] == told
@@ -152,7 +152,7 @@ def played_in_two_sets(bench):
 
 def test_a_capture_alone_gives_every_set_as_it_was_heard(bench, tmp_path):
     live = played_in_two_sets(bench)
-    recording = recall(tmp_path / "raw" / "wire.cap")
+    recording = recording_from_capture(tmp_path / "raw" / "wire.cap")
     assert [run.name for run in recording.runs] == ["set 1", "set 2"]
     assert recording.info["expected_torque_delay"] == bench.expected_delay._asdict()
     for run, (start_s, answers) in zip(recording.runs, live, strict=True):
@@ -173,10 +173,10 @@ def test_a_capture_without_a_set_or_with_records_of_no_kind_is_refused(bench, tm
         play(bench, 30)
     path = tmp_path / "raw" / "wire.cap"
     with pytest.raises(RecordingError, match="ends before the first set had a sample"):
-        recall(path)
+        recording_from_capture(path)
     path.write_bytes(path.read_bytes().replace(b'"opened"', b'"closed"'))
     with pytest.raises(RecordingError, match="nothing was played"):
-        recall(path)
+        recording_from_capture(path)
 
 
 def test_a_mark_that_says_nonsense_is_refused(bench, tmp_path):
@@ -184,7 +184,7 @@ def test_a_mark_that_says_nonsense_is_refused(bench, tmp_path):
     path = tmp_path / "raw" / "wire.cap"
     path.write_bytes(path.read_bytes().replace(b'"start_s": 1', b'"start_x": 1'))
     with pytest.raises(RecordingError, match="none that this version writes"):
-        recall(path)
+        recording_from_capture(path)
 
 
 def test_capture_holds_what_crossed_the_wire(bench, tmp_path):
@@ -344,7 +344,7 @@ def test_a_bench_that_was_never_opened_has_nothing_to_better(bench):
 
 
 def test_torque_that_is_recorded_as_it_was_sent_needs_no_drives_clock(bench):
-    bench.amplifier.config = bench._restamping._config = CONFIG.amplifier.model_copy(update={"torque_source": "sent"})
+    bench.amplifier.config = bench._retiming._config = CONFIG.amplifier.model_copy(update={"torque_source": "sent"})
     with bench.opened(), bench.armed():
         bench.begin_set(lambda t: 0.0, 3.0)
         for _ in range(6000):

@@ -59,7 +59,7 @@ def test_a_device_that_vanishes_is_a_fault_after_what_it_still_said(line):
     os.write(device, b"last words")
     assert port.wait_readable(2.0)
     os.close(device)
-    port._ear.join(2.0)
+    port._thread.join(2.0)
     assert port.read() == b"last words"
     with pytest.raises(DeviceFault, match="has vanished"):
         port.read()

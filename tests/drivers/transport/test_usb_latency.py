@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.transport.usb_latency import latency_ms, latency_told
+from drivers.transport.usb_latency import describe_usb_latency, usb_latency_ms
 
 
 def adapter(root: Path, timer: str) -> Path:
@@ -15,7 +15,7 @@ def adapter(root: Path, timer: str) -> Path:
 
 @pytest.mark.parametrize(("timer", "says"), [("16\n", "latency timer 16 ms: bytes arrive in bunches"), ("1\n", "1 ms")])
 def test_the_timer_is_told_with_what_it_means(tmp_path, timer, says):
-    told = latency_told("/dev/ttyUSB7", adapter(tmp_path, timer))
+    told = describe_usb_latency("/dev/ttyUSB7", adapter(tmp_path, timer))
     assert says in told
     assert ("bunches" in told) == (timer == "16\n")
 
@@ -23,13 +23,13 @@ def test_the_timer_is_told_with_what_it_means(tmp_path, timer, says):
 def test_a_port_is_followed_by_its_stable_name(tmp_path):
     link = tmp_path / "by-id"
     link.symlink_to("/dev/ttyUSB7")
-    assert latency_ms(str(link), adapter(tmp_path, "16")) == 16
+    assert usb_latency_ms(str(link), adapter(tmp_path, "16")) == 16
 
 
 @pytest.mark.parametrize("port", ["/dev/ttyACM0", "COM3"])
 def test_a_port_without_a_timer_says_nothing(tmp_path, port):
-    assert latency_told(port, tmp_path) == ""
+    assert describe_usb_latency(port, tmp_path) == ""
 
 
 def test_a_timer_that_is_no_number_says_nothing(tmp_path):
-    assert latency_told("/dev/ttyUSB7", adapter(tmp_path, "soon")) == ""
+    assert describe_usb_latency("/dev/ttyUSB7", adapter(tmp_path, "soon")) == ""

@@ -16,7 +16,7 @@ from rig.guard.base import Rest, Tick
 from rig.guard.motion import motion_checks
 from rig.interface import GyroSample, TorqueSample
 from rig.platform import Platform
-from rig.sequencer.warm_up import rehearse
+from rig.sequencer.warm_up import warm_up
 
 LIMITS = LimitsConfig(travel_deg=10, rate_deg_s=400, torque_nm=150)
 DECLARED = Platform(0.02, 0.06, 680.0)
@@ -26,9 +26,9 @@ SETS: list[PlannedSet] = []
 FAULTS = """
 import resource
 from rig import realtime
-from rig.sequencer.warm_up import rehearse
+from rig.sequencer.warm_up import warm_up
 from tests.rig.sequencer.test_warm_up import DECLARED, LIMITS, SETS, moving_ticks, new_guard
-rehearse(new_guard(), DECLARED, SETS, 1000.0)
+warm_up(new_guard(), DECLARED, SETS, 1000.0)
 guard, ticks = new_guard(), moving_ticks()
 grant = realtime.acquire(0, lock_memory=True)
 before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
@@ -72,7 +72,7 @@ def test_the_guard_runs_nothing_for_the_first_time_in_the_loop() -> None:
     guard = new_guard()
     guard.begin(0.0, Rest())
     in_the_loop = called(lambda: [guard.look(tick) for tick in moving_ticks()])
-    rehearsed = called(lambda: rehearse(new_guard(), DECLARED, SETS, 1000.0))
+    rehearsed = called(lambda: warm_up(new_guard(), DECLARED, SETS, 1000.0))
     assert len(in_the_loop) > 20
     assert {code.co_qualname for code in in_the_loop - rehearsed} <= {"Check._trip", "Trip.__init__"}
 
@@ -81,7 +81,7 @@ def test_an_easy_motion_of_the_declared_platform_trips_nothing(monkeypatch: pyte
     verdicts: list[object] = []
     look = Guard.look
     monkeypatch.setattr(Guard, "look", lambda self, tick: verdicts.append(look(self, tick)))
-    rehearse(new_guard(), DECLARED, SETS, 1000.0)
+    warm_up(new_guard(), DECLARED, SETS, 1000.0)
     assert len(verdicts) > 400
     assert set(verdicts) == {None}
 

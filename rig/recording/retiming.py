@@ -20,22 +20,22 @@ MOST_POINTS = 10_000_000
 LARGEST_STEP_S = 1.0  # what a file says must not turn a recording upside down
 
 
-class Restamps(NamedTuple):
+class Retiming(NamedTuple):
     """Of one run: points (recorded, bettered), shape (2, n), in seconds since it began; None where nothing changes."""
 
     samples: Array | None = None
     torque: Array | None = None
 
 
-NO_RESTAMPS = Restamps()
+NO_RETIMING = Retiming()
 
 
-def restamps(start_s: float, samples: Sequence[Sequence[float]], torque: Sequence[Sequence[float]]) -> Restamps:
+def retiming_of(start_s: float, samples: Sequence[Sequence[float]], torque: Sequence[Sequence[float]]) -> Retiming:
     """From points on the clock of the campaign, of a set that began at ``start_s``.
 
     Raises ValueError where the points are no map of times to times in the same order.
     """
-    return Restamps(_points(samples, start_s), _points(torque, start_s))
+    return Retiming(_points(samples, start_s), _points(torque, start_s))
 
 
 def _points(pairs: Sequence[Sequence[float]], start_s: float) -> Array | None:
@@ -49,7 +49,7 @@ def _points(pairs: Sequence[Sequence[float]], start_s: float) -> Array | None:
     return points
 
 
-def event_values(start_s: float, found: Restamps) -> dict[str, Any]:
+def event_values(start_s: float, found: Retiming) -> dict[str, Any]:
     """What an event of the journal says."""
     return {
         EVENT_KEY: True,
@@ -59,7 +59,7 @@ def event_values(start_s: float, found: Restamps) -> dict[str, Any]:
     }
 
 
-def restamps_of(values: Mapping[str, Any]) -> tuple[float, Restamps] | None:
+def retiming_from_event(values: Mapping[str, Any]) -> tuple[float, Retiming] | None:
     """(when its run began, the points) from the values of an event; None where it is another one, or nonsense.
 
     The recorded times are sound without it, so nonsense here costs no sample.
@@ -67,12 +67,12 @@ def restamps_of(values: Mapping[str, Any]) -> tuple[float, Restamps] | None:
     if not isinstance(values, Mapping) or values.get(EVENT_KEY) is not True:
         return None
     try:
-        return float(values[BEGUN_S]), restamps(0.0, values["samples"], values["torque"])
+        return float(values[BEGUN_S]), retiming_of(0.0, values["samples"], values["torque"])
     except (KeyError, TypeError, ValueError, OverflowError):
         return None
 
 
-def restamped(time_s: Array, points: Array | None) -> Array:
+def retimed(time_s: Array, points: Array | None) -> Array:
     """Times, shape (n,), moved as the points say; those outside as the first or the last."""
     if points is None:
         return time_s

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rig.recording import Journal, read_journal, recording_from_journal
-from rig.recording.restamped import BEGUN_S, event_values, restamped, restamps, restamps_of
+from rig.recording.retiming import BEGUN_S, event_values, retimed, retiming_from_event, retiming_of
 
 SAMPLES = ([100.0, 100.5, 101.0], [99.9, 100.5, 101.1])
 
@@ -26,17 +26,17 @@ def written(path: Path, values: dict[str, Any] | None) -> None:
 
 
 def test_times_move_as_the_points_say_and_those_outside_as_the_outermost() -> None:
-    points = restamps(100.0, SAMPLES, ((), ()))
+    points = retiming_of(100.0, SAMPLES, ((), ()))
     assert points.torque is None
-    found = restamped(np.array([-1.0, 0.0, 0.25, 0.5, 1.0, 2.0]), points.samples)
+    found = retimed(np.array([-1.0, 0.0, 0.25, 0.5, 1.0, 2.0]), points.samples)
     np.testing.assert_allclose(found, [-1.1, -0.1, 0.2, 0.5, 1.1, 2.1], atol=1e-12)
 
 
 def test_an_event_says_every_digit_of_the_map() -> None:
     rng = np.random.default_rng(1)
     times = np.cumsum(rng.random(20)) + 3e4
-    found = restamps(3e4, (times, times + 1e-5 * np.arange(20)), ((), ()))
-    again = restamps_of(json.loads(json.dumps(event_values(3e4, found))))
+    found = retiming_of(3e4, (times, times + 1e-5 * np.arange(20)), ((), ()))
+    again = retiming_from_event(json.loads(json.dumps(event_values(3e4, found))))
     assert again is not None and again[0] == 3e4
     assert again[1].samples is not None and found.samples is not None and again[1].torque is None
     np.testing.assert_array_equal(again[1].samples, found.samples)
@@ -44,7 +44,7 @@ def test_an_event_says_every_digit_of_the_map() -> None:
 
 def test_a_journal_read_back_has_the_better_times_and_keeps_the_tables_as_they_were(tmp_path: Path) -> None:
     path = tmp_path / "a.journal"
-    written(path, event_values(100.0, restamps(100.0, SAMPLES, ([100.0, 101.0], [99.9, 100.9]))))
+    written(path, event_values(100.0, retiming_of(100.0, SAMPLES, ([100.0, 101.0], [99.9, 100.9]))))
     contents = read_journal(path)
     run = recording_from_journal(contents).runs[0]
     np.testing.assert_allclose(run.time_s, [-0.1, 0.2, 1.1], atol=1e-12)
@@ -70,7 +70,7 @@ def test_a_journal_read_back_has_the_better_times_and_keeps_the_tables_as_they_w
     ],
 )
 def test_a_map_that_is_nonsense_or_of_another_run_costs_no_sample(tmp_path: Path, spoilt: dict[str, Any]) -> None:
-    values = event_values(100.0, restamps(100.0, SAMPLES, ((), ()))) | spoilt
+    values = event_values(100.0, retiming_of(100.0, SAMPLES, ((), ()))) | spoilt
     written(tmp_path / "a.journal", values)
     run = recording_from_journal(read_journal(tmp_path / "a.journal")).runs[0]
     np.testing.assert_array_equal(run.time_s, [0.0, 0.25, 1.0])
