@@ -46,21 +46,21 @@ def duration_s(config: Config, sets: Sequence[PlannedSet]) -> float:
 
 def _line(planned: PlannedSet) -> str:
     peak_nm = float(np.max(np.abs(planned.torque(np.arange(0.0, planned.duration_s, PEAK_STEP_S)))))
-    scaled = "" if planned.scale == 1.0 else f", scaled to {100 * planned.scale:.1f} %"
+    scaled = "" if planned.scale == 1.0 else f", reduced to {100 * planned.scale:.1f} % to stay within the limits"
     return f"{plain(planned.name)}: {planned.duration_s:g} s, up to {peak_nm:.1f} N m{scaled}"
 
 
 def _probe(config: Config, sets: Sequence[PlannedSet]) -> str:
     assert config.bench is not None
     if not config.bench.probe.play:
-        return "NONE (bench.probe.play is false): the first set is the first torque"
+        return "NONE (bench.probe.play is false): the first torque is that of the first set"
     most_nm = Probe(config.bench.probe, config.limits, config.model.platform(), sets).largest_nm
-    return f"small pulses first, up to {most_nm:.1f} N m where nothing moves before"
+    return f"small pulses first, up to {most_nm:.1f} N m while the platform does not move"
 
 
 def _time(statement: Statement, config: Config, sets: Sequence[PlannedSet]) -> str:
     seconds = duration_s(config, sets)
     if statement.torque is Torque.SIMULATED:
-        return f"{seconds:.0f} s of the rig's time, simulated in a few seconds; then the identification"
+        return f"{seconds:.0f} s of simulated time, computed in a few seconds; then the identification"
     settle_s = config.bench.settle_s if config.bench is not None else 0.0
     return f"{seconds + settle_s:.0f} s on the bench; then the identification"

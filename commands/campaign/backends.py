@@ -73,9 +73,7 @@ def emulated(loaded: LoadedConfig, raw_folder: Path) -> Iterator[Stage]:
     config = loaded.config
     _require_channels(config)
     if _bench_section(config).replay is not None:
-        raise UsageError(
-            "--emulate and bench.replay exclude each other: the first emulates devices, the second has none."
-        )
+        raise UsageError("--emulate and bench.replay exclude each other: a replay uses no devices.")
     require_emulators()
     from sim_backend.emulators.launch import on_emulated_ports, started
 
@@ -100,7 +98,7 @@ def backend_name(config: Config, dry_run: bool, emulate: bool) -> str:
 def require_emulators() -> None:
     """Raise UsageError where there are no pseudo terminals to emulate devices on."""
     if sys.platform == "win32":
-        raise UsageError("emulated devices need pseudo terminals, which Windows has not: use --dry-run there.")
+        raise UsageError("emulated devices need pseudo terminals, which Windows does not have. Use --dry-run instead.")
 
 
 def _require_channels(config: Config) -> None:
@@ -121,7 +119,7 @@ def _require_channels(config: Config) -> None:
 
 def _bench_section(config: Config) -> BenchConfig:
     if config.bench is None:
-        raise UsageError("this needs a `bench:` section, which the file has not: see examples/bench.yaml.")
+        raise UsageError("the file has no `bench:` section. Add one as in examples/bench.yaml.")
     return config.bench
 
 
@@ -146,9 +144,9 @@ def _replayed(path: Path, section: BenchConfig) -> Stage:
     rig = ReplayRig(path)
     if otherwise := rig.differences(section):
         raise ConfigError(
-            "bench.replay: a replay has the devices as they were, but the file says otherwise:\n  "
+            "bench.replay: these settings differ from those of the capture:\n  "
             + "\n  ".join(otherwise)
-            + "\nTake these lines back to what the capture has; ports may differ."
+            + "\nSet them to the values of the capture; ports may differ."
         )
     return Stage(rig, rig.clock, lambda: {"replay_of": str(path)})
 

@@ -31,7 +31,7 @@ def ask_consent(statement: Statement, yes: bool, is_terminal: bool, ask: Callabl
         return
     if not is_terminal:
         raise UsageError(
-            "this campaign applies REAL torque and nobody can be asked without a terminal: give --yes if the "
+            "this campaign applies REAL torque, and without a terminal nobody can be asked. Give --yes if the "
             "machine is clear, or try --dry-run or --emulate first. Nothing was moved."
         )
     try:

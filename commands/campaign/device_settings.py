@@ -100,7 +100,7 @@ def _port_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
         yield (
             CAN_CHANNEL,
             f"{channel} is the port that {'.'.join(map(str, GYRO_PORT))} names too ({gyro}): gyroscope and CAN adapter "
-            "are on one port each; `rig devices` lists what is plugged in",
+            "need a port each; `rig devices` lists what is plugged in",
         )
 
 

@@ -52,12 +52,13 @@ def disk_space_warning(folder: Path, needed_bytes: float) -> str:
     left = f"{free / MEGABYTE:.3g} MB are free in {plain(str(there))}"
     if free < START_BYTES:
         raise Aborted(
-            f"{os.strerror(errno.ENOSPC)}: {left}, this campaign writes about {about} and begins with "
-            f"{START_BYTES / MEGABYTE:.2g} MB: make room or choose another --out. Nothing was moved."
+            f"{os.strerror(errno.ENOSPC)}: {left}, but this campaign writes about {about} and "
+            f"needs {START_BYTES / MEGABYTE:.2g} MB to start. Free space or choose another --out. Nothing was moved."
         )
     if free < needed_bytes:
         return (
-            f"ROOM      {left}, this campaign writes about {about}: it will end, torque off, when the disk is full. "
-            "Make room or choose another --out."
+            f"DISK      {left}, but this campaign writes about {about}. It will stop with torque off when the "
+            "disk is full. "
+            "Free space or choose another --out."
         )
     return ""

@@ -22,8 +22,8 @@ from rig.interface import Statement, Torque
 from rig.platform import Platform
 
 NOBODY_AGREED = (  # the same whether it was asked, could not be, or is a replay: results are compared
-    "it is not played: identify.follow_up is ask, and nobody said yes (without a terminal nobody can be asked); "
-    "identify.follow_up: auto plays it (real torque needs --yes as well)"
+    "it is not played: identify.follow_up is ask, and nobody agreed (without a terminal nobody can be asked); "
+    "set identify.follow_up: auto to play it without asking (real torque also needs --yes)"
 )
 QUESTION = "Play this follow-up now? Type yes to play it: "
 NEXT_SEED = 1_000_003  # a simulated gyro must not repeat its noise
@@ -76,7 +76,7 @@ def _refusal(context: CommandContext, loaded: LoadedConfig) -> str:
     replayed = backend == "bench" and config.bench is not None and config.bench.replay is not None
     if config.identify.follow_up == "ask" and (replayed or not _somebody_there()):
         return NOBODY_AGREED
-    return "it is not played: a capture that is replayed has nothing more to tell" if replayed else ""
+    return "it is not played: a replayed capture holds no further data" if replayed else ""
 
 
 def _somebody_there() -> bool:

@@ -94,7 +94,7 @@ def read_unfinished(folder: Path) -> UnfinishedCampaign:
     from rig.recording.results import campaign_journals
 
     if not folder.is_dir():
-        raise RecordingError(f"--resume {folder}: is no folder: give the results folder of the campaign to resume")
+        raise RecordingError(f"--resume {folder}: is not a folder: give the results folder of the campaign to resume")
     journals = campaign_journals(folder)
     if not journals:
         raise RecordingError(f"--resume {folder}: holds no {JOURNAL_FILE}: play the campaign anew, without --resume")
@@ -124,7 +124,7 @@ def refuse_what_differs(before: UnfinishedCampaign, loaded: LoadedConfig, backen
     was = before.header.get("played_on")
     if was != backend:
         raise UsageError(
-            f"--resume {before.folder}: was played on the {was} backend and would go on on the {backend} one: "
+            f"--resume {before.folder}: was played on the {was} backend and would continue on the {backend} backend: "
             "resume with the same backend and options"
         )
     then = before.header["config"]

@@ -57,9 +57,9 @@ def describe_location(played: PlayedCampaign, folder: Path) -> str:
     if played.recording.runs:
         return f"What was recorded is in {folder}"
     if not played.read_back:
-        return f"What was recorded could not be read back; what the disk took is in {folder}: try `rig recover` on it"
+        return f"The recording could not be read back; what reached the disk is in {folder}: try `rig recover` on it"
     wire = any(path.stat().st_size for path in folder.glob("raw/**/*.*") if path.name in WIRE_LOGS)
-    kept = "the raw capture of what crossed the wire, and the journal" if wire else "the journal"
+    kept = "the raw capture of the wire, and the journal" if wire else "the journal"
     return f"Nothing was recorded, since it ended before the first sample of a set; {folder} has {kept}, which says why"
 
 

@@ -203,7 +203,7 @@ def _identified_again(
     except (Aborted, KeyboardInterrupt) as error:
         stopped = error
     except UsageError as error:
-        return played, _noted(found, f"the follow-up was played, but is of no use: {error}"), False
+        return played, _noted(found, f"the follow-up was played, but cannot be used: {error}"), False
     return dataclasses.replace(played, cause=stopped), _noted(found, STOPPED_AGAIN, aborted=True), False
 
 
@@ -230,7 +230,7 @@ def _planned(
     rounds = len(found.follow_up.rounds) if found.follow_up else 0
     prefix = "follow-up" if rounds == 0 else f"follow-up {rounds + 1}"
     if any(found.verdict.confusable_with.values()):
-        context.terminal.note("planning what would part the rivals")
+        context.terminal.note("planning a follow-up that separates the candidate effects")
     try:
         planned = plan_follow_up(
             found, dataclasses.replace(recording, info={}), allowed, rate_hz, loaded.config.excitation.rest_s, prefix

@@ -26,8 +26,7 @@ from rig.interface import Torque
 from rig.preflight import Prediction, playable_sets, predict_all
 
 UNKNOWN_INERTIA_NOTE = (
-    "forecast for a platform of unit inertia (model.inertia_unknown): how far a torque moves the real one nobody can "
-    "tell before its inertia is declared"
+    "forecast for a platform of unit inertia (model.inertia_unknown): declare the inertia to forecast the real travel"
 )
 
 
@@ -66,10 +65,7 @@ def forecast(known: Known) -> list[str]:
     except PreflightRefusal as error:
         raise with_locations(error, known.loaded) from None
     doubt = [UNKNOWN_INERTIA_NOTE] if config.model.inertia_unknown else []
-    return doubt + [
-        f"forecast {plain(p.describe())}" + ("" if p.passes else f", scaled to {100 * p.scale:.1f} % as asked")
-        for p in known.predictions
-    ]
+    return doubt + [f"forecast {plain(p.describe_as_played())}" for p in known.predictions]
 
 
 def recordings(known: Known) -> list[str]:

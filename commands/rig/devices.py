@@ -33,12 +33,12 @@ def _can_adapters() -> list[Any]:
 def device_lines(serial_ports: Lister = _serial_ports, can_adapters: Lister = _can_adapters) -> list[str]:
     """What is there, one line each; a listing that fails is said in its place and does not hide the other."""
     return [
-        *_listing("Serial ports", serial_ports, _serial_line, "none found: plug the gyro in, or check its driver"),
+        *_listing("Serial ports", serial_ports, _serial_line, "None detected. Plug the gyro in, or check its driver."),
         *_listing(
             "CAN adapters",
             can_adapters,
             _can_line,
-            "none found that announce themselves; a serial (slcan) adapter stands among the serial ports",
+            "None detected. Serial (slcan) adapters are listed under serial ports.",
         ),
     ]
 

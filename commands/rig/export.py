@@ -27,7 +27,7 @@ def export_recording(source: Path, wanted: str, out: Path | None) -> int:
     Raises UsageError where it cannot be done; nothing is overwritten.
     """
     if wanted not in FORMATS:
-        raise UsageError(f"--to {wanted[:40]} is no format known here: take one of {', '.join(FORMATS)}")
+        raise UsageError(f"--to {wanted[:40]} is not a known format: choose one of {', '.join(FORMATS)}")
     home = source if source.is_dir() else source.parent
     folder = out if out is not None else home / f"export_{wanted}"
     if folder.exists() or folder.is_symlink():
@@ -55,7 +55,7 @@ def _can_logs(home: Path, wanted: str, folder: Path) -> Iterator[str]:
     for capture in captures:
         part = capture.parent.name if capture.parent != home / "raw" else "can"
         target = folder / f"{part}.{wanted}"
-        yield f"{target}: {write_can_log(capture, target)} frames of {capture}, times since the first"
+        yield f"{target}: {write_can_log(capture, target)} frames of {capture}, times count from the first"
 
 
 def _runs(source: Path, wanted: str, folder: Path) -> Iterator[str]:
@@ -64,7 +64,7 @@ def _runs(source: Path, wanted: str, folder: Path) -> Iterator[str]:
 
     runs = [content for content in read_file(source) if isinstance(content, Run)]
     if not runs:
-        raise RecordingError(f"{source}: was not written by this program: it is a table already")
+        raise RecordingError(f"{source}: was not written by this program and is a table already")
     _made(folder)
     write = writers.writer_of(wanted)
     entries: list[dict[str, Any]] = []

@@ -27,7 +27,7 @@ def recover_folder(folder: Path) -> int:
     from rig.recording.recover import recover
 
     if not folder.is_dir():
-        raise RecordingError(f"{folder}: is no folder: give the results folder of a campaign")
+        raise RecordingError(f"{folder}: is not a folder: give the results folder of a campaign")
     for line in _captures(folder):
         sys.stdout.write(plain(line) + "\n")
     try:
@@ -37,9 +37,9 @@ def recover_folder(folder: Path) -> int:
     for line in recovery.lines:
         sys.stdout.write(plain(line) + "\n")
     if not (folder / RESULT_FILE).exists():
-        sys.stdout.write(f"{RESULT_FILE}: absent: nothing was identified before it ended\n")
+        sys.stdout.write(f"{RESULT_FILE}: absent: the campaign ended before it was identified\n")
     if not recovery.is_new:
-        sys.stdout.write(f"Nothing had to be recovered: {plain(str(recovery.export))} has everything.\n")
+        sys.stdout.write(f"Nothing to recover: {plain(str(recovery.export))} is complete.\n")
         return OK
     config = _write_config(folder, recovery.export, recovery.recording.info)
     sys.stdout.write(
@@ -86,7 +86,7 @@ def _out_of_captures(folder: Path, without: RecordingError) -> Recovery:
         except Aborted:
             raise
         except RigError as error:
-            lines.append(f"{name}: no set can be had from it: {str(error).removeprefix(f'{path} ')}")
+            lines.append(f"{name}: no set could be recovered from it: {str(error).removeprefix(f'{path} ')}")
     if not recordings:
         raise RecordingError("; ".join((str(without), *lines[1:])))
     runs = [run for recording in recordings for run in recording.runs]
@@ -97,7 +97,7 @@ def _out_of_captures(folder: Path, without: RecordingError) -> Recovery:
     there = (folder / RECORDING_FILE).exists()
     path = free_name(folder, RECOVERED_FILE if there else RECORDING_FILE)
     write_recording_h5(path, recording)
-    lines.append(f"{path.name}: written, {len(runs)} run(s); what the sets were called is lost with the journal")
+    lines.append(f"{path.name}: written, {len(runs)} run(s); the names of the sets are lost with the journal")
     return Recovery(tuple(lines), recording, path, is_new=True)
 
 

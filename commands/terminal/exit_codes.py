@@ -74,11 +74,11 @@ def exit_code_of(error: BaseException) -> int:
 def as_rig_error(error: BaseException) -> BaseException:
     """A full disk, or a reader that has gone away, ends a campaign as Ctrl-C does; all else is what it is."""
     if isinstance(error, BrokenPipeError):
-        return Aborted("nobody reads the output any more.")
+        return Aborted("the program that read the output has ended.")
     if isinstance(error, OSError) and error.errno in _DISK_FULL_ERRNOS:
         return Aborted(
             f"cannot write {error.filename or 'the results'}: {error.strerror}. What was written until then is "
-            "kept; make room or choose another --out."
+            "kept; free space or choose another --out."
         )
     return error
 

@@ -27,7 +27,7 @@ Overrides = Annotated[
 ]
 Seed = Annotated[int | None, typer.Option(metavar="N", min=0, max=2**32 - 1, help="Seed of simulation and search.")]
 Quiet = Annotated[
-    bool, typer.Option("--quiet", help="Say only errors and what must be known: REAL torque, code run, little room.")
+    bool, typer.Option("--quiet", help="Print only errors and warnings: REAL torque, code that is run, low disk space.")
 ]
 
 

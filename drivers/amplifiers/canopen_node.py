@@ -73,7 +73,7 @@ def read_dictionary(path: Path, node: int) -> canopen.ObjectDictionary:
             raise ConfigError(f"bench.amplifier.settings.eds: there is no file {path}")
         if not path.is_file() or path.stat().st_size > MAX_EDS_BYTES:
             raise ConfigError(
-                f"bench.amplifier.settings.eds: {path} is no regular file of at most {MAX_EDS_BYTES >> 20} MiB: "
+                f"bench.amplifier.settings.eds: {path} is not a regular file of at most {MAX_EDS_BYTES >> 20} MiB: "
                 "give the EDS or DCF of the drive's maker"
             )
         return canopen.import_od(str(path), node_id=node)

@@ -47,7 +47,7 @@ class Cia402(Amplifier):
         super().__init__(config)
         self.settings = read_settings(Cia402Settings, config.settings, "bench.amplifier.settings")
         if not 1 <= config.node <= 127:
-            raise ConfigError(f"bench.amplifier.node: {config.node} is no CANopen node, allowed are 1 to 127")
+            raise ConfigError(f"bench.amplifier.node: {config.node} is not a CANopen node, allowed are 1 to 127")
         if config.node == self.settings.host_node:
             raise ConfigError(
                 f"bench.amplifier.settings.host_node: {config.node} is the drive's own node number; choose another"
@@ -185,8 +185,8 @@ class Cia402(Amplifier):
         )
         if not off:
             raise DeviceFault(
-                f"{self.label} still says 'operation enabled' (statusword 0x{self.statusword:04X}) after it was "
-                "told to disable: PRESS THE EMERGENCY STOP and check the drive"
+                f"{self.label} still reports 'operation enabled' (statusword 0x{self.statusword:04X}) after it was "
+                "commanded to disable: PRESS THE EMERGENCY STOP and check the drive"
             )
         link.send([CanFrame(0, bytes([NMT_PRE_OPERATIONAL, self.config.node]))])
         # It is off and was seen to be: stop watching, or it would report a fault when we fall silent.

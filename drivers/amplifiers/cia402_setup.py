@@ -151,8 +151,8 @@ class Cia402Setup:
         objects.write(cia402.HEARTBEAT_CONSUMER, 1, wanted, 4)
         if objects.read(cia402.HEARTBEAT_CONSUMER, 1) != wanted:
             raise DeviceFault(
-                f"{self._label} did not keep its heartbeat consumer (0x1016:01): it would go on driving when this "
-                "computer dies. Refused; use a drive or firmware that has one."
+                f"{self._label} did not keep its heartbeat consumer (0x1016:01): it would keep driving if this "
+                "computer fails. Refused; use a drive or firmware that has one."
             )
         if objects.read_if_there(cia402.ABORT_CONNECTION_OPTION) is not None:
             objects.write(cia402.ABORT_CONNECTION_OPTION, 0, s.on_lost_host, 2)
@@ -171,7 +171,7 @@ class Cia402Setup:
             raise DeviceFault(
                 f"{self._label} has no 0x6007 and "
                 + ("no 0x1029" if behaviour is None else "its 0x1029:01 stays 1 (no change)")
-                + ": nothing makes it cut the torque when this computer dies. Refused; use another drive or firmware."
+                + ": nothing makes it cut the torque if this computer fails. Refused; use another drive or firmware."
             )
 
     def _map(self, objects: RemoteObjects, plan: DrivePlan) -> bool:

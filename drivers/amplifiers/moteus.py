@@ -2,7 +2,7 @@
 
 Register protocol (docs/protocol/registers.md of the firmware). Its watchdog latches mode 11 ("position
 timeout") a tenth of a second after the last command and holds it until a stop: that is the drive-side guard,
-armed as delivered, and proved when it is armed here: with zero torque commanded, this computer falls silent once
+armed as delivered, and tested when the drive is armed here: with zero torque commanded, this computer falls silent once
 and a controller that goes on as if nothing were is refused. Needs an adapter for CAN-FD with bit-rate switching
 (``can.interface`` socketcan, ...).
 """
@@ -150,7 +150,7 @@ class Moteus(Amplifier):
             raise DeviceFault(f"{self.label} does not answer: check its supply, id and the CAN-FD bit rates (1/5 M)")
         return [
             f"peak {self.peak_torque_nm:.4g} N m as declared, watchdog {self.config.watchdog_ms} ms in each frame, "
-            "proved when it is armed"
+            "tested when the drive is armed"
         ]
 
     def arm(self, link: CanLink) -> None:
@@ -169,7 +169,8 @@ class Moteus(Amplifier):
         if not heard or self.mode != MODE_TIMEOUT:
             link.send(self.off_frames())
             raise DeviceFault(
-                f"{self.label} goes on without a sign of life of this computer (mode {self.mode}, {MODE_TIMEOUT} "
+                f"{self.label} keeps running without a sign of life from this computer (mode {self.mode}, "
+                f"{MODE_TIMEOUT} "
                 "expected): refused. Its firmware has to keep the watchdog of the position command (register 0x027)."
             )
 
@@ -221,4 +222,4 @@ class Moteus(Amplifier):
         """Stop, and read the mode back."""
         self._armed = False
         if not self._ask(link, encode_stop()) or not link.wait(ANSWER_TIMEOUT_S, lambda: self.mode == MODE_STOPPED):
-            raise DeviceFault(f"{self.label} does not say that it has stopped: PRESS THE EMERGENCY STOP")
+            raise DeviceFault(f"{self.label} does not confirm that it has stopped: PRESS THE EMERGENCY STOP")

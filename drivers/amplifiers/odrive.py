@@ -41,7 +41,7 @@ class Odrive(Amplifier):
         super().__init__(config)
         self.settings = read_settings(OdriveSettings, config.settings, "bench.amplifier.settings")
         if config.node > 63:
-            raise ConfigError(f"bench.amplifier.node: {config.node} is no ODrive node, allowed are 0 to 63")
+            raise ConfigError(f"bench.amplifier.node: {config.node} is not an ODrive node, allowed are 0 to 63")
         self.label = f"ODrive, node {config.node}"
         self._torque_id = self._id(Command.SET_INPUT_TORQUE)
         self._beat: wire.Heartbeat | None = None
@@ -77,14 +77,15 @@ class Odrive(Amplifier):
         if self.receive not in link.listeners:
             link.listeners.append(self.receive)
         if not link.wait(5 * HEARTBEAT_S, lambda: self._beat is not None):
-            raise DeviceFault(f"{self.label} is not heard: check its supply, node number, CAN bit rate and wiring")
+            raise DeviceFault(f"{self.label} is silent: check its supply, node number, CAN bit rate and wiring")
         link.send([
             self._frame(Command.CLEAR_ERRORS),
             self._frame(Command.SET_CONTROLLER_MODE, wire.CONTROL_TORQUE, wire.INPUT_PASSTHROUGH),
         ])  # fmt: skip
         return [
             f"torque control, peak {self.peak_torque_nm:.4g} N m as declared",
-            f"watchdog of {self.config.watchdog_ms} ms: CANSimple cannot read it, so it is proved when it is armed",
+            f"watchdog of {self.config.watchdog_ms} ms: CANSimple cannot read it, so it is tested when the "
+            "drive is armed",
         ]
 
     def arm(self, link: CanLink) -> None:
@@ -121,7 +122,8 @@ class Odrive(Amplifier):
         if not tripped:
             link.send(self.off_frames())
             raise DeviceFault(
-                f"{self.label} goes on without a sign of life of this computer: refused. Switch its watchdog on "
+                f"{self.label} keeps running without a sign of life from this computer: refused. Switch its "
+                "watchdog on "
                 "(odrivetool: axis0.config.enable_watchdog = True, watchdog_timeout = "
                 f"{self.config.watchdog_ms * 1e-3:g}, save_configuration())"
             )
@@ -182,5 +184,5 @@ class Odrive(Amplifier):
         )
         if not off:
             raise DeviceFault(
-                f"{self.label} does not say that it is idle ({self._how_it_is()}): PRESS THE EMERGENCY STOP"
+                f"{self.label} does not confirm that it is idle ({self._how_it_is()}): PRESS THE EMERGENCY STOP"
             )

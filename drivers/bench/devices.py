@@ -147,4 +147,4 @@ def _together(faults: list[RigError]) -> RigError:
         return faults[0]
     text = "\n".join(f"  {fault}" for fault in faults)
     kind = ConfigError if all(isinstance(fault, ConfigError) for fault in faults) else DeviceFault
-    return kind(f"{len(faults)} things are wrong on the bench:\n{text}")
+    return kind(f"{len(faults)} faults on the bench:\n{text}")

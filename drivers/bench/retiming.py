@@ -54,9 +54,9 @@ class BenchRetiming:
 
     def expected_delay(self) -> ExpectedDelay:
         """Zero: what a driver knows of its road it takes off, and says so here."""
-        torque = "torque from the instant at which it was sent"
+        torque = "torque timed when it was sent"
         if takes_reported(self._config, self._amplifier):
-            when = "stamped by its own clock" if self._amplifier.stamps_torque else "from the instant it came in"
+            when = "stamped by its own clock" if self._amplifier.stamps_torque else "timed when it arrived"
             torque = f"torque as the drive reports it, {when}"
         return ExpectedDelay(0.0, (*self._gyroscope.describe_delays(), torque))
 

@@ -41,7 +41,7 @@ def messages_of(capture: Path) -> Iterator[can.Message]:
                 is_fd=frame.fd, channel=0, check=True,
             )  # fmt: skip
         except ValueError as error:
-            raise RecordingError(f"{capture}: holds a frame that is none ({error}): it was changed") from error
+            raise RecordingError(f"{capture}: holds an invalid frame ({error}): the file was changed") from error
 
 
 def write_can_log(capture: Path, target: Path) -> int:

@@ -181,7 +181,7 @@ class Capture:
                     self._file.close()
                 raise Aborted(
                     f"the raw capture {self.path} cannot be written: {problem.strerror}. What was written until then "
-                    "is kept; make room or choose another --out."
+                    "is kept; free space or choose another --out."
                 ) from None
 
     def close(self) -> None:

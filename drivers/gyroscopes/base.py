@@ -123,8 +123,8 @@ class Gyroscope(ABC):
         on_wire_s = self.packet_bytes * BITS_PER_BYTE / self.baud
         steps = (
             ("gyro group delay", self.delay_s),
-            ("gyro latency as its packets say", self.counts.latency_s),
-            ("gyro packet on the line", on_wire_s),
+            ("gyro latency by its packets", self.counts.latency_s),
+            ("gyro packet transmission", on_wire_s),
         )
         return tuple(f"{words} {1e3 * delay_s:.3g} ms" for words, delay_s in steps if delay_s > 0.0)
 

@@ -166,14 +166,17 @@ class GyroLine:
         elif other_rate := self._other_rate():
             found.append(f"{where}: {other_rate}")
         if too_slow := line_too_slow(gyro.packet_bytes, gyro.sample_rate_hz, gyro.baud):
-            found.append(f"{where}: {too_slow}: let the device send less in a packet, or less often, or faster")
+            found.append(
+                f"{where}: {too_slow}: make the device send shorter packets, fewer packets, or use a higher baud rate"
+            )
         rates = counts.recent_rates
         if not rates:
             found.append(f"{where}: no valid sample ({counts.last_reason or 'no reason given'})")
         elif len(rates) >= LEAST_FOR_NOISE and min(rates) == max(rates):
             found.append(
-                f"{where}: all of {len(rates)} samples read exactly {math.degrees(rates[0]):.6g} deg/s: what measures "
-                f"shows noise. Is {gyro.config.axis} an axis that it measures (bench.gyroscope.axis), does it hang?"
+                f"{where}: all of {len(rates)} samples read exactly {math.degrees(rates[0]):.6g} deg/s: a "
+                "working sensor "
+                f"shows noise. Is {gyro.config.axis} an axis that it measures (bench.gyroscope.axis), or has it hung?"
             )
         return found
 

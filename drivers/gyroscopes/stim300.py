@@ -47,12 +47,12 @@ class Stim300(Gyroscope):
         if s.datagram not in wire.LAYOUTS:
             known = ", ".join(f"0x{i:02X}" for i in wire.LAYOUTS)
             raise ConfigError(
-                f"bench.gyroscope.settings.datagram: 0x{s.datagram:02X} is none of the STIM300's: {known}"
+                f"bench.gyroscope.settings.datagram: 0x{s.datagram:02X} is not one of the STIM300's: {known}"
             )
         rate_hz = config.sample_rate_hz or self.default_rate_hz
         if rate_hz not in SAMPLE_RATES_HZ:
             raise ConfigError(
-                f"bench.gyroscope.sample_rate_hz: {rate_hz:g} is none of the STIM300's: {SAMPLE_RATES_HZ}"
+                f"bench.gyroscope.sample_rate_hz: {rate_hz:g} is not one of the STIM300's: {SAMPLE_RATES_HZ}"
             )
         self._check_line_carries(s, rate_hz, config.baud or self.default_baud)
         super().__init__(config, wire.datagram_matcher((s.datagram,), s.line_ending))

@@ -51,7 +51,7 @@ def recording_from_capture(path: Path) -> Recording:
         found = (_run(f"set {n}", one, rig.rate_low_pass, better) for n, one in enumerate(sets, 1))
         runs = tuple(run for run in found if run is not None)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError, struct.error) as error:
-        raise RecordingError(f"{path}: its records are none that this version writes ({error!r})") from None
+        raise RecordingError(f"{path}: its records are not in the format of this version ({error!r})") from None
     if not runs:
         raise RecordingError(f"{path} ends before the first set had a sample: nothing was recorded")
     expected = {"expected_torque_delay": rig.expected_delay._asdict()}

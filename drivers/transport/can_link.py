@@ -197,7 +197,7 @@ def bus_faults(config: CanConfig) -> Iterator[tuple[str, str]]:
     yield from _harm(config)
     if config.bitrate not in BIT_RATE_CODES:
         allowed = ", ".join(str(rate) for rate in sorted(BIT_RATE_CODES))
-        yield "bitrate", f"{config.bitrate} is none of a Lawicel adapter's: {allowed}"
+        yield "bitrate", f"{config.bitrate} is not one of a Lawicel adapter's: {allowed}"
     for key in config.options:
         if key not in OWN_OPTIONS:
             yield f"options.{key}", f"unknown key; {OWN_INTERFACE} knows {', '.join(OWN_OPTIONS)}"

@@ -202,7 +202,7 @@ def is_same_port(one: str, other: str) -> bool:
 def stalled(name: str, left: int, timeout_s: float) -> DeviceFault:
     """The fault of a port that accepts no more bytes."""
     return DeviceFault(
-        f"{name} does not take bytes: {left} left after {timeout_s * 1e3:.0f} ms. "
+        f"{name} accepts no bytes: {left} left after {timeout_s * 1e3:.0f} ms. "
         "The adapter has stalled or its line is too slow; unplug it and plug it in again."
     )
 

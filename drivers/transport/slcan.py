@@ -95,7 +95,7 @@ class SlcanBulkBus(can.BusABC):
             self._port.read()
             if time.monotonic() > talks_until_s:
                 raise DeviceFault(
-                    f"{self._port.name} goes on sending, {TALKS_S:g} s after it was told to close its channel, allowed "
+                    f"{self._port.name} keeps sending, {TALKS_S:g} s after the command to close its channel; allowed "
                     f"is a pause of {1e3 * QUIET_S:g} ms. It is no Lawicel adapter, or its baud rate differs. Are the "
                     "ports of gyroscope and adapter swapped (bench.amplifier.can.channel)?"
                 )

@@ -155,8 +155,8 @@ def _require_within(path: Path, folder: Path) -> None:
         is_within = False
     if not is_within:
         raise ConfigError(
-            f"{str(path)[:200]} does not lie in the folder of this configuration ({folder.absolute()}) or below it, "
-            "and its code is not run: look at it, then copy it there"
+            f"{str(path)[:200]} is not in the folder of this configuration ({folder.absolute()}) or below it, "
+            "and its code is not run: review it, then copy it there"
         )
 
 
@@ -194,5 +194,5 @@ def _listing(faults: Sequence[Fault]) -> str:
     ordered = sorted(faults, key=lambda f: (f.place.source, f.place.line or 0))
     lines = [str(fault) for fault in ordered[:MAX_FAULTS_SHOWN]]
     if len(ordered) > MAX_FAULTS_SHOWN:
-        lines.append(f"... and {len(ordered) - MAX_FAULTS_SHOWN} more; mend these first")
+        lines.append(f"... and {len(ordered) - MAX_FAULTS_SHOWN} more; correct these first")
     return "\n".join(lines)

@@ -46,7 +46,7 @@ def _put(document: Document, parts: Sequence[str], value: Any, source: str) -> K
             raise ConfigError(f"{source}: {dotted(path)} is the value {container!r:.60}, it has no key {part!r}")
         elif part.isdecimal() and part not in container:
             raise ConfigError(
-                f"{source}: {dotted(path) or 'the file'} is no list written there, so it has no item {part}: "
+                f"{source}: {dotted(path) or 'the file'} is not written as a list there, so it has no item {part}: "
                 f"give the whole list, e.g. --set '{dotted(path)}=[...]'"
             )
         path = (*path, step)

@@ -94,7 +94,7 @@ def read_text(path: Path) -> str:
         if not path.exists():
             raise ConfigError(f"{path}: no such file: check the name and the folder you are in ({Path.cwd()})")
         if not path.is_file():
-            raise ConfigError(f"{path}: is no regular file (a device or pipe): give a yaml file")
+            raise ConfigError(f"{path}: is not a regular file (a device or pipe): give a yaml file")
         with path.open("rb") as file:
             raw = file.read(MAX_FILE_BYTES + 1)
     except (OSError, ValueError) as error:
@@ -214,7 +214,7 @@ class _Walk:
             if key in result:
                 first = self.places[inner]
                 also = f" (first on line {first.line})" if first.line else ""
-                self._fault(place, inner, f"the key stands twice{also}: keep one")
+                self._fault(place, inner, f"the key is given twice{also}: keep one")
                 continue
             self.places[inner] = place
             self._characters += len(key)

@@ -94,11 +94,11 @@ _WAYS = {
         "Resisting: positive with {x} above x0.", "N*m", "nm", _ALONE, "coupling",
     ),
     "stiffness": _Way(
-        _stiffness, Place.LOAD, "T = slope * (x - x0) * th", "The spring is another one when {x} changes.",
+        _stiffness, Place.LOAD, "T = slope * (x - x0) * th", "The stiffness changes with {x}.",
         "K is the stiffness at x0; a positive slope stiffens.", "N*m/rad", "nm_rad", _ALONE, "restoring torque",
     ),
     "damping": _Way(
-        _damping, Place.LOAD, "T = slope * (x - x0) * w", "The damping is another one when {x} changes.",
+        _damping, Place.LOAD, "T = slope * (x - x0) * w", "The damping changes with {x}.",
         "C is the damping at x0; a positive slope damps.", "N*m*s/rad", "nm_s_rad", _ALONE, "friction",
     ),
     "gain": _Way(
@@ -107,7 +107,7 @@ _WAYS = {
         "The recorded torque is right at x0; a negative slope gives less.", "1", "1", _ALONE, "drive",
     ),
     "friction": _Way(
-        _torque, Place.FRICTION, "T = slope * (x - x0) * sgn(w)", "Dry friction is another one when {x} changes.",
+        _torque, Place.FRICTION, "T = slope * (x - x0) * sgn(w)", "Dry friction changes with {x}.",
         "coulomb_friction has the level at x0; a negative slope takes from it.", "N*m", "nm", _ALONE, "friction",
         ("coulomb_friction",),
     ),

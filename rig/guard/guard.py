@@ -71,7 +71,7 @@ class StaleGyro(Check):
             return "No valid gyro sample arrived: check the cable and supply, and whether the rate left the full scale."
         return (
             f"This machine does not keep up: it was {self._late_s * 1e3:.1f} ms late since the last valid sample. "
-            "Free the processor; if it comes back on a machine in time, check the gyro's cable and supply."
+            "Free the processor; if it recurs on a machine that keeps up, check the gyro's cable and supply."
         )
 
 
@@ -112,7 +112,7 @@ class Rate(Check):
             if rate_deg_s > allowed or (not valid and rate_deg_s >= allowed * (1.0 - 1e-9)):
                 return self._trip(
                     "rate (limits.rate_deg_s)", rate_deg_s, allowed, "deg/s", time_s,
-                    "Lower torque_nm; rig check says how far.",
+                    "Lower torque_nm; `rig check` gives the largest allowed.",
                 )  # fmt: skip
         return None
 
@@ -239,7 +239,7 @@ class Guard:
             return Trip(
                 "stall or clock jump (limits.stall_ms)", late_s * 1e3, self._stall_s * 1e3, "ms late",
                 now_s - self._start_s,
-                "Nothing resumes after a stall: find what stopped this program, then start anew.",
+                "The campaign does not resume after a stall. Find what stopped this program, then start again.",
             )  # fmt: skip
         if abs(torque_nm) <= self._torque_nm:
             return None

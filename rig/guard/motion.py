@@ -165,7 +165,7 @@ class WrongSign(Check):
         if missing <= allowed:
             return None
         return self._trip(
-            "torque and rate have opposite signs: work came back that had not been put in (limits.motion_check)",
+            "torque and rate have opposite signs: the platform returned work that was not put in (limits.motion_check)",
             missing, allowed, "J", time_s,
             "Check bench.amplifier.invert and bench.gyroscope.invert, and the coupling of gyro and motor to the shaft.",
         )  # fmt: skip

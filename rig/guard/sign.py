@@ -145,7 +145,7 @@ class ReversedSign(Check):
         if self._count < BLOCKS_IN_A_ROW:
             return None
         return self._trip(
-            "torque and rate have opposite signs: only the platform turned round explains the torque "
+            "torque and rate have opposite signs: only a platform of reversed sign explains the torque "
             "(limits.motion_check)", 1e2 * upright, 1e2 * allowed, "% left unexplained", time_s,
             "Did a connector come loose or a setting change? Check bench.amplifier.invert and bench.gyroscope.invert. "
             "If both are right, model.inertia_kg_m2 and model.stiffness_nm_rad are far off.",

@@ -68,24 +68,47 @@ class Prediction:
 
     def describe(self) -> str:
         """One line for the operator."""
-        told = (
+        motion = self._describe_motion()
+        if self.passes:
+            return f"{motion}: within the limits"
+        most = f"At most {self._allowed_torque} is allowed" if self.scale > 0 else "No torque is small enough"
+        if not self.broken:
+            return f"{motion}: within the limits alone, but not after the sets before it. {most}"
+        return f"{motion}: exceeds {self._describe_broken()}. {most}"
+
+    def describe_as_played(self) -> str:
+        """The same line of a set that is played with the torque that is allowed."""
+        if self.passes or self.scale <= 0:
+            return self.describe()
+        broken = [name for (name, _), key in zip(_UNITS, self.keys, strict=True) if key in self.broken]
+        limits = f"the {' and '.join(broken)} limit{'s' if len(broken) > 1 else ''}" if broken else "the limits"
+        reason = f"exceeds {self._describe_broken()}" if broken else "too far after the sets before it"
+        return (
+            f"{self._describe_motion()}: {reason}. Reduced to {self._allowed_torque} ({100 * self.scale:.1f} %) "
+            f"to stay within {limits}."
+        )
+
+    @property
+    def _allowed_torque(self) -> str:
+        return f"{_rounded_down(self.largest_torque_nm)} N m"
+
+    def _describe_motion(self) -> str:
+        text = (
             f"{self.planned.name}: {self.peaks.torque_nm:.1f} N m would travel {self.peaks.travel_deg:.2f} deg "
             f"at up to {self.peaks.rate_deg_s:.0f} deg/s"
         )
         if abs(self.starts_deg) >= SMALLEST_REPORTED_DEG:
-            told += f", beginning {self.starts_deg:.2f} deg from where the campaign began"
-        if self.passes:
-            return f"{told}: passes"
+            text += f", starting {self.starts_deg:.2f} deg from the start of the campaign"
+        return text
+
+    def _describe_broken(self) -> str:
         units = zip(_UNITS, self.allowed, self.keys, strict=True)
         broken = [
             f"the {name} limit of {limit:g} {unit} ({key}{'' if key in LIMIT_KEYS else ', the full scale of the gyro'})"
             for (name, unit), limit, key in units
             if key in self.broken
         ]
-        cure = f"{_rounded_down(self.largest_torque_nm)} N m passes" if self.scale > 0 else "no torque passes"
-        if not broken:
-            return f"{told}: within the limits, but what all sets together leave behind is not; {cure}"
-        return f"{told}: beyond {' and '.join(broken)}; {cure}"
+        return " and ".join(broken)
 
 
 _UNITS = (("travel", "deg"), ("rate", "deg/s"), ("torque", "N m"))
@@ -234,9 +257,10 @@ def model_hint(platform: Platform) -> str:
             "model.stiffness_nm_rad": platform.stiffness_nm_rad,
             "model.damping_nm_s_rad": platform.damping_nm_s_rad,
         }
-        told = " and ".join(f"{key} is {values[key]:g}" for key in wrong)
+        listed = " and ".join(f"{key} is {values[key]:g}" for key in wrong)
         return (
-            f"The declared model is unstable ({told}): any torque makes it run away. Turn the sign; both are 0 or more."
+            f"The declared model is unstable ({listed}): any torque makes it diverge. Change the sign; both "
+            "must be 0 or more."
         )
     if platform.stiffness_nm_rad == 0:
         return (

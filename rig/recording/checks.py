@@ -112,7 +112,7 @@ def _check_order(time_s: Array, path: Path) -> None:
     if (step > 0).all():
         if len(step) and float(np.median(step)) < SHORTEST_STEP_S:
             raise RecordingError(
-                f"{path}: samples stand {float(np.median(step)):g} s apart (median), which nothing measures: correct "
+                f"{path}: samples are {float(np.median(step)):g} s apart (median), which is implausible: correct "
                 "recorded.scale.time"
             )
         return
@@ -171,11 +171,11 @@ def _check_motion(run: Run, path: Path) -> None:
         largest = float(np.max(np.abs(given))) if given is not None and len(given) else 0.0
         if 0.0 < largest < SMALLEST_PEAK:
             raise RecordingError(
-                f"{path}: the {name} never exceeds {largest:g}, which nothing measures: correct recorded.scale.{name}"
+                f"{path}: the {name} never exceeds {largest:g}, which is implausible: correct recorded.scale.{name}"
             )
         if largest > LARGEST_VALUE:
             raise RecordingError(
-                f"{path}: the {name} reaches {largest:g}, which nothing survives: correct recorded.scale.{name}"
+                f"{path}: the {name} reaches {largest:g}, which is implausible: correct recorded.scale.{name}"
             )
     if np.ptp(values[run.valid]) > 0:
         return

@@ -112,7 +112,7 @@ def check_time_unit(run: Run, path: Path) -> None:
         key=lambda entry: abs(np.log10(step * entry[1]) + 3),
     )
     raise RecordingError(
-        f"{path}: samples stand {step:g} s apart (median), too far to see a platform move: the time looks like "
+        f"{path}: samples are {step:g} s apart (median), too coarse to follow a platform: the time looks like "
         f"{unit}: set recorded.scale.time: {factor:.9f}".rstrip("0")
         + "; if it is in seconds, say so with recorded.scale.time: 1"
     )

@@ -218,7 +218,7 @@ def read_journal(path: str | Path) -> JournalContents:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}; check the path") from error
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError, struct.error) as error:
         raise RecordingError(
-            f"{path}: the frame at byte {reading.end} is not what this version writes ({error}): "
+            f"{path}: the frame at byte {reading.end} is not in the format of this version ({error}): "
             "read it with the version that wrote it"
         ) from error
     if not isinstance(reading.header, dict) and not runs:

@@ -44,7 +44,7 @@ def recover(folder: Path) -> Recovery:
     recording = _recording_of(contents, lines) if contents is not None else Recording(())
     state, whole = _state_of_export(folder / RECORDING_FILE, recording)
     lines.append(f"{RECORDING_FILE}: {state}")
-    lines += [f"{part.name}: half written, left as it is" for part in sorted(folder.glob("*.part"))]
+    lines += [f"{part.name}: incomplete, left unchanged" for part in sorted(folder.glob("*.part"))]
     if whole is not None:
         return Recovery(tuple(lines), whole, folder / RECORDING_FILE, is_new=False)
     if contents is None or not recording.runs:
@@ -77,7 +77,7 @@ def _read_all(journals: Sequence[Path], lines: list[str]) -> list[JournalContent
 
 def _account(contents: JournalContents) -> str:
     if contents.closed and not contents.unread_bytes:
-        return "whole, closed in order"
+        return "complete, closed normally"
     told = [] if contents.closed else [f"its writer was killed: up to {UNWRITTEN_S:g} s before that were never written"]
     if contents.gaps:
         told.append(
@@ -102,7 +102,7 @@ def _never_played(contents: JournalContents) -> list[str]:
     names = [str(name) for name in planned] if isinstance(planned, list) else []
     begun = {run.name for run in contents.runs}
     missing = [name for name in names if name not in begun]
-    return [f"  never begun: {', '.join(missing)}"] if missing else []
+    return [f"  never played: {', '.join(missing)}"] if missing else []
 
 
 def _recording_of(contents: JournalContents, lines: list[str]) -> Recording:
@@ -113,7 +113,9 @@ def _recording_of(contents: JournalContents, lines: list[str]) -> Recording:
         try:
             found = recording_from_journal(single).runs
         except (KeyError, TypeError, ValueError, IndexError) as error:
-            lines.append(f"  {source.name}: lost: its frames are sound but not what this version writes ({error!r})")
+            lines.append(
+                f"  {source.name}: lost: its frames are intact but not in the format of this version ({error!r})"
+            )
             continue
         for run in found:
             name, n = run.name, 2
@@ -122,7 +124,7 @@ def _recording_of(contents: JournalContents, lines: list[str]) -> Recording:
             taken.add(name)
             runs.append(dataclasses.replace(run, name=name))
     recording = recording_from_journal(dataclasses.replace(contents, runs=()))
-    info = {"recovered": True, "aborted": "recovered from the raw journal: the campaign did not end in order"}
+    info = {"recovered": True, "aborted": "recovered from the raw journal: the campaign did not end normally"}
     return dataclasses.replace(recording, runs=tuple(runs), info=dict(recording.info) | info)
 
 

@@ -171,7 +171,7 @@ class Probe:
         peak_deg_s = math.degrees(last.peak_rad_s)
         if last.inertia is None:
             raise SafetyTrip(
-                f"Torque is off. The probe found no clear answer: {asked} made {peak_deg_s:.2g} deg/s at most. "
+                f"Torque is off. The probe found no clear answer: {asked} gave {peak_deg_s:.2g} deg/s at most. "
                 "Is a brake on, the platform stuck, the motor not connected, the gyro off its shaft? Where friction "
                 "holds it, raise bench.probe.torque_nm. Nothing was played."
             )
@@ -179,27 +179,28 @@ class Probe:
         if high < 0.0:
             raise SafetyTrip(
                 f"Torque is off. The probe found torque and rate with opposite signs: {asked} answered like an "
-                f"inertia of {found:.3g} kg m2. Turn one of bench.amplifier.invert and bench.gyroscope.invert. "
+                f"inertia of {found:.3g} kg m2. Change one of bench.amplifier.invert and bench.gyroscope.invert. "
                 "Nothing was played."
             )
         if not self._is_clear(last.inertia):
             raise SafetyTrip(
-                f"Torque is off. The probe found no clear answer: {asked} made {peak_deg_s:.3g} deg/s, as any inertia "
-                f"from {low:.3g} to {high:.3g} kg m2 might; declared are {declared:.3g}, allowed is "
-                f"{declared / factor:.3g} to {declared * factor:.3g}. Much friction hides the scale: raise "
-                "bench.probe.torque_nm, mend model.inertia_kg_m2, or widen bench.probe.inertia_factor. Nothing was "
+                f"Torque is off. The probe found no clear answer: {asked} gave {peak_deg_s:.3g} deg/s, which "
+                "fits any inertia "
+                f"from {low:.3g} to {high:.3g} kg m2; declared {declared:.3g}, allowed "
+                f"{declared / factor:.3g} to {declared * factor:.3g}. High friction hides the scale: raise "
+                "bench.probe.torque_nm, correct model.inertia_kg_m2, or widen bench.probe.inertia_factor. Nothing was "
                 "played."
             )
         if not 1.0 / factor <= found / declared <= factor:
             raise SafetyTrip(
                 f"Torque is off. The probe found an inertia of {found:.3g} kg m2 ({asked}, {peak_deg_s:.3g} deg/s); "
-                f"declared are {declared:.3g}, allowed is {declared / factor:.3g} to {declared * factor:.3g}. Check "
+                f"declared {declared:.3g}, allowed {declared / factor:.3g} to {declared * factor:.3g}. Check "
                 "the drive's torque scale and gear ratio, the gyro's axis, and model.inertia_kg_m2 (or "
                 "bench.probe.inertia_factor). Nothing was played."
             )
         return (
-            f"probe: {asked} answered with {peak_deg_s:.3g} deg/s, like an inertia of {found:.3g} kg m2 "
-            f"(declared {declared:.3g}): sign and scale are right"
+            f"probe: {asked} gave {peak_deg_s:.3g} deg/s, which fits an inertia of {found:.3g} kg m2 "
+            f"(declared {declared:.3g}): sign and scale are correct"
         )
 
 

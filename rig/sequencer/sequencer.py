@@ -262,7 +262,7 @@ class Sequencer:
         if not isinstance(error, DeviceFault) or self._verdict_s is None:
             return None
         trip = self._guard.permit(0.0, now_s, late_s + self._verdict_s - now_s)
-        return None if trip is None else SafetyTrip(f"{self._tripped(trip)} What it led to: {error}")
+        return None if trip is None else SafetyTrip(f"{self._tripped(trip)} Consequence: {error}")
 
     def _tripped(self, trip: Trip) -> SafetyTrip:
         self._note_verdict()
@@ -318,7 +318,7 @@ def _with_context(error: RigError) -> RigError:
     earlier = error.__context__
     told = bool(str(earlier)) and str(earlier) in str(error)
     if isinstance(error, DeviceFault) and isinstance(earlier, (RigError, KeyboardInterrupt)) and not told:
-        return DeviceFault(f"{error} This happened on the way out of: {earlier or 'Ctrl-C'}")
+        return DeviceFault(f"{error} This happened while handling: {earlier or 'Ctrl-C'}")
     return error
 
 

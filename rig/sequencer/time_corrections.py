@@ -19,11 +19,11 @@ def log_time_corrections(rig: Rig, journal: Journal | None, now_s: Callable[[], 
     try:
         found = {one.start_s: retiming_of(*one) for one in rig.corrections()}
     except Exception as error:  # noqa: BLE001 (nothing that goes wrong here may cost a recording)
-        _tell(journal, now_s, f"the times of the samples stay as they were while playing: {error!r}", {})
+        _tell(journal, now_s, f"the times of the samples could not be corrected: {error!r}", {})
         return {}
     for start_s, better in found.items():
         values = event_values(start_s, better)
-        if not _tell(journal, now_s, "times of a set by all that was heard around it", values):
+        if not _tell(journal, now_s, "corrected times of a set", values):
             return {}
     return found
 

@@ -49,7 +49,7 @@ def test_a_disk_that_fills_up_in_a_set_takes_the_torque_off_and_keeps_what_was_w
         off = [event for event in devices.events if event["event"] in OFF]
         last = [event for event in devices.events if "torque_nm" in event][-1]
     assert code == 130
-    assert "No space left on device" in host.said and "make room" in host.said
+    assert "No space left on device" in host.said and "free space" in host.said
     assert "Traceback" not in host.said
     assert last["torque_nm"][1] == 0.0
     assert not any(event["event"] == "watchdog" for event in off)  # the host took it off, not its silence

@@ -27,7 +27,7 @@ def test_it_names_the_kind_of_torque_the_limits_every_set_the_time_and_the_folde
     said = announcement(REAL, config, sets, Path("runs/x"))
     for words in ("Torque is REAL: a drive; a gyro", "travel 10 deg", "rate 400 deg/s", "torque 350 N m", "runs/x"):
         assert words in said
-    assert "0.5 Hz: 10 s, up to 150.0 N m, scaled to 50.0 %" in said
+    assert "0.5 Hz: 10 s, up to 150.0 N m, reduced to 50.0 %" in said
     assert "99 s on the bench" in said
 
 

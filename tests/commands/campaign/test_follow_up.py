@@ -38,4 +38,4 @@ def test_never_is_never(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_replay_of_one_that_was_allowed_says_why_it_cannot(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert "nothing more to tell" in refused(monkeypatch, True, "identify.follow_up=auto", *REPLAY)
+    assert "no further data" in refused(monkeypatch, True, "identify.follow_up=auto", *REPLAY)

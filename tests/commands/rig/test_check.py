@@ -33,14 +33,14 @@ def test_the_torques_of_the_paper_within_ten_degrees_are_refused_set_by_set_with
     lines = done.stderr.splitlines()
     for name in PAPER_SETS:
         (line,) = [line for line in lines if name in line]
-        assert "would travel" in line and "deg" in line and "N m passes" in line
+        assert "would travel" in line and "deg" in line and "N m is allowed" in line
 
 
 def test_what_passes_by_its_word_does_pass(tmp_path: Path) -> None:
     text = TWO_SETS + "    - {torque_nm: 300, frequency_hz: 0.5, duration_s: 2}\n"
     refused = command(app, "check", write_config(tmp_path, text))
     (line,) = [line for line in refused.stderr.splitlines() if "0.5 Hz" in line]
-    torque = line.split("; ")[1].split(" N m passes")[0]
+    torque = line.split("At most ")[1].split(" N m is allowed")[0]
     config = write_config(tmp_path, text.replace("torque_nm: 300", f"torque_nm: {torque}"))
     assert command(app, "check", config).exit_code == 0
 

@@ -22,7 +22,7 @@ def test_each_port_and_adapter_has_a_line_with_what_identifies_it() -> None:
 
 
 def test_nothing_found_is_said_with_what_to_do() -> None:
-    assert sum("none found" in line for line in device_lines(list, list)) == 2
+    assert sum("None detected" in line for line in device_lines(list, list)) == 2
 
 
 def test_a_listing_that_fails_does_not_hide_the_other() -> None:

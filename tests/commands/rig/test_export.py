@@ -91,8 +91,8 @@ def test_what_cannot_be_exported_is_said_and_leaves_no_folder(tmp_path: Path) ->
     (tmp_path / "a.csv").write_text("time_s,rate_rad_s\n0,1\n1,2\n")
     write_recording_h5(tmp_path / "recording.h5", Recording((held_run(),)))
     for source, to, said in (
-        ("recording.h5", "xlsx", "take one of csv, mat, npz, blf, asc, mf4"),
-        ("a.csv", "mat", "it is a table already"),
+        ("recording.h5", "xlsx", "choose one of csv, mat, npz, blf, asc, mf4"),
+        ("a.csv", "mat", "is a table already"),
         ("absent.h5", "csv", "no such file"),
         ("recording.h5", "blf", "only a bench run has a CAN log"),
     ):

@@ -85,7 +85,7 @@ def test_a_refused_campaign_leaves_no_folder_behind(tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = command(app, "play", write_config(tmp_path), "--set", "limits.torque_nm=10", "--out", out)
     assert done.exit_code == 2
-    assert "10.000 N m passes" in done.stderr
+    assert "At most 10.000 N m is allowed" in done.stderr
     assert not out.exists()
 
 
@@ -252,7 +252,7 @@ def test_a_bench_without_a_port_is_refused_before_anything_is_written(tmp_path: 
     ("options", "said"),
     [
         (["--dry-run", "--emulate"], "exclude each other"),
-        (["--emulate"], "needs a `bench:` section"),
+        (["--emulate"], "the file has no `bench:` section"),
         (["--seed", "-1"], "--seed"),
         (["--set", "limits.travel=1"], "did you mean 'travel_deg'"),
     ],

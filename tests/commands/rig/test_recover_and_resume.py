@@ -91,7 +91,7 @@ def test_a_damaged_export_stays_and_another_is_written_beside_it(played: Path, t
     before = contents(folder)
     done = command(app, "recover", folder)
     assert done.exit_code == 0, done.output
-    assert "recording.h5: damaged" in done.stdout and "recording.h5.part: half written" in done.stdout
+    assert "recording.h5: damaged" in done.stdout and "recording.h5.part: incomplete" in done.stdout
     assert before.items() <= contents(folder).items()
     assert len(read_recording_h5(folder / "recovered.h5").runs) == 2
     assert len(read_file(folder)) == 2  # the folder itself can be named as a recording
@@ -100,7 +100,7 @@ def test_a_damaged_export_stays_and_another_is_written_beside_it(played: Path, t
 def test_a_whole_folder_is_left_as_it_is(played: Path) -> None:
     before = contents(played)
     done = command(app, "recover", played)
-    assert done.exit_code == 0 and "Nothing had to be recovered" in done.stdout
+    assert done.exit_code == 0 and "Nothing to recover" in done.stdout
     assert contents(played) == before
 
 
@@ -211,7 +211,7 @@ def test_what_cannot_be_resumed_is_said(tmp_path: Path) -> None:
     config, recorded = write_config(tmp_path), tmp_path / "recorded.yaml"
     recorded.write_text("backend: recorded\nrecorded: {runs: [{file: a.csv}]}\n")
     for line, said in (
-        ((config, "--resume", tmp_path / "absent"), "is no folder"),
+        ((config, "--resume", tmp_path / "absent"), "is not a folder"),
         ((config, "--resume", tmp_path), "play the campaign anew"),
         ((recorded, "--resume", tmp_path), "nothing to resume"),
     ):

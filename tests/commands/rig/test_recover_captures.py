@@ -33,7 +33,7 @@ def test_the_sets_are_recovered_from_the_capture_alone_and_can_be_identified(onl
     done = command(app, "recover", only_raw)
     assert done.exit_code == 0, done.output
     assert "no journal with a sample: the raw capture is played through the drivers" in done.stdout
-    assert "what the sets were called is lost with the journal" in done.stdout
+    assert "the names of the sets are lost with the journal" in done.stdout
     runs = read_recording_h5(only_raw / "recording.h5").runs
     assert [run.name for run in runs] == ["set 1", "set 2"]
     assert all(f"{run.name}: {len(run.time_s)} samples" in done.stdout for run in runs)
@@ -51,7 +51,7 @@ def test_a_follow_up_stands_behind_the_campaign_and_one_that_is_damaged_is_said(
     (only_raw / "recording.h5").write_bytes(b"damaged")
     done = command(app, "recover", only_raw)
     assert done.exit_code == 0, done.output
-    assert "raw/follow_up_2/wire.cap: no set can be had from it: is not a raw capture" in done.stdout
+    assert "raw/follow_up_2/wire.cap: no set could be recovered from it: is not a raw capture" in done.stdout
     runs = read_recording_h5(only_raw / "recovered.h5").runs
     assert [run.name for run in runs] == ["set 1", "set 2", "set 3", "set 4"]
     assert (only_raw / "recording.h5").read_bytes() == b"damaged"

@@ -185,7 +185,7 @@ def test_absent_drive_is_named_with_what_to_check(bench):
 def test_drive_without_heartbeat_consumer_is_refused(bench):
     keep = bench.drive.od.write
     bench.drive.od.write = lambda i, s, d: None if i == 0x1016 else keep(i, s, d)
-    with pytest.raises(DeviceFault, match="go on driving when this computer dies"):
+    with pytest.raises(DeviceFault, match="keep driving if this computer fails"):
         bench.amplifier.contact(bench.link)
 
 
@@ -210,7 +210,7 @@ def test_without_sync_every_frame_acts_at_once():
     ("config", "message"),
     [
         ({"device": "cia401"}, "there are cia402, odrive, moteus, vesc"),
-        ({"node": 0}, "0 is no CANopen node"),
+        ({"node": 0}, "0 is not a CANopen node"),
         ({"node": 127}, "host_node: 127 is the drive's own"),
         ({"settings": {"mode": "position"}}, "settings.mode"),
         ({"settings": {"on_lost_host": 0}}, "on_lost_host: 0 is not allowed"),

@@ -79,7 +79,7 @@ def test_odrive_cuts_the_torque_when_the_loop_hangs():
 def test_absent_odrive_is_named_with_what_to_check():
     bench = odrive()
     bench.bus.silent = True
-    with pytest.raises(DeviceFault, match="ODrive, node 3 is not heard"):
+    with pytest.raises(DeviceFault, match="ODrive, node 3 is silent"):
         bench.amplifier.contact(bench.link)
 
 
@@ -156,7 +156,7 @@ def test_moteus_whose_watchdog_does_nothing_is_refused():
     bench = Bench(
         "moteus", FakeMoteus(watchdog=False), node=7, can=CanConfig(interface="virtual", channel="x"),
     )  # fmt: skip
-    with pytest.raises(DeviceFault, match="goes on without a sign of life"):
+    with pytest.raises(DeviceFault, match="keeps running without a sign of life"):
         bench.armed()
     assert bench.drive.mode == moteus.MODE_STOPPED
 

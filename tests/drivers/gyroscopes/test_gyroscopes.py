@@ -50,8 +50,8 @@ def test_sample_is_stamped_before_its_arrival_by_wire_time_latency_and_group_del
     assert samples[-1].time_s == pytest.approx(expected, abs=1e-9)
     assert gyro.describe_delays() == (
         "gyro group delay 2.2 ms",
-        "gyro latency as its packets say 0.506 ms",
-        "gyro packet on the line 0.195 ms",
+        "gyro latency by its packets 0.506 ms",
+        "gyro packet transmission 0.195 ms",
     )
     assert math.degrees(samples[-1].rate_rad_s) == pytest.approx(10.0)
 
@@ -139,9 +139,9 @@ def test_device_set_otherwise_than_the_file_is_objected_to():
         ({"device": "stim3000"}, "there are stim300, vectornav, kvh1750"),
         ({"settings": {"filter": 262}}, "did you mean filter_hz"),
         ({"settings": {"filter_hz": 100}}, "filter_hz: 100 is not allowed"),
-        ({"sample_rate_hz": 1500.0}, "1500 is none of the STIM300's"),
+        ({"sample_rate_hz": 1500.0}, "1500 is not one of the STIM300's"),
         ({"baud": 460_800, "settings": {"datagram": 0x93}}, "need 760000 baud, the line has 460800"),
-        ({"settings": {"datagram": 0x12}}, "0x12 is none of the STIM300's"),
+        ({"settings": {"datagram": 0x12}}, "0x12 is not one of the STIM300's"),
     ],
 )
 def test_settings_that_cannot_work_are_refused(config, message):

@@ -123,7 +123,7 @@ def test_replay_gives_bit_identical_samples(bench, tmp_path):
     ("source", "told"),
     [
         ("auto", "torque as the drive reports it, stamped by its own clock"),
-        ("sent", "torque from the instant at which it was sent"),
+        ("sent", "torque timed when it was sent"),
     ],
 )
 def test_what_is_taken_off_both_roads_is_told_and_no_delay_expected(bench, source, told):
@@ -183,7 +183,7 @@ def test_a_mark_that_says_nonsense_is_refused(bench, tmp_path):
     played_in_two_sets(bench)
     path = tmp_path / "raw" / "wire.cap"
     path.write_bytes(path.read_bytes().replace(b'"start_s": 1', b'"start_x": 1'))
-    with pytest.raises(RecordingError, match="none that this version writes"):
+    with pytest.raises(RecordingError, match="not in the format of this version"):
         recording_from_capture(path)
 
 
@@ -245,7 +245,7 @@ def test_all_that_is_wrong_is_listed_at_once(bench, monkeypatch):
 
     monkeypatch.setattr(drivers.bench.devices, "open_port", lambda path, baud: Silent(bench.time))
     bench.drive.receive = lambda frame, now_s: None
-    with pytest.raises(DeviceFault, match=r"(?s)2 things are wrong.*does not answer.*no byte in 1"), bench.opened():
+    with pytest.raises(DeviceFault, match=r"(?s)2 faults on the bench.*does not answer.*no byte in 1"), bench.opened():
         pass
 
 

@@ -289,4 +289,4 @@ def test_two_faults_on_the_way_out_are_both_told_and_the_same_one_once(also: str
     told = str(sequencer(rig).play(plan()).cause)
     assert told.count("vanished") == 1
     assert told.count("the drive could not be shown to be off") == 1
-    assert ("on the way out of" in told) is (count == 2)
+    assert ("while handling" in told) is (count == 2)

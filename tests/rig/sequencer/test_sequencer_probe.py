@@ -71,7 +71,7 @@ def test_the_probe_comes_first_is_small_and_the_set_starts_from_rest() -> None:
     listener, rig = Listener(), Watched(platform())
     campaign = played(rig, listener)
     assert campaign.cause is None
-    assert "sign and scale are right" in listener.findings[0]
+    assert "sign and scale are correct" in listener.findings[0]
     [start_s] = rig.begun_s
     before = [nm for at_s, nm in rig.sent if at_s < start_s]
     assert 0.1 < max(before) < 2.0

@@ -45,7 +45,7 @@ def test_a_stall_within_a_tick_is_a_trip_that_also_tells_what_the_drive_said(mil
     assert isinstance(campaign.cause, SafetyTrip)
     said = str(campaign.cause)
     assert said.startswith("Torque is off. Tripped on stall or clock jump (limits.stall_ms)")
-    assert f"{milliseconds:.4g} ms late" in said and said.endswith(f"What it led to: {COMPLAINT}")
+    assert f"{milliseconds:.4g} ms late" in said and said.endswith(f"Consequence: {COMPLAINT}")
     assert "torque off" in rig.log and rig.log[-2:] == ["disarm", "close"]
     assert rig.torque_nm == 0.0
 

@@ -96,7 +96,7 @@ def test_a_rig_that_fails_over_it_costs_no_sample_and_it_is_said(tmp_path: Path)
         campaign = played(rig, journal)
     assert campaign.cause is None
     assert len(campaign.recording.runs) == 2
-    assert any("stay as they were" in event.text for event in read_journal(tmp_path / "a.journal").events)
+    assert any("could not be corrected" in event.text for event in read_journal(tmp_path / "a.journal").events)
 
 
 def test_a_map_that_turns_time_around_is_refused_as_a_whole() -> None:
