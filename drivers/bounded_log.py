@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 T = TypeVar("T")
-KEPT_AT_EACH_END = 50
+KEPT_AT_EACH_END = 50  # lines: what fits on a screen
 
 
 class FirstAndLast(list[T]):

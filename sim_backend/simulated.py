@@ -19,7 +19,7 @@ from sim_backend import amplifier
 from sim_backend.gyroscope import Gyroscope
 from sim_backend.plant import SENSED, Plant
 
-HIGHEST_COMMON_RATE_HZ = 100_000
+HIGHEST_COMMON_RATE_HZ = 100_000  # steps a second that are still simulated in seconds
 
 
 class SimulatedRig(Rig):

@@ -15,7 +15,7 @@ JOURNAL_FILE = "recording.journal"
 RECORDING_FILE = "recording.h5"
 RAW_FOLDER = "raw"
 DISK_FULL_ERRNOS = (errno.ENOSPC, errno.EDQUOT)
-MOST_FOLDERS_A_SECOND = 1000
+MOST_FOLDERS_A_SECOND = 1000  # campaigns of one name that begin within a second
 
 
 class ResultsFolder:

@@ -18,9 +18,9 @@ from rig.excitation import PlannedSet
 from rig.sequencer import Observer, Progress
 from rig.sequencer.recorder import SetStatistics
 
-BAR_WIDTH = 24
+BAR_WIDTH = 24  # characters
 MOST_WAITING = 50  # lines; a terminal that takes none loses bars, not memory
-LAST_WORDS_S = 1.0
+LAST_WORDS_S = 1.0  # how long a slow terminal is waited for at the end
 LOST = "Stopped because its terminal is gone"
 
 

@@ -14,7 +14,7 @@ from commands.terminal.early_signals import SIGNALS, handled_signals
 from rig.errors import Aborted
 
 STOPPING = "Stopping: torque to zero, then saving. Ctrl-C again cuts the torque at once."
-AGAIN_S = 0.02
+AGAIN_S = 0.02  # until the signal strikes again: the callback has returned by then
 SAVING = "Stopping as soon as what is being saved is saved."
 
 

@@ -34,7 +34,7 @@ from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 from rig.interface import TorqueSample
 
-BEATS_PER_WATCHDOG = 4
+BEATS_PER_WATCHDOG = 4  # heartbeats within the watchdog: three may be lost
 STAMP_UNIT_S, STAMP_MODULUS = 1e-6, 1 << 32  # of 0x1013
 
 

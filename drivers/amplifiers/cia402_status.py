@@ -9,7 +9,7 @@ from drivers.transport.can_link import ReceivedFrame
 from rig.errors import DeviceFault
 
 NMT_OPERATIONAL = 0x05
-MISSED_BEATS = 3.0
+MISSED_BEATS = 3.0  # periods of the heartbeat without one: the drive is silent
 
 
 class DriveStatus:

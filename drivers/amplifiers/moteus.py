@@ -23,9 +23,9 @@ from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 
 MODE_STOPPED, MODE_FAULT, MODE_POSITION, MODE_TIMEOUT = 0, 1, 10, 11
-ANSWER_TIMEOUT_S = 0.1
-SILENT_S = 0.05
-PROOF_FACTOR = 1.5
+ANSWER_TIMEOUT_S = 0.1  # s, far beyond a round trip on the bus; chosen, not derived
+SILENT_S = 0.05  # fifty ticks at 1 kHz without an answer
+PROOF_FACTOR = 1.5  # of the watchdog, before the drive must have tripped
 
 _WRITE_I8_1 = 0x01  # write one int8 register
 _WRITE_F32_1, _WRITE_F32_2 = 0x0D, 0x0E

@@ -22,8 +22,8 @@ from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 
 WATCHDOG_EXPIRED = 0x800
-HEARTBEAT_S = 0.1
-PROOF_FACTOR = 1.5
+HEARTBEAT_S = 0.1  # CANSimple as delivered (heartbeat_msg_rate_ms)
+PROOF_FACTOR = 1.5  # of the watchdog, before the drive must have tripped
 
 
 class OdriveSettings(Settings):

@@ -15,10 +15,10 @@ from collections import deque
 from drivers.timing.retiming import OWN_LINE, ClockRetiming
 from drivers.timing.source_clock import SourceClock
 
-BLOCK_S = 0.25
-BLOCKS_KEPT = 240
-MOST_UNANSWERED = 16
-FAST_SHARE = 0.1
+BLOCK_S = 0.25  # as in drivers.timing.source_clock
+BLOCKS_KEPT = 240  # a minute
+MOST_UNANSWERED = 16  # requests that wait for an answer
+FAST_SHARE = 0.1  # of the answers of a block; the fastest one may be a slip
 
 
 class TorqueClock:

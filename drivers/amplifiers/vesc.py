@@ -21,9 +21,9 @@ from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 
 SET_CURRENT, STATUS, STATUS_4 = 1, 9, 16
-STATUS_TIMEOUT_S = 0.5
-SILENT_S = 0.25
-ZERO_CURRENT_A = 0.5
+STATUS_TIMEOUT_S = 0.5  # s, chosen, not derived
+SILENT_S = 0.25  # s without a status message; chosen, not derived
+ZERO_CURRENT_A = 0.5  # A; what counts as zero; chosen, not derived
 
 
 def encode_current(current_a: float) -> bytes:

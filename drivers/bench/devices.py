@@ -18,7 +18,7 @@ from rig.config.bench import BenchConfig
 from rig.errors import Aborted, ConfigError, DeviceFault, RigError
 from rig.interface import GyroSample
 
-CONTACT_TIME_S = 0.002
+CONTACT_TIME_S = 0.002  # between two looks at both devices
 MOST_WAITING, NEWEST_KEPT = 2000, 1000  # samples, while nothing is played and only the newest matter
 
 

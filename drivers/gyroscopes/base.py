@@ -23,7 +23,7 @@ from rig.interface import GyroSample, LowPass
 AXES = "xyz"
 BITS_PER_BYTE = 10  # start, eight data bits, stop
 CATCHES_UP_S = 0.03  # a kernel that was busy hands out what it kept back within this time
-MESSAGES_KEPT = 5
+MESSAGES_KEPT = 5  # first and last messages of a device
 MOST_LOST_MARKED = 20_000  # ten seconds at 2 kHz: more is a new start, not a gap
 
 

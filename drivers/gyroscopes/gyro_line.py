@@ -17,11 +17,11 @@ from drivers.transport.ports import BytePort
 from rig.errors import DeviceFault
 from rig.interface import GyroSample
 
-RAW_KEPT = 4096
-LEAST_SHARE_RECEIVED = 0.5
+RAW_KEPT = 4096  # bytes, for the message where none of them is a packet
+LEAST_SHARE_RECEIVED = 0.5  # of the samples expected at first contact; fewer are another sample rate
 RATE_TOLERANCE = 0.05  # of what the file says; crystals are better by far, a stall of this computer looks worse
-PACE_S = 0.25
-PACES_KEPT = 240
+PACE_S = 0.25  # s, a block of the sample rate
+PACES_KEPT = 240  # blocks: a minute
 LEAST_FOR_NOISE = 100  # samples
 
 

@@ -33,7 +33,7 @@ from rig.interface import (
     TorqueSample,
 )
 
-SAME_TORQUE_NM = 1e-6
+SAME_TORQUE_NM = 1e-6  # rounding of the same computation on another machine
 
 
 class ReplayLink(CanLink):

@@ -25,7 +25,7 @@ from rig.arrays import Array
 WINDOW_S = 60.0  # on either side of a set
 LONGEST_LINE_S = 60.0  # longer sets get a line a minute, joined: no crystal runs straight for ever
 BLOCKS_KEPT = int(24 * 3600 / BLOCK_S)
-MIN_BLOCKS = 12
+MIN_BLOCKS = 12  # blocks: 3 s of readings
 # Of the readings of a block; the fastest one may be a slip. The more of them count, the less they scatter and the more
 # they follow how busy the machine is, which cancels where both ways are known.
 FAST_TWO_WAY, FAST_ONE_WAY = 0.05, 0.01

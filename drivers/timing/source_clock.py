@@ -14,9 +14,9 @@ import numpy as np
 
 from drivers.timing.line_fit import lower_line
 
-BLOCK_S = 0.25
-BLOCKS_KEPT = 240
-MIN_BLOCKS_FOR_DRIFT = 6
+BLOCK_S = 0.25  # s
+BLOCKS_KEPT = 240  # a minute, over which a crystal runs straight
+MIN_BLOCKS_FOR_DRIFT = 6  # 1.5 s
 
 
 class SourceClock:

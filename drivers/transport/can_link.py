@@ -23,10 +23,10 @@ from drivers.transport.socket_port import open_port
 from rig.config.bench import CanConfig
 from rig.errors import ConfigError, DeviceFault
 
-POLL_INTERVAL_S = 0.0005
-MOST_FRAMES_A_POLL = 10_000
-SEND_TIMEOUT_S = 0.005
-MOST_ERRORS, ERRORS_WITHIN_S = 20, 0.1
+POLL_INTERVAL_S = 0.0005  # half a tick of 1 kHz
+MOST_FRAMES_A_POLL = 10_000  # frames: a babbling node must not hold the loop
+SEND_TIMEOUT_S = 0.005  # five ticks of 1 kHz: an adapter that takes longer has stalled
+MOST_ERRORS, ERRORS_WITHIN_S = 20, 0.1  # error frames, s: more is a fault of the bus; chosen, not derived
 OWN_INTERFACE = "slcan_bulk"
 OWN_URLS = {"etas": "ETAS://"}  # what an interface calls its own channels; pyserial has no part in it
 CODE_OPTIONS = {"usb2can": ("dll",)}  # they name a library that python-can would load and run

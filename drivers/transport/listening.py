@@ -17,7 +17,7 @@ from drivers.transport.ports import BytePort
 from rig.errors import DeviceFault
 
 MOST_CHUNKS = 100_000  # half a minute of a loop that hangs; then the oldest go
-LISTEN_S = 0.05
+LISTEN_S = 0.05  # between two looks at whether to stop
 
 
 class ListeningPort:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 USB_SERIAL = Path("/sys/bus/usb-serial/devices")
-BRISK_MS = 1
+BRISK_MS = 1  # ms, the least that an FTDI latency timer can be set to
 
 
 def usb_latency_ms(port: str, root: Path = USB_SERIAL) -> int | None:

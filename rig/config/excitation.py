@@ -10,7 +10,7 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from rig.config.base import Section
 from rig.excitation import Chirp, FreeDecay, Multisine, RampHoldRelease, Sine
 
-LEAST_SAMPLES = 40
+LEAST_SAMPLES = 40  # of a set; an arbitrary floor
 PAPER_SETS: tuple[tuple[float, float], ...] = ((300, 0.5), (300, 1.0), (250, 3.0), (200, 6.0), (150, 9.0))
 
 

@@ -17,24 +17,25 @@ from rig.guard.base import Check, Rest, Tick, TorqueHistory, Trip
 from rig.guard.sign import ReversedSign
 from rig.platform import Platform
 
-NOISE_SIGMAS = 8.0
-INERTIA_FACTOR = 3.0
+NOISE_SIGMAS = 8.0  # of a difference of samples: never by chance in a campaign of days
+INERTIA_FACTOR = 3.0  # the declared inertia may be wrong by so much (decision 0016: two, and margin)
 FRICTION_SHARE = 0.15  # of the torque limit: what friction may add or take away from one sample to the next
-STEP_WINDOW_S = 0.003
+STEP_WINDOW_S = 0.003  # three samples of 1 kHz; tuned by hand, not derived: a debt
 STEP_BLOCK_S, STEP_BLOCKS = 0.01, 6  # steps are remembered for as long as a drive and a filter may take
-LONGEST_GAP_S = 0.01
+LONGEST_GAP_S = 0.01  # between samples: beyond it a rate may change by itself; tuned by hand, not derived: a debt
 LEAST_NOISE_RAD_S = 2e-3  # a tenth of a degree a second, where the rest before told nothing
 
 REST_ENERGIES = 10.0  # a ring that is left over from before may give back what it has
 DELAYS_S = (0.0, 0.003, 0.006)  # of the torque behind its command, of which any may be the true one
 ENERGY_CREDIT = 0.3  # of all work done in either direction: covers 20 degrees of phase beyond those
-STORED_FACTOR = 3.0
-STORED_SHARE = 0.3
+STORED_FACTOR = 3.0  # of the energy stored by the declared model; tuned by hand, not derived: a debt
+STORED_SHARE = 0.3  # of the most energy stored: what may be missing; tuned by hand, not derived: a debt
 LEAST_RATE_RAD_S = 0.5  # energies below that of so slow a motion are let be
 
 MOVES_RAD_S, MOVES_MOST_RAD_S = math.radians(0.5), math.radians(3.0)  # however the rest before rang
 MOVES_SHARE = 0.01  # of the largest rate of the set
 STILL_FOR_S = 0.04  # beyond any delay between a torque and the sample that shows it
+# Of torque at standstill: times the peak so far, within shares of the largest; tuned by hand, not derived: a debt.
 STILL_PEAKS, STILL_LEAST, STILL_MOST = 1.3, 0.2, 0.4
 
 

@@ -14,9 +14,9 @@ from rig.excitation import PlannedSet
 from rig.platform import Platform
 
 PEAK_RATE_HZ = 4000.0  # the crest of a 29 Hz ring read at 4 kHz is low by 0.03 %
-COAST_RATE_HZ = 200.0
+COAST_RATE_HZ = 200.0  # only the end of a rest is used, and the integrator chooses its own substeps
 SETTLED = 3.0  # time constants after which a spring has pulled it back
-BISECTIONS = 24
+BISECTIONS = 24  # halvings: the factor to 6e-8
 State = tuple[float, float]
 AT_ORIGIN: State = (0.0, 0.0)
 

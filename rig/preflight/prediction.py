@@ -18,7 +18,7 @@ from rig.excitation import PlannedSet, planned
 from rig.platform import Platform
 from rig.preflight.forecast import Peaks, SetForecast, SetSequence, has_no_restoring_spring, largest
 
-SMALLEST_REPORTED_DEG = 0.005
+SMALLEST_REPORTED_DEG = 0.005  # half of the last digit shown
 LIMIT_KEYS = ("limits.travel_deg", "limits.rate_deg_s", "limits.torque_nm")
 __all__ = ["Peaks", "Prediction", "peaks", "plan", "predict", "predict_all"]
 

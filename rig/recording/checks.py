@@ -18,8 +18,8 @@ from rig.signals import TorqueHold, Use
 
 MIN_SAMPLES = 40  # in a row, fewer tell nothing of two states, three parameters and the noise
 # No torque, rate, angle or time of a machine in SI units comes near; squares of it would overflow.
-LARGEST_VALUE = 1e12
-SHORTEST_STEP_S = 1e-8
+LARGEST_VALUE = 1e12  # of any quantity in SI units: far beyond any platform
+SHORTEST_STEP_S = 1e-8  # 100 MHz: nothing samples a platform faster
 SMALLEST_PEAK = 1e-30  # a channel that stays below: squares of it would vanish
 
 

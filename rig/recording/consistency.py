@@ -23,9 +23,9 @@ _KNOWN_FACTORS = (
     (1 / (2 * np.pi), "the angle is in turns", "recorded.scale.angle: 6.28319"),
 )
 SURE_CORRELATION = 0.99  # both channels show the same motion, delays and noise aside
-SURE_DEVIATION = 0.05
-LIKELY_CORRELATION = 0.9
-LIKELY_DEVIATION = 0.3
+SURE_DEVIATION = 0.05  # of the factor from 1: more than a scale that is merely calibrated badly
+LIKELY_CORRELATION = 0.9  # tuned by hand, not derived: a debt
+LIKELY_DEVIATION = 0.3  # tuned by hand, not derived: a debt
 # Four samples a second or fewer: no platform with a spring is seen through that.
 SLOWEST_STEP_S = 0.25
 

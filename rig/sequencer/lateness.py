@@ -7,7 +7,7 @@ from array import array
 from collections.abc import Iterable
 
 CLASS_RATIO = 1.01  # of the ends of a class: quantiles are right to within a per cent
-SHORTEST_S, LONGEST_S = 1e-7, 1e4
+SHORTEST_S, LONGEST_S = 1e-7, 1e4  # range of the classes, s: the clock's resolution to some hours
 _PER_LOG = 1.0 / math.log(CLASS_RATIO)
 _CLASSES = int(math.log(LONGEST_S / SHORTEST_S) * _PER_LOG) + 2
 

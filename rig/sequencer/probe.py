@@ -29,23 +29,27 @@ from rig.excitation import PlannedSet
 from rig.guard.base import Rest, Tick
 from rig.platform import Platform
 
-SHORTEST_S, LONGEST_S = 0.01, 0.1
+SHORTEST_S, LONGEST_S = 0.01, 0.1  # of a pulse: from ten samples at 1 kHz to what a campaign can wait for
 PERIOD_SHARE = 0.5  # of the declared period of the ring: the length of a pulse
-LISTEN_PERIODS = 0.6
+LISTEN_PERIODS = 0.6  # of the ring, after a pulse: beyond the first swing back
 LATE_S = 0.05  # samples and torque may be so late
 FIRST_RATE, LARGEST_RATE, LARGEST_TRAVEL = 0.05, 0.6, 0.3  # of the limits, by the declared model
+# Ratios of torques: the last step, and what is gentle still; tuned by hand, not derived: a debt.
+# Ratios of torques: the last step, and what is gentle still; tuned by hand, not derived: a debt.
 LEAST_STEP, GENTLE_STEPS = 1.02, 8.0
 LARGEST_TORQUE = 0.3  # of the campaign's
+# Of the noise, and at least: a response that counts; tuned by hand, not derived: a debt.
+# Of the noise, and at least: a response that counts; tuned by hand, not derived: a debt.
 CLEAR_SIGMAS, CLEAR_LEAST_RAD_S = 40.0, math.radians(5.0)
-MOST_LEVELS = 16
+MOST_LEVELS = 16  # pulses: doublings from the first torque to any limit
 DELAY_SHARE, DELAY_STEP_S = 0.6, 0.001  # of the pulse: how late the torque may act
-NEARLY = 1.5
-EDGE = 0.9
-STILL_SHARE = 0.05
+NEARLY = 1.5  # ratio of residuals: fits "within half as much again" (decision 0016)
+EDGE = 0.9  # a range may stick out of the allowed one by a tenth
+STILL_SHARE = 0.05  # of the peak rate: below it the platform starts from rest; tuned by hand, not derived: a debt
 STIFFNESS_FACTOR = 3.0  # the declared one may be wrong by so much
 POOR_FIT = 0.3  # of the scatter of the impulse: beyond it a pulse does not count
-FEWEST_SAMPLES = 8
-STEPS = 400
+FEWEST_SAMPLES = 8  # for five unknowns
+STEPS = 400  # integration steps a pulse
 
 
 class Span(NamedTuple):

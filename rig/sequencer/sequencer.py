@@ -35,8 +35,10 @@ SETTLE_S = 0.5  # zero torque before the first set: the gyro's bias is read here
 TAIL_S = 0.05  # zero torque after a set, for samples still on their way
 REST_PERIOD_S = 0.01  # ticks of zero torque may be slower; they still feed the drive's watchdog
 BIAS_WINDOW_S = 1.0  # of a rest, at its end
-PROGRESS_S = 0.1
+PROGRESS_S = 0.1  # between two reports to the observer: ten a second is what an eye follows
 LOOK_S = 0.25  # after the probe: how often to ask whether the ring has died out
+# Standstill: a mean rate below either; tuned by hand, not derived: a debt.
+# Standstill: a mean rate below either; tuned by hand, not derived: a debt.
 STILL_SIGMAS, STILL_RAD_S = 6.0, math.radians(0.5)
 
 

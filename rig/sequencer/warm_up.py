@@ -20,9 +20,9 @@ from rig.platform import Platform
 from rig.sequencer.probe import inertia_of
 
 LENGTH_S = 0.5  # every check has given a verdict by then
-FREQUENCY_HZ = 5.0
-ANGLE_RAD = 1e-5
-PULSE_S = 0.05
+FREQUENCY_HZ = 5.0  # any frequency serves: nothing is judged here
+ANGLE_RAD = 1e-5  # far below every limit
+PULSE_S = 0.05  # within the lengths that a probe plays (0.01 to 0.1 s)
 
 
 def warm_up(guard: Guard, platform: Platform, sets: Sequence[PlannedSet], sample_rate_hz: float) -> None:

@@ -29,7 +29,7 @@ from sim_backend.emulators.socket_port import SocketListener
 from sim_backend.emulators.world import World
 
 WORLD_STEPS_PER_SAMPLE = 10  # of what the gyro filters; with half as many a 29 Hz ring reads 2.5e-5 too weak
-LONGEST_SLEEP_S = 0.002
+LONGEST_SLEEP_S = 0.002  # the promise of ``run``: ``stop`` is asked so often
 DEFAULT_BAUD, DEFAULT_RATE_HZ = 921_600, 2000.0
 
 

@@ -13,7 +13,7 @@ from drivers.codecs.stim300_special import Stim300Configuration, encode_configur
 from rig.arrays import Array
 
 AXES = "xyz"
-BITS_PER_BYTE = 10
+BITS_PER_BYTE = 10  # a start bit, eight, a stop bit
 
 
 @dataclass(frozen=True)

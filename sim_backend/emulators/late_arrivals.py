@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 LATE_LOOK_S = 0.0015  # between two looks at the ports; more than this is the machine's doing
 REPORTED_PAUSE_S = 0.005  # a longer pause is told, since it bears on every time measured around it
-SMOOTHING = 0.2
+SMOOTHING = 0.2  # weight of the newest interval between lines: five lines of memory
 
 
 class Piece(NamedTuple):

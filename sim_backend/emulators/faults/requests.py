@@ -12,8 +12,8 @@ from pydantic import ValidationError
 from rig.config.bench import InjectedFault
 from rig.errors import ConfigError
 
-EVERY_S = 0.01
-LONGEST_LINE = 65_536
+EVERY_S = 0.01  # between two looks
+LONGEST_LINE = 65_536  # bytes of a request
 
 
 class FaultRequests:
