@@ -34,8 +34,8 @@ def announcement(statement: Statement, config: Config, sets: Sequence[PlannedSet
 
 def recorded_announcement(files: int, runs: int, folder: Path) -> str:
     """The opening statement where nothing is played."""
-    told = f"Torque is RECORDED: nothing moves; {runs} run(s) read from {files} file(s)"
-    return "\n".join([RULE, f"  {told}", RULE, f"results   {plain(str(folder))}"])
+    summary = f"Torque is RECORDED: nothing moves; {runs} run(s) read from {files} file(s)"
+    return "\n".join([RULE, f"  {summary}", RULE, f"results   {plain(str(folder))}"])
 
 
 def duration_s(config: Config, sets: Sequence[PlannedSet]) -> float:

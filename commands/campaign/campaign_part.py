@@ -23,7 +23,7 @@ class PlayedCampaign:
     ----------
     recording
         All runs, the last one perhaps cut short; ``info`` says how they came about.
-    whole
+    completed
         The names of the runs that came to their end.
     cause
         What ended the campaign early, or None.
@@ -36,7 +36,7 @@ class PlayedCampaign:
     """
 
     recording: Recording
-    whole: frozenset[str]
+    completed: frozenset[str]
     cause: BaseException | None
     journals: tuple[str, ...] = (JOURNAL_FILE,)
     rate_full_scale_rad_s: float | None = None
@@ -45,7 +45,7 @@ class PlayedCampaign:
     @property
     def complete_runs(self) -> Recording:
         """The whole runs: a run that was cut short may end in the fault that cut it."""
-        runs = tuple(run for run in self.recording.runs if run.name in self.whole)
+        runs = tuple(run for run in self.recording.runs if run.name in self.completed)
         return dataclasses.replace(self.recording, runs=runs)
 
 
@@ -54,24 +54,24 @@ class CampaignPart:
     """One part of a campaign: what its files are called, what stands in the folder already, who is asked.
 
     ``earlier`` is what was played before: into the same folder, where its recording is kept and added to, or into
-    the one that this part ``resumes``; then its journals are ``brought``, each under its new name.
+    the one that this part ``resumes``; then its journals are ``copied_journals``, each under its new name.
     """
 
     journal: str = JOURNAL_FILE
     raw: str = RAW_FOLDER
     earlier: PlayedCampaign | None = None
     consent: Callable[[Statement, bool, bool, Callable[[str], str]], None] = ask_consent
-    brought: tuple[tuple[Path, str], ...] = ()
+    copied_journals: tuple[tuple[Path, str], ...] = ()
     resumes: Path | None = None
 
     @property
     def done(self) -> frozenset[str]:
         """Names of the sets that are not played again."""
-        return self.earlier.whole if self.earlier is not None and self.resumes is not None else frozenset()
+        return self.earlier.completed if self.earlier is not None and self.resumes is not None else frozenset()
 
-    def bring(self, path: Path) -> None:
+    def copy_journals(self, path: Path) -> None:
         """Copy what was played before into the folder of this part. Raises OSError."""
-        for source, name in self.brought:
+        for source, name in self.copied_journals:
             shutil.copyfile(source, path / name)
             if tail_of(source).is_file():
                 shutil.copyfile(tail_of(source), tail_of(path / name), follow_symlinks=False)

@@ -29,8 +29,8 @@ def estimated_bytes(config: Config, statement: Statement, sets: Sequence[Planned
     bench = config.bench if is_bench else None
     a_tick = TICK_BYTES + (RAW_TICK_BYTES if bench is not None and bench.raw_capture else 0)
     seconds = duration_s(config, sets) + (bench.settle_s if bench is not None else 0.0)
-    brought = sum(source.stat().st_size for source, _ in part.brought)
-    return RESULTS_BYTES + seconds * config.excitation.sample_rate_hz * a_tick + brought
+    copied_journals = sum(source.stat().st_size for source, _ in part.copied_journals)
+    return RESULTS_BYTES + seconds * config.excitation.sample_rate_hz * a_tick + copied_journals
 
 
 def disk_space_warning(folder: Path, needed_bytes: float) -> str:

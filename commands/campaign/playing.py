@@ -52,7 +52,7 @@ class SetLog(SetBars):
         super().set_ends(statistics)
 
     @property
-    def whole(self) -> frozenset[str]:
+    def completed(self) -> frozenset[str]:
         """Names of the sets that are complete."""
         return frozenset(s.name for s in self.statistics if s.complete)
 
@@ -186,7 +186,7 @@ def _record(
     A signal after the last tick counts too: all is saved, and the campaign ends as one that was stopped.
     """
     path = folder.create()
-    part.bring(path)
+    part.copy_journals(path)
     played_on = backend_name(loaded.config, context.options.dry_run, context.options.emulate)
     info = provenance(loaded) | {"backend": str(stage.rig.statement()), "played_on": played_on}
     recorder = _CampaignRecorder(context, stage, loaded, sets)
@@ -221,7 +221,7 @@ def _saved(
     expected = stage.rig.expected_delay
     if expected is not None:
         info["expected_torque_delay"] = expected._asdict()
-    played = PlayedCampaign(Recording(()), tally.whole, cause, (part.journal,), stage.rig.rate_full_scale_rad_s)
+    played = PlayedCampaign(Recording(()), tally.completed, cause, (part.journal,), stage.rig.rate_full_scale_rad_s)
     return save(context, folder.path, recorder.recording, info, played, part)
 
 

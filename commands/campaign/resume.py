@@ -69,15 +69,15 @@ def play_campaign(context: CommandContext, loaded: LoadedConfig, folder: Results
         raise UsageError("--resume: recordings are read, not played: there is nothing to resume.")
     before = read_unfinished(context.options.resume)
     refuse_what_differs(before, loaded, backend)
-    told = f"Resuming {plain(str(before.folder))}: {len(before.done)} of {len(before.planned)} set(s) are finished"
+    summary = f"Resuming {plain(str(before.folder))}: {len(before.done)} of {len(before.planned)} set(s) are finished"
     names = tuple(f"earlier_{number}.journal" for number in range(1, len(before.journals) + 1))
     earlier = PlayedCampaign(Recording(before.runs), before.done, None, names)
     copies = tuple(zip(before.journals, names, strict=True))
-    part = CampaignPart(earlier=earlier, brought=copies, resumes=before.folder)
+    part = CampaignPart(earlier=earlier, copied_journals=copies, resumes=before.folder)
     if not before.missing:
-        context.terminal.show(f"{told}; nothing is left to play.")
+        context.terminal.show(f"{summary}; nothing is left to play.")
         return export_earlier(context, loaded, folder, part, before.header)
-    context.terminal.show(f"{told}; to play: {plain(', '.join(before.missing))}.")
+    context.terminal.show(f"{summary}; to play: {plain(', '.join(before.missing))}.")
     return play(context, _with_another_seed(loaded, len(before.journals)), folder, part)
 
 

@@ -42,7 +42,7 @@ def save(
         contents = joined([c for c in (*before, contents) if c is not None])
         recording = (_added if part.resumes is None else _resumed)(earlier.recording, recording)
         played = dataclasses.replace(
-            played, whole=played.whole | earlier.whole, journals=(*earlier.journals, *played.journals)
+            played, completed=played.completed | earlier.completed, journals=(*earlier.journals, *played.journals)
         )
     if recording.runs:
         try:
@@ -101,10 +101,10 @@ def export_earlier(
 ) -> PlayedCampaign:
     """Make a folder of what was played before, where nothing is left to play."""
     path = folder.create()
-    part.bring(path)
+    part.copy_journals(path)
     assert part.earlier is not None
     info = dict(header) | provenance(loaded) | {"resumed_from": str(part.resumes), "aborted": None}
-    contents = joined([c for _, name in part.brought if (c := _read_back(context, path / name)) is not None])
+    contents = joined([c for _, name in part.copied_journals if (c := _read_back(context, path / name)) is not None])
     recording = dataclasses.replace(part.earlier.recording, info=info, noise=header.get("noise"))
     with context.stops.saving():
         write_recording_h5(path / RECORDING_FILE, recording, contents)

@@ -126,14 +126,8 @@ def emulate(config: ConfigFile, overrides: Overrides = None) -> None:
     """
 
     def command() -> int:
-        from commands.campaign.backends import require_emulators
+        from commands.rig.emulate import emulate_devices
 
-        require_emulators()
-        from sim_backend.emulators.process import run_emulators
-
-        requests = sys.stdin.fileno() if sys.stdin is not None and not sys.stdin.closed else None
-        options = Options(config, emulate=True, overrides=tuple(overrides or ()))
-        run_emulators(options.load().config, requests)
-        return 0
+        return emulate_devices(Options(config, emulate=True, overrides=tuple(overrides or ())))
 
     raise typer.Exit(run_to_exit_code(command))

@@ -31,7 +31,7 @@ UNKNOWN_INERTIA_NOTE = (
 
 
 @dataclass(frozen=True)
-class Known:
+class CheckSubject:
     """What the checks look at. ``stage`` is None where nothing is played."""
 
     loaded: LoadedConfig
@@ -46,36 +46,36 @@ class Known:
         return predict_all(config.model.platform(), config.excitation, config.limits, scale, key)
 
 
-Check = Callable[[Known], list[str]]
+Check = Callable[[CheckSubject], list[str]]
 
 
-def configuration(known: Known) -> list[str]:
+def configuration(subject: CheckSubject) -> list[str]:
     """That the file is sound: it would not have been loaded otherwise."""
-    config = known.loaded.config
-    return [f"configuration {plain(str(known.loaded.path))}: sound (backend {config.backend})"]
+    config = subject.loaded.config
+    return [f"configuration {plain(str(subject.loaded.path))}: sound (backend {config.backend})"]
 
 
-def forecast(known: Known) -> list[str]:
+def forecast(subject: CheckSubject) -> list[str]:
     """Travel, rate and torque of every set. Raises PreflightRefusal where one may not be played."""
-    if known.stage is None:
+    if subject.stage is None:
         return []
-    config = known.loaded.config
+    config = subject.loaded.config
     try:
-        playable_sets(known.predictions, config.model.platform(), config.excitation)
+        playable_sets(subject.predictions, config.model.platform(), config.excitation)
     except PreflightRefusal as error:
-        raise with_locations(error, known.loaded) from None
+        raise with_locations(error, subject.loaded) from None
     doubt = [UNKNOWN_INERTIA_NOTE] if config.model.inertia_unknown else []
-    return doubt + [f"forecast {plain(p.describe_as_played())}" for p in known.predictions]
+    return doubt + [f"forecast {plain(p.describe_as_played())}" for p in subject.predictions]
 
 
-def recordings(known: Known) -> list[str]:
+def recordings(subject: CheckSubject) -> list[str]:
     """That every recording can be read and trusted. Raises RecordingError."""
-    if known.stage is not None:
+    if subject.stage is not None:
         return []
     from rig.recording.load import read_recording
 
     lines = []
-    for run in read_recording(known.loaded).runs:
+    for run in read_recording(subject.loaded).runs:
         channels = [name for name, values in (("rate", run.rate_rad_s), ("angle", run.angle_rad)) if values is not None]
         torque = "with torque" if run.torque_nm is not None else "without torque (free decay)"
         lines.append(
@@ -85,31 +85,31 @@ def recordings(known: Known) -> list[str]:
     return lines
 
 
-def identifiability(known: Known) -> list[str]:
+def identifiability(subject: CheckSubject) -> list[str]:
     """What every set alone and all together can determine about the declared platform."""
     from identify.foresight import of_planned_campaign, of_recorded_campaign
 
-    config = known.loaded.config
-    if known.stage is None:
+    config = subject.loaded.config
+    if subject.stage is None:
         from rig.recording.load import read_recording
 
         try:
-            recording = read_recording(known.loaded)
+            recording = read_recording(subject.loaded)
         except RecordingError:  # said by the check before
             return []
         lines = of_recorded_campaign(recording, config.model.platform())
     else:
-        rig = known.stage.rig
+        rig = subject.stage.rig
         platform = config.model.platform()
         # A set that would break a limit is refused by the forecast; here it speaks at the torque that passes.
-        sets = [p.planned.scaled(p.scale) for p in known.predictions if p.scale > 0.0]
+        sets = [p.planned.scaled(p.scale) for p in subject.predictions if p.scale > 0.0]
         lines = of_planned_campaign(platform, sets, config.excitation.sample_rate_hz, rig.noise_rad_s)
     return [f"identifiability {plain(line)}" for line in lines]
 
 
-def contact(known: Known) -> list[str]:
+def contact(subject: CheckSubject) -> list[str]:
     """That every device answers, without torque. Raises DeviceFault that lists all that do not."""
-    stage = known.stage
+    stage = subject.stage
     if stage is None or stage.rig.statement().torque is Torque.SIMULATED:
         return []
     with stage.rig.opened():
@@ -132,10 +132,10 @@ CHECKS: tuple[Check, ...] = (configuration, recordings, forecast, identifiabilit
 def run_checks(context: CommandContext, loaded: LoadedConfig) -> int:
     """Run all checks; lines go to stdout, what is wrong to stderr. Returns the exit code of the first fault."""
     code = OK
-    with tempfile.TemporaryDirectory() as scratch, _known(context, loaded, Path(scratch)) as known:
+    with tempfile.TemporaryDirectory() as scratch, _subject(context, loaded, Path(scratch)) as subject:
         for check in CHECKS:
             try:
-                lines = check(known)
+                lines = check(subject)
             except Aborted:
                 raise
             except RigError as error:
@@ -150,10 +150,10 @@ def run_checks(context: CommandContext, loaded: LoadedConfig) -> int:
 
 
 @contextmanager
-def _known(context: CommandContext, loaded: LoadedConfig, scratch: Path) -> Iterator[Known]:
+def _subject(context: CommandContext, loaded: LoadedConfig, scratch: Path) -> Iterator[CheckSubject]:
     name = backend_name(loaded.config, False, context.options.emulate)
     if name == RECORDED:
-        yield Known(loaded, None)
+        yield CheckSubject(loaded, None)
         return
     with BACKENDS[name](loaded, scratch / "raw") as stage:
-        yield Known(loaded, stage)
+        yield CheckSubject(loaded, stage)

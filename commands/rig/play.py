@@ -23,5 +23,5 @@ def play_only(context: CommandContext, loaded: LoadedConfig) -> int:
             if played.recording.runs
             else f". {describe_location(played, folder.path)}"
         )
-        sys.stdout.write(f"{len(played.whole)} complete set(s){plain(where)}\n")
+        sys.stdout.write(f"{len(played.completed)} complete set(s){plain(where)}\n")
     return 0 if played.cause is None else exit_code_of(played.cause)

@@ -153,16 +153,16 @@ class SetBars(Observer):
     def progress(self, progress: Progress) -> None:
         """Where it stands."""
         p = progress
-        told = _figures(p.late_max_s, p.missed_ticks, p.drops, p.peak_torque_nm)
+        figures = _figures(p.late_max_s, p.missed_ticks, p.drops, p.peak_torque_nm)
         bar = _bar(p.time_s / p.duration_s)
-        self._terminal.overwrite(f"{self._head} {bar} {p.time_s:5.1f}/{p.duration_s:g} s  {told}")
+        self._terminal.overwrite(f"{self._head} {bar} {p.time_s:5.1f}/{p.duration_s:g} s  {figures}")
 
     def set_ends(self, statistics: SetStatistics) -> None:
         """How it went."""
         s = statistics
-        told = _figures(s.late.max_s, s.missed_ticks, s.drops, s.peak_torque_nm)
+        figures = _figures(s.late.max_s, s.missed_ticks, s.drops, s.peak_torque_nm)
         self._terminal.clear_line()
-        self._terminal.show(f"{self._head} {_bar(1.0) if s.complete else 'CUT SHORT'} {told}")
+        self._terminal.show(f"{self._head} {_bar(1.0) if s.complete else 'CUT SHORT'} {figures}")
 
 
 def _bar(part: float) -> str:

@@ -17,7 +17,7 @@ from drivers.amplifiers.cia402_setup import (
     NMT_PRE_OPERATIONAL,
     NMT_START,
     PER_MILLE,
-    Agreed,
+    AgreedSetup,
     Cia402Settings,
     Cia402Setup,
 )
@@ -58,7 +58,7 @@ class Cia402(Amplifier):
         self._setup.dictionary()  # a file that is not there, or says that the drive cannot do it, is refused at once
         self._status = DriveStatus(node, self.settings.drive_heartbeat_ms * 1e-3, self.label)
         self._clock = TorqueClock(STAMP_UNIT_S, STAMP_MODULUS)
-        self._agreed: Agreed | None = None
+        self._agreed: AgreedSetup | None = None
         self._rpdo_id = 0x200 + node
         self._host_beat = CanFrame(0x700 + self.settings.host_node, bytes([NMT_OPERATIONAL]))
         self._sync = CanFrame(0x80, b"")
@@ -123,7 +123,7 @@ class Cia402(Amplifier):
         status.begin(link.clock())
         self._armed = True
 
-    def _contacted(self) -> Agreed:
+    def _contacted(self) -> AgreedSetup:
         if self._agreed is None:
             raise DeviceFault(f"{self.label} was not contacted before: open the bench first")
         return self._agreed

@@ -58,7 +58,7 @@ class Cia402Settings(Settings):
 
 
 @dataclass(frozen=True)
-class Agreed:
+class AgreedSetup:
     """What was found out and set: torques at the motor; ``stamped`` where 0x1013 comes with the torque."""
 
     objects: RemoteObjects
@@ -95,7 +95,7 @@ class Cia402Setup:
             raise ConfigError(f"bench.amplifier.settings.eds: {s.eds}: {error}") from None
         return found
 
-    def run(self, link: CanLink) -> Agreed:
+    def run(self, link: CanLink) -> AgreedSetup:
         """All of it. Raises DeviceFault where the drive does not answer or cannot do what is needed."""
         s, node = self._settings, self._node
         dictionary = self.dictionary()
@@ -110,7 +110,7 @@ class Cia402Setup:
         objects.write(cia402.MODE, 0, plan.mode, 1)
         link.send([CanFrame(0, bytes([NMT_START, node]))])
         notes = (*plan.fallbacks, *([] if profile == 402 else [f"0x1000 says profile {profile}, not 402"]))
-        return Agreed(objects, plan, reference_nm, peak_nm, stamped, notes)
+        return AgreedSetup(objects, plan, reference_nm, peak_nm, stamped, notes)
 
     def _plan(self, dictionary: Any, modes: int | None) -> DrivePlan:
         s = self._settings

@@ -173,7 +173,7 @@ class BenchRig(DeviceRig):
         self._retiming.tick()
         if self._capture is not None:
             self._capture.flush_if_due(now_s)
-        return answer(self._config, amplifier, gyro, [TorqueSample(sent_s, nm) for nm in sent])
+        return exchange_of(self._config, amplifier, gyro, [TorqueSample(sent_s, nm) for nm in sent])
 
     def torque_off(self) -> None:
         """Zero torque now. Safe at any time, twice, and from a signal handler."""
@@ -249,7 +249,7 @@ class BenchRig(DeviceRig):
             self._capture.clock(time_s)
 
 
-def answer(
+def exchange_of(
     config: BenchConfig,
     amplifier: Amplifier,
     gyro: list[GyroSample],

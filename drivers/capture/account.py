@@ -28,8 +28,8 @@ class CaptureSummary(NamedTuple):
     cut_bytes: int
 
     def __str__(self) -> str:
-        told = f"{self.duration_s:.3f} s: {self.gyro_bytes} gyro bytes, {self.frames} CAN frames, {self.ticks} ticks"
-        return told + (f"; {self.cut_bytes} byte(s) at its end are cut" if self.cut_bytes else "; not cut")
+        text = f"{self.duration_s:.3f} s: {self.gyro_bytes} gyro bytes, {self.frames} CAN frames, {self.ticks} ticks"
+        return text + (f"; {self.cut_bytes} byte(s) at its end are cut" if self.cut_bytes else "; not cut")
 
 
 def summary_of(path: Path) -> CaptureSummary:

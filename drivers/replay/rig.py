@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from drivers.amplifiers import make_amplifier
 from drivers.bench.device_rig import DeviceRig
 from drivers.bench.retiming import BenchRetiming
-from drivers.bench.rig import answer
+from drivers.bench.rig import exchange_of
 from drivers.capture import wire_capture
 from drivers.capture.wire_capture import Entry, read_capture, unpack_frame, unpack_torque
 from drivers.codecs.lawicel import CanFrame
@@ -203,7 +203,7 @@ class ReplayRig(DeviceRig):
             elif entry.kind == wire_capture.TICK:
                 self._same_campaign(torque_nm, unpack_torque(entry.payload))
                 self._retiming.tick()
-                return answer(self.config, self.amplifier, gyro, sent)
+                return exchange_of(self.config, self.amplifier, gyro, sent)
         raise RecordingError(f"{self._path} ends here: the campaign that it holds was cut short")
 
     def _same_campaign(self, asked_nm: float, played_nm: float) -> None:

@@ -15,7 +15,7 @@ from rig.platform import Platform
 
 PEAK_RATE_HZ = 4000.0  # the crest of a 29 Hz ring read at 4 kHz is low by 0.03 %
 COAST_RATE_HZ = 200.0  # only the end of a rest is used, and the integrator chooses its own substeps
-SETTLED = 3.0  # time constants after which a spring has pulled it back
+SETTLED_TIME_CONSTANTS = 3.0  # time constants after which a spring has pulled it back
 BISECTIONS = 24  # halvings: the factor to 6e-8
 State = tuple[float, float]
 AT_ORIGIN: State = (0.0, 0.0)
@@ -71,7 +71,7 @@ def has_no_restoring_spring(platform: Platform, rest_s: float) -> bool:
     j, c, k = platform.inertia_kg_m2, platform.damping_nm_s_rad, platform.stiffness_nm_rad
     if k < 0.0 or c < 0.0:
         return False  # runs away by itself, which is said otherwise
-    return k == 0.0 or 2.0 * math.pi * math.sqrt(j / k) > rest_s > 0.0 or c / k * SETTLED > rest_s > 0.0
+    return k == 0.0 or 2.0 * math.pi * math.sqrt(j / k) > rest_s > 0.0 or c / k * SETTLED_TIME_CONSTANTS > rest_s > 0.0
 
 
 class SetSequence:
@@ -107,12 +107,12 @@ class SetSequence:
             return 1.0
         if self._linear:
             return min(limit / value for peaks in found for value, limit in zip(peaks, allowed, strict=True) if value)
-        return largest(lambda factor: all(
+        return largest_factor(lambda factor: all(
             stretch.peaks.within(allowed) for stretch in self.play([factor * scale for scale in scales])
         ))  # fmt: skip
 
 
-def largest(passes: Callable[[float], bool]) -> float:
+def largest_factor(passes: Callable[[float], bool]) -> float:
     """The largest factor below 1 that passes, found by bisection; 0 where none does."""
     low, high = 0.0, 1.0
     for _ in range(BISECTIONS):

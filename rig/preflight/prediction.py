@@ -16,7 +16,7 @@ from rig.config.limits import LimitsConfig
 from rig.errors import PreflightRefusal
 from rig.excitation import PlannedSet, planned
 from rig.platform import Platform
-from rig.preflight.forecast import Peaks, SetForecast, SetSequence, has_no_restoring_spring, largest
+from rig.preflight.forecast import Peaks, SetForecast, SetSequence, has_no_restoring_spring, largest_factor
 
 SMALLEST_REPORTED_DEG = 0.005  # half of the last digit shown
 LIMIT_KEYS = ("limits.travel_deg", "limits.rate_deg_s", "limits.torque_nm")
@@ -142,11 +142,13 @@ def predict(
     if not platform.effects:
         ratios = [limit / value for value, limit in zip(found, allowed, strict=True) if value > 0.0]
         return Prediction(planned_set, found, allowed, min(1.0, *ratios), keys)
-    scale = largest(lambda factor: forecast.play(factor).peaks.within(allowed))
+    scale = largest_factor(lambda factor: forecast.play(factor).peaks.within(allowed))
     return Prediction(planned_set, found, allowed, scale, keys)
 
 
-def _together(platform: Platform, alone: Sequence[Prediction], allowed: Peaks, rest_s: float) -> tuple[Prediction, ...]:
+def _predict_together(
+    platform: Platform, alone: Sequence[Prediction], allowed: Peaks, rest_s: float
+) -> tuple[Prediction, ...]:
     """Sets that pass one by one, from where the ones before leave the platform: all lowered alike until they fit."""
     chain = SetSequence(platform, [p.planned for p in alone], rest_s)
     asked = chain.play([1.0] * len(alone))
@@ -180,7 +182,7 @@ def predict_all(
     alone = tuple(predict(platform, s, allowed, keys) for s in planned(excitation.sets))
     if len(alone) < 2 or not has_no_restoring_spring(platform, excitation.rest_s):
         return alone
-    return _together(platform, alone, allowed, excitation.rest_s)
+    return _predict_together(platform, alone, allowed, excitation.rest_s)
 
 
 def plan(

@@ -48,8 +48,8 @@ def recover(folder: Path) -> Recovery:
     if whole is not None:
         return Recovery(tuple(lines), whole, folder / RECORDING_FILE, is_new=False)
     if contents is None or not recording.runs:
-        told = "; ".join(lines)
-        raise RecordingError(f"{folder}: nothing can be recovered: no journal with a sample in it ({told})")
+        details = "; ".join(lines)
+        raise RecordingError(f"{folder}: nothing can be recovered: no journal with a sample in it ({details})")
     name = RECORDING_FILE if state == "absent" else RECOVERED_FILE
     path = free_name(folder, name)
     write_recording_h5(path, recording, contents)
@@ -78,15 +78,17 @@ def _read_all(journals: Sequence[Path], lines: list[str]) -> list[JournalContent
 def _account(contents: JournalContents) -> str:
     if contents.closed and not contents.unread_bytes:
         return "complete, closed normally"
-    told = [] if contents.closed else [f"its writer was killed: up to {UNWRITTEN_S:g} s before that were never written"]
+    notes = (
+        [] if contents.closed else [f"its writer was killed: up to {UNWRITTEN_S:g} s before that were never written"]
+    )
     if contents.gaps:
-        told.append(
+        notes.append(
             f"{contents.gaps} damaged stretch(es), {contents.stray_rows} row(s) behind them belong to no known run and "
             "are left out"
         )
     if contents.unread_bytes:
-        told.append(f"{contents.unread_bytes} byte(s) lost: cut or damaged")
-    return "; ".join(told)
+        notes.append(f"{contents.unread_bytes} byte(s) lost: cut or damaged")
+    return "; ".join(notes)
 
 
 def _line(run: JournalRun) -> str:

@@ -43,8 +43,8 @@ LARGEST_TORQUE = 0.3  # of the campaign's
 CLEAR_SIGMAS, CLEAR_LEAST_RAD_S = 40.0, math.radians(5.0)
 MOST_LEVELS = 16  # pulses: doublings from the first torque to any limit
 DELAY_SHARE, DELAY_STEP_S = 0.6, 0.001  # of the pulse: how late the torque may act
-NEARLY = 1.5  # ratio of residuals: fits "within half as much again" (decision 0016)
-EDGE = 0.9  # a range may stick out of the allowed one by a tenth
+NEAR_BEST_RATIO = 1.5  # ratio of residuals: fits "within half as much again" (decision 0016)
+RANGE_TOLERANCE = 0.9  # a range may stick out of the allowed one by a tenth
 STILL_SHARE = 0.05  # of the peak rate: below it the platform starts from rest; tuned by hand, not derived: a debt
 STIFFNESS_FACTOR = 3.0  # the declared one may be wrong by so much
 POOR_FIT = 0.3  # of the scatter of the impulse: beyond it a pulse does not count
@@ -52,7 +52,7 @@ FEWEST_SAMPLES = 8  # for five unknowns
 STEPS = 400  # integration steps a pulse
 
 
-class Span(NamedTuple):
+class InertiaRange(NamedTuple):
     """The inertia in kg m2 that fits best, and between which ones all lie that fit nearly as well."""
 
     best: float
@@ -61,12 +61,12 @@ class Span(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Answer:
+class PulseResponse:
     """What one pulse told. ``inertia`` is None where it moved too little, or followed no law like that above."""
 
     torque_nm: float
     peak_rad_s: float
-    inertia: Span | None
+    inertia: InertiaRange | None
 
 
 class Probe:
@@ -90,21 +90,21 @@ class Probe:
         period_s = 2.0 * math.pi * math.sqrt(j / k) if k > 0.0 else math.inf
         self.pulse_s = min(max(PERIOD_SHARE * period_s, SHORTEST_S), LONGEST_S)
         self._listen_s = min(LISTEN_PERIODS * period_s, LONGEST_S)
-        peak_rate, peak_angle = _answer_of(platform, self.pulse_s)
+        peak_rate, peak_angle = _predicted_response(platform, self.pulse_s)
         rate = math.radians(limits.rate_deg_s)
         # What a harder pulse adds, were the inertia half of what is declared, has to stay below these.
         self._rate_per_nm, self._most_rad_s = 2.0 * peak_rate, LARGEST_RATE * rate
         self._step_nm = LARGEST_TRAVEL * math.radians(limits.travel_deg) / (2.0 * peak_angle)
-        campaign_nm = max(_largest(s) for s in sets) if sets else limits.torque_nm
+        campaign_nm = max(_peak_torque_nm(s) for s in sets) if sets else limits.torque_nm
         given = config.torque_nm
         first_nm = FIRST_RATE * rate / peak_rate
         # A campaign of little torque is probed with more of it, as far as that is little for the platform.
         own_nm = max(LARGEST_TORQUE * campaign_nm, min(campaign_nm, GENTLE_STEPS * first_nm))
         self.largest_nm = min(own_nm if given is None else given, limits.torque_nm)
         self._torque_nm = min(first_nm, self.largest_nm)
-        self._way, self._sign = 1.0, 0.0
-        self._clear_share = 0.25 * peak_rate
-        self._answers: list[Answer] = []
+        self._direction, self._sign = 1.0, 0.0
+        self._clear_rate_per_nm = 0.25 * peak_rate
+        self._responses: list[PulseResponse] = []
         self._pulse_at_s = 0.0
         self._samples: list[tuple[float, float]] = []
         self._rest = Rest()
@@ -118,58 +118,59 @@ class Probe:
     def torque(self, at_s: float) -> float:
         """Torque in N m at seconds since the probe began."""
         x = (at_s - self._pulse_at_s) / self.pulse_s
-        return self._way * self._torque_nm * math.sin(math.pi * x) if 0.0 <= x <= 1.0 and not self.over else 0.0
+        return self._direction * self._torque_nm * math.sin(math.pi * x) if 0.0 <= x <= 1.0 and not self.over else 0.0
 
     def take(self, at_s: float, start_s: float, tick: Tick) -> None:
         """What a tick brought; ``start_s`` is when the probe began on the clock of the ticks."""
         self._samples += [(t - start_s, w - self._rest.bias_rad_s) for t, w, valid in tick.gyro if valid]
         if at_s - self._pulse_at_s >= self.pulse_s + self._listen_s + LATE_S:
-            self._judge(at_s)
+            self._end_pulse(at_s)
 
-    def _judge(self, at_s: float) -> None:
-        answer = self._heard(self._clear_share)
+    def _end_pulse(self, at_s: float) -> None:
+        answer = self._evaluate_pulse(self._clear_rate_per_nm)
         room_nm = min((self._most_rad_s - answer.peak_rad_s) / self._rate_per_nm, self._step_nm, self._torque_nm)
         next_nm = min(self._torque_nm + room_nm, self.largest_nm)
-        is_last = next_nm < LEAST_STEP * self._torque_nm or len(self._answers) >= MOST_LEVELS
+        is_last = next_nm < LEAST_STEP * self._torque_nm or len(self._responses) >= MOST_LEVELS
         if is_last and answer.inertia is None:
-            answer = self._heard(0.0)  # what little there is has to do, friction being fitted too
-        self._answers.append(answer)
+            answer = self._evaluate_pulse(0.0)  # what little there is has to do, friction being fitted too
+        self._responses.append(answer)
         if is_last or (answer.inertia is not None and self._is_clear(answer.inertia)):
             self.over = True
             return
-        self._torque_nm, self._way = next_nm, -self._way  # back again: friction may have left it beside its spring
+        self._torque_nm = next_nm
+        self._direction = -self._direction  # back again: friction may have left it beside its spring
         self._pulse_at_s = at_s
         self._samples.clear()
 
-    def _is_clear(self, found: Span) -> bool:
+    def _is_clear(self, found: InertiaRange) -> bool:
         """Whether all that fits is allowed, give or take a tenth, or nothing of it."""
         factor = self._config.inertia_factor
         least, most = self._platform.inertia_kg_m2 / factor, self._platform.inertia_kg_m2 * factor
         if least <= found.best <= most:
-            return EDGE * least <= found.low and EDGE * found.high <= most
+            return RANGE_TOLERANCE * least <= found.low and RANGE_TOLERANCE * found.high <= most
         return found.high < least or found.low > most
 
-    def _heard(self, clear_share: float) -> Answer:
+    def _evaluate_pulse(self, clear_share: float) -> PulseResponse:
         data = np.array(self._samples, dtype=float).reshape(-1, 2)
         data = data[(data[:, 0] >= self._pulse_at_s) & (data[:, 0] <= self._pulse_at_s + self.pulse_s + self._listen_s)]
         peak = float(np.max(np.abs(data[:, 1]))) if len(data) else 0.0
         clear = max(CLEAR_SIGMAS * self._rest.noise_rad_s, CLEAR_LEAST_RAD_S, clear_share * self._torque_nm)
         # An answer that is larger than foreseen is clear too: the inertia may be the one that is wrong.
         if peak < clear or len(data) < FEWEST_SAMPLES:
-            return Answer(self._torque_nm, peak, None)
+            return PulseResponse(self._torque_nm, peak, None)
         if self._sign == 0.0 or abs(data[0, 1]) < STILL_SHARE * peak:  # else it still rings from the pulse before
-            self._sign = self._way * _first_way(data[:, 1])
-        span = inertia_of(
-            data[:, 0] - self._pulse_at_s, self._sign * data[:, 1], self._way * self._torque_nm, self.pulse_s,
+            self._sign = self._direction * _initial_direction(data[:, 1])
+        span = estimate_inertia(
+            data[:, 0] - self._pulse_at_s, self._sign * data[:, 1], self._direction * self._torque_nm, self.pulse_s,
             self._stiffest_nm_rad,
         )  # fmt: skip
         if span is not None and self._sign < 0.0:
-            span = Span(-span.best, -span.high, -span.low)
-        return Answer(self._torque_nm, peak, span)
+            span = InertiaRange(-span.best, -span.high, -span.low)
+        return PulseResponse(self._torque_nm, peak, span)
 
     def finding(self) -> str:
         """What came of it, in a sentence. Raises SafetyTrip where the campaign must not go on."""
-        last = self._answers[-1]
+        last = self._responses[-1]
         declared, factor = self._platform.inertia_kg_m2, self._config.inertia_factor
         asked = f"{last.torque_nm:.3g} N m for {self.pulse_s * 1e3:.0f} ms"
         peak_deg_s = math.degrees(last.peak_rad_s)
@@ -208,9 +209,9 @@ class Probe:
         )
 
 
-def inertia_of(
+def estimate_inertia(
     time_s: Array, rate_rad_s: Array, torque_nm: float, pulse_s: float, stiffest_nm_rad: float = math.inf
-) -> Span | None:
+) -> InertiaRange | None:
     """Inertia from the answer to half a sine of this height that began at time zero; None if none fits.
 
     Parameters
@@ -236,16 +237,16 @@ def inertia_of(
         y = _impulse(t - delay_s, torque_nm, pulse_s)
         y = y - y[0]
         size = max(float(np.std(y)), 1e-300) * math.sqrt(len(y))
-        inertia, left = _solved(columns, y, stiffest_nm_rad)
+        inertia, left = _solve_impulse_balance(columns, y, stiffest_nm_rad)
         found.append((left / size, inertia))
     least = min(left for left, _ in found)
     if least >= POOR_FIT:
         return None
-    near = [inertia for left, inertia in found if left <= NEARLY * least]
-    return Span(min(found)[1], min(near), max(near))
+    near = [inertia for left, inertia in found if left <= NEAR_BEST_RATIO * least]
+    return InertiaRange(min(found)[1], min(near), max(near))
 
 
-def _solved(columns: Array, y: Array, stiffest: float) -> tuple[float, float]:
+def _solve_impulse_balance(columns: Array, y: Array, stiffest: float) -> tuple[float, float]:
     """Inertia, stiffness and friction of one sign: else half a period of delay would pass for the other sign."""
     scale = np.maximum(np.max(np.abs(columns), axis=0), 1e-300)
     solved, left = nnls(columns / scale, y)
@@ -256,7 +257,7 @@ def _solved(columns: Array, y: Array, stiffest: float) -> tuple[float, float]:
     return float(solved[0] / scale[0]), float(left)
 
 
-def _first_way(rate: Array) -> float:
+def _initial_direction(rate: Array) -> float:
     """The direction in which it first moves: from rest that is the torque's, whatever holds or delays it."""
     begun = np.abs(rate) > 0.3 * float(np.max(np.abs(rate))) + 1.5 * abs(float(rate[0]))
     return float(np.sign(rate[int(np.argmax(begun))]))
@@ -285,7 +286,7 @@ def _impulse(time_s: Array, torque_nm: float, pulse_s: float) -> Array:
     return torque_nm * pulse_s / math.pi * (1.0 - np.cos(math.pi * x))
 
 
-def _answer_of(platform: Platform, pulse_s: float) -> tuple[float, float]:
+def _predicted_response(platform: Platform, pulse_s: float) -> tuple[float, float]:
     """Largest rate and angle per N m of a pulse on the declared linear platform."""
     j, c, k = platform.inertia_kg_m2, platform.damping_nm_s_rad, platform.stiffness_nm_rad
     step_s = pulse_s / STEPS
@@ -298,6 +299,6 @@ def _answer_of(platform: Platform, pulse_s: float) -> tuple[float, float]:
     return peak_rate, peak_angle
 
 
-def _largest(planned: PlannedSet) -> float:
+def _peak_torque_nm(planned: PlannedSet) -> float:
     times = np.linspace(0.0, planned.duration_s, 2001)
     return float(np.max(np.abs(planned.torque(times))))

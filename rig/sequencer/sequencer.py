@@ -118,14 +118,14 @@ class Sequencer:
         cause: RigError | None = None
         self._recorders, self._statistics = [], []
         try:
-            with _without_collector(), self._rig.opened(), self._rig.armed():
+            with _without_garbage_collection(), self._rig.opened(), self._rig.armed():
                 self._guard.begin(self._clock.now_s(), Rest())
-                self._zero(SETTLE_S, REST_PERIOD_S)
+                self._hold_zero(SETTLE_S, REST_PERIOD_S)
                 self._guard.origin()
-                self._probing()
+                self._play_probe()
                 for number, planned in enumerate(sets, 1):
                     if number > 1:
-                        self._zero(self._rest_s, REST_PERIOD_S)
+                        self._hold_zero(self._rest_s, REST_PERIOD_S)
                     self._observer.set_begins(planned, number, len(sets))
                     self._play_set(planned)
         except KeyboardInterrupt:
@@ -149,7 +149,7 @@ class Sequencer:
         except RigError:
             return self._verdict_s or 0.0
 
-    def _probing(self) -> None:
+    def _play_probe(self) -> None:
         """Small pulses and what they tell, then rest until the platform is still. Raises SafetyTrip."""
         probe = self._probe
         if probe is None:
@@ -182,11 +182,11 @@ class Sequencer:
         still_rad_s = max(STILL_SIGMAS * rest.noise_rad_s, STILL_RAD_S)
         left_s = max(self._rest_s, SETTLE_S)
         while left_s > 0.0:
-            self._zero(min(LOOK_S, left_s), REST_PERIOD_S)
+            self._hold_zero(min(LOOK_S, left_s), REST_PERIOD_S)
             left_s -= LOOK_S
             if all(abs(rate - rest.bias_rad_s) < still_rad_s for _, rate in self._still):
                 break
-        self._zero(SETTLE_S, REST_PERIOD_S)
+        self._hold_zero(SETTLE_S, REST_PERIOD_S)
 
     def _note_verdict(self) -> None:
         """The instant at which the first error was known; it ends up in the journal and in ``Campaign``."""
@@ -205,7 +205,7 @@ class Sequencer:
         try:
             self._rig.begin_set(planned.torque, start_s)
             self._ticks(planned, recorder, start_s)
-            self._zero(TAIL_S, self._period_s, recorder)
+            self._hold_zero(TAIL_S, self._period_s, recorder)
             complete = True
         except BaseException:
             with contextlib.suppress(RigError):  # the fault that is under way is the one to report
@@ -218,7 +218,7 @@ class Sequencer:
     def _ticks(self, planned: PlannedSet, recorder: SetRecorder, start_s: float) -> None:
         """The set itself: from its first tick to the one that takes the torque off."""
         period_s, duration_s = self._period_s, planned.duration_s
-        tick, told_s, playing = 0, -math.inf, True
+        tick, reported_s, playing = 0, -math.inf, True
         while playing:
             deadline_s = start_s + tick * period_s
             now_s = self._clock.wait_until(deadline_s)
@@ -228,8 +228,8 @@ class Sequencer:
             late_s = now_s - deadline_s
             self._exchange(now_s, late_s, period_s, torque_nm, recorder)
             tick += 1 + int(late_s / period_s + 1e-9)
-            if at_s - told_s >= PROGRESS_S:
-                told_s = at_s
+            if at_s - reported_s >= PROGRESS_S:
+                reported_s = at_s
                 self._tell(planned, recorder, at_s)
 
     def _exchange(
@@ -274,7 +274,7 @@ class Sequencer:
             return SafetyTrip(f"Tripped on {trip} Torque off could not be sent: {fault}")
         return SafetyTrip(f"Torque is off. Tripped on {trip}")
 
-    def _zero(self, duration_s: float, period_s: float, recorder: SetRecorder | None = None) -> None:
+    def _hold_zero(self, duration_s: float, period_s: float, recorder: SetRecorder | None = None) -> None:
         """Zero torque for a while, guarded, the gyro listened to for its bias."""
         begin_s = self._clock.now_s()
         deadline_s = begin_s
@@ -301,8 +301,8 @@ class Sequencer:
 
     def _tell(self, planned: PlannedSet, recorder: SetRecorder, at_s: float) -> None:
         r = recorder
-        told = (r.late_max_s, r.missed_ticks, r.drops, r.peak_torque_nm)
-        self._observer.progress(Progress(planned.name, at_s, planned.duration_s, *told))
+        figures = (r.late_max_s, r.missed_ticks, r.drops, r.peak_torque_nm)
+        self._observer.progress(Progress(planned.name, at_s, planned.duration_s, *figures))
 
     def _keep(self, recorder: SetRecorder, complete: bool) -> None:
         """Keep the set; a journal that fails on the way out of an error must not hide that error."""
@@ -318,14 +318,14 @@ class Sequencer:
 def _with_context(error: RigError) -> RigError:
     """A fault while disarming after another error: both matter, the fault decides the exit code; none is told twice."""
     earlier = error.__context__
-    told = bool(str(earlier)) and str(earlier) in str(error)
-    if isinstance(error, DeviceFault) and isinstance(earlier, (RigError, KeyboardInterrupt)) and not told:
+    is_repeated = bool(str(earlier)) and str(earlier) in str(error)
+    if isinstance(error, DeviceFault) and isinstance(earlier, (RigError, KeyboardInterrupt)) and not is_repeated:
         return DeviceFault(f"{error} This happened while handling: {earlier or 'Ctrl-C'}")
     return error
 
 
 @contextlib.contextmanager
-def _without_collector() -> Iterator[None]:
+def _without_garbage_collection() -> Iterator[None]:
     """A pause of the garbage collector is a missed tick; nothing in the loop makes reference cycles."""
     was_enabled = gc.isenabled()
     gc.disable()

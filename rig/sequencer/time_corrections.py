@@ -19,16 +19,16 @@ def log_time_corrections(rig: Rig, journal: Journal | None, now_s: Callable[[], 
     try:
         found = {one.start_s: retiming_of(*one) for one in rig.corrections()}
     except Exception as error:  # noqa: BLE001 (nothing that goes wrong here may cost a recording)
-        _tell(journal, now_s, f"the times of the samples could not be corrected: {error!r}", {})
+        _log_event(journal, now_s, f"the times of the samples could not be corrected: {error!r}", {})
         return {}
     for start_s, better in found.items():
         values = event_values(start_s, better)
-        if not _tell(journal, now_s, "corrected times of a set", values):
+        if not _log_event(journal, now_s, "corrected times of a set", values):
             return {}
     return found
 
 
-def _tell(journal: Journal | None, now_s: Callable[[], float], text: str, values: Mapping[str, object]) -> bool:
+def _log_event(journal: Journal | None, now_s: Callable[[], float], text: str, values: Mapping[str, object]) -> bool:
     """False where the journal takes no more."""
     if journal is not None:
         with contextlib.suppress(RigError):

@@ -17,7 +17,7 @@ from rig.guard import Guard
 from rig.guard.base import Rest, Tick
 from rig.interface import GyroSample, TorqueSample
 from rig.platform import Platform
-from rig.sequencer.probe import inertia_of
+from rig.sequencer.probe import estimate_inertia
 
 LENGTH_S = 0.5  # every check has given a verdict by then
 FREQUENCY_HZ = 5.0  # any frequency serves: nothing is judged here
@@ -48,4 +48,4 @@ def warm_up(guard: Guard, platform: Platform, sets: Sequence[PlannedSet], sample
     for planned in sets:
         planned.torque(0.0)
     time_s = np.linspace(0.0, PULSE_S, 100)
-    inertia_of(time_s, PULSE_S / math.pi * (1.0 - np.cos(math.pi * time_s / PULSE_S)), 1.0, PULSE_S)
+    estimate_inertia(time_s, PULSE_S / math.pi * (1.0 - np.cos(math.pi * time_s / PULSE_S)), 1.0, PULSE_S)

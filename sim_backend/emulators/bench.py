@@ -22,7 +22,7 @@ from sim_backend.emulators.device import EmulatedDrive, Event
 from sim_backend.emulators.drive import Cia402Drive
 from sim_backend.emulators.faults.schedule import FaultSchedule
 from sim_backend.emulators.gyro import GYROS, AnyGyro, GyroSettings, flat_low_pass
-from sim_backend.emulators.late_arrivals import REPORTED_PAUSE_S, Arrivals
+from sim_backend.emulators.late_arrivals import REPORTED_PAUSE_S, ArrivalTimes
 from sim_backend.emulators.odrive import OdriveAxis
 from sim_backend.emulators.pty_port import PtyPort
 from sim_backend.emulators.socket_port import SocketListener
@@ -122,7 +122,7 @@ class EmulatedBench:
         self._window = np.zeros(2 * len(self._kernel))
         self._slot = 0
         self._adapter = LawicelAdapter(self._from_host, clock)
-        self._arrivals = Arrivals()
+        self._arrivals = ArrivalTimes()
         self._port = PORTS[emulator.ports or "terminal"]
         self.gyro_port, self.can_port = self._port(), self._port()
         self._now_s = self._start_s = clock() + 0.05

@@ -14,21 +14,21 @@ REPORTED_PAUSE_S = 0.005  # a longer pause is told, since it bears on every time
 SMOOTHING = 0.2  # weight of the newest interval between lines: five lines of memory
 
 
-class Piece(NamedTuple):
+class ReceivedBytes(NamedTuple):
     """Bytes of the host, ended by a carriage return but for the last, and when they are taken to have come."""
 
     time_s: float
     data: bytes
 
 
-class Arrivals:
+class ArrivalTimes:
     """Knows how often a line usually comes, and so when those that waited were sent."""
 
     def __init__(self) -> None:
         self._line_every_s = 0.0
         self._last_s: float | None = None
 
-    def pieces(self, data: bytes, before_s: float, now_s: float) -> list[Piece]:
+    def pieces(self, data: bytes, before_s: float, now_s: float) -> list[ReceivedBytes]:
         """``data``, found at ``now_s``; the port was looked at last at ``before_s``.
 
         Found in time it is one piece. Else its lines came as often as they usually do, the last one just now, the
@@ -40,9 +40,9 @@ class Arrivals:
             if last_s is not None and lines:
                 every_s = (now_s - last_s) / lines
                 self._line_every_s += (SMOOTHING if self._line_every_s else 1.0) * (every_s - self._line_every_s)
-            return [Piece(now_s, data)]
+            return [ReceivedBytes(now_s, data)]
         every_s = min(self._line_every_s, (now_s - before_s) / lines)
         parts = data.split(b"\r")
         ended = [part + b"\r" for part in parts[:-1]]
-        found = [Piece(now_s - (lines - 1 - k) * every_s, line) for k, line in enumerate(ended)]
-        return [*found, Piece(now_s, parts[-1])] if parts[-1] else found
+        found = [ReceivedBytes(now_s - (lines - 1 - k) * every_s, line) for k, line in enumerate(ended)]
+        return [*found, ReceivedBytes(now_s, parts[-1])] if parts[-1] else found

@@ -36,7 +36,7 @@ class FaultSchedule:
 
     def __init__(self, planned: Sequence[InjectedFault], tell: Callable[[float, str], None], seed: int = 0) -> None:
         for item in planned:
-            known(item.fault)
+            require_known(item.fault)
         self._waiting = list(planned)
         self._coming: list[_Planned] = []
         self._acting: list[tuple[float, str, Fault]] = []
@@ -51,7 +51,7 @@ class FaultSchedule:
 
     def plan(self, item: InjectedFault, now_s: float) -> None:
         """One more, from now on. Raises ConfigError for a fault that does not exist."""
-        known(item.fault)
+        require_known(item.fault)
         self._coming.append(_Planned(item, now_s + item.after_s))
 
     def pass_time(self, bench: Bench, now_s: float) -> None:
@@ -101,7 +101,7 @@ class FaultSchedule:
         return torque_nm
 
 
-def known(name: str) -> None:
+def require_known(name: str) -> None:
     """Raise ConfigError for a fault that does not exist."""
     if name not in FAULTS:
         raise ConfigError(f"bench.emulator.faults: there is no fault {name!r}; there are {', '.join(FAULTS)}")

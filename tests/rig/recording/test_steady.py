@@ -284,5 +284,5 @@ def test_a_tail_goes_with_its_journal_into_the_folder_that_resumes_it(tmp_path: 
     journal = before / "recording.journal"
     journal.write_bytes(b"0123")
     tail_of(journal).write_bytes(record(4, b"45"))
-    CampaignPart(brought=((journal, "earlier_1.journal"),)).bring(after)
+    CampaignPart(copied_journals=((journal, "earlier_1.journal"),)).copy_journals(after)
     assert whole(after / "earlier_1.journal") == b"012345"

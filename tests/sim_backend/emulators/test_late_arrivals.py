@@ -4,13 +4,13 @@ import itertools
 
 import pytest
 
-from sim_backend.emulators.late_arrivals import Arrivals
+from sim_backend.emulators.late_arrivals import ArrivalTimes
 
 TICK = b"t2014AAAA\rt0800\r"
 
 
-def used_to_a_tick_each_millisecond() -> Arrivals:
-    arrivals = Arrivals()
+def used_to_a_tick_each_millisecond() -> ArrivalTimes:
+    arrivals = ArrivalTimes()
     for k in range(100):
         arrivals.pieces(TICK, 1e-3 * k - 2e-4, 1e-3 * k)
     return arrivals
