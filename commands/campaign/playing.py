@@ -125,7 +125,7 @@ class _CampaignRecorder:
     """One campaign while it is recorded. What came of it stays here, whatever happens on the way out."""
 
     def __init__(self, context: CommandContext, stage: Stage, loaded: LoadedConfig, sets: Sequence[PlannedSet]) -> None:
-        self.tally = SetLog(context.terminal)
+        self.set_log = SetLog(context.terminal)
         self.recording: Recording | None = None
         self.cause: BaseException | None = None
         self.verdict_s: float | None = None
@@ -157,7 +157,7 @@ class _CampaignRecorder:
             sample_rate_hz=config.excitation.sample_rate_hz,
             rest_s=config.excitation.rest_s,
             journal=journal,
-            observer=self.tally,
+            observer=self.set_log,
             stop=self._context.stops.poll,
             probe=None if asked is None else Probe(asked, config.limits, platform, self._sets),
             keep_runs=in_memory,
@@ -209,19 +209,19 @@ def _saved(
     part: CampaignPart,
 ) -> PlayedCampaign:
     """What was played, written and told. Raises UsageError where it was refused before anything was."""
-    cause, tally = recorder.cause or _late_stop(context), recorder.tally
-    if isinstance(cause, UsageError) and not tally.statistics:
+    cause, set_log = recorder.cause or _late_stop(context), recorder.set_log
+    if isinstance(cause, UsageError) and not set_log.statistics:
         _discard_part(folder, part)
         raise cause
     if cause is not None:
         context.say_error(cause)
     info |= {"ended_utc": datetime.now(UTC).isoformat(), "aborted": str(cause) if cause else None}
     info |= {"verdict_time_s": recorder.verdict_s}
-    info |= {"sets": [figures(s) for s in tally.statistics]} | stage.account()
+    info |= {"sets": [figures(s) for s in set_log.statistics]} | stage.account()
     expected = stage.rig.expected_delay
     if expected is not None:
         info["expected_torque_delay"] = expected._asdict()
-    played = PlayedCampaign(Recording(()), tally.completed, cause, (part.journal,), stage.rig.rate_full_scale_rad_s)
+    played = PlayedCampaign(Recording(()), set_log.completed, cause, (part.journal,), stage.rig.rate_full_scale_rad_s)
     return save(context, folder.path, recorder.recording, info, played, part)
 
 

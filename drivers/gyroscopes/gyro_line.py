@@ -87,11 +87,11 @@ class GyroLine:
     def request_identification(self) -> None:
         """Discard what lay in the buffers of the system, and ask the device to introduce itself."""
         self._port.read()
-        greeting = self.gyroscope.identification_request()
-        if greeting:
-            self._port.write(greeting)
+        request = self.gyroscope.identification_request()
+        if request:
+            self._port.write(request)
             if self._capture is not None:
-                self._capture.gyro_sent(self._clock(), greeting)
+                self._capture.gyro_sent(self._clock(), request)
 
     def _take(self) -> None:
         for at_s, data in arrivals(self._port, self._clock):

@@ -72,9 +72,9 @@ def test_the_guard_runs_nothing_for_the_first_time_in_the_loop() -> None:
     guard = new_guard()
     guard.begin(0.0, Rest())
     in_the_loop = called(lambda: [guard.look(tick) for tick in moving_ticks()])
-    rehearsed = called(lambda: warm_up(new_guard(), DECLARED, SETS, 1000.0))
+    warmed_up = called(lambda: warm_up(new_guard(), DECLARED, SETS, 1000.0))
     assert len(in_the_loop) > 20
-    assert {code.co_qualname for code in in_the_loop - rehearsed} <= {"Check._trip", "Trip.__init__"}
+    assert {code.co_qualname for code in in_the_loop - warmed_up} <= {"Check._trip", "Trip.__init__"}
 
 
 def test_an_easy_motion_of_the_declared_platform_trips_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
