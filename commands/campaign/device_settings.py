@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from commands.campaign.backends import EMULATED, SIMULATED
 from rig.config.bench import AmplifierConfig, CanConfig, GyroscopeConfig
-from rig.config.yaml_text import KeyPath
+from rig.config.parsing.yaml_text import KeyPath
 from rig.errors import ConfigError
 
 GYRO_PORT: KeyPath = ("bench", "gyroscope", "port")

@@ -7,9 +7,9 @@ from typing import Any
 
 from commands.terminal.display import plain
 from rig.config.load import LoadedConfig
-from rig.config.messages import place_of
-from rig.config.overrides import apply_override
-from rig.config.yaml_text import parse
+from rig.config.parsing.messages import place_of
+from rig.config.parsing.overrides import apply_override
+from rig.config.parsing.yaml_text import parse
 from rig.errors import ConfigError, PreflightRefusal
 
 

@@ -10,10 +10,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from rig.config.messages import faults_of, place_of, shown
-from rig.config.overrides import apply_override
+from rig.config.parsing.messages import faults_of, place_of, shown
+from rig.config.parsing.overrides import apply_override
+from rig.config.parsing.yaml_text import Document, Fault, KeyPath, dotted, parse, read_text
 from rig.config.root import BACKENDS, Config, name_from_stem
-from rig.config.yaml_text import Document, Fault, KeyPath, dotted, parse, read_text
 from rig.errors import ConfigError
 
 MAX_FAULTS_SHOWN = 25

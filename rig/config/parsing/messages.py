@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ValidationError
 
 from rig.config.effects import KeyFaults, unknown
-from rig.config.yaml_text import Document, Fault, KeyPath, Place
+from rig.config.parsing.yaml_text import Document, Fault, KeyPath, Place
 
 _WANTED = {
     "float_type": "a number",

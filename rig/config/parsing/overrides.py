@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Sequence
 from typing import Any
 
-from rig.config.yaml_text import Document, KeyPath, Place, dotted, parse
+from rig.config.parsing.yaml_text import Document, KeyPath, Place, dotted, parse
 from rig.errors import ConfigError
 
 
