@@ -56,7 +56,7 @@ class SimulatedRig(Rig):
     def statement(self) -> Statement:
         """Torque is SIMULATED."""
         kind = self._config.amplifier.kind
-        held = [f"{name} held at {reading:g}, where its effects do nothing" for name, reading in self._held.items()]
+        held = [f"{name} held at {reading:g}, where its effects are zero" for name, reading in self._held.items()]
         devices = ("simulated platform", f"{kind} amplifier", "simulated gyroscope", *held)
         return Statement(Torque.SIMULATED, devices)
 

@@ -99,8 +99,8 @@ def _port_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     if isinstance(gyro, str) and isinstance(channel, str) and is_same_port(gyro, channel.partition("@")[0]):
         yield (
             CAN_CHANNEL,
-            f"{channel} is the port that {'.'.join(map(str, GYRO_PORT))} names too ({gyro}): gyroscope and CAN adapter "
-            "need a port each; `rig devices` lists what is plugged in",
+            f"{channel} is the port that {'.'.join(map(str, GYRO_PORT))} names as well ({gyro}): gyroscope and "
+            "CAN adapter need a port each; `rig devices` lists what is plugged in",
         )
 
 

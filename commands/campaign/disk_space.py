@@ -58,7 +58,6 @@ def disk_space_warning(folder: Path, needed_bytes: float) -> str:
     if free < needed_bytes:
         return (
             f"DISK      {left}, but this campaign writes about {about}. It will stop with torque off when the "
-            "disk is full. "
-            "Free space or choose another --out."
+            "disk is full. Free space or choose another --out."
         )
     return ""

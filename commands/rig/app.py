@@ -34,7 +34,7 @@ def rig(version: Version = False) -> None:
 
 @app.command()
 def check(config: ConfigFile, emulate: Emulate = False, overrides: Overrides = None) -> None:
-    """Validate CONFIG, forecast every set, contact the devices without torque; say what is wrong and its cure."""
+    """Validate CONFIG, forecast every set, contact the devices without torque; list every fault with its cure."""
 
     def command(context: CommandContext) -> int:
         loaded = context.options.load()
@@ -88,7 +88,7 @@ def recover(
         Path, typer.Argument(metavar="DIR", help="The results folder of a campaign.", show_default=False)
     ],
 ) -> None:
-    """Mend what a kill or a power cut left of a results folder; nothing that stands there is changed."""
+    """Recover a results folder after a kill or a power cut; files that are there are not changed."""
 
     def command() -> int:
         from commands.rig.recover import recover_folder
@@ -108,7 +108,7 @@ def export(
         Path | None, typer.Option(metavar="DIR", help="A folder that does not exist yet. Default: FROM/export_FORMAT/")
     ] = None,
 ) -> None:
-    """Write a recording for other programs, every digit kept, with a rig.yaml that reads it back."""
+    """Write a recording for other programs at full precision, with a rig.yaml that reads it back."""
 
     def command() -> int:
         from commands.rig.export import export_recording

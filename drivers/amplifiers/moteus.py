@@ -170,8 +170,8 @@ class Moteus(Amplifier):
             link.send(self.off_frames())
             raise DeviceFault(
                 f"{self.label} keeps running without a sign of life from this computer (mode {self.mode}, "
-                f"{MODE_TIMEOUT} "
-                "expected): refused. Its firmware has to keep the watchdog of the position command (register 0x027)."
+                f"{MODE_TIMEOUT} expected): refused. Its firmware has to keep the watchdog of the position command "
+                "(register 0x027)."
             )
 
     def _bring_to(self, link: CanLink, body: bytes, mode: int) -> None:

@@ -123,8 +123,7 @@ class Odrive(Amplifier):
             link.send(self.off_frames())
             raise DeviceFault(
                 f"{self.label} keeps running without a sign of life from this computer: refused. Switch its "
-                "watchdog on "
-                "(odrivetool: axis0.config.enable_watchdog = True, watchdog_timeout = "
+                "watchdog on (odrivetool: axis0.config.enable_watchdog = True, watchdog_timeout = "
                 f"{self.config.watchdog_ms * 1e-3:g}, save_configuration())"
             )
 

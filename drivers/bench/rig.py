@@ -232,7 +232,7 @@ class BenchRig(DeviceRig):
         """What is known of the devices so far. Raises DeviceFault before the bench was open."""
         devices = self._devices
         if devices is None or devices.line is None:
-            raise DeviceFault("there is nothing to report of a bench that was never open")
+            raise DeviceFault("a bench that was never open has nothing to report")
         return BenchReport(
             devices.line.report(),
             tuple(devices.notes),

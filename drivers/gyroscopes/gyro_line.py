@@ -175,8 +175,8 @@ class GyroLine:
         elif len(rates) >= LEAST_FOR_NOISE and min(rates) == max(rates):
             found.append(
                 f"{where}: all of {len(rates)} samples read exactly {math.degrees(rates[0]):.6g} deg/s: a "
-                "working sensor "
-                f"shows noise. Is {gyro.config.axis} an axis that it measures (bench.gyroscope.axis), or has it hung?"
+                f"working sensor shows noise. Is {gyro.config.axis} an axis that it measures (bench.gyroscope.axis), "
+                "or has it hung?"
             )
         return found
 

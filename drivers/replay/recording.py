@@ -53,7 +53,7 @@ def recording_from_capture(path: Path) -> Recording:
     except (KeyError, TypeError, ValueError, IndexError, OverflowError, struct.error) as error:
         raise RecordingError(f"{path}: its records are not in the format of this version ({error!r})") from None
     if not runs:
-        raise RecordingError(f"{path} ends before the first set had a sample: nothing was recorded")
+        raise RecordingError(f"{path} ends before the first sample of a set: nothing was recorded")
     expected = {"expected_torque_delay": rig.expected_delay._asdict()}
     return Recording(runs, noise=rig.noise_rad_s, info={"backend": f"raw capture {path.name}"} | expected)
 

@@ -203,7 +203,7 @@ def stalled(name: str, left: int, timeout_s: float) -> DeviceFault:
     """The fault of a port that accepts no more bytes."""
     return DeviceFault(
         f"{name} accepts no bytes: {left} left after {timeout_s * 1e3:.0f} ms. "
-        "The adapter has stalled or its line is too slow; unplug it and plug it in again."
+        "The adapter has stalled or its line is too slow. Unplug it and plug it in again."
     )
 
 

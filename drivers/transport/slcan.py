@@ -96,8 +96,8 @@ class SlcanBulkBus(can.BusABC):
             if time.monotonic() > talks_until_s:
                 raise DeviceFault(
                     f"{self._port.name} keeps sending, {TALKS_S:g} s after the command to close its channel; allowed "
-                    f"is a pause of {1e3 * QUIET_S:g} ms. It is no Lawicel adapter, or its baud rate differs. Are the "
-                    "ports of gyroscope and adapter swapped (bench.amplifier.can.channel)?"
+                    f"is a pause of {1e3 * QUIET_S:g} ms. It is not a Lawicel adapter, or its baud rate "
+                    "differs. Are the ports of gyroscope and adapter swapped (bench.amplifier.can.channel)?"
                 )
         self._ask(lawicel.BIT_RATE_CODES[bitrate])
         self._ask("Z1" if timestamps else "Z0", may_refuse=not timestamps)

@@ -69,7 +69,7 @@ class ExcitationConfig(Section):
                 count = planned.duration_s * self.sample_rate_hz
                 raise ValueError(
                     f"sets.{number}: {planned.duration_s:g} s are {count:.3g} samples at {self.sample_rate_hz:g} Hz, "
-                    "from which nothing can be identified: duration_s has to be at least "
+                    "too few to identify from: duration_s has to be at least "
                     f"{LEAST_SAMPLES / self.sample_rate_hz:g} s"
                 )
         return self

@@ -51,8 +51,7 @@ class Config(Section):
             raise ValueError(
                 "inertia_unknown is true: its numbers are per unit of an inertia that nobody gave, so what a torque "
                 "would move cannot be predicted; multiply damping, stiffness and all that is in N m (N m s/rad, "
-                "...) by "
-                "the platform's inertia, set inertia_kg_m2 to it and take inertia_unknown out"
+                "...) by the platform's inertia, set inertia_kg_m2 to it and take inertia_unknown out"
             )
         return model
 

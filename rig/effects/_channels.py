@@ -158,19 +158,19 @@ def declare(channels: Iterable[Channel], is_taken: Callable[[str], bool]) -> Non
 
 def make(channel: Channel, way: str) -> Effect:
     """The effect that a channel has in one way."""
-    told, words = _WAYS[way], channel.name.replace("_", " ")
+    form, words = _WAYS[way], channel.name.replace("_", " ")
     if way == "drive":
         parameter = Parameter("share", "1", "share of the torque that follows the channel", linear=True)
     else:
-        unit, suffix = _per(told.unit, told.suffix, channel.measured_in)
+        unit, suffix = _per(form.unit, form.suffix, channel.measured_in)
         parameter = Parameter(
             "slope", unit, f"change per {channel.measured_in} of {words}", linear=True, low=-float("inf"), suffix=suffix
         )
     return Effect(
-        name=effect_name(channel.name, way), family=told.family, place=told.place, equation=told.equation,
-        source="first-order dependence on a measured channel", meaning=told.meaning.format(x=words),
-        sign=told.sign.format(x=words), parameters=(parameter,), kernel=told.kernel, lower_order=told.lower_order,
-        separated_by=told.separated_by.format(x=words), reads=channel,
+        name=effect_name(channel.name, way), family=form.family, place=form.place, equation=form.equation,
+        source="first-order dependence on a measured channel", meaning=form.meaning.format(x=words),
+        sign=form.sign.format(x=words), parameters=(parameter,), kernel=form.kernel, lower_order=form.lower_order,
+        separated_by=form.separated_by.format(x=words), reads=channel,
     )  # fmt: skip
 
 

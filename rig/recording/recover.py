@@ -78,9 +78,7 @@ def _read_all(journals: Sequence[Path], lines: list[str]) -> list[JournalContent
 def _account(contents: JournalContents) -> str:
     if contents.closed and not contents.unread_bytes:
         return "complete, closed normally"
-    notes = (
-        [] if contents.closed else [f"its writer was killed: up to {UNWRITTEN_S:g} s before that were never written"]
-    )
+    notes = [] if contents.closed else [f"the program was killed: up to {UNWRITTEN_S:g} s before that were not written"]
     if contents.gaps:
         notes.append(
             f"{contents.gaps} damaged stretch(es), {contents.stray_rows} row(s) behind them belong to no known run and "

@@ -190,8 +190,7 @@ class Probe:
         if not self._is_clear(last.inertia):
             raise SafetyTrip(
                 f"Torque is off. The probe found no clear answer: {asked} gave {peak_deg_s:.3g} deg/s, which "
-                "fits any inertia "
-                f"from {low:.3g} to {high:.3g} kg m2; declared {declared:.3g}, allowed "
+                f"fits any inertia from {low:.3g} to {high:.3g} kg m2; declared {declared:.3g}, allowed "
                 f"{declared / factor:.3g} to {declared * factor:.3g}. High friction hides the scale: raise "
                 "bench.probe.torque_nm, correct model.inertia_kg_m2, or widen bench.probe.inertia_factor. Nothing was "
                 "played."

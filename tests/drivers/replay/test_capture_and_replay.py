@@ -172,7 +172,7 @@ def test_a_capture_without_a_set_or_with_records_of_no_kind_is_refused(bench, tm
     with bench.opened(), bench.armed():
         play(bench, 30)
     path = tmp_path / "raw" / "wire.cap"
-    with pytest.raises(RecordingError, match="ends before the first set had a sample"):
+    with pytest.raises(RecordingError, match="ends before the first sample of a set"):
         recording_from_capture(path)
     path.write_bytes(path.read_bytes().replace(b'"opened"', b'"closed"'))
     with pytest.raises(RecordingError, match="nothing was played"):
