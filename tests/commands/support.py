@@ -10,7 +10,7 @@ import pytest
 import typer
 from typer.testing import CliRunner, Result
 
-from commands.campaign import backends
+from commands.campaign import backends, playing
 from commands.campaign.backends import Stage
 from rig.clock import VirtualClock
 from rig.config.load import LoadedConfig
@@ -48,4 +48,4 @@ def put_on_stage(monkeypatch: pytest.MonkeyPatch, rig: Rig, name: str = "simulat
         yield Stage(rig, VirtualClock())
 
     monkeypatch.setattr(backends, "BACKENDS", {**backends.BACKENDS, name: scripted})
-    monkeypatch.setattr("commands.campaign.playing.BACKENDS", {**backends.BACKENDS, name: scripted})
+    monkeypatch.setattr(playing, "BACKENDS", {**backends.BACKENDS, name: scripted})
