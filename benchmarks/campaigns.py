@@ -18,7 +18,8 @@ from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.signals.prepare import LEAD_IN_S, prepare
 from identify.signals.trace import Trace
-from rig.recording.run import Array, Run
+from rig.arrays import Array
+from rig.recording.run import Run
 
 TRUTH = {"inertia": 0.02, "damping": 0.045, "stiffness": 677.3}
 SETS = ((111.0, 0.5), (111.0, 1.0), (104.0, 3.0), (67.0, 6.0), (42.0, 9.0))  # N m, Hz: within 10 deg and 400 deg/s

@@ -13,10 +13,10 @@ import numpy as np
 from line_chart import Line, panel, svg
 
 from rig import effects
+from rig.arrays import Array
 from rig.dynamics.filters import run_filter
 from rig.dynamics.native import addresses
 from rig.effects import Effect, Parameter, Place
-from rig.recording.run import Array
 
 FOLDER = Path(__file__).parents[1] / "docs" / "effects"
 JCK = (0.02, 0.045, 677.3)  # the paper's platform

@@ -32,8 +32,8 @@ from threadpoolctl import threadpool_limits
 from identify.bounds.identifiability import Information, information_of, together
 from identify.model.parameters import Name
 from identify.signals.trace import Trace
+from rig.arrays import Array
 from rig.platform import Platform
-from rig.recording.run import Array
 
 DELAY_S = 1.5e-3
 MOST_JOINT, MOST_ALONE = 1.10, 1.2

@@ -23,7 +23,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from benchmarks.preloaded import Started, parent
-from drivers.capture import FILE_NAME, MARK, TICK, read_capture
+from drivers.capture.wire_capture import FILE_NAME, MARK, TICK, read_capture
 from rig.errors import RigError
 from rig.recording.journal_reader import read_journal
 

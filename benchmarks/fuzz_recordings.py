@@ -52,10 +52,10 @@ def read_as_eds(path: Path) -> None:
 
 def read_as_capture(path: Path) -> None:
     """As a raw capture, replayed through the drivers."""
-    from drivers.capture_account import account_of  # noqa: PLC0415
+    from drivers.capture.account import summary_of  # noqa: PLC0415
     from drivers.replay import ReplayRig  # noqa: PLC0415
 
-    account_of(path)
+    summary_of(path)
     rig = ReplayRig(path)
     rig.open()
     rig.arm()

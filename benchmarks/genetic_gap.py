@@ -25,10 +25,10 @@ from identify.genetic.per_set import genetic
 from identify.model.structure import Structure
 from identify.signals.prepare import prepare
 from identify.signals.trace import Trace
+from rig.arrays import Array
 from rig.config.identify import GeneticConfig, IdentifyConfig
 from rig.dynamics import TorqueSignal, simulate
 from rig.platform import TERMS, Platform
-from rig.recording.run import Array
 
 SECOND = GeneticConfig(population=500, generations=600, crossover_probability=0.8, mutation_probability=0.05)
 SMALL = GeneticConfig(population=24, generations=40, mutation_probability=0.5)  # one gene, a simulation's worth each

@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from identify.estimate.cross_validation import horizon_s
 from identify.estimate.final_fit import by_output_error
-from rig.recording.run import Array
+from rig.arrays import Array
 
 GYRO = Path(__file__).parents[2] / "shared/data/adis16405_gyro/gyro_counts.npz"
 LOST_SHARE = 0.02

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.emulated import Devices, Host, Recovered, recovered
-from drivers.capture import FILE_NAME
+from drivers.capture.wire_capture import FILE_NAME
 
 SET_S = 1.5
 SHORT = (

@@ -23,12 +23,12 @@ from rig.clock import MonotonicClock
 from rig.config.load import load_config
 from rig.config.root import Config
 from rig.guard import Guard
-from rig.guard_motion import motion_checks
+from rig.guard.motion import motion_checks
 from rig.interface import Torque
-from rig.lateness import Lateness
 from rig.preflight import plan
-from rig.rehearsal import rehearse
 from rig.sequencer import Sequencer
+from rig.sequencer.lateness import Lateness
+from rig.sequencer.warm_up import warm_up
 from sim_backend.emulators.launch import Emulators, on_emulated_ports, started
 
 P99_9 = 0.999
@@ -82,7 +82,7 @@ def bench_loop(config: Config, emulators: Emulators, raw: Path) -> tuple[Latenes
     cpu = SetCpu(rig)
     sets = plan(config.model.platform(), config.excitation, config.limits, rig.rate_full_scale_rad_s)
     platform = config.model.platform()
-    rehearse(Guard(config.limits, motion_checks(config.limits, platform)), platform, sets, 1.0 / PERIOD_S)
+    warm_up(Guard(config.limits, motion_checks(config.limits, platform)), platform, sets, 1.0 / PERIOD_S)
     guard = Guard(config.limits, motion_checks(config.limits, platform))
     played = Sequencer(rig, rig.clock, guard, sample_rate_hz=1.0 / PERIOD_S, rest_s=0.0).play(sets)
     gyro, one = rig.report().gyro, played.statistics[0]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rig.recording.run import Array
+from rig.arrays import Array
 
 Line = tuple[str, Array, Array]  # label, x, y
 COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e")

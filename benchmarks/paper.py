@@ -71,7 +71,7 @@ def played(folder: Path) -> dict[str, list[dict[str, Any]]]:
             out = folder / f"{table}-seed{seed}"
             if not (out / "result.json").exists():
                 print(f"playing {table}, seed {seed}", file=sys.stderr)
-                command = [sys.executable, "-c", "from identify.cli import main; main()"]
+                command = [sys.executable, "-c", "from commands.identify_run import main; main()"]
                 config = str(ROOT / "examples" / f"{table}.yaml")
                 subprocess.run([*command, config, "--seed", str(seed), "--quiet", "--out", str(out)], check=True)
             found[table].append(json.loads((out / "result.json").read_text(encoding="utf-8")))

@@ -38,8 +38,8 @@ from threadpoolctl import threadpool_limits
 
 from identify.bounds.identifiability import information_of, together
 from identify.signals.trace import Trace
+from rig.arrays import Array
 from rig.platform import Platform
-from rig.recording.run import Array
 
 UPSAMPLING = 8
 DELAY_S = 1.5e-3

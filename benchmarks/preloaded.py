@@ -131,7 +131,7 @@ def _child(request: dict[str, Any]) -> int:
     sys.argv = ["rig", *request["argv"]]
     if request["program"] == "host":
         _as_host()
-    from rig.cli import main as rig  # noqa: PLC0415  loaded already
+    from commands.rig import main as rig  # noqa: PLC0415  loaded already
 
     try:
         rig()
@@ -143,8 +143,8 @@ def _child(request: dict[str, Any]) -> int:
 def _load() -> None:
     """Everything that a command needs, compiled functions included."""
     time.monotonic = lambda: monotonic() + jumped[0]
-    import rig.cli.app  # noqa: PLC0415
-    import rig.cli.play  # noqa: F401, PLC0415
+    import commands.rig.app  # noqa: PLC0415
+    import commands.rig.play  # noqa: F401, PLC0415
     from rig.config.load import load_config  # noqa: PLC0415
     from rig.preflight import plan  # noqa: PLC0415
     from sim_backend.emulators.bench import EmulatedBench  # noqa: PLC0415

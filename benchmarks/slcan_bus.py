@@ -21,7 +21,7 @@ import can
 from can.interfaces.slcan import slcanBus
 
 from drivers.codecs.lawicel import CanFrame, encode_frame
-from drivers.slcan import SlcanBulkBus
+from drivers.transport.slcan import SlcanBulkBus
 from sim_backend.emulators.adapter import LawicelAdapter
 from sim_backend.emulators.pty_port import PtyPort
 

@@ -19,9 +19,10 @@ from campaigns import SETS, SIGMA_RAD_S, TRUTH, run_of, times
 from stick_slip import StickSlip
 
 from identify.pipeline import identify
+from rig.arrays import Array
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
-from rig.recording.run import Array, Recording
+from rig.recording.run import Recording
 
 FRICTION = {"coulomb": 1.2, "static": 2.4, "speed": 0.08}
 FACTORS = (0.33, 1.0, 3.0)

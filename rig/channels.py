@@ -68,5 +68,5 @@ class Channel:
 def name_fault(name: str) -> str:
     """What is wrong with a channel's name; empty where nothing is."""
     if not _NAME.fullmatch(name):
-        return f"{name[:60]!r} is no name for a channel: lower-case letters, digits and _, beginning with a letter"
+        return f"{name[:60]!r} is not a name for a channel: lower-case letters, digits and _, beginning with a letter"
     return ""

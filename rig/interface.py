@@ -25,7 +25,7 @@ from enum import Enum
 from typing import Any, NamedTuple, Self
 
 from rig.config.bench import ProbeConfig
-from rig.recording.run import TorqueHold
+from rig.signals import TorqueHold
 
 TorqueOfTime = Callable[[Any], Any]  # seconds since the start of the set (float or array) -> N m, same shape
 NO_CHANNELS: Mapping[str, float] = {}

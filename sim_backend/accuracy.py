@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.excitation import Sine
 from rig.platform import Platform
-from rig.recording.run import Array
 from sim_backend.plant import RATE, Plant
 
 TICK_S = 1e-3

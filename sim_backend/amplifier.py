@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.config.simulated import AnyAmplifier, HoldAmplifier, IdealAmplifier, MotorAmplifier
 from rig.interface import TorqueOfTime, TorqueSample
-from rig.recording.run import Array, TorqueHold
+from rig.signals import TorqueHold
 from sim_backend.motor import motor_state
 
 if TYPE_CHECKING:

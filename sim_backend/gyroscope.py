@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.interface import GyroSample
-from rig.recording.run import Array
 
 if TYPE_CHECKING:
     from rig.config.simulated import SimulatedGyro

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.dynamics import native
-from rig.recording.run import Array
 
 if TYPE_CHECKING:
     from rig.config.simulated import MotorAmplifier

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.dynamics import Equations, integrator, native
 from rig.dynamics.filters import through_filters
 from rig.errors import ConfigError
 from rig.platform import Platform
-from rig.recording.run import Array
 from sim_backend.motor import MotorState, motor_torque
 
 ANGLE, RATE, SENSED, TORQUE = range(4)  # columns of what Plant.follow and its like return

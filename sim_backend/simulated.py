@@ -14,12 +14,12 @@ from rig.channels import Channel
 from rig.config.simulated import SimulatedConfig
 from rig.errors import ConfigError, DeviceFault
 from rig.interface import Exchange, GyroSample, Rig, Statement, Torque, TorqueOfTime, TorqueSample
-from rig.recording.run import TorqueHold
+from rig.signals import TorqueHold
 from sim_backend import amplifier
 from sim_backend.gyroscope import Gyroscope
 from sim_backend.plant import SENSED, Plant
 
-HIGHEST_COMMON_RATE_HZ = 100_000
+HIGHEST_COMMON_RATE_HZ = 100_000  # steps a second that are still simulated in seconds
 
 
 class SimulatedRig(Rig):
@@ -56,7 +56,7 @@ class SimulatedRig(Rig):
     def statement(self) -> Statement:
         """Torque is SIMULATED."""
         kind = self._config.amplifier.kind
-        held = [f"{name} held at {reading:g}, where its effects do nothing" for name, reading in self._held.items()]
+        held = [f"{name} held at {reading:g}, where its effects are zero" for name, reading in self._held.items()]
         devices = ("simulated platform", f"{kind} amplifier", "simulated gyroscope", *held)
         return Statement(Torque.SIMULATED, devices)
 

@@ -14,13 +14,13 @@ from drivers.amplifiers.cia402_status import DriveStatus
 from drivers.amplifiers.moteus import decode_registers
 from drivers.amplifiers.torque_clock import TorqueClock
 from drivers.amplifiers.vesc import decode_status
-from drivers.can_link import Heard
-from drivers.capture import pack_frame, unpack_frame
+from drivers.capture.wire_capture import pack_frame, unpack_frame
 from drivers.codecs import cia402, lawicel, odrive_cansimple
 from drivers.codecs.lawicel import CanFrame, LawicelDecoder
 from drivers.gyroscopes import make_gyroscope
-from drivers.hindsight import LARGEST_CORRECTION_S
-from drivers.source_clock import SourceClock
+from drivers.timing.retiming import LARGEST_CORRECTION_S
+from drivers.timing.source_clock import SourceClock
+from drivers.transport.can_link import ReceivedFrame
 from rig.config.bench import AmplifierConfig, CanConfig, GyroscopeConfig
 from rig.errors import DeviceFault
 
@@ -87,7 +87,7 @@ def frames_of(data: bytes) -> list[CanFrame]:
 
 def _drive(amplifier: Amplifier, data: bytes) -> None:
     for k, frame in enumerate(frames_of(data)):
-        amplifier.receive(Heard(k * 1e-3, frame))
+        amplifier.receive(ReceivedFrame(k * 1e-3, frame))
         actual = amplifier.actual_torque_nm
         assert actual is None or isinstance(actual, float)
         try:
@@ -144,7 +144,7 @@ def cia402_frames(data: bytes) -> int:
     status = DriveStatus(1, 0.1, "drive")
     status.begin(0.0)
     for k, frame in enumerate(frames_of(data)):
-        rest = status.receive(Heard(k * 1e-3, frame))
+        rest = status.receive(ReceivedFrame(k * 1e-3, frame))
         assert rest is None or rest == frame.data[2:]
         if len(frame.data) >= 2:
             word = int.from_bytes(frame.data[:2], "little")
@@ -169,14 +169,14 @@ def cia402_frames(data: bytes) -> int:
 def clocks(data: bytes) -> int:
     """Counters that jump, run backwards or stand still, at times that do the same: every time stays a number.
 
-    What is said of the times in hindsight is in order and near what was recorded.
+    What is said of the times in clock is in order and near what was recorded.
     """
     source, torque = SourceClock(1e-3), TorqueClock(1e-6, 1 << 32)
     gyro = make_gyroscope(GyroscopeConfig(sample_rate_hz=2000))
-    both = (torque.hindsight, gyro.hindsight)
+    both = (torque.retiming, gyro.retiming)
     count, now_s, at = 0, 100.0, 0
-    for hindsight in both:
-        hindsight.begin_set(now_s)
+    for clock in both:
+        clock.begin_set(now_s)
     while at + 8 <= len(data):
         kind, counter, latency, step, wait = struct.unpack_from("<BBHhh", data, at)
         at += 8
@@ -184,12 +184,12 @@ def clocks(data: bytes) -> int:
         now_s = min(max(now_s + wait * scale, 0.0), 1e9)
         count = min(max(count + (step << kind % 24), -(1 << 62)), 1 << 62)
         if kind & 16:
-            for hindsight in both:
-                hindsight.settle()
+            for clock in both:
+                clock.end_tick()
         if counter == ANOTHER_SET:
-            for hindsight in both:
-                hindsight.end_set()
-                hindsight.begin_set(now_s)
+            for clock in both:
+                clock.end_set()
+                clock.begin_set(now_s)
         if kind & 32:
             source.observe(count, now_s)
             assert math.isfinite(source.host_time_s(count)), "the device's clock was lost"
@@ -198,15 +198,15 @@ def clocks(data: bytes) -> int:
         if kind & 64:
             if kind & 128:
                 torque.asked(now_s)
-            assert math.isfinite(torque.heard(count & 0xFFFFFFFF, now_s))
+            assert math.isfinite(torque.received(count & 0xFFFFFFFF, now_s))
             continue
         body = b"\x90" + bytes(10) + bytes([counter]) + latency.to_bytes(2, "big")
         for sample in gyro.feed(body + checksums.stim300_crc(body).to_bytes(4, "big"), now_s):
             assert math.isfinite(sample.time_s)
-    for hindsight in both:
-        hindsight.settle()
-        hindsight.end_set()
-        for one in hindsight.refined():
+    for clock in both:
+        clock.end_tick()
+        clock.end_set()
+        for one in clock.retimed_sets():
             assert len(one.recorded_s) == len(one.refined_s) > 0
             assert np.all(np.diff(one.recorded_s) > 0.0) and np.all(np.diff(one.refined_s) > 0.0), "times out of order"
             assert np.max(np.abs(one.refined_s - one.recorded_s)) <= LARGEST_CORRECTION_S + 1e-9, "too far"

@@ -19,7 +19,7 @@ import h5py
 import numpy as np
 import scipy.io
 
-from drivers.capture import Capture
+from drivers.capture.wire_capture import Capture
 from drivers.codecs import stim300
 from drivers.codecs.lawicel import CanFrame
 from rig.recording import Journal, Recording, Run

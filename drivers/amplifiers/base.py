@@ -5,10 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
-from drivers.bounded import FirstAndLast
-from drivers.can_link import CanLink, Heard
+from drivers.bounded_log import FirstAndLast
 from drivers.codecs.lawicel import CanFrame
-from drivers.hindsight import Hindsight
+from drivers.timing.retiming import ClockRetiming
+from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import AmplifierConfig
 from rig.interface import TorqueSample
 
@@ -62,7 +62,7 @@ class Amplifier(ABC):
         return FirstAndLast()
 
     @property
-    def hindsight(self) -> Hindsight | None:
+    def retiming(self) -> ClockRetiming | None:
         """What is needed to stamp the reported torques anew; None where the drive has no clock."""
         return None
 
@@ -94,7 +94,7 @@ class Amplifier(ABC):
         """A frame of ours was handed over at this time; called for every one of them."""
 
     @abstractmethod
-    def receive(self, heard: Heard) -> None:
+    def receive(self, heard: ReceivedFrame) -> None:
         """Take note of a frame from the bus."""
 
     @abstractmethod

@@ -9,9 +9,9 @@ from typing import Any
 import canopen
 from canopen.sdo import SdoAbortedError, SdoClient, SdoCommunicationError
 
-from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
-from drivers.ports import MOST_QUOTED
+from drivers.transport.can_link import CanLink, ReceivedFrame
+from drivers.transport.ports import MOST_QUOTED
 from rig.errors import ConfigError, DeviceFault
 
 MAX_EDS_BYTES = 4 << 20  # the largest of the trade have one
@@ -50,7 +50,7 @@ class PolledNetwork(canopen.Network):
         self._link = link
         link.listeners.append(self._hear)
 
-    def _hear(self, heard: Heard) -> None:
+    def _hear(self, heard: ReceivedFrame) -> None:
         frame = heard.frame
         if not frame.remote and not frame.extended:
             self.notify(frame.identifier, bytearray(frame.data), heard.time_s)
@@ -73,7 +73,7 @@ def read_dictionary(path: Path, node: int) -> canopen.ObjectDictionary:
             raise ConfigError(f"bench.amplifier.settings.eds: there is no file {path}")
         if not path.is_file() or path.stat().st_size > MAX_EDS_BYTES:
             raise ConfigError(
-                f"bench.amplifier.settings.eds: {path} is no regular file of at most {MAX_EDS_BYTES >> 20} MiB: "
+                f"bench.amplifier.settings.eds: {path} is not a regular file of at most {MAX_EDS_BYTES >> 20} MiB: "
                 "give the EDS or DCF of the drive's maker"
             )
         return canopen.import_od(str(path), node_id=node)

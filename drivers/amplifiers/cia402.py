@@ -17,24 +17,24 @@ from drivers.amplifiers.cia402_setup import (
     NMT_PRE_OPERATIONAL,
     NMT_START,
     PER_MILLE,
-    Agreed,
+    AgreedSetup,
     Cia402Settings,
     Cia402Setup,
 )
 from drivers.amplifiers.cia402_status import NMT_OPERATIONAL, DriveStatus
 from drivers.amplifiers.torque_clock import TorqueClock
-from drivers.bounded import FirstAndLast
-from drivers.can_link import CanLink, Heard
+from drivers.bounded_log import FirstAndLast
 from drivers.codecs import cia402
 from drivers.codecs.cia402 import State
 from drivers.codecs.lawicel import CanFrame
-from drivers.hindsight import Hindsight
 from drivers.settings import read_settings
+from drivers.timing.retiming import ClockRetiming
+from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 from rig.interface import TorqueSample
 
-BEATS_PER_WATCHDOG = 4
+BEATS_PER_WATCHDOG = 4  # heartbeats within the watchdog: three may be lost
 STAMP_UNIT_S, STAMP_MODULUS = 1e-6, 1 << 32  # of 0x1013
 
 
@@ -47,7 +47,7 @@ class Cia402(Amplifier):
         super().__init__(config)
         self.settings = read_settings(Cia402Settings, config.settings, "bench.amplifier.settings")
         if not 1 <= config.node <= 127:
-            raise ConfigError(f"bench.amplifier.node: {config.node} is no CANopen node, allowed are 1 to 127")
+            raise ConfigError(f"bench.amplifier.node: {config.node} is not a CANopen node, allowed are 1 to 127")
         if config.node == self.settings.host_node:
             raise ConfigError(
                 f"bench.amplifier.settings.host_node: {config.node} is the drive's own node number; choose another"
@@ -58,7 +58,7 @@ class Cia402(Amplifier):
         self._setup.dictionary()  # a file that is not there, or says that the drive cannot do it, is refused at once
         self._status = DriveStatus(node, self.settings.drive_heartbeat_ms * 1e-3, self.label)
         self._clock = TorqueClock(STAMP_UNIT_S, STAMP_MODULUS)
-        self._agreed: Agreed | None = None
+        self._agreed: AgreedSetup | None = None
         self._rpdo_id = 0x200 + node
         self._host_beat = CanFrame(0x700 + self.settings.host_node, bytes([NMT_OPERATIONAL]))
         self._sync = CanFrame(0x80, b"")
@@ -123,7 +123,7 @@ class Cia402(Amplifier):
         status.begin(link.clock())
         self._armed = True
 
-    def _contacted(self) -> Agreed:
+    def _contacted(self) -> AgreedSetup:
         if self._agreed is None:
             raise DeviceFault(f"{self.label} was not contacted before: open the bench first")
         return self._agreed
@@ -185,8 +185,8 @@ class Cia402(Amplifier):
         )
         if not off:
             raise DeviceFault(
-                f"{self.label} still says 'operation enabled' (statusword 0x{self.statusword:04X}) after it was "
-                "told to disable: PRESS THE EMERGENCY STOP and check the drive"
+                f"{self.label} still reports 'operation enabled' (statusword 0x{self.statusword:04X}) after it was "
+                "commanded to disable: PRESS THE EMERGENCY STOP and check the drive"
             )
         link.send([CanFrame(0, bytes([NMT_PRE_OPERATIONAL, self.config.node]))])
         # It is off and was seen to be: stop watching, or it would report a fault when we fall silent.
@@ -246,11 +246,11 @@ class Cia402(Amplifier):
         return self._agreed is not None and self._agreed.stamped
 
     @property
-    def hindsight(self) -> Hindsight | None:
+    def retiming(self) -> ClockRetiming | None:
         """Of its 0x1013."""
-        return self._clock.hindsight if self.stamps_torque else None
+        return self._clock.retiming if self.stamps_torque else None
 
-    def receive(self, heard: Heard) -> None:
+    def receive(self, heard: ReceivedFrame) -> None:
         """Status, actual torque with its time, heartbeat, emergencies."""
         values = self._status.receive(heard)
         if values is None or len(values) < 2 or self._agreed is None:
@@ -258,7 +258,7 @@ class Cia402(Amplifier):
         self._actual = int.from_bytes(values[:2], "little", signed=True)
         time_s = heard.time_s
         if self._agreed.stamped and len(values) >= 6:
-            time_s = self._clock.heard(int.from_bytes(values[2:6], "little"), heard.time_s)
+            time_s = self._clock.received(int.from_bytes(values[2:6], "little"), heard.time_s)
         self._reported.append(TorqueSample(time_s, self._in_nm(self._actual)))
 
     def _why(self) -> str:

@@ -107,7 +107,7 @@ def _choose_mode(dictionary: canopen.ObjectDictionary, wish: ModeWish, supported
     wanted = _WISHES[wish]
     bits = supported_modes if supported_modes is not None else _default(dictionary, cia402.SUPPORTED_MODES)
     if bits is None:
-        return wanted[0], f"no 0x6502 (supported modes): {cia402.MODE_NAMES[wanted[0]]} is taken on trust"
+        return wanted[0], f"no 0x6502 (supported modes): {cia402.MODE_NAMES[wanted[0]]} is assumed"
     for mode in wanted:
         if bits & cia402.MODE_BITS[mode]:
             return mode, ""

@@ -11,10 +11,10 @@ from pydantic import Field
 
 from drivers.amplifiers.canopen_node import RemoteObjects, read_dictionary
 from drivers.amplifiers.cia402_plan import DrivePlan, ModeWish, plan_drive, standard_dictionary
-from drivers.can_link import CanLink
 from drivers.codecs import cia402
 from drivers.codecs.lawicel import CanFrame
 from drivers.settings import Settings
+from drivers.transport.can_link import CanLink
 from rig.errors import ConfigError, DeviceFault
 
 NMT_START, NMT_PRE_OPERATIONAL = 0x01, 0x80
@@ -58,7 +58,7 @@ class Cia402Settings(Settings):
 
 
 @dataclass(frozen=True)
-class Agreed:
+class AgreedSetup:
     """What was found out and set: torques at the motor; ``stamped`` where 0x1013 comes with the torque."""
 
     objects: RemoteObjects
@@ -95,7 +95,7 @@ class Cia402Setup:
             raise ConfigError(f"bench.amplifier.settings.eds: {s.eds}: {error}") from None
         return found
 
-    def run(self, link: CanLink) -> Agreed:
+    def run(self, link: CanLink) -> AgreedSetup:
         """All of it. Raises DeviceFault where the drive does not answer or cannot do what is needed."""
         s, node = self._settings, self._node
         dictionary = self.dictionary()
@@ -110,7 +110,7 @@ class Cia402Setup:
         objects.write(cia402.MODE, 0, plan.mode, 1)
         link.send([CanFrame(0, bytes([NMT_START, node]))])
         notes = (*plan.fallbacks, *([] if profile == 402 else [f"0x1000 says profile {profile}, not 402"]))
-        return Agreed(objects, plan, reference_nm, peak_nm, stamped, notes)
+        return AgreedSetup(objects, plan, reference_nm, peak_nm, stamped, notes)
 
     def _plan(self, dictionary: Any, modes: int | None) -> DrivePlan:
         s = self._settings
@@ -151,8 +151,8 @@ class Cia402Setup:
         objects.write(cia402.HEARTBEAT_CONSUMER, 1, wanted, 4)
         if objects.read(cia402.HEARTBEAT_CONSUMER, 1) != wanted:
             raise DeviceFault(
-                f"{self._label} did not keep its heartbeat consumer (0x1016:01): it would go on driving when this "
-                "computer dies. Refused; use a drive or firmware that has one."
+                f"{self._label} did not keep its heartbeat consumer (0x1016:01): it would keep driving if this "
+                "computer fails. Refused; use a drive or firmware that has one."
             )
         if objects.read_if_there(cia402.ABORT_CONNECTION_OPTION) is not None:
             objects.write(cia402.ABORT_CONNECTION_OPTION, 0, s.on_lost_host, 2)
@@ -171,7 +171,7 @@ class Cia402Setup:
             raise DeviceFault(
                 f"{self._label} has no 0x6007 and "
                 + ("no 0x1029" if behaviour is None else "its 0x1029:01 stays 1 (no change)")
-                + ": nothing makes it cut the torque when this computer dies. Refused; use another drive or firmware."
+                + ": nothing makes it cut the torque if this computer fails. Refused; use another drive or firmware."
             )
 
     def _map(self, objects: RemoteObjects, plan: DrivePlan) -> bool:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from drivers.bounded import FirstAndLast
-from drivers.can_link import Heard
+from drivers.bounded_log import FirstAndLast
 from drivers.codecs import cia402
 from drivers.codecs.cia402 import State
+from drivers.transport.can_link import ReceivedFrame
 from rig.errors import DeviceFault
 
 NMT_OPERATIONAL = 0x05
-MISSED_BEATS = 3.0
+MISSED_BEATS = 3.0  # periods of the heartbeat without one: the drive is silent
 
 
 class DriveStatus:
@@ -42,7 +42,7 @@ class DriveStatus:
         self._last_beat_s = now_s
         self._nmt_state = None  # the last heartbeat may have been sent before the drive was started
 
-    def receive(self, heard: Heard) -> bytes | None:
+    def receive(self, heard: ReceivedFrame) -> bytes | None:
         """Take note of a frame; the bytes behind the statusword where it was the status PDO."""
         can_id, data = heard.frame.identifier, heard.frame.data
         if can_id == self._tpdo_id and len(data) >= 2:

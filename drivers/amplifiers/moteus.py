@@ -2,7 +2,7 @@
 
 Register protocol (docs/protocol/registers.md of the firmware). Its watchdog latches mode 11 ("position
 timeout") a tenth of a second after the last command and holds it until a stop: that is the drive-side guard,
-armed as delivered, and proved when it is armed here: with zero torque commanded, this computer falls silent once
+armed as delivered, and tested when the drive is armed here: with zero torque commanded, this computer falls silent once
 and a controller that goes on as if nothing were is refused. Needs an adapter for CAN-FD with bit-rate switching
 (``can.interface`` socketcan, ...).
 """
@@ -16,16 +16,16 @@ from typing import Annotated
 from pydantic import Field
 
 from drivers.amplifiers.base import Amplifier
-from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
 from drivers.settings import Settings, read_settings
+from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 
 MODE_STOPPED, MODE_FAULT, MODE_POSITION, MODE_TIMEOUT = 0, 1, 10, 11
-ANSWER_TIMEOUT_S = 0.1
-SILENT_S = 0.05
-PROOF_FACTOR = 1.5
+ANSWER_TIMEOUT_S = 0.1  # s, far beyond a round trip on the bus; chosen, not derived
+SILENT_S = 0.05  # fifty ticks at 1 kHz without an answer
+PROOF_FACTOR = 1.5  # of the watchdog, before the drive must have tripped
 
 _WRITE_I8_1 = 0x01  # write one int8 register
 _WRITE_F32_1, _WRITE_F32_2 = 0x0D, 0x0E
@@ -150,7 +150,7 @@ class Moteus(Amplifier):
             raise DeviceFault(f"{self.label} does not answer: check its supply, id and the CAN-FD bit rates (1/5 M)")
         return [
             f"peak {self.peak_torque_nm:.4g} N m as declared, watchdog {self.config.watchdog_ms} ms in each frame, "
-            "proved when it is armed"
+            "tested when the drive is armed"
         ]
 
     def arm(self, link: CanLink) -> None:
@@ -169,8 +169,9 @@ class Moteus(Amplifier):
         if not heard or self.mode != MODE_TIMEOUT:
             link.send(self.off_frames())
             raise DeviceFault(
-                f"{self.label} goes on without a sign of life of this computer (mode {self.mode}, {MODE_TIMEOUT} "
-                "expected): refused. Its firmware has to keep the watchdog of the position command (register 0x027)."
+                f"{self.label} keeps running without a sign of life from this computer (mode {self.mode}, "
+                f"{MODE_TIMEOUT} expected): refused. Its firmware has to keep the watchdog of the position command "
+                "(register 0x027)."
             )
 
     def _bring_to(self, link: CanLink, body: bytes, mode: int) -> None:
@@ -193,7 +194,7 @@ class Moteus(Amplifier):
             return None
         return self.shaft_nm(struct.unpack_from("<f", frame.data, 16)[0])
 
-    def receive(self, heard: Heard) -> None:
+    def receive(self, heard: ReceivedFrame) -> None:
         """A reply of this controller."""
         if heard.frame.identifier != self._reply_id or not heard.frame.extended:
             return
@@ -221,4 +222,4 @@ class Moteus(Amplifier):
         """Stop, and read the mode back."""
         self._armed = False
         if not self._ask(link, encode_stop()) or not link.wait(ANSWER_TIMEOUT_S, lambda: self.mode == MODE_STOPPED):
-            raise DeviceFault(f"{self.label} does not say that it has stopped: PRESS THE EMERGENCY STOP")
+            raise DeviceFault(f"{self.label} does not confirm that it has stopped: PRESS THE EMERGENCY STOP")

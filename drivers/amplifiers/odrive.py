@@ -13,17 +13,17 @@ from typing import Annotated
 from pydantic import Field
 
 from drivers.amplifiers.base import Amplifier
-from drivers.can_link import CanLink, Heard
 from drivers.codecs import odrive_cansimple as wire
 from drivers.codecs.lawicel import CanFrame
 from drivers.codecs.odrive_cansimple import Command
 from drivers.settings import Settings, read_settings
+from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 
 WATCHDOG_EXPIRED = 0x800
-HEARTBEAT_S = 0.1
-PROOF_FACTOR = 1.5
+HEARTBEAT_S = 0.1  # CANSimple as delivered (heartbeat_msg_rate_ms)
+PROOF_FACTOR = 1.5  # of the watchdog, before the drive must have tripped
 
 
 class OdriveSettings(Settings):
@@ -41,7 +41,7 @@ class Odrive(Amplifier):
         super().__init__(config)
         self.settings = read_settings(OdriveSettings, config.settings, "bench.amplifier.settings")
         if config.node > 63:
-            raise ConfigError(f"bench.amplifier.node: {config.node} is no ODrive node, allowed are 0 to 63")
+            raise ConfigError(f"bench.amplifier.node: {config.node} is not an ODrive node, allowed are 0 to 63")
         self.label = f"ODrive, node {config.node}"
         self._torque_id = self._id(Command.SET_INPUT_TORQUE)
         self._beat: wire.Heartbeat | None = None
@@ -77,14 +77,15 @@ class Odrive(Amplifier):
         if self.receive not in link.listeners:
             link.listeners.append(self.receive)
         if not link.wait(5 * HEARTBEAT_S, lambda: self._beat is not None):
-            raise DeviceFault(f"{self.label} is not heard: check its supply, node number, CAN bit rate and wiring")
+            raise DeviceFault(f"{self.label} is silent: check its supply, node number, CAN bit rate and wiring")
         link.send([
             self._frame(Command.CLEAR_ERRORS),
             self._frame(Command.SET_CONTROLLER_MODE, wire.CONTROL_TORQUE, wire.INPUT_PASSTHROUGH),
         ])  # fmt: skip
         return [
             f"torque control, peak {self.peak_torque_nm:.4g} N m as declared",
-            f"watchdog of {self.config.watchdog_ms} ms: CANSimple cannot read it, so it is proved when it is armed",
+            f"watchdog of {self.config.watchdog_ms} ms: CANSimple cannot read it, so it is tested when the "
+            "drive is armed",
         ]
 
     def arm(self, link: CanLink) -> None:
@@ -121,8 +122,8 @@ class Odrive(Amplifier):
         if not tripped:
             link.send(self.off_frames())
             raise DeviceFault(
-                f"{self.label} goes on without a sign of life of this computer: refused. Switch its watchdog on "
-                "(odrivetool: axis0.config.enable_watchdog = True, watchdog_timeout = "
+                f"{self.label} keeps running without a sign of life from this computer: refused. Switch its "
+                "watchdog on (odrivetool: axis0.config.enable_watchdog = True, watchdog_timeout = "
                 f"{self.config.watchdog_ms * 1e-3:g}, save_configuration())"
             )
 
@@ -139,7 +140,7 @@ class Odrive(Amplifier):
             return None
         return self.shaft_nm(wire.decode(Command.SET_INPUT_TORQUE, frame.data)[0])
 
-    def receive(self, heard: Heard) -> None:
+    def receive(self, heard: ReceivedFrame) -> None:
         """Heartbeat and current."""
         node, command = wire.split(heard.frame.identifier)
         if node != self.config.node or heard.frame.extended:
@@ -182,5 +183,5 @@ class Odrive(Amplifier):
         )
         if not off:
             raise DeviceFault(
-                f"{self.label} does not say that it is idle ({self._how_it_is()}): PRESS THE EMERGENCY STOP"
+                f"{self.label} does not confirm that it is idle ({self._how_it_is()}): PRESS THE EMERGENCY STOP"
             )

@@ -12,13 +12,13 @@ import math
 import statistics
 from collections import deque
 
-from drivers.hindsight import OWN_LINE, Hindsight
-from drivers.source_clock import SourceClock
+from drivers.timing.retiming import OWN_LINE, ClockRetiming
+from drivers.timing.source_clock import SourceClock
 
-BLOCK_S = 0.25
-BLOCKS_KEPT = 240
-MOST_UNANSWERED = 16
-FAST_SHARE = 0.1
+BLOCK_S = 0.25  # as in drivers.timing.source_clock
+BLOCKS_KEPT = 240  # a minute
+MOST_UNANSWERED = 16  # requests that wait for an answer
+FAST_SHARE = 0.1  # of the answers of a block; the fastest one may be a slip
 
 
 class TorqueClock:
@@ -34,7 +34,7 @@ class TorqueClock:
 
     def __init__(self, unit_s: float, modulus: int) -> None:
         self._back = SourceClock(unit_s)
-        self.hindsight = Hindsight(self._back)
+        self.retiming = ClockRetiming(self._back)
         self._unit_s, self._modulus = unit_s, modulus
         self._stamp: int | None = None
         self._asked_s: deque[float] = deque(maxlen=MOST_UNANSWERED)
@@ -49,7 +49,7 @@ class TorqueClock:
         """A request to apply and stamp was handed over."""
         self._asked_s.append(at_s)
 
-    def heard(self, stamp: int, heard_s: float) -> float:
+    def received(self, stamp: int, heard_s: float) -> float:
         """Host time of a stamp that was heard at ``heard_s``; later than every one before."""
         before = self._stamp if self._stamp is not None else stamp
         self._stamp = before + (stamp - before) % self._modulus
@@ -62,14 +62,14 @@ class TorqueClock:
         if len(before_it) == 1:  # two at once cannot be told apart
             self._note_way(stamped_s - before_it[0], heard_s)
         source_s = self._stamp * self._unit_s
-        self.hindsight.observe(source_s, heard_s, before_it[0] if len(before_it) == 1 else math.nan)
+        self.retiming.observe(source_s, heard_s, before_it[0] if len(before_it) == 1 else math.nan)
         line = self._back.fits + self._ways_known
         # Set points that the drive took up together carry one stamp; the last of them is the one that holds.
         time_s = stamped_s - self.way_s
         if time_s < self._last_s + self._unit_s:
             time_s, line = self._last_s + self._unit_s, OWN_LINE
         self._last_s = time_s
-        self.hindsight.stamped(time_s, source_s, line)
+        self.retiming.record(time_s, source_s, line)
         return time_s
 
     def _note_way(self, way_s: float, now_s: float) -> None:

@@ -14,16 +14,16 @@ from typing import Annotated
 from pydantic import Field
 
 from drivers.amplifiers.base import Amplifier
-from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
 from drivers.settings import Settings, read_settings
+from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 
 SET_CURRENT, STATUS, STATUS_4 = 1, 9, 16
-STATUS_TIMEOUT_S = 0.5
-SILENT_S = 0.25
-ZERO_CURRENT_A = 0.5
+STATUS_TIMEOUT_S = 0.5  # s, chosen, not derived
+SILENT_S = 0.25  # s without a status message; chosen, not derived
+ZERO_CURRENT_A = 0.5  # A; what counts as zero; chosen, not derived
 
 
 def encode_current(current_a: float) -> bytes:
@@ -137,7 +137,7 @@ class Vesc(Amplifier):
         milliamperes: int = struct.unpack(">i", frame.data)[0]
         return self.shaft_nm(milliamperes * 1e-3 * self.settings.torque_constant_nm_a)
 
-    def receive(self, heard: Heard) -> None:
+    def receive(self, heard: ReceivedFrame) -> None:
         """Status frames."""
         frame = heard.frame
         if not frame.extended or len(frame.data) != 8:

@@ -55,7 +55,7 @@ def encode_service_command(command: str, *parameters: object) -> bytes:
         If the letter is not a service-mode command.
     """
     if command not in SERVICE_COMMANDS:
-        raise ValueError(f"{command!r} is no service-mode command; allowed: {' '.join(SERVICE_COMMANDS)}")
+        raise ValueError(f"{command!r} is not a service-mode command; allowed: {' '.join(SERVICE_COMMANDS)}")
     text = ",".join(str(p) for p in parameters)
     if not text.isprintable():
         raise ValueError(f"service-mode parameters must be printable, got {text!r}")

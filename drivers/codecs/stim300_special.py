@@ -119,9 +119,7 @@ def decode_configuration(packet: bytes) -> Stim300Configuration:
             ),
         )
     except KeyError as unknown:
-        raise ValueError(
-            f"STIM300 configuration datagram {packet.hex()}: no meaning known for the code {unknown}"
-        ) from None
+        raise ValueError(f"STIM300 configuration datagram {packet.hex()}: unknown code {unknown}") from None
 
 
 def encode_configuration(configuration: Stim300Configuration) -> bytes:

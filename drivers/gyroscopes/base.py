@@ -12,10 +12,10 @@ from abc import ABC, abstractmethod
 from collections import deque
 from typing import NamedTuple
 
-from drivers.bounded import FirstAndLast
+from drivers.bounded_log import FirstAndLast
 from drivers.codecs.framing import Matcher, StreamFramer
-from drivers.hindsight import Hindsight
-from drivers.source_clock import SourceClock
+from drivers.timing.retiming import ClockRetiming
+from drivers.timing.source_clock import SourceClock
 from rig.config.bench import GyroscopeConfig
 from rig.errors import ConfigError
 from rig.interface import GyroSample, LowPass
@@ -23,7 +23,7 @@ from rig.interface import GyroSample, LowPass
 AXES = "xyz"
 BITS_PER_BYTE = 10  # start, eight data bits, stop
 CATCHES_UP_S = 0.03  # a kernel that was busy hands out what it kept back within this time
-SAID_KEPT = 5
+MESSAGES_KEPT = 5  # first and last messages of a device
 MOST_LOST_MARKED = 20_000  # ten seconds at 2 kHz: more is a new start, not a gap
 
 
@@ -40,7 +40,7 @@ class Reading(NamedTuple):
     latency_s: float = 0.0
 
 
-class Tally:
+class SampleCounts:
     """What came through so far, and why some of it is not used."""
 
     def __init__(self) -> None:
@@ -98,9 +98,9 @@ class Gyroscope(ABC):
         self.sign = -1.0 if config.invert else 1.0
         self.framer = StreamFramer(matcher)
         self.clock = SourceClock(1.0 / (self.sample_rate_hz * self.counts_per_sample))
-        self.hindsight = Hindsight(self.clock)
-        self.tally = Tally()
-        self.said: FirstAndLast[str] = FirstAndLast(SAID_KEPT)
+        self.retiming = ClockRetiming(self.clock)
+        self.counts = SampleCounts()
+        self.messages: FirstAndLast[str] = FirstAndLast(MESSAGES_KEPT)
         self.packet_bytes = 0
         """Length of the last packet with a sample."""
         self._count: int | None = None
@@ -118,13 +118,13 @@ class Gyroscope(ABC):
     def delay_s(self) -> float:
         """From the motion to the instant that the clock gives a sample: group delay of the filter."""
 
-    def delays_told(self) -> tuple[str, ...]:
+    def describe_delays(self) -> tuple[str, ...]:
         """What is taken off the time at which a sample was read, in words; the last as it was with the last sample."""
         on_wire_s = self.packet_bytes * BITS_PER_BYTE / self.baud
         steps = (
             ("gyro group delay", self.delay_s),
-            ("gyro latency as its packets say", self.tally.latency_s),
-            ("gyro packet on the line", on_wire_s),
+            ("gyro latency by its packets", self.counts.latency_s),
+            ("gyro packet transmission", on_wire_s),
         )
         return tuple(f"{words} {1e3 * delay_s:.3g} ms" for words, delay_s in steps if delay_s > 0.0)
 
@@ -145,9 +145,9 @@ class Gyroscope(ABC):
 
     @abstractmethod
     def decode(self, packet: bytes) -> Reading | None:
-        """The sample in a packet, or None for a packet without one (put what it said into ``said``)."""
+        """The sample in a packet, or None for a packet without one (put what it said into ``messages``)."""
 
-    def greeting(self) -> bytes:
+    def identification_request(self) -> bytes:
         """What to send to make the device introduce itself; b"" for nothing."""
         return b""
 
@@ -174,7 +174,7 @@ class Gyroscope(ABC):
             try:
                 reading = self.decode(packet)
             except ValueError as nonsense:  # whole on the wire, but it says what no data sheet knows
-                self.tally.last_reason = str(nonsense)
+                self.counts.last_reason = str(nonsense)
                 reading = None
             # What still arrived behind a packet in this read came after it, at the speed of the line.
             on_wire_s = (len(packet) + behind) * BITS_PER_BYTE / self.baud
@@ -183,7 +183,7 @@ class Gyroscope(ABC):
                 self._replaced += self.answers_replace_samples
             else:
                 self.packet_bytes = len(packet)
-                self.tally.latency_s = reading.latency_s
+                self.counts.latency_s = reading.latency_s
                 readings.append((reading, read_at_s - on_wire_s - reading.latency_s))
         return self._stamp(readings[::-1])
 
@@ -200,7 +200,7 @@ class Gyroscope(ABC):
             if before is None or reading.number is None or reading[:3] != before[:3] or at_s - before_s > 0.5 * turn_s:
                 fresh.append((reading, at_s))
             else:
-                self.tally.repeated += 1
+                self.counts.repeated += 1
         return fresh
 
     def _stamp(self, every: list[tuple[Reading, float]]) -> list[GyroSample]:
@@ -213,7 +213,7 @@ class Gyroscope(ABC):
             self._mark_lost(count, samples)
             if reading.valid or not self.clock.started:  # a device that starts up misreports its latency
                 self.clock.observe(count, taken_at_s)
-                self.hindsight.observe(count * self.clock.period_s, taken_at_s)
+                self.retiming.observe(count * self.clock.period_s, taken_at_s)
             samples.append(self._sample(count, reading))
             self._count = count
         return samples
@@ -222,17 +222,17 @@ class Gyroscope(ABC):
         rate = self.sign * reading.rate_rad_s
         valid = reading.valid and abs(rate) <= self.full_scale_rad_s
         if reading.valid and not valid:
-            self.tally.last_reason = (
+            self.counts.last_reason = (
                 f"rate of {math.degrees(rate):.0f} deg/s beyond the full scale of "
                 f"{math.degrees(self.full_scale_rad_s):.0f} deg/s"
             )
-        self.tally.received += 1
-        self.tally.invalid += not valid
+        self.counts.received += 1
+        self.counts.invalid += not valid
         if valid:
-            self.tally.recent_rates.append(rate)
+            self.counts.recent_rates.append(rate)
         clock = self.clock
         time_s = clock.host_time_s(count) - self.delay_s
-        self.hindsight.stamped(time_s, count * clock.period_s, clock.fits)
+        self.retiming.record(time_s, count * clock.period_s, clock.fits)
         return GyroSample(time_s, rate, valid)
 
     def _mark_lost(self, count: int, samples: list[GyroSample]) -> None:
@@ -244,7 +244,7 @@ class Gyroscope(ABC):
             return
         excused = min(missing, self._replaced)
         self._replaced -= excused
-        self.tally.lost += missing - excused
+        self.counts.lost += missing - excused
         for k in range(missing):
             at = self._count + (k + 1) * step
             samples.append(GyroSample(self.clock.host_time_s(at) - self.delay_s, math.nan, False))
@@ -287,5 +287,5 @@ class Gyroscope(ABC):
         """Forget the count and the clock: the device was switched off and on, or its port reopened."""
         self.framer.flush()
         self.clock = SourceClock(self.clock.period_s)
-        self.hindsight.forget(self.clock)
+        self.retiming.reset(self.clock)
         self._count = None

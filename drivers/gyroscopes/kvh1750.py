@@ -57,11 +57,11 @@ class Kvh1750(Gyroscope):
         message = wire.decode_kvh(packet)
         if message is None:
             passed = wire.built_in_test_passed(packet)
-            self.said.append(f"built-in test {'passed' if passed else 'FAILED'}")
+            self.messages.append(f"built-in test {'passed' if passed else 'FAILED'}")
             return None
         valid = bool(message.status >> self.axis & 1)
         if not valid:
-            self.tally.last_reason = f"status 0x{message.status:02X}: rotation axis not valid"
+            self.counts.last_reason = f"status 0x{message.status:02X}: rotation axis not valid"
         return Reading(message.sequence, message.rotation[self.axis] * self._scale, valid)
 
     def explain_silence(self, raw: bytes) -> str:

@@ -47,12 +47,12 @@ class Stim300(Gyroscope):
         if s.datagram not in wire.LAYOUTS:
             known = ", ".join(f"0x{i:02X}" for i in wire.LAYOUTS)
             raise ConfigError(
-                f"bench.gyroscope.settings.datagram: 0x{s.datagram:02X} is none of the STIM300's: {known}"
+                f"bench.gyroscope.settings.datagram: 0x{s.datagram:02X} is not one of the STIM300's: {known}"
             )
         rate_hz = config.sample_rate_hz or self.default_rate_hz
         if rate_hz not in SAMPLE_RATES_HZ:
             raise ConfigError(
-                f"bench.gyroscope.sample_rate_hz: {rate_hz:g} is none of the STIM300's: {SAMPLE_RATES_HZ}"
+                f"bench.gyroscope.sample_rate_hz: {rate_hz:g} is not one of the STIM300's: {SAMPLE_RATES_HZ}"
             )
         self._check_line_carries(s, rate_hz, config.baud or self.default_baud)
         super().__init__(config, wire.datagram_matcher((s.datagram,), s.line_ending))
@@ -93,14 +93,14 @@ class Stim300(Gyroscope):
         return math.radians(wire.FULL_SCALE_DEG_S)
 
     def decode(self, packet: bytes) -> Reading | None:
-        """Fast road for data; everything else goes to ``said``."""
+        """Fast road for data; everything else goes to ``messages``."""
         if packet[0] != self.settings.datagram:
             self._listen(packet)
             return None
         status = packet[10]
         valid = self._good[status]
         if not valid:
-            self.tally.last_reason = f"status byte: {wire.status_in_words(status)}"
+            self.counts.last_reason = f"status byte: {wire.status_in_words(status)}"
         at, counter_at = self._at, self._counter_at
         return Reading(
             packet[counter_at],
@@ -113,15 +113,15 @@ class Stim300(Gyroscope):
         identifier = packet[0]
         if identifier in special.CONFIGURATION_IDS:
             self.configuration = special.decode_configuration(packet)
-            self.said.append(f"{self.configuration}")
+            self.messages.append(f"{self.configuration}")
         elif identifier in special.SERIAL_NUMBER_IDS:
-            self.said.append(f"serial number {special.decode_serial_number(packet)}")
+            self.messages.append(f"serial number {special.decode_serial_number(packet)}")
         elif identifier in special.PART_NUMBER_IDS:
-            self.said.append(f"part number {special.decode_part_number(packet)}")
+            self.messages.append(f"part number {special.decode_part_number(packet)}")
         elif identifier in special.ERROR_IDS:
-            self.said.append(f"errors: {', '.join(special.decode_errors(packet)) or 'none'}")
+            self.messages.append(f"errors: {', '.join(special.decode_errors(packet)) or 'none'}")
 
-    def greeting(self) -> bytes:
+    def identification_request(self) -> bytes:
         """Ask for the Configuration datagram."""
         return special.REQUESTS["configuration"]
 

@@ -47,21 +47,21 @@ class VectorNav(Gyroscope):
         return math.radians(self.settings.full_scale_deg_s)
 
     def decode(self, packet: bytes) -> Reading | None:
-        """A rate from any message that carries one; errors and answers go to ``said``."""
+        """A rate from any message that carries one; errors and answers go to ``messages``."""
         message = wire.decode_vectornav(packet)
         if message.error:
-            self.said.append(message.error)
-            self.tally.last_reason = message.error
+            self.messages.append(message.error)
+            self.counts.last_reason = message.error
         if message.rate_rad_s is None:
             if not message.error:
-                self.said.append(",".join([message.name, *message.fields]))
+                self.messages.append(",".join([message.name, *message.fields]))
             return None
         count = None
         if message.time_startup_ns is not None:
             count = round(message.time_startup_ns * 1e-9 * self.sample_rate_hz)
         return Reading(count, message.rate_rad_s[self.axis], True)
 
-    def greeting(self) -> bytes:
+    def identification_request(self) -> bytes:
         """Ask for the model number."""
         return wire.encode_line("RRG", "01")
 

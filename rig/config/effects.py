@@ -41,7 +41,7 @@ def check_effect_names(names: Sequence[str]) -> None:
         if name not in known:
             wrong.append(((i,), unknown("effect", name, known)))
         elif name in names[:i]:
-            wrong.append(((i,), f"{name!r} stands in the list twice"))
+            wrong.append(((i,), f"{name!r} is listed twice"))
     if wrong:
         raise KeyFaults(wrong)
 

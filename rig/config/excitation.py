@@ -10,7 +10,7 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from rig.config.base import Section
 from rig.excitation import Chirp, FreeDecay, Multisine, RampHoldRelease, Sine
 
-LEAST_SAMPLES = 40
+LEAST_SAMPLES = 40  # of a set; an arbitrary floor
 PAPER_SETS: tuple[tuple[float, float], ...] = ((300, 0.5), (300, 1.0), (250, 3.0), (200, 6.0), (150, 9.0))
 
 
@@ -69,7 +69,7 @@ class ExcitationConfig(Section):
                 count = planned.duration_s * self.sample_rate_hz
                 raise ValueError(
                     f"sets.{number}: {planned.duration_s:g} s are {count:.3g} samples at {self.sample_rate_hz:g} Hz, "
-                    "from which nothing can be identified: duration_s has to be at least "
+                    "too few to identify from: duration_s has to be at least "
                     f"{LEAST_SAMPLES / self.sample_rate_hz:g} s"
                 )
         return self

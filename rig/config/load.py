@@ -10,10 +10,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from rig.config.messages import faults_of, place_of, shown
-from rig.config.overrides import apply_override
+from rig.config.parsing.messages import faults_of, place_of, shown
+from rig.config.parsing.overrides import apply_override
+from rig.config.parsing.yaml_text import Document, Fault, KeyPath, dotted, parse, read_text
 from rig.config.root import BACKENDS, Config, name_from_stem
-from rig.config.yaml_text import Document, Fault, KeyPath, dotted, parse, read_text
 from rig.errors import ConfigError
 
 MAX_FAULTS_SHOWN = 25
@@ -155,8 +155,8 @@ def _require_within(path: Path, folder: Path) -> None:
         is_within = False
     if not is_within:
         raise ConfigError(
-            f"{str(path)[:200]} does not lie in the folder of this configuration ({folder.absolute()}) or below it, "
-            "and its code is not run: look at it, then copy it there"
+            f"{str(path)[:200]} is not in the folder of this configuration ({folder.absolute()}) or below it, "
+            "and its code is not run: review it, then copy it there"
         )
 
 
@@ -194,5 +194,5 @@ def _listing(faults: Sequence[Fault]) -> str:
     ordered = sorted(faults, key=lambda f: (f.place.source, f.place.line or 0))
     lines = [str(fault) for fault in ordered[:MAX_FAULTS_SHOWN]]
     if len(ordered) > MAX_FAULTS_SHOWN:
-        lines.append(f"... and {len(ordered) - MAX_FAULTS_SHOWN} more; mend these first")
+        lines.append(f"... and {len(ordered) - MAX_FAULTS_SHOWN} more; correct these first")
     return "\n".join(lines)

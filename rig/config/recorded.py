@@ -17,7 +17,7 @@ ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
 def _check_path(file: str) -> str:
     # Whoever wrote the file may read any recording on the machine (`../data/run1.csv` is ordinary), and
     # reading a file as numbers discloses nothing; what is no local path at all is refused here, and what
-    # is no regular file (a pipe that never ends, a device) where it is opened.
+    # is not a regular file (a pipe that never ends, a device) where it is opened.
     if "://" in file:
         raise ValueError("is an address, not a file: download it first and give the path of the copy")
     if "\0" in file or not file.strip():

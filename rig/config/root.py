@@ -50,8 +50,8 @@ class Config(Section):
         if model.inertia_unknown and info.data.get("backend") == "bench":
             raise ValueError(
                 "inertia_unknown is true: its numbers are per unit of an inertia that nobody gave, so what a torque "
-                "would move cannot be foretold; multiply damping, stiffness and all that is in N m (N m s/rad, ...) by "
-                "the platform's inertia, set inertia_kg_m2 to it and take inertia_unknown out"
+                "would move cannot be predicted; multiply damping, stiffness and all that is in N m (N m s/rad, "
+                "...) by the platform's inertia, set inertia_kg_m2 to it and take inertia_unknown out"
             )
         return model
 

@@ -98,7 +98,7 @@ class SimulatedConfig(Section):
         if max(resonance_hz, decay_hz) > FASTEST_HZ:
             raise ValueError(
                 f"platform moves at up to {max(resonance_hz, decay_hz):.3g} Hz (stiffness {resonance_hz:.3g} Hz, "
-                f"damping {decay_hz:.3g} Hz), which would be simulated for ever: at most {FASTEST_HZ:g} Hz, so raise "
+                f"damping {decay_hz:.3g} Hz), which takes too long to simulate: at most {FASTEST_HZ:g} Hz, so raise "
                 "inertia_kg_m2 or lower stiffness_nm_rad or damping_nm_s_rad"
             )
         return self

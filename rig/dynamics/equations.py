@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from rig import effects
+from rig.arrays import Array
 from rig.channels import Channel
 from rig.dynamics import integrator
 from rig.dynamics.filters import run_filter
@@ -17,7 +18,6 @@ from rig.dynamics.native import addresses
 from rig.effects._channels import AT_REST, SLOTS
 from rig.effects.base import Effect, Place
 from rig.platform import Platform
-from rig.recording.run import Array
 
 STEP_PHASE_RAD = 0.06  # of the fastest motion in one fine step: 4th order leaves 1e-7 of a frequency
 MAX_SUBSTEPS = 64

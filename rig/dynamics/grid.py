@@ -10,10 +10,10 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from rig import effects
+from rig.arrays import Array
 from rig.dynamics.equations import Equations
 from rig.dynamics.torque import NO_TORQUE, TorqueSignal
 from rig.platform import Platform
-from rig.recording.run import Array
 
 
 def _projection(parts: int) -> Array:

@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from rig.recording.run import Array
+from rig.arrays import Array
 
 _BISECTIONS = 60
 _STEEPEST = 400.0

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import PPoly
 
+from rig.arrays import Array
 from rig.dynamics.native import jit
-from rig.recording.run import Array
 
 
 class Polynomials:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.dynamics.integrator import jit, pointer, resisting, slowed
-from rig.recording.run import Array
 
 if TYPE_CHECKING:
     from rig.dynamics.equations import Equations, Readings

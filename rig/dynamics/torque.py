@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from rig.arrays import Array
 from rig.dynamics.polynomials import Polynomials
-from rig.recording.run import Array, TorqueHold
+from rig.signals import TorqueHold
 
 KEPT = 6  # readings between the samples: every fit to a run asks for one of a few
 

@@ -94,11 +94,11 @@ _WAYS = {
         "Resisting: positive with {x} above x0.", "N*m", "nm", _ALONE, "coupling",
     ),
     "stiffness": _Way(
-        _stiffness, Place.LOAD, "T = slope * (x - x0) * th", "The spring is another one when {x} changes.",
+        _stiffness, Place.LOAD, "T = slope * (x - x0) * th", "The stiffness changes with {x}.",
         "K is the stiffness at x0; a positive slope stiffens.", "N*m/rad", "nm_rad", _ALONE, "restoring torque",
     ),
     "damping": _Way(
-        _damping, Place.LOAD, "T = slope * (x - x0) * w", "The damping is another one when {x} changes.",
+        _damping, Place.LOAD, "T = slope * (x - x0) * w", "The damping changes with {x}.",
         "C is the damping at x0; a positive slope damps.", "N*m*s/rad", "nm_s_rad", _ALONE, "friction",
     ),
     "gain": _Way(
@@ -107,7 +107,7 @@ _WAYS = {
         "The recorded torque is right at x0; a negative slope gives less.", "1", "1", _ALONE, "drive",
     ),
     "friction": _Way(
-        _torque, Place.FRICTION, "T = slope * (x - x0) * sgn(w)", "Dry friction is another one when {x} changes.",
+        _torque, Place.FRICTION, "T = slope * (x - x0) * sgn(w)", "Dry friction changes with {x}.",
         "coulomb_friction has the level at x0; a negative slope takes from it.", "N*m", "nm", _ALONE, "friction",
         ("coulomb_friction",),
     ),
@@ -158,19 +158,19 @@ def declare(channels: Iterable[Channel], is_taken: Callable[[str], bool]) -> Non
 
 def make(channel: Channel, way: str) -> Effect:
     """The effect that a channel has in one way."""
-    told, words = _WAYS[way], channel.name.replace("_", " ")
+    form, words = _WAYS[way], channel.name.replace("_", " ")
     if way == "drive":
         parameter = Parameter("share", "1", "share of the torque that follows the channel", linear=True)
     else:
-        unit, suffix = _per(told.unit, told.suffix, channel.measured_in)
+        unit, suffix = _per(form.unit, form.suffix, channel.measured_in)
         parameter = Parameter(
             "slope", unit, f"change per {channel.measured_in} of {words}", linear=True, low=-float("inf"), suffix=suffix
         )
     return Effect(
-        name=effect_name(channel.name, way), family=told.family, place=told.place, equation=told.equation,
-        source="first-order dependence on a measured channel", meaning=told.meaning.format(x=words),
-        sign=told.sign.format(x=words), parameters=(parameter,), kernel=told.kernel, lower_order=told.lower_order,
-        separated_by=told.separated_by.format(x=words), reads=channel,
+        name=effect_name(channel.name, way), family=form.family, place=form.place, equation=form.equation,
+        source="first-order dependence on a measured channel", meaning=form.meaning.format(x=words),
+        sign=form.sign.format(x=words), parameters=(parameter,), kernel=form.kernel, lower_order=form.lower_order,
+        separated_by=form.separated_by.format(x=words), reads=channel,
     )  # fmt: skip
 
 

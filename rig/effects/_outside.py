@@ -114,7 +114,7 @@ def read_file(path: Path, known: Collection[str]) -> str:
 def _effects_in(path: Path) -> list[Effect]:
     spec = importlib.util.spec_from_file_location(f"effects_from_{path.stem}", path)
     if spec is None or spec.loader is None:
-        raise ConfigError(f"{path} is no Python file: its name has to end in .py")
+        raise ConfigError(f"{path} is not a Python file: its name has to end in .py")
     module = importlib.util.module_from_spec(spec)
     # What Numba compiles of it is kept beside the file under the module's name, and has to find it there next time.
     sys.modules[spec.name] = module

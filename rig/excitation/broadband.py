@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from rig.arrays import Array
 from rig.excitation.base import ExcitationSet, NotNegative, Positive, rise
-from rig.recording.run import Array
 
 
 class Multisine(ExcitationSet):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from rig.excitation.base import ExcitationSet
-from rig.recording.run import Use
+from rig.signals import Use
 
 
 @dataclass(frozen=True)

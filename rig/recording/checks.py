@@ -8,17 +8,18 @@ from pathlib import Path
 from typing import get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rig.arrays import Array, Mask
 from rig.errors import RecordingError
 from rig.recording.consistency import check_angle_against_rate, check_time_unit
 from rig.recording.readers.base import Table
-from rig.recording.run import Array, Run, TorqueHold, Use
+from rig.recording.run import Run
+from rig.signals import TorqueHold, Use
 
 MIN_SAMPLES = 40  # in a row, fewer tell nothing of two states, three parameters and the noise
 # No torque, rate, angle or time of a machine in SI units comes near; squares of it would overflow.
-LARGEST_VALUE = 1e12
-SHORTEST_STEP_S = 1e-8
+LARGEST_VALUE = 1e12  # of any quantity in SI units: far beyond any platform
+SHORTEST_STEP_S = 1e-8  # 100 MHz: nothing samples a platform faster
 SMALLEST_PEAK = 1e-30  # a channel that stays below: squares of it would vanish
 
 
@@ -32,7 +33,7 @@ def missing_column(table: Table, quantity: str, names: Sequence[str], *, mapped:
     return RecordingError(f"{table.path}: has no column {wanted}{hint} (it has: {there}): {cure}")
 
 
-def check_samples(table: Table, columns: Mapping[str, Array]) -> NDArray[np.bool_]:
+def check_samples(table: Table, columns: Mapping[str, Array]) -> Mask:
     """Check lengths and numbers of the columns as stored; gives the mask of valid samples, shape (n,).
 
     Raises RecordingError.
@@ -111,7 +112,7 @@ def _check_order(time_s: Array, path: Path) -> None:
     if (step > 0).all():
         if len(step) and float(np.median(step)) < SHORTEST_STEP_S:
             raise RecordingError(
-                f"{path}: samples stand {float(np.median(step)):g} s apart (median), which nothing measures: correct "
+                f"{path}: samples are {float(np.median(step)):g} s apart (median), which is implausible: correct "
                 "recorded.scale.time"
             )
         return
@@ -170,11 +171,11 @@ def _check_motion(run: Run, path: Path) -> None:
         largest = float(np.max(np.abs(given))) if given is not None and len(given) else 0.0
         if 0.0 < largest < SMALLEST_PEAK:
             raise RecordingError(
-                f"{path}: the {name} never exceeds {largest:g}, which nothing measures: correct recorded.scale.{name}"
+                f"{path}: the {name} never exceeds {largest:g}, which is implausible: correct recorded.scale.{name}"
             )
         if largest > LARGEST_VALUE:
             raise RecordingError(
-                f"{path}: the {name} reaches {largest:g}, which nothing survives: correct recorded.scale.{name}"
+                f"{path}: the {name} reaches {largest:g}, which is implausible: correct recorded.scale.{name}"
             )
     if np.ptp(values[run.valid]) > 0:
         return

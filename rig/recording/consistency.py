@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.errors import RecordingError
-from rig.recording.run import Array, Run
+from rig.recording.run import Run
 
 # d(angle)/dt over rate -> what that factor usually means, and the cure.
 _KNOWN_FACTORS = (
@@ -22,9 +23,9 @@ _KNOWN_FACTORS = (
     (1 / (2 * np.pi), "the angle is in turns", "recorded.scale.angle: 6.28319"),
 )
 SURE_CORRELATION = 0.99  # both channels show the same motion, delays and noise aside
-SURE_DEVIATION = 0.05
-LIKELY_CORRELATION = 0.9
-LIKELY_DEVIATION = 0.3
+SURE_DEVIATION = 0.05  # of the factor from 1: more than a scale that is merely calibrated badly
+LIKELY_CORRELATION = 0.9  # tuned by hand, not derived: a debt
+LIKELY_DEVIATION = 0.3  # tuned by hand, not derived: a debt
 # Four samples a second or fewer: no platform with a spring is seen through that.
 SLOWEST_STEP_S = 0.25
 
@@ -111,7 +112,7 @@ def check_time_unit(run: Run, path: Path) -> None:
         key=lambda entry: abs(np.log10(step * entry[1]) + 3),
     )
     raise RecordingError(
-        f"{path}: samples stand {step:g} s apart (median), too far to see a platform move: the time looks like "
+        f"{path}: samples are {step:g} s apart (median), too coarse to follow a platform: the time looks like "
         f"{unit}: set recorded.scale.time: {factor:.9f}".rstrip("0")
         + "; if it is in seconds, say so with recorded.scale.time: 1"
     )

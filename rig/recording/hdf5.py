@@ -16,13 +16,14 @@ from typing import Any
 import h5py
 import numpy as np
 
+from rig.arrays import Array
 from rig.channels import KINDS, Channel
 from rig.errors import RecordingError
 from rig.recording.journal import JournalError
 from rig.recording.journal_reader import JournalContents
 from rig.recording.memory import at_most
 from rig.recording.readers.h5_heaps import check_heaps
-from rig.recording.run import Array, Recording, Run
+from rig.recording.run import Recording, Run
 
 FORMAT = "isp-rig recording"
 VERSION = 1
@@ -120,7 +121,9 @@ def read_recording_h5(path: str | Path, *, with_info: bool = True) -> Recording:
         with h5py.File(path, "r") as file, at_most(MOST_BYTES):
             with at_most(MOST_TEXT_BYTES):
                 if file.attrs.get("format") != FORMAT:
-                    raise RecordingError(f"{path}: is no recording of this program: map its columns under `recorded`")
+                    raise RecordingError(
+                        f"{path}: is not a recording of this program: map its columns under `recorded`"
+                    )
                 if int(file.attrs["version"]) > VERSION:
                     raise RecordingError(f"{path}: written by a later version: read it with that one")
                 noise, axis = file.attrs.get("noise"), file.attrs["axis"]
@@ -161,7 +164,7 @@ class _Reader:
             raise RecordingError(f"{self._path}: {name!r} is a link to another place: copy the values in (h5repack)")
         data = group[name]
         if not isinstance(data, h5py.Dataset) or data.external or data.is_virtual or data.ndim != 1:
-            raise RecordingError(f"{self._path}: {name!r} is no plain column in this file: copy it in (h5repack)")
+            raise RecordingError(f"{self._path}: {name!r} is not a plain column in this file: copy it in (h5repack)")
         if data.dtype.kind not in "fiub":
             raise RecordingError(f"{self._path}: {name!r} holds {data.dtype} values, not numbers")
         self._values_left -= data.size

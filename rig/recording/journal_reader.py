@@ -18,6 +18,7 @@ from typing import Any, BinaryIO, Literal
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.recording.journal import (
     BLOCK,
@@ -31,9 +32,9 @@ from rig.recording.journal import (
     RUN,
     RUN_END,
 )
-from rig.recording.restamped import BEGUN_S, NO_RESTAMPS, Restamps, restamped, restamps_of
+from rig.recording.retiming import BEGUN_S, NO_RETIMING, Retiming, retimed, retiming_from_event
 from rig.recording.rows import increasing, on_samples
-from rig.recording.run import Array, Recording, Run, printable
+from rig.recording.run import Recording, Run, printable
 from rig.recording.steady import opened
 
 RUN_META = (
@@ -46,7 +47,7 @@ class JournalRun:
     """One run as written: ``tables`` maps a kind to its rows, shape (n, columns).
 
     ``ended`` is False where the writer was killed in it, ``complete`` only True where it was played to its end.
-    ``restamps`` are what became known of its times afterwards; the tables are as they were written.
+    ``retiming_of`` are what became known of its times afterwards; the tables are as they were written.
     """
 
     name: str
@@ -55,7 +56,7 @@ class JournalRun:
     tables: Mapping[str, Array]
     ended: bool
     complete: bool = False
-    restamps: Restamps = NO_RESTAMPS
+    retiming_of: Retiming = NO_RETIMING
 
     def column(self, kind: str, name: str) -> Array:
         """One column of one kind, shape (n,). Raises KeyError where there is none."""
@@ -100,13 +101,13 @@ class _OpenRun:
     ended: bool = False
     complete: bool = False
 
-    def done(self, better: Mapping[float, Restamps]) -> JournalRun:
+    def done(self, better: Mapping[float, Retiming]) -> JournalRun:
         tables = {
             kind: np.concatenate(self.blocks[kind]) if kind in self.blocks else np.empty((0, len(names)))
             for kind, names in self.columns.items()
         }
         begun_s = self.meta.get(BEGUN_S)
-        known = better.get(begun_s, NO_RESTAMPS) if isinstance(begun_s, float) else NO_RESTAMPS
+        known = better.get(begun_s, NO_RETIMING) if isinstance(begun_s, float) else NO_RETIMING
         return JournalRun(self.name, self.meta, self.columns, tables, self.ended, self.complete, known)
 
 
@@ -211,13 +212,13 @@ def read_journal(path: str | Path) -> JournalContents:
             is_one = file.read(len(MARKER)) == MARKER
             for found in _frames(file, size) if is_one else ():
                 reading.take(*found)
-        better = dict(each for event in reading.events if (each := restamps_of(event.values)) is not None)
+        better = dict(each for event in reading.events if (each := retiming_from_event(event.values)) is not None)
         runs = tuple(run.done(better) for run in reading.runs)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}; check the path") from error
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError, struct.error) as error:
         raise RecordingError(
-            f"{path}: the frame at byte {reading.end} is not what this version writes ({error}): "
+            f"{path}: the frame at byte {reading.end} is not in the format of this version ({error}): "
             "read it with the version that wrote it"
         ) from error
     if not isinstance(reading.header, dict) and not runs:
@@ -249,7 +250,7 @@ def run_from_journal(source: JournalRun) -> Run:
     """
     rows = increasing(source.tables["samples"])
     samples = {name: rows[:, i].copy() for i, name in enumerate(source.columns["samples"])}
-    time_s = restamped(samples.pop("time_s"), source.restamps.samples)
+    time_s = retimed(samples.pop("time_s"), source.retiming_of.samples)
     valid = samples.pop("valid", np.ones_like(time_s)) != 0
     rate, angle = samples.pop("rate_rad_s", None), samples.pop("angle_rad", None)
     commands = increasing(source.tables["commands"]) if "commands" in source.tables else np.empty((0, 2))
@@ -263,7 +264,7 @@ def run_from_journal(source: JournalRun) -> Run:
         valid=valid,
         rate_rad_s=rate,
         angle_rad=angle,
-        torque_time_s=restamped(commands[:, names.index("time_s")].copy(), source.restamps.torque)
+        torque_time_s=retimed(commands[:, names.index("time_s")].copy(), source.retiming_of.torque)
         if len(commands)
         else None,
         torque_nm=commands[:, names.index("torque_nm")].copy() if len(commands) else None,

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.recording.checks import check_channel, check_run, check_samples, missing_column
 from rig.recording.readers import read_file
 from rig.recording.readers.base import Table
-from rig.recording.run import Array, Recording, Run, printable
+from rig.recording.run import Recording, Run, printable
 
 if TYPE_CHECKING:
     from rig.config.load import LoadedConfig

@@ -44,12 +44,12 @@ def recover(folder: Path) -> Recovery:
     recording = _recording_of(contents, lines) if contents is not None else Recording(())
     state, whole = _state_of_export(folder / RECORDING_FILE, recording)
     lines.append(f"{RECORDING_FILE}: {state}")
-    lines += [f"{part.name}: half written, left as it is" for part in sorted(folder.glob("*.part"))]
+    lines += [f"{part.name}: incomplete, left unchanged" for part in sorted(folder.glob("*.part"))]
     if whole is not None:
         return Recovery(tuple(lines), whole, folder / RECORDING_FILE, is_new=False)
     if contents is None or not recording.runs:
-        told = "; ".join(lines)
-        raise RecordingError(f"{folder}: nothing can be recovered: no journal with a sample in it ({told})")
+        details = "; ".join(lines)
+        raise RecordingError(f"{folder}: nothing can be recovered: no journal with a sample in it ({details})")
     name = RECORDING_FILE if state == "absent" else RECOVERED_FILE
     path = free_name(folder, name)
     write_recording_h5(path, recording, contents)
@@ -77,16 +77,16 @@ def _read_all(journals: Sequence[Path], lines: list[str]) -> list[JournalContent
 
 def _account(contents: JournalContents) -> str:
     if contents.closed and not contents.unread_bytes:
-        return "whole, closed in order"
-    told = [] if contents.closed else [f"its writer was killed: up to {UNWRITTEN_S:g} s before that were never written"]
+        return "complete, closed normally"
+    notes = [] if contents.closed else [f"the program was killed: up to {UNWRITTEN_S:g} s before that were not written"]
     if contents.gaps:
-        told.append(
+        notes.append(
             f"{contents.gaps} damaged stretch(es), {contents.stray_rows} row(s) behind them belong to no known run and "
             "are left out"
         )
     if contents.unread_bytes:
-        told.append(f"{contents.unread_bytes} byte(s) lost: cut or damaged")
-    return "; ".join(told)
+        notes.append(f"{contents.unread_bytes} byte(s) lost: cut or damaged")
+    return "; ".join(notes)
 
 
 def _line(run: JournalRun) -> str:
@@ -102,7 +102,7 @@ def _never_played(contents: JournalContents) -> list[str]:
     names = [str(name) for name in planned] if isinstance(planned, list) else []
     begun = {run.name for run in contents.runs}
     missing = [name for name in names if name not in begun]
-    return [f"  never begun: {', '.join(missing)}"] if missing else []
+    return [f"  never played: {', '.join(missing)}"] if missing else []
 
 
 def _recording_of(contents: JournalContents, lines: list[str]) -> Recording:
@@ -113,7 +113,9 @@ def _recording_of(contents: JournalContents, lines: list[str]) -> Recording:
         try:
             found = recording_from_journal(single).runs
         except (KeyError, TypeError, ValueError, IndexError) as error:
-            lines.append(f"  {source.name}: lost: its frames are sound but not what this version writes ({error!r})")
+            lines.append(
+                f"  {source.name}: lost: its frames are intact but not in the format of this version ({error!r})"
+            )
             continue
         for run in found:
             name, n = run.name, 2
@@ -122,7 +124,7 @@ def _recording_of(contents: JournalContents, lines: list[str]) -> Recording:
             taken.add(name)
             runs.append(dataclasses.replace(run, name=name))
     recording = recording_from_journal(dataclasses.replace(contents, runs=()))
-    info = {"recovered": True, "aborted": "recovered from the raw journal: the campaign did not end in order"}
+    info = {"recovered": True, "aborted": "recovered from the raw journal: the campaign did not end normally"}
     return dataclasses.replace(recording, runs=tuple(runs), info=dict(recording.info) | info)
 
 

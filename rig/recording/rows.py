@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rig.recording.run import Array
+from rig.arrays import Array
 
 
 def increasing(rows: Array) -> Array:

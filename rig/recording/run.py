@@ -6,14 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rig.arrays import Array, Mask
 from rig.channels import Channel
+from rig.signals import TorqueHold, Use
 
-Array = NDArray[np.floating[Any]]  # float64 in fact; numpy's annotations lose that in arithmetic
-TorqueHold = Literal["band_limited", "zero_order"]
-Use = Literal["auto", "fit", "holdout"]
 LONGEST_NAME = 200
 
 
@@ -64,7 +60,7 @@ class Run:
 
     name: str
     time_s: Array
-    valid: NDArray[np.bool_]
+    valid: Mask
     rate_rad_s: Array | None = None
     angle_rad: Array | None = None
     torque_time_s: Array | None = None

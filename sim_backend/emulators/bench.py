@@ -20,16 +20,16 @@ from rig.errors import ConfigError
 from sim_backend.emulators.adapter import LawicelAdapter
 from sim_backend.emulators.device import EmulatedDrive, Event
 from sim_backend.emulators.drive import Cia402Drive
-from sim_backend.emulators.faults import Faults
+from sim_backend.emulators.faults.schedule import FaultSchedule
 from sim_backend.emulators.gyro import GYROS, AnyGyro, GyroSettings, flat_low_pass
+from sim_backend.emulators.late_arrivals import REPORTED_PAUSE_S, ArrivalTimes
 from sim_backend.emulators.odrive import OdriveAxis
-from sim_backend.emulators.overslept import TOLD_S, Arrivals
 from sim_backend.emulators.pty_port import PtyPort
 from sim_backend.emulators.socket_port import SocketListener
 from sim_backend.emulators.world import World
 
 WORLD_STEPS_PER_SAMPLE = 10  # of what the gyro filters; with half as many a 29 Hz ring reads 2.5e-5 too weak
-LONGEST_SLEEP_S = 0.002
+LONGEST_SLEEP_S = 0.002  # the promise of ``run``: ``stop`` is asked so often
 DEFAULT_BAUD, DEFAULT_RATE_HZ = 921_600, 2000.0
 
 
@@ -110,7 +110,7 @@ class EmulatedBench:
         if config.bench is None:
             raise ConfigError("there is no `bench` section to emulate: add one that names the devices")
         self._gyro, self.drive = _make_gyro(config), _make_drive(config)
-        self._faults = Faults(config.bench.emulator.faults, self._tell_of_fault, config.simulated.seed)
+        self._faults = FaultSchedule(config.bench.emulator.faults, self._report_fault, config.simulated.seed)
         emulator = config.bench.emulator
         rate_hz = config.bench.gyroscope.sample_rate_hz or DEFAULT_RATE_HZ
         self._period_s = 1.0 / rate_hz / (1.0 + emulator.gyro_drift_ppm * 1e-6)
@@ -122,7 +122,7 @@ class EmulatedBench:
         self._window = np.zeros(2 * len(self._kernel))
         self._slot = 0
         self._adapter = LawicelAdapter(self._from_host, clock)
-        self._arrivals = Arrivals()
+        self._arrivals = ArrivalTimes()
         self._port = PORTS[emulator.ports or "terminal"]
         self.gyro_port, self.can_port = self._port(), self._port()
         self._now_s = self._start_s = clock() + 0.05
@@ -133,7 +133,7 @@ class EmulatedBench:
     def _from_host(self, frame: CanFrame) -> None:
         self.drive.receive(frame, self._now_s)
 
-    def _tell_of_fault(self, now_s: float, what: str) -> None:
+    def _report_fault(self, now_s: float, what: str) -> None:
         self._on_event(Event("injected", now_s, self.drive.torque_nm, self.drive.torque_nm, what))
 
     def inject(self, fault: InjectedFault) -> None:
@@ -151,12 +151,12 @@ class EmulatedBench:
     def replug_gyro(self) -> None:
         """Its port is there again, under another name, which is told."""
         self.gyro_port = self._port()
-        self._tell_of_fault(self._now_s, f"the gyro is plugged in again: {self.gyro_port.path}")
+        self._report_fault(self._now_s, f"the gyro is plugged in again: {self.gyro_port.path}")
 
     def replug_adapter(self) -> None:
         """As ``replug_gyro``."""
         self.can_port = self._port()
-        self._tell_of_fault(self._now_s, f"the CAN adapter is plugged in again: {self.can_port.path}")
+        self._report_fault(self._now_s, f"the CAN adapter is plugged in again: {self.can_port.path}")
 
     def flag_gyro(self, status: int) -> None:
         """Set bits of its status byte."""
@@ -180,22 +180,22 @@ class EmulatedBench:
             ports = [port for port in (self.can_port, self.gyro_port) if port.plugged_in]
             readable = select.select(ports, [], [], wait_s)[0]
             before_s, self._now_s = self._now_s, self._clock()
-            if self._now_s - before_s > TOLD_S:
-                self._tell_of_pause(self._now_s - before_s)
+            if self._now_s - before_s > REPORTED_PAUSE_S:
+                self._report_pause(self._now_s - before_s)
             self._faults.pass_time(self, self._now_s)
             if self.can_port in readable and self.can_port.plugged_in:
-                self._hear_host(before_s)
+                self._receive_from_host(before_s)
             self._serve_drive(b"")
             if self.gyro_port in readable and self.gyro_port.plugged_in:
                 self._gyro.command(self.gyro_port.read())
             self._send_samples(lag_s)
 
-    def _tell_of_pause(self, paused_s: float) -> None:
+    def _report_pause(self, paused_s: float) -> None:
         nm = self.drive.torque_nm
         what = f"this machine kept the emulators from running for {paused_s * 1e3:.1f} ms"
         self._on_event(Event("paused", self._now_s, nm, nm, what))
 
-    def _hear_host(self, before_s: float) -> None:
+    def _receive_from_host(self, before_s: float) -> None:
         found_s = self._now_s
         for at_s, sent in self._arrivals.pieces(self.can_port.read(), before_s, found_s):
             self._now_s = at_s

@@ -10,10 +10,10 @@ import numpy as np
 
 from drivers.codecs import stim300, vectornav
 from drivers.codecs.stim300_special import Stim300Configuration, encode_configuration, encode_serial_number
-from rig.recording.run import Array
+from rig.arrays import Array
 
 AXES = "xyz"
-BITS_PER_BYTE = 10
+BITS_PER_BYTE = 10  # a start bit, eight, a stop bit
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 from rig.config.root import Config
 from rig.errors import DeviceFault
 
-START_TIMEOUT_S = 60.0
-STOP_TIMEOUT_S = 3.0
+START_TIMEOUT_S = 60.0  # the first start compiles the plant
+STOP_TIMEOUT_S = 3.0  # then it is killed
 
 
 @dataclass

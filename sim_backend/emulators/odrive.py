@@ -10,7 +10,7 @@ from sim_backend.emulators.device import Event, TorqueOutput
 WATCHDOG_EXPIRED = 0x800
 ESTOP_REQUESTED = 0x4000
 INVALID_STATE = 0x1
-HEARTBEAT_S = 0.1
+HEARTBEAT_S = 0.1  # CANSimple as delivered
 
 
 class OdriveAxis:

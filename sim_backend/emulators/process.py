@@ -15,7 +15,7 @@ from rig.config.root import Config
 from rig.errors import RigError
 from sim_backend.emulators.bench import EmulatedBench
 from sim_backend.emulators.device import Event
-from sim_backend.emulators.requests import FaultRequests
+from sim_backend.emulators.faults.requests import FaultRequests
 
 PRIORITY_ABOVE_THE_LOOP = 5
 LOOK_FOR_LISTENER_S = 0.2

@@ -1,4 +1,4 @@
-"""The emulators' end of a port on a local socket; see ``drivers.socket_port`` for why there are such."""
+"""The emulators' end of a port on a local socket; see ``drivers.transport.socket_port`` for why there are such."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ if sys.platform == "win32":
     pytest.skip("emulated devices need pseudo terminals", allow_module_level=True)
 
 from benchmarks.emulated import recovered
-from drivers.capture import Capture
+from drivers.capture.wire_capture import Capture
 from rig.recording.journal import Journal
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drivers.ports import gone, stalled
+from drivers.transport.ports import gone, stalled
 from sim_backend.emulators.adapter import LawicelAdapter
 
 

@@ -15,18 +15,18 @@ from typing import Any
 
 import pytest
 
-from identify.app import app
+from commands.campaign.saving import save
+from commands.identify_run.app import app
+from commands.terminal.display import Terminal
+from commands.terminal.exit_codes import TRACEBACK_FILE
 from identify.results import Identification
-from rig.cli.exits import TRACEBACK_FILE
-from rig.cli.saving import save
-from rig.cli.terminal import Terminal
 from rig.config.identify import IdentifyConfig
 from rig.errors import DeviceFault, RecordingError, RigError
 from rig.platform import Platform
 from rig.recording.hdf5 import read_recording_h5
 from rig.recording.run import Recording, Run
+from tests.commands.support import SECOND_SET_S, TWO_SETS, command, put_on_stage, write_config
 from tests.identify.sample import sample
-from tests.rig.cli.support import SECOND_SET_S, TWO_SETS, command, put_on_stage, write_config
 from tests.rig.scripted import ScriptedRig
 
 TRUTH = """
@@ -261,7 +261,7 @@ def test_ctrl_c_while_the_recording_is_saved_ends_in_130_with_results_marked_abo
         os.kill(os.getpid(), signal.SIGINT)
         return save(*arguments, **more)
 
-    monkeypatch.setattr("rig.cli.campaign.save", save_and_stop)
+    monkeypatch.setattr("commands.campaign.playing.save", save_and_stop)
     out = tmp_path / "out"
     assert command(app, write_config(tmp_path), "--out", out).exit_code == 130
     assert json.loads((out / "result.json").read_text())["aborted"] is True

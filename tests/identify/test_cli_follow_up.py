@@ -12,17 +12,17 @@ from typing import Any
 
 import pytest
 
-from identify.app import app
+from commands.identify_run.app import app
+from commands.rig.app import app as rig_app
 from identify.results import FollowUp, FollowUpPlan, Identification, Parting
-from rig.cli.app import app as rig_app
 from rig.config.identify import IdentifyConfig
 from rig.errors import DeviceFault
 from rig.interface import Exchange, GyroSample, Statement, Torque, TorqueSample
 from rig.platform import Platform
 from rig.recording.hdf5 import read_recording_h5
 from rig.recording.run import Recording
+from tests.commands.support import TWO_SETS, command, put_on_stage, write_config
 from tests.identify.sample import sample
-from tests.rig.cli.support import TWO_SETS, command, put_on_stage, write_config
 from tests.rig.scripted import ScriptedRig
 
 FIRST_S = 0.5 + 0.4 + 0.05 + 0.2 + 0.4 + 0.05  # how long the two sets take on the sequencer's clock
@@ -166,8 +166,8 @@ def test_at_a_terminal_the_question_decides(
     tmp_path: Path, stub: Stub, monkeypatch: pytest.MonkeyPatch, answer: str, runs: int
 ) -> None:
     stub(doubtful(), sure())
-    monkeypatch.setattr("rig.cli.follow_up._somebody_there", lambda: True)
-    monkeypatch.setattr("rig.cli.campaign._ask", lambda question: answer)
+    monkeypatch.setattr("commands.campaign.follow_up._somebody_there", lambda: True)
+    monkeypatch.setattr("commands.campaign.playing._ask", lambda question: answer)
     out = tmp_path / "out"
     done = command(app, write_config(tmp_path), "--yes", "--out", out)
     assert done.exit_code == 0, done.output
@@ -203,8 +203,8 @@ def test_without_yes_real_torque_is_asked_for_each_time(
     def consent(statement: Statement, yes: bool, is_terminal: bool, ask: Callable[[str], str]) -> None:
         asked.append(f"{statement.torque.value}, yes {yes}")
 
-    monkeypatch.setattr("rig.cli.follow_up.ask_consent", consent)
-    monkeypatch.setattr("rig.cli.follow_up._somebody_there", lambda: True)
+    monkeypatch.setattr("commands.campaign.follow_up.ask_consent", consent)
+    monkeypatch.setattr("commands.campaign.follow_up._somebody_there", lambda: True)
     out = tmp_path / "out"
     assert command(app, write_config(tmp_path), "--yes", "--out", out).exit_code == 0
     assert asked == ["REAL, yes False"]  # --yes is no answer where the file says ask
@@ -270,7 +270,7 @@ def test_what_ends_a_follow_up_before_it_begins_leaves_the_first_results(
     def fail(*_: Any) -> None:
         raise error
 
-    monkeypatch.setattr("rig.cli.follow_up.play", fail)
+    monkeypatch.setattr("commands.campaign.follow_up.play", fail)
     out = tmp_path / "out"
     done = command(app, write_config(tmp_path), *AUTO, "--out", out)
     assert done.exit_code == code, done.output

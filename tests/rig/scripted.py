@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from rig.interface import Exchange, GyroSample, Rig, Statement, Torque, TorqueSample
-from rig.recording.run import TorqueHold
+from rig.signals import TorqueHold
 
 
 class ScriptedRig(Rig):

@@ -75,8 +75,8 @@ def test_a_refusal_lists_every_set_with_its_travel_and_the_torque_that_passes() 
 
 
 def test_what_is_said_to_pass_does_pass() -> None:
-    sentences = [p.sentence() for p in predict_all(PAPER, ExcitationConfig(), LimitsConfig())]
-    said = [float(re.search(r"([0-9.]+) N m passes$", text)[1]) for text in sentences]  # type: ignore[index]
+    sentences = [p.describe() for p in predict_all(PAPER, ExcitationConfig(), LimitsConfig())]
+    said = [float(re.search(r"At most ([0-9.]+) N m is allowed$", text)[1]) for text in sentences]  # type: ignore[index]
     sets = [{"torque_nm": a, "frequency_hz": f} for a, (_, f) in zip(said, PAPER_SETS, strict=True)]
     assert len(plan(PAPER, ExcitationConfig.model_validate({"sets": sets}), LimitsConfig())) == 5
 
@@ -134,10 +134,10 @@ def test_what_sets_leave_behind_where_no_spring_pulls_back_adds_up() -> None:
 @pytest.mark.parametrize("effects", [{}, {"coulomb_friction": {"level": 0.002}}])
 def test_the_torques_said_to_pass_pass_together(effects: dict[str, dict[str, float]]) -> None:
     loose = Platform(0.5, 0.0, 0.0, effects, ("inertia",))
-    sentences = [p.sentence() for p in predict_all(loose, walking(4), WIDE)]
-    assert "what all sets together leave behind is not" in sentences[0]
-    assert "from where the campaign began: beyond the travel limit" in sentences[3]
-    said = [float(re.search(r"([0-9.]+) N m passes$", text)[1]) for text in sentences]  # type: ignore[index]
+    sentences = [p.describe() for p in predict_all(loose, walking(4), WIDE)]
+    assert "not after the sets before it" in sentences[0]
+    assert "from the start of the campaign: exceeds the travel limit" in sentences[3]
+    said = [float(re.search(r"At most ([0-9.]+) N m is allowed$", text)[1]) for text in sentences]  # type: ignore[index]
     sets = [{"torque_nm": a, "frequency_hz": 1, "duration_s": 3} for a in said]
     played = plan(loose, ExcitationConfig.model_validate({"sets": sets, "rest_s": 2}), WIDE)
     assert [p.scale for p in played] == [1.0] * 4

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.cli.recover import recover_folder
+from commands.rig.recover import recover_folder
 from rig.recording.hdf5 import read_recording_h5
 
 ROOT = Path(__file__).parents[2]
 BENCH = ROOT / "examples" / "bench.yaml"
-IDENTIFY_RUN = (sys.executable, "-c", "from identify.cli import main; main()")
+IDENTIFY_RUN = (sys.executable, "-c", "from commands.identify_run import main; main()")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="emulated devices need pseudo terminals")
 # Short, and patient with a machine that others use: what is asserted is never how fast it was.
 SHORT = (

@@ -20,7 +20,7 @@ DOUBTING = """
 from dataclasses import replace
 import identify.follow_up
 import identify.loop
-from identify.cli import main
+from commands.identify_run import main
 from identify.results import FollowUp, FollowUpPlan, Parting
 
 certain, pair = identify.loop.identify, ("coulomb_friction", "stribeck_friction")

@@ -16,8 +16,8 @@ import pytest
 from rig.recording.hdf5 import read_recording_h5
 
 ROOT = Path(__file__).parents[2]
-RIG = (sys.executable, "-c", "from rig.cli import main; main()")
-IDENTIFY_RUN = (sys.executable, "-c", "from identify.cli import main; main()")
+RIG = (sys.executable, "-c", "from commands.rig import main; main()")
+IDENTIFY_RUN = (sys.executable, "-c", "from commands.identify_run import main; main()")
 posix = pytest.mark.skipif(sys.platform == "win32", reason="emulated devices need pseudo terminals")
 # Patient with a machine that others use: how far it may be late is asked in the tests of the guard.
 ONE_LONG_SET = (

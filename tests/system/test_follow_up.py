@@ -50,7 +50,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(folder: Path, out: str, *more: str) -> None:
-    command = [sys.executable, "-c", "from identify.cli import main; main()", "rig.yaml", "--out", out]
+    command = [sys.executable, "-c", "from commands.identify_run import main; main()", "rig.yaml", "--out", out]
     done = subprocess.run(
         [*command, *more], cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
         check=False,

@@ -15,12 +15,12 @@ if sys.platform != "linux":
     pytest.skip("a small disk is made by mounting one", allow_module_level=True)
 
 from benchmarks.emulated import OFF, SHORT, Devices, Host, recovered
-from drivers.capture import TICK, read_capture
+from drivers.capture.wire_capture import TICK, read_capture
 from rig.recording.hdf5 import read_recording_h5
 from rig.recording.journal_reader import read_journal
 
 SIZE_MIB = 2  # full a second or two into the set
-RIG = (sys.executable, "-c", "from rig.cli import main; main()")
+RIG = (sys.executable, "-c", "from commands.rig import main; main()")
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def test_a_disk_that_fills_up_in_a_set_takes_the_torque_off_and_keeps_what_was_w
         off = [event for event in devices.events if event["event"] in OFF]
         last = [event for event in devices.events if "torque_nm" in event][-1]
     assert code == 130
-    assert "No space left on device" in host.said and "make room" in host.said
+    assert "No space left on device" in host.said and "free space" in host.said
     assert "Traceback" not in host.said
     assert last["torque_nm"][1] == 0.0
     assert not any(event["event"] == "watchdog" for event in off)  # the host took it off, not its silence

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identify.app import app as identify_run
-from rig.cli.app import app
+from commands.identify_run.app import app as identify_run
+from commands.rig.app import app
 from rig.config.load import load_config
 from rig.errors import ConfigError
 from rig.recording.journal import Journal
-from tests.rig.cli.support import command
+from tests.commands.support import command
 
 SCRIPT = "<script>alert(1)</script>"
 IMAGE = "<img src=x onerror=alert(1)>"

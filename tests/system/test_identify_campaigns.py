@@ -22,7 +22,7 @@ SEEDS = range(1, 6)
 
 def run(folder: Path, config: str, *more: str) -> tuple[dict[str, Any], str]:
     """result.json and the summary of one campaign that has to be accepted."""
-    command = [sys.executable, "-c", "from identify.cli import main; main()", str(ROOT / config)]
+    command = [sys.executable, "-c", "from commands.identify_run import main; main()", str(ROOT / config)]
     done = subprocess.run(
         [*command, "--out", str(folder / "out"), *more],
         cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,

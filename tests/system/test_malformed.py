@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from typer.testing import Result
 
-from identify.app import app
-from tests.rig.cli.support import command
+from commands.identify_run.app import app
+from tests.commands.support import command
 from tests.rig.config.test_malformed import CASES as CONFIGS
 from tests.rig.recording.test_malformed_files import TEXTS
 

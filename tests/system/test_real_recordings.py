@@ -12,10 +12,11 @@ from scipy.integrate import solve_ivp
 
 from identify.pipeline import identify
 from identify.results import Identification
+from rig.arrays import Array
 from rig.config.load import load_config
 from rig.platform import Platform
 from rig.recording.load import read_recording
-from rig.recording.run import Array, Recording
+from rig.recording.run import Recording
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 LORENZ_RUN = "{{file: {file}, use: {use}, min_rate_rad_s: 1.0}}"

@@ -14,7 +14,7 @@ if sys.platform == "win32":
 from benchmarks.fault_cases import CASES
 from benchmarks.faults import undisturbed
 from benchmarks.kills import one_kill
-from sim_backend.emulators.fault_kinds import FAULTS
+from sim_backend.emulators.faults.kinds import FAULTS
 
 
 @pytest.mark.slow
@@ -48,7 +48,7 @@ def test_every_fault_of_the_emulators_stands_in_the_table() -> None:
 
 @pytest.mark.slow
 def test_emulators_end_when_nobody_listens_any_more(request: pytest.FixtureRequest) -> None:
-    line = (sys.executable, "-c", "from rig.cli import main; main()", "emulate", "examples/bench.yaml")
+    line = (sys.executable, "-c", "from commands.rig import main; main()", "emulate", "examples/bench.yaml")
     process = subprocess.Popen(
         line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=request.config.rootpath
     )

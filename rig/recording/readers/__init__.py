@@ -43,7 +43,7 @@ def read_file(path: Path) -> Sequence[Table | Run]:
     suffix = next((s for s in _BY_SUFFIX if path.name.lower().endswith(s)), None)
     if suffix is None:
         raise RecordingError(
-            f"{path}: the suffix {path.suffix!r} is no format known here: export it as one of {', '.join(suffixes())}"
+            f"{path}: the suffix {path.suffix!r} is not a known format: export it as one of {', '.join(suffixes())}"
         )
     reader = import_module(f"rig.recording.readers.{_BY_SUFFIX[suffix]}")
     contents: Sequence[Table | Run] = reader.read(path)
@@ -70,7 +70,7 @@ def _check_is_file(path: Path) -> None:
         raise RecordingError(f"{path}: cannot be opened: {reason}; check path and permissions") from error
     if not stat.S_ISREG(status.st_mode):
         # A pipe may never end and a device may never answer.
-        raise RecordingError(f"{path}: is no regular file (a pipe or device): save the data to a file first")
+        raise RecordingError(f"{path}: is not a regular file (a pipe or device): save the data to a file first")
     if status.st_size == 0:
         raise RecordingError(f"{path}: the file is empty: export the recording again")
     if status.st_size > MAX_FILE_BYTES:

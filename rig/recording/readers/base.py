@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.arrays import Array
 from rig.errors import RecordingError
-from rig.recording.run import Array
 
 MAX_SAMPLES = 10_000_000
 

@@ -14,9 +14,9 @@ from typing import IO, cast
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.recording.readers.base import MAX_SAMPLES, Table, too_long
-from rig.recording.run import Array
 
 MAX_LINE_CHARACTERS = 65_536
 MAX_LINES = MAX_SAMPLES + 1_000_000

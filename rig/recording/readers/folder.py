@@ -31,8 +31,8 @@ def read(path: Path) -> Sequence[Run]:
             wrong.append(str(error))
     if found:
         return found
-    told = "\n".join(wrong) or f"it has neither {RECORDING_FILE} nor a .journal"
+    faults = "\n".join(wrong) or f"it has neither {RECORDING_FILE} nor a .journal"
     raise RecordingError(
-        f"{path}: is a folder without a recording that can be read: {told}; name one file "
+        f"{path}: is a folder without a recording that can be read: {faults}; name one file "
         "of it for each run, or a results folder"
     )

@@ -29,7 +29,7 @@ def read(path: Path) -> Sequence[Table | Run]:
                 ours = file.attrs.get("format") == hdf5.FORMAT
             datasets = {} if ours else _datasets(file)
     except _DAMAGE as error:
-        raise RecordingError(f"{path}: is no HDF5 file that can be read ({error}): export it again") from error
+        raise RecordingError(f"{path}: is not an HDF5 file that can be read ({error}): export it again") from error
     if ours:
         return hdf5.read_recording_h5(path, with_info=False).runs
     if not datasets:

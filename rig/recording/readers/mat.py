@@ -49,7 +49,7 @@ def read(path: Path) -> Sequence[Any]:
         columns = dict(mat4.variables(data) if 0 in head[:4] else _variables(path, data))
     except (ValueError, IndexError, struct.error, zlib.error, MemoryError) as error:
         raise RecordingError(
-            f"{path}: is no .mat file that can be read ({error}): save it again with save(..., '-v7')"
+            f"{path}: is not a .mat file that can be read ({error}): save it again with save(..., '-v7')"
         ) from error
     if not columns:
         raise RecordingError(f"{path}: holds no variables: save time_s, torque_nm, rate_rad_s as vectors")

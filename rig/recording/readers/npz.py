@@ -22,7 +22,7 @@ def read(path: Path) -> Sequence[Table]:
         with zipfile.ZipFile(path) as archive:
             members = {n.removesuffix(".npy"): n for n in archive.namelist() if n.endswith(".npy")}
     except _DAMAGE as error:
-        raise RecordingError(f"{path}: is no .npz archive ({error}): write it again with numpy.savez") from error
+        raise RecordingError(f"{path}: is not a .npz archive ({error}): write it again with numpy.savez") from error
     if not members:
         raise RecordingError(f"{path}: holds no arrays: write them with numpy.savez(file, time_s=..., ...)")
     return [Table(path, tuple(members), read_each(path, lambda name: _array(path, name, members[name])))]

@@ -18,7 +18,7 @@ def read(path: Path) -> Sequence[Run]:
         runs = [run_from_journal(run) for run in contents.runs if tells_something(run)]
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise RecordingError(
-            f"{path}: its frames are sound but not what this version writes ({error!r}): "
+            f"{path}: its frames are intact but not in the format of this version ({error!r}): "
             "read it with the version that wrote it"
         ) from error
     if not runs:

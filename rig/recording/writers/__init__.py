@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
 
-from rig.recording.run import Array
+from rig.arrays import Array
 
 Writer = Callable[[Path, Mapping[str, Array]], None]
 _BY_NAME = {"csv": "csv_text", "mat": "mat", "npz": "npz"}

@@ -12,7 +12,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rig.recording.run import Array, Run
+from rig.arrays import Array
+from rig.recording.run import Run
 
 _NOT_IN_A_NAME = re.compile(r"\W+", re.ASCII)
 OWN = frozenset(("time_s", "torque_nm", "rate_rad_s", "angle_rad", "valid", "rate_deg_s", "angle_deg", "file", "args"))

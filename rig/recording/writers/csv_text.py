@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.recording.run import Array
+from rig.arrays import Array
 
 BLOCK = 10_000
 

@@ -8,7 +8,7 @@ from typing import cast
 
 from scipy.io import savemat
 
-from rig.recording.run import Array
+from rig.arrays import Array
 
 
 def write(path: Path, columns: Mapping[str, Array]) -> None:

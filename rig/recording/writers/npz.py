@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.recording.run import Array
+from rig.arrays import Array
 
 
 def write(path: Path, columns: Mapping[str, Array]) -> None:

@@ -1,11 +1,11 @@
 import pytest
 
-import drivers.can_link
+import drivers.transport.can_link
 from drivers.amplifiers import make_amplifier
-from drivers.can_link import CanLink
 from drivers.codecs import cia402
 from drivers.codecs.cia402 import State
 from drivers.codecs.lawicel import CanFrame
+from drivers.transport.can_link import CanLink
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 from sim_backend.emulators.drive import Cia402Drive
@@ -14,7 +14,7 @@ from tests.drivers.emulated_bus import EmulatedBus, FakeTime
 
 @pytest.fixture(autouse=True)
 def no_sleeping(monkeypatch):
-    monkeypatch.setattr(drivers.can_link.time, "sleep", lambda s: None)
+    monkeypatch.setattr(drivers.transport.can_link.time, "sleep", lambda s: None)
 
 
 class Bench:
@@ -185,7 +185,7 @@ def test_absent_drive_is_named_with_what_to_check(bench):
 def test_drive_without_heartbeat_consumer_is_refused(bench):
     keep = bench.drive.od.write
     bench.drive.od.write = lambda i, s, d: None if i == 0x1016 else keep(i, s, d)
-    with pytest.raises(DeviceFault, match="go on driving when this computer dies"):
+    with pytest.raises(DeviceFault, match="keep driving if this computer fails"):
         bench.amplifier.contact(bench.link)
 
 
@@ -210,7 +210,7 @@ def test_without_sync_every_frame_acts_at_once():
     ("config", "message"),
     [
         ({"device": "cia401"}, "there are cia402, odrive, moteus, vesc"),
-        ({"node": 0}, "0 is no CANopen node"),
+        ({"node": 0}, "0 is not a CANopen node"),
         ({"node": 127}, "host_node: 127 is the drive's own"),
         ({"settings": {"mode": "position"}}, "settings.mode"),
         ({"settings": {"on_lost_host": 0}}, "on_lost_host: 0 is not allowed"),

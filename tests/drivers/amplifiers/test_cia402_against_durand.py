@@ -2,13 +2,13 @@
 
 import pytest
 
-import drivers.can_link
+import drivers.transport.can_link
 from drivers.amplifiers import make_amplifier
-from drivers.can_link import CanLink
 from drivers.codecs import cia402
 from drivers.codecs.cia402 import State
 from drivers.codecs.lawicel import CanFrame
-from drivers.slcan import SlcanBulkBus
+from drivers.transport.can_link import CanLink
+from drivers.transport.slcan import SlcanBulkBus
 from rig.config.bench import AmplifierConfig
 from rig.errors import DeviceFault
 from tests.drivers.emulated_bus import FakeTime
@@ -103,7 +103,7 @@ class Slave:
 
 @pytest.fixture
 def slave(monkeypatch):
-    monkeypatch.setattr(drivers.can_link.time, "sleep", lambda s: None)
+    monkeypatch.setattr(drivers.transport.can_link.time, "sleep", lambda s: None)
     return Slave()
 
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-import drivers.can_link
+import drivers.transport.can_link
 from drivers.amplifiers import make_amplifier
-from drivers.can_link import CanLink
 from drivers.codecs import cia402
+from drivers.transport.can_link import CanLink
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
 from sim_backend.emulators.canopen_node import CanopenNode
@@ -17,7 +17,7 @@ MODES_OF_AN_EPOS4 = 0x3A5  # as its firmware says; the DCF leaves the value out
 
 @pytest.fixture(autouse=True)
 def no_sleeping(monkeypatch):
-    monkeypatch.setattr(drivers.can_link.time, "sleep", lambda s: None)
+    monkeypatch.setattr(drivers.transport.can_link.time, "sleep", lambda s: None)
 
 
 class Contact:

@@ -4,10 +4,10 @@ import struct
 import can
 import pytest
 
-import drivers.can_link
+import drivers.transport.can_link
 from drivers.amplifiers import make_amplifier, moteus, vesc
-from drivers.can_link import CanLink, Heard
 from drivers.codecs.lawicel import CanFrame
+from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import AmplifierConfig, CanConfig
 from rig.errors import ConfigError, DeviceFault
 from sim_backend.emulators.odrive import OdriveAxis
@@ -19,7 +19,7 @@ MOTEUS_REPLIES = [v for v in vectors("mjbots") if v["hex"].startswith("24")]
 
 @pytest.fixture(autouse=True)
 def no_sleeping(monkeypatch):
-    monkeypatch.setattr(drivers.can_link.time, "sleep", lambda s: None)
+    monkeypatch.setattr(drivers.transport.can_link.time, "sleep", lambda s: None)
 
 
 class Bench:
@@ -79,7 +79,7 @@ def test_odrive_cuts_the_torque_when_the_loop_hangs():
 def test_absent_odrive_is_named_with_what_to_check():
     bench = odrive()
     bench.bus.silent = True
-    with pytest.raises(DeviceFault, match="ODrive, node 3 is not heard"):
+    with pytest.raises(DeviceFault, match="ODrive, node 3 is silent"):
         bench.amplifier.contact(bench.link)
 
 
@@ -156,7 +156,7 @@ def test_moteus_whose_watchdog_does_nothing_is_refused():
     bench = Bench(
         "moteus", FakeMoteus(watchdog=False), node=7, can=CanConfig(interface="virtual", channel="x"),
     )  # fmt: skip
-    with pytest.raises(DeviceFault, match="goes on without a sign of life"):
+    with pytest.raises(DeviceFault, match="keeps running without a sign of life"):
         bench.armed()
     assert bench.drive.mode == moteus.MODE_STOPPED
 
@@ -189,8 +189,8 @@ def test_vesc_without_a_confirmed_timeout_is_refused():
 def test_vesc_reports_its_hottest_spot_and_its_current():
     driver = make_amplifier(vesc_config())
     assert driver.readings == {}
-    driver.receive(Heard(0.0, CanFrame(9 << 8 | 11, struct.pack(">ihh", 0, 125, 0), extended=True)))
-    driver.receive(Heard(0.0, CanFrame(16 << 8 | 11, struct.pack(">hhhh", 412, 655, 0, 0), extended=True)))
+    driver.receive(ReceivedFrame(0.0, CanFrame(9 << 8 | 11, struct.pack(">ihh", 0, 125, 0), extended=True)))
+    driver.receive(ReceivedFrame(0.0, CanFrame(16 << 8 | 11, struct.pack(">hhhh", 412, 655, 0, 0), extended=True)))
     assert driver.readings == {"drive_current_a": 12.5, "drive_temperature_c": 65.5}
 
 

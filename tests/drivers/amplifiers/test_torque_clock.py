@@ -18,7 +18,7 @@ def exchange(clock, there_s, back_s, ticks=12_000, together=()):
             clock.asked(asked_s + 1e-5)
         taken_s = asked_s + there_s(k)
         stamp = int((taken_s + OFFSET_S) * (1 + DRIFT) * 1e6) & 0xFFFFFFFF
-        errors.append(clock.heard(stamp, taken_s + back_s(k)) - taken_s)
+        errors.append(clock.received(stamp, taken_s + back_s(k)) - taken_s)
     return np.array(errors)
 
 
@@ -48,12 +48,12 @@ def test_an_answer_that_is_looked_at_after_the_next_request_still_finds_its_own(
         asked_s = 10.0 + k * 1e-3
         clock.asked(asked_s)
         for answer in waiting:
-            clock.heard(*answer)
+            clock.received(*answer)
         waiting = [(int((asked_s + 80e-6) * 1e6), asked_s + 160e-6)]
     assert clock.way_s == pytest.approx(160e-6, abs=4e-6)
 
 
 def test_times_never_stand_still():
     clock = TorqueClock(1e-6, 1 << 32)
-    times = [clock.heard(1000, 5.0) for _ in range(3)]
+    times = [clock.received(1000, 5.0) for _ in range(3)]
     assert np.all(np.diff(times) > 0)

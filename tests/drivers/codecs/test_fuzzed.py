@@ -59,7 +59,7 @@ def test_nonsense_with_a_right_checksum_does_not_stop_a_gyroscope() -> None:
     datagram = stim300.encode_datagram(stim300.Datagram(0x90, (0, 0, 100), 0, 7, 500))
     samples = gyro.feed(unknown + datagram, 1.0)
     assert [sample.valid for sample in samples] == [True]
-    assert "no meaning known" in gyro.tally.last_reason
+    assert "unknown code" in gyro.counts.last_reason
     other = make_gyroscope(GyroscopeConfig(device="vectornav"))
     lines = vectornav.encode_line("GYR", "x", 1, 2) + vectornav.encode_line("ERR", "zz")
     assert other.feed(lines + vectornav.encode_line("GYR", 1, 2, 3), 1.0)[-1].valid

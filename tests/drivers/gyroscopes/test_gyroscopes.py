@@ -34,8 +34,8 @@ def test_real_start_up_log_gives_every_sample_and_marks_the_bad_ones():
     samples = []
     for k, at in enumerate(range(0, len(raw), 80)):
         samples += gyro.feed(raw[at : at + 80], 7.0 + k * 1e-3)
-    assert (gyro.tally.received, gyro.tally.invalid, gyro.tally.lost) == (8392, 562, 0)
-    assert "start-up" in gyro.tally.last_reason
+    assert (gyro.counts.received, gyro.counts.invalid, gyro.counts.lost) == (8392, 562, 0)
+    assert "start-up" in gyro.counts.last_reason
     assert all(abs(math.degrees(s.rate_rad_s)) < 400 for s in samples if s.valid)
     steps = [b.time_s - a.time_s for a, b in itertools.pairwise(samples[4000:])]
     assert min(steps) > 0.49e-3
@@ -48,10 +48,10 @@ def test_sample_is_stamped_before_its_arrival_by_wire_time_latency_and_group_del
     on_wire_s = 18 * 10 / 921_600
     expected = 50.0 + 5999 / 2000 - on_wire_s - 506e-6 - 2.2e-3
     assert samples[-1].time_s == pytest.approx(expected, abs=1e-9)
-    assert gyro.delays_told() == (
+    assert gyro.describe_delays() == (
         "gyro group delay 2.2 ms",
-        "gyro latency as its packets say 0.506 ms",
-        "gyro packet on the line 0.195 ms",
+        "gyro latency by its packets 0.506 ms",
+        "gyro packet transmission 0.195 ms",
     )
     assert math.degrees(samples[-1].rate_rad_s) == pytest.approx(10.0)
 
@@ -73,7 +73,7 @@ def test_gap_longer_than_the_counter_is_seen_by_the_clock():
     gyro = stim()
     play(gyro, range(4000))
     late = play(gyro, range(4300, 4400), start_s=50.0 + 4300 / 2000)
-    assert gyro.tally.lost == 300
+    assert gyro.counts.lost == 300
     assert late[-1].time_s == pytest.approx(50.0 + 4399 / 2000 - 180 / 921_600 - 506e-6 - 2.2e-3, abs=2e-6)
 
 
@@ -84,7 +84,7 @@ def test_datagrams_that_were_held_up_and_catch_up_are_not_taken_for_lost():
     for k in range(0, 320, 10):  # in pieces, as a kernel hands them out that was busy with something else
         gyro.feed(b"".join(datagram(4000 + k + i) for i in range(10)), resumed_s + k * 20e-6)
     late = play(gyro, range(4320, 4400), start_s=50.0 + 4320 / 2000)
-    assert gyro.tally.lost == 0
+    assert gyro.counts.lost == 0
     assert late[-1].time_s == pytest.approx(50.0 + 4399 / 2000 - 180 / 921_600 - 506e-6 - 2.2e-3, abs=2e-6)
 
 
@@ -93,16 +93,16 @@ def test_answer_takes_the_place_of_a_sample_which_is_then_not_lost():
     play(gyro, range(3))
     gyro.feed(stim300_special.encode_serial_number("N25581846020021"), 50.0015)
     gyro.feed(datagram(4), 50.002)
-    assert gyro.tally.lost == 0
-    assert gyro.said == ["serial number N25581846020021"]
+    assert gyro.counts.lost == 0
+    assert gyro.messages == ["serial number N25581846020021"]
 
 
 def test_clipped_and_flagged_samples_are_invalid_with_the_reason():
     gyro = stim()
     assert [s.valid for s in gyro.feed(datagram(0, 410.0), 1.0)] == [False]
-    assert "beyond the full scale" in gyro.tally.last_reason
+    assert "beyond the full scale" in gyro.counts.last_reason
     assert [s.valid for s in gyro.feed(datagram(1, 10.0, status=0b0010_0000), 1.0005)] == [False]
-    assert gyro.tally.last_reason == "status byte: outside operating conditions"
+    assert gyro.counts.last_reason == "status byte: outside operating conditions"
 
 
 def test_incremental_angle_is_a_mean_rate_half_a_sample_older():
@@ -139,9 +139,9 @@ def test_device_set_otherwise_than_the_file_is_objected_to():
         ({"device": "stim3000"}, "there are stim300, vectornav, kvh1750"),
         ({"settings": {"filter": 262}}, "did you mean filter_hz"),
         ({"settings": {"filter_hz": 100}}, "filter_hz: 100 is not allowed"),
-        ({"sample_rate_hz": 1500.0}, "1500 is none of the STIM300's"),
+        ({"sample_rate_hz": 1500.0}, "1500 is not one of the STIM300's"),
         ({"baud": 460_800, "settings": {"datagram": 0x93}}, "need 760000 baud, the line has 460800"),
-        ({"settings": {"datagram": 0x12}}, "0x12 is none of the STIM300's"),
+        ({"settings": {"datagram": 0x12}}, "0x12 is not one of the STIM300's"),
     ],
 )
 def test_settings_that_cannot_work_are_refused(config, message):
@@ -155,7 +155,7 @@ def test_vectornav_binary_carries_its_own_time():
     for k in (*range(800), *range(803, 1600)):
         packet = vectornav.encode_binary_rate(round(k / 400 * 1e9), (0.25, 0.0, 0.0))
         samples += gyro.feed(packet, 9.0 + k / 400)
-    assert gyro.tally.lost == 3
+    assert gyro.counts.lost == 3
     assert samples[-1].time_s == pytest.approx(9.0 + 1599 / 400 - len(packet) * 10 / 921_600, abs=1e-9)
     assert samples[-1].rate_rad_s == 0.25
 
@@ -163,7 +163,7 @@ def test_vectornav_binary_carries_its_own_time():
 def test_vectornav_error_line_is_said():
     gyro = make_gyroscope(GyroscopeConfig(device="vectornav"))
     gyro.feed(vectornav.encode_line("ERR", "12"), 1.0)
-    assert gyro.said == ["insufficient baud rate for this output"]
+    assert gyro.messages == ["insufficient baud rate for this output"]
 
 
 def test_kvh_increments_become_rates_and_invalid_axes_are_marked():
@@ -185,4 +185,4 @@ def test_a_datagram_that_comes_twice_is_one_sample_and_no_turn_of_the_counter():
     assert len(samples) == 2000
     steps = [b.time_s - a.time_s for a, b in itertools.pairwise(samples[1000:])]
     assert max(steps) == pytest.approx(0.5e-3, rel=0.05)
-    assert gyro.tally.repeated == 2000
+    assert gyro.counts.repeated == 2000

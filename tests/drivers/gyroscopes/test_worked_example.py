@@ -44,7 +44,7 @@ def test_example_reads_rates_and_marks_lost_invalid_and_damaged_lines(gyro):
     assert [s.valid for s in samples] == [True, True, False, False, False, True]
     assert math.degrees(samples[0].rate_rad_s) == pytest.approx(12.345)
     assert samples[-1].time_s == pytest.approx(10.0 + 5 / 500 - 4.5e-3, abs=1e-3)
-    assert gyro.tally.lost == 2
+    assert gyro.counts.lost == 2
     damaged = bytearray(line(4, 12.345))
     damaged[3] ^= 1
     assert gyro.feed(bytes(damaged), 10.02) == []

@@ -146,7 +146,7 @@ CASES = {
         "download it first",
     ),
     "name with a path": (RUNS + "name: ../../etc", ":5: name", "folder's name", "letters, digits"),
-    "duplicate key": (RUNS + "name: a\nname: b", ":6: name", "stands twice (first on line 5)", "keep one"),
+    "duplicate key": (RUNS + "name: a\nname: b", ":6: name", "given twice (first on line 5)", "keep one"),
     "bad indentation": ("backend: recorded\n recorded: 1", ":2:", "not YAML", "indentation"),
     "tab": ("backend: recorded\nrecorded:\n\truns: 1", ":3:", "not YAML", "spaces, never with tabs"),
     "unclosed bracket": ("backend: [recorded", ":1:", "not YAML", "brackets"),
@@ -200,7 +200,7 @@ def test_a_folder_is_no_config(tmp_path: Path) -> None:
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
 def test_a_pipe_is_refused_instead_of_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.yaml")
-    assert "no regular file" in refusal(tmp_path / "pipe.yaml")
+    assert "not a regular file" in refusal(tmp_path / "pipe.yaml")
 
 
 def test_bytes_that_are_no_text_are_named_by_line(tmp_path: Path) -> None:
@@ -238,7 +238,7 @@ def test_a_long_list_of_faults_is_cut(tmp_path: Path) -> None:
     path.write_text(RUNS + "".join(f"wrong{i}: 1\n" for i in range(100)))
     lines = refusal(path).splitlines()
     assert len(lines) == 26
-    assert lines[-1] == "... and 75 more; mend these first"
+    assert lines[-1] == "... and 75 more; correct these first"
 
 
 def test_a_long_value_is_cut_in_the_message(tmp_path: Path) -> None:

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from rig.arrays import Array
 from rig.dynamics import Equations, TorqueSignal, simulate
 from rig.platform import Platform
-from rig.recording.run import Array
 
 NOISE_RAD_S = math.radians(0.05)  # of one gyro sample
 COULOMB = {"coulomb_friction": {"level": 1.2}}

@@ -7,7 +7,7 @@ import pytest
 
 from rig.dynamics import TorqueSignal
 from rig.dynamics.torque import KEPT
-from rig.recording.run import TorqueHold
+from rig.signals import TorqueHold
 
 TIME = np.arange(1001) * 1e-3
 BETWEEN = np.linspace(0.01, 0.99, 7777)

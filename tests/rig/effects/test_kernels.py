@@ -12,10 +12,10 @@ import pytest
 from scipy import signal
 
 from rig import effects
+from rig.arrays import Array
 from rig.dynamics.filters import run_filter
 from rig.dynamics.native import addresses
 from rig.effects import Effect, Place
-from rig.recording.run import Array
 from tests.rig.effects.values import VALUES
 
 J, C, K = 0.02, 0.045, 677.3

@@ -152,7 +152,7 @@ def test_code_outside_the_folder_of_the_yaml_is_refused_and_not_run(
         old, new = ("model: {}", "model: {{{}}}") if section == "model" else ("platform: {}", "platform: {{{}}}")
         text = text.replace(old, new.format(f"effects_from: '{file}'"))
     (folder / "rig.yaml").write_text(text, encoding="utf-8")
-    with pytest.raises(ConfigError, match=rf"{key}: .*its code is not run: look at it, then copy it there"):
+    with pytest.raises(ConfigError, match=rf"{key}: .*its code is not run: review it, then copy it there"):
         load_config(folder / "rig.yaml", [f"{key}={file}"] if way == "set" else [], announce=said.append)
     assert not ran.exists() and said == []
 

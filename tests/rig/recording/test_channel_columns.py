@@ -103,7 +103,7 @@ def test_an_empty_or_a_wild_channel_is_refused_with_its_key_or_line(tmp_path: Pa
     [
         ("{winding: {kind: warmth}}", r"channels\.winding\.kind: 'warmth' is not allowed: has to be 'current', 'temp"),
         ("{winding: {column: T1}}", r"channels\.winding\.kind: is required and missing"),
-        ("{Winding 1: {kind: other}}", r"'Winding 1' is no name for a channel: lower-case letters"),
+        ("{Winding 1: {kind: other}}", r"'Winding 1' is not a name for a channel: lower-case letters"),
         ("{cubic: {kind: other}}", r"a channel 'cubic' would make an effect 'cubic_stiffness', and there is one"),
         ("{a: {kind: other, column: T}, b: {kind: other, column: T}}", r"column 'T' is used for two quantities"),
         ("{w: {kind: temperature, torque_constant_nm_a: 1}}", r"torque_constant_nm_a belongs to kind: current"),

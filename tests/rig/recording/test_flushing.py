@@ -15,10 +15,10 @@ import rig.recording.steady as steady_module
 from rig.excitation import PlannedSet, Sine
 from rig.guard import Tick
 from rig.interface import GyroSample, TorqueSample
-from rig.recorder import SetRecorder
 from rig.recording.flushing import Repeating, sync, sync_folder
 from rig.recording.journal import Journal
 from rig.recording.journal_reader import read_journal
+from rig.sequencer.recorder import SetRecorder
 
 
 def test_work_is_repeated_until_it_is_stopped_and_never_after() -> None:

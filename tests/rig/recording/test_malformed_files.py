@@ -148,21 +148,21 @@ def foreign_journal(path: Path) -> None:
 FILES: dict[str, tuple[str, Callable[[Path], Any], str, str]] = {
     "empty": ("run.csv", lambda p: p.write_bytes(b""), "the file is empty", "export the recording again"),
     "folder": ("run.csv", lambda p: p.mkdir(), "is a folder", "name one file of it"),
-    "unknown suffix": ("run.xlsx", lambda p: p.write_bytes(b"PK"), "'.xlsx' is no format known", ".csv, .csv.gz"),
+    "unknown suffix": ("run.xlsx", lambda p: p.write_bytes(b"PK"), "'.xlsx' is not a known format", ".csv, .csv.gz"),
     "binary in a csv": ("run.csv", lambda p: p.write_bytes(bytes(range(256))), "is not text", "as CSV"),
     "no gzip": ("run.csv.gz", lambda p: p.write_text(GOOD), "cannot be read", "export the file again"),
     "cut gzip": ("run.csv.gz", gzip_cut, "ended before the end-of-stream", "export the file again"),
-    "no npz": ("run.npz", lambda p: p.write_text(GOOD), "is no .npz archive", "numpy.savez"),
-    "npy named npz": ("run.npz", lambda p: p.write_bytes(npy(T)), "is no .npz archive", "numpy.savez"),
-    "cut npz": ("run.npz", cut_npz, "is no .npz archive", "numpy.savez"),
+    "no npz": ("run.npz", lambda p: p.write_text(GOOD), "is not a .npz archive", "numpy.savez"),
+    "npy named npz": ("run.npz", lambda p: p.write_bytes(npy(T)), "is not a .npz archive", "numpy.savez"),
+    "cut npz": ("run.npz", cut_npz, "is not a .npz archive", "numpy.savez"),
     "damaged npz": ("run.npz", flipped_npz, "is damaged", "export the file again"),
     "npz without arrays": ("run.npz", np.savez, "holds no arrays", "numpy.savez"),
     "npz of objects": ("run.npz", object_array, "never loaded (they can run code)", "save it as numbers"),
     "npz that announces a terabyte": ("run.npz", announced_array, "137438953472 samples", "cut it into runs"),
-    "no mat": ("run.mat", lambda p: p.write_text(GOOD), "is no .mat file", "'-v7'"),
+    "no mat": ("run.mat", lambda p: p.write_text(GOOD), "is not a .mat file", "'-v7'"),
     "mat bomb": ("run.mat", compressed_mat_bomb, "unpacks to more than", "save fewer variables"),
     "empty mat": ("run.mat", lambda p: scipy.io.savemat(p, {}), "holds no variables", "as vectors"),
-    "no hdf5": ("run.h5", lambda p: p.write_text(GOOD), "is no HDF5 file", "export it again"),
+    "no hdf5": ("run.h5", lambda p: p.write_text(GOOD), "is not an HDF5 file", "export it again"),
     "empty hdf5": ("run.h5", lambda p: h5py.File(p, "w").close(), "holds no datasets", "write time_s"),
     "hdf5 with values elsewhere": ("run.h5", h5_elsewhere, "keeps its values in another file", "copy them"),
     "hdf5 that links elsewhere": ("run.h5", h5_link_elsewhere, "no column 'rate_rad_s'", "recorded.columns"),
@@ -176,10 +176,10 @@ FILES: dict[str, tuple[str, Callable[[Path], Any], str, str]] = {
     "frame that is no JSON": (
         "run.journal",
         lambda p: p.write_bytes(frame(HEADER, b"{}") + frame(RUN, b"[" * 100_000)),
-        "not what this version writes",
+        "not in the format of this version",
         "the version that wrote it",
     ),
-    "journal of another program": ("run.journal", foreign_journal, "not what this version writes", "wrote it"),
+    "journal of another program": ("run.journal", foreign_journal, "not in the format of this version", "wrote it"),
     "journal without samples": (
         "run.journal",
         lambda p: Journal.create(p, {}).close(),
@@ -209,13 +209,13 @@ def test_a_missing_file_lists_what_is_there(tmp_path: Path) -> None:
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
 def test_a_pipe_is_refused_instead_of_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "run.csv")
-    assert "no regular file (a pipe or device): save the data to a file first" in refusal(tmp_path, "run.csv")
+    assert "not a regular file (a pipe or device): save the data to a file first" in refusal(tmp_path, "run.csv")
 
 
 def test_a_device_is_refused(tmp_path: Path) -> None:
     if not Path("/dev/zero").exists():
         pytest.skip("no /dev/zero on this system")
-    assert "no regular file" in refusal(tmp_path, "/dev/zero")
+    assert "not a regular file" in refusal(tmp_path, "/dev/zero")
 
 
 def test_a_home_that_does_not_exist_is_said(tmp_path: Path) -> None:

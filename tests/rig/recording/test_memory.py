@@ -52,7 +52,7 @@ def test_a_text_that_claims_gigabytes_is_refused_before_they_are_taken(tmp_path:
     HARMFUL["refuse own_long_text.h5"](path)
     done = subprocess.run([sys.executable, "-c", READ, str(path)], capture_output=True, text=True, check=True)
     said, used_mib = done.stdout.splitlines()
-    assert "is no HDF5 file that can be read" in said
+    assert "is not an HDF5 file that can be read" in said
     assert int(used_mib) < 600
 
 

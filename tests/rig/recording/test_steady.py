@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 import rig.recording.steady as steady_module
-from drivers.capture import TICK, Capture, read_capture
-from drivers.capture_account import account_of
-from rig.cli.parts import Part
+from commands.campaign.campaign_part import CampaignPart
+from drivers.capture.account import summary_of
+from drivers.capture.wire_capture import TICK, Capture, read_capture
 from rig.recording.journal import Journal
 from rig.recording.journal_reader import read_journal
 from rig.recording.steady import RESERVED_BYTES, SteadyFile, missing_of, opened, record, tail_of, whole
@@ -209,7 +209,7 @@ def test_what_a_journal_and_a_capture_hold_in_their_tails_is_read(tmp_path: Path
     assert read_journal(journal.path).runs[0].column("samples", "time_s").tolist() == [0.5]
     assert read_journal(journal.path).unread_bytes == 0
     assert [entry.time_s for entry in read_capture(capture.path) if entry.kind == TICK] == [7.0]
-    assert account_of(capture.path).cut_bytes == 0
+    assert summary_of(capture.path).cut_bytes == 0
     hanging.release.set()
     for thread in threads:
         thread.join()
@@ -223,7 +223,7 @@ import sys, threading, time
 from collections import defaultdict
 from pathlib import Path
 import rig.recording.steady as steady
-from drivers.capture import Capture
+from drivers.capture.wire_capture import Capture
 from rig.recording.journal import Journal
 
 held, write = defaultdict(threading.Lock), steady._write_all
@@ -284,5 +284,5 @@ def test_a_tail_goes_with_its_journal_into_the_folder_that_resumes_it(tmp_path: 
     journal = before / "recording.journal"
     journal.write_bytes(b"0123")
     tail_of(journal).write_bytes(record(4, b"45"))
-    Part(brought=((journal, "earlier_1.journal"),)).bring(after)
+    CampaignPart(copied_journals=((journal, "earlier_1.journal"),)).copy_journals(after)
     assert whole(after / "earlier_1.journal") == b"012345"

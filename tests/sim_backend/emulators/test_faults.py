@@ -10,9 +10,9 @@ import pytest
 from drivers.codecs import stim300
 from rig.config.bench import InjectedFault
 from rig.errors import ConfigError
-from sim_backend.emulators.fault_kinds import FAULTS
-from sim_backend.emulators.faults import Faults
-from sim_backend.emulators.requests import FaultRequests
+from sim_backend.emulators.faults.kinds import FAULTS
+from sim_backend.emulators.faults.requests import FaultRequests
+from sim_backend.emulators.faults.schedule import FaultSchedule
 
 DATAGRAM = stim300.encode_datagram(stim300.Datagram(0x90, (0, 0, 1234), 0, 7, 506))
 BENCH = SimpleNamespace(freeze_gyro=lambda frozen: None)
@@ -20,7 +20,7 @@ BENCH = SimpleNamespace(freeze_gyro=lambda frozen: None)
 
 def acting(name, value=None, bench=BENCH):
     told = []
-    faults = Faults([], lambda now_s, what: told.append((now_s, what)))
+    faults = FaultSchedule([], lambda now_s, what: told.append((now_s, what)))
     faults.plan(InjectedFault(fault=name, after_s=1.0, lasts_s=2.0, value=value), 10.0)
     faults.pass_time(bench, 10.5)
     assert faults.gyro_bytes(DATAGRAM) == DATAGRAM, "not yet"
@@ -37,7 +37,7 @@ def test_a_fault_begins_and_ends_on_time_and_both_are_told():
 
 
 def test_faults_of_the_file_count_from_the_moment_the_drive_is_enabled():
-    faults = Faults([InjectedFault(fault="gyro_silent", after_s=0.5)], lambda now_s, what: None)
+    faults = FaultSchedule([InjectedFault(fault="gyro_silent", after_s=0.5)], lambda now_s, what: None)
     faults.pass_time(BENCH, 1e6)
     assert faults.gyro_bytes(DATAGRAM) == DATAGRAM
     faults.enabled(20.0)
@@ -104,7 +104,7 @@ def test_what_a_device_does_of_itself_is_done_once():
 
 def test_an_unknown_fault_is_refused_with_those_there_are():
     with pytest.raises(ConfigError, match=r"no fault 'gremlins'; there are gyro_unplugged, .*torque_reversed"):
-        Faults([InjectedFault(fault="gremlins")], lambda now_s, what: None)
+        FaultSchedule([InjectedFault(fault="gremlins")], lambda now_s, what: None)
 
 
 def test_requests_come_as_lines_and_nonsense_is_refused_with_the_reason():

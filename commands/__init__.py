@@ -1,0 +1,1 @@
+"""The commands: the top floor, which only wires the rest together."""

@@ -1,0 +1,1 @@
+"""What plays a campaign from the command line, shared by both programs."""

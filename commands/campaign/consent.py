@@ -1,0 +1,42 @@
+"""The question before real torque is applied."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rig.errors import UsageError
+from rig.interface import Statement, Torque
+
+QUESTION = "REAL torque will be applied. Is everybody clear of the machine? Type yes to start: "
+
+
+def ask_consent(statement: Statement, yes: bool, is_terminal: bool, ask: Callable[[str], str]) -> None:
+    """Return where torque may be applied.
+
+    Parameters
+    ----------
+    yes
+        Whether --yes was given.
+    is_terminal
+        Whether somebody can answer.
+    ask
+        Puts the question and returns the answer; EOFError where none comes.
+
+    Raises
+    ------
+    UsageError
+        Where it may not; nothing was moved.
+    """
+    if statement.torque is not Torque.REAL or yes:
+        return
+    if not is_terminal:
+        raise UsageError(
+            "this campaign applies REAL torque, and without a terminal nobody can be asked. Give --yes if the "
+            "machine is clear, or try --dry-run or --emulate first. Nothing was moved."
+        )
+    try:
+        answer = ask(QUESTION)
+    except EOFError:
+        answer = ""
+    if answer.strip().lower() not in ("yes", "y"):
+        raise UsageError("not started: the answer was not yes. Nothing was moved.")

@@ -1,0 +1,133 @@
+"""The command `rig`: check, devices, play, emulate, recover, export."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from commands.campaign.context import CommandContext, Options, run_command
+from commands.terminal.exit_codes import run_to_exit_code
+from commands.terminal.options import (
+    ConfigFile,
+    DryRun,
+    Emulate,
+    Out,
+    Overrides,
+    Quiet,
+    Resume,
+    Seed,
+    Version,
+    Yes,
+    new_app,
+)
+
+app = new_app("Prepare, check and play a campaign on the rig. To identify from it: identify-run.")
+
+
+@app.callback()
+def rig(version: Version = False) -> None:
+    """Prepare, check and play a campaign on the rig. To identify from it: identify-run."""
+
+
+@app.command()
+def check(config: ConfigFile, emulate: Emulate = False, overrides: Overrides = None) -> None:
+    """Validate CONFIG, forecast every set, contact the devices without torque; list every fault with its cure."""
+
+    def command(context: CommandContext) -> int:
+        loaded = context.options.load()
+        from commands.rig.check import run_checks
+
+        return run_checks(context, loaded)
+
+    raise typer.Exit(run_command(Options(config, emulate=emulate, overrides=tuple(overrides or ())), command))
+
+
+@app.command()
+def devices() -> None:
+    """List the serial ports and CAN adapters of this machine."""
+
+    def command() -> int:
+        from commands.rig.devices import device_lines
+
+        sys.stdout.write("\n".join(device_lines()) + "\n")
+        return 0
+
+    raise typer.Exit(run_to_exit_code(command))
+
+
+@app.command()
+def play(
+    config: ConfigFile,
+    out: Out = None,
+    dry_run: DryRun = False,
+    emulate: Emulate = False,
+    yes: Yes = False,
+    overrides: Overrides = None,
+    seed: Seed = None,
+    quiet: Quiet = False,
+    resume: Resume = None,
+) -> None:
+    """Play and record only."""
+
+    def command(context: CommandContext) -> int:
+        loaded = context.options.load()
+        from commands.rig.play import play_only
+
+        return play_only(context, loaded)
+
+    options = Options(config, out, dry_run, emulate, yes, tuple(overrides or ()), seed, quiet, resume)
+    raise typer.Exit(run_command(options, command))
+
+
+@app.command()
+def recover(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="The results folder of a campaign.", show_default=False)
+    ],
+) -> None:
+    """Recover a results folder after a kill or a power cut; files that are there are not changed."""
+
+    def command() -> int:
+        from commands.rig.recover import recover_folder
+
+        return recover_folder(folder)
+
+    raise typer.Exit(run_to_exit_code(command))
+
+
+@app.command()
+def export(
+    source: Annotated[
+        Path, typer.Argument(metavar="FROM", help="A results folder, recording.h5 or journal.", show_default=False)
+    ],
+    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, npz; of the CAN log: blf, asc, mf4.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="A folder that does not exist yet. Default: FROM/export_FORMAT/")
+    ] = None,
+) -> None:
+    """Write a recording for other programs at full precision, with a rig.yaml that reads it back."""
+
+    def command() -> int:
+        from commands.rig.export import export_recording
+
+        return export_recording(source, to, out)
+
+    raise typer.Exit(run_to_exit_code(command))
+
+
+@app.command()
+def emulate(config: ConfigFile, overrides: Overrides = None) -> None:
+    """Emulate the devices of CONFIG's `bench` section at wire level until Ctrl-C; JSON lines say what they do.
+
+    JSON lines on standard input let faults take hold: {"fault": "gyro_silent", "lasts_s": 0.2}.
+    """
+
+    def command() -> int:
+        from commands.rig.emulate import emulate_devices
+
+        return emulate_devices(Options(config, emulate=True, overrides=tuple(overrides or ())))
+
+    raise typer.Exit(run_to_exit_code(command))

@@ -1,0 +1,64 @@
+"""`rig devices`: what is plugged into this machine."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+from commands.terminal.display import plain
+from drivers.transport.usb_latency import describe_usb_latency
+
+NO_ADAPTERS = ("virtual", "udp_multicast", "serial")  # offered by python-can everywhere; nothing is plugged in
+Lister = Callable[[], list[Any]]
+
+
+def _serial_ports() -> list[Any]:
+    from serial.tools import list_ports
+
+    return sorted(list_ports.comports(), key=lambda port: str(port.device))
+
+
+def _can_adapters() -> list[Any]:
+    import can
+
+    earlier = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)  # python-can reports every interface whose library is not installed
+    try:
+        return [found for found in can.detect_available_configs() if found["interface"] not in NO_ADAPTERS]
+    finally:
+        logging.disable(earlier)
+
+
+def device_lines(serial_ports: Lister = _serial_ports, can_adapters: Lister = _can_adapters) -> list[str]:
+    """What is there, one line each; a listing that fails is said in its place and does not hide the other."""
+    return [
+        *_listing("Serial ports", serial_ports, _serial_line, "None detected. Plug the gyro in, or check its driver."),
+        *_listing(
+            "CAN adapters",
+            can_adapters,
+            _can_line,
+            "None detected. Serial (slcan) adapters are listed under serial ports.",
+        ),
+    ]
+
+
+def _listing(title: str, find: Lister, line: Callable[[Any], str], none: str) -> list[str]:
+    try:
+        found = [plain(line(item)) for item in find()]
+    except Exception as problem:  # noqa: BLE001 (drivers of other makers raise what they like)
+        found = [plain(f"could not be listed: {type(problem).__name__}: {problem}")]
+    return [f"{title}:", *(f"  {text}" for text in found or [none])]
+
+
+def _serial_line(port: Any) -> str:
+    ids = f", USB {port.vid:04x}:{port.pid:04x}" if port.vid is not None and port.pid is not None else ""
+    number = f", serial number {port.serial_number}" if port.serial_number else ""
+    latency = describe_usb_latency(str(port.device))
+    return f"{port.device}  {port.description or 'no description'}{ids}{number}{', ' if latency else ''}{latency}"
+
+
+def _can_line(adapter: Any) -> str:
+    first = ("interface", "channel")
+    rest = [f"{key} {value}" for key, value in adapter.items() if key not in first]
+    return ", ".join([*(f"{key} {adapter.get(key)}" for key in first), *rest])

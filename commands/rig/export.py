@@ -1,0 +1,90 @@
+"""`rig export`: a recording for other programs and a rig.yaml that reads it back; the CAN log as BLF, ASC or MF4."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from commands.rig.recover import CAPTURE_FILE
+from commands.terminal.display import plain
+from commands.terminal.exit_codes import OK
+from rig.errors import RecordingError, UsageError
+from rig.recording import writers
+from rig.recording.run import Run
+
+CAN_FORMATS = ("blf", "asc", "mf4")
+FORMATS = (*writers.names(), *CAN_FORMATS)
+CONFIG_FILE = "rig.yaml"
+
+
+def export_recording(source: Path, wanted: str, out: Path | None) -> int:
+    """Write ``source`` (a results folder, a recording.h5, a journal) as ``wanted``; returns the exit code.
+
+    Raises UsageError where it cannot be done; nothing is overwritten.
+    """
+    if wanted not in FORMATS:
+        raise UsageError(f"--to {wanted[:40]} is not a known format: choose one of {', '.join(FORMATS)}")
+    home = source if source.is_dir() else source.parent
+    folder = out if out is not None else home / f"export_{wanted}"
+    if folder.exists() or folder.is_symlink():
+        raise UsageError(f"{folder} exists and is never overwritten: choose another --out")
+    lines = list(_can_logs(home, wanted, folder) if wanted in CAN_FORMATS else _runs(source, wanted, folder))
+    sys.stdout.writelines(f"{plain(line)}\n" for line in lines)
+    return OK
+
+
+def _made(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True)
+    except OSError as problem:
+        raise UsageError(f"cannot make {folder}: {problem.strerror}: choose another --out") from None
+
+
+def _can_logs(home: Path, wanted: str, folder: Path) -> Iterator[str]:
+    from drivers.capture.can_export import check_installed, write_can_log
+
+    check_installed(wanted)
+    captures = sorted(home.glob(f"raw/**/{CAPTURE_FILE}"))
+    if not captures:
+        raise RecordingError(f"{home}: has no raw/{CAPTURE_FILE}: only a bench run has a CAN log")
+    _made(folder)
+    for capture in captures:
+        part = capture.parent.name if capture.parent != home / "raw" else "can"
+        target = folder / f"{part}.{wanted}"
+        yield f"{target}: {write_can_log(capture, target)} frames of {capture}, times count from the first"
+
+
+def _runs(source: Path, wanted: str, folder: Path) -> Iterator[str]:
+    from rig.recording.readers import read_file
+    from rig.recording.writers.columns import columns_of
+
+    runs = [content for content in read_file(source) if isinstance(content, Run)]
+    if not runs:
+        raise RecordingError(f"{source}: was not written by this program and is a table already")
+    _made(folder)
+    write = writers.writer_of(wanted)
+    entries: list[dict[str, Any]] = []
+    for number, run in enumerate(runs, 1):
+        name = writers.file_name(number, run.name, wanted)
+        write(folder / name, columns_of(run))
+        entries.append(_entry(run, name))
+        yield f"{folder / name}: {len(run.time_s)} samples"
+    section = {"torque_hold": runs[0].torque_hold, "runs": entries}
+    text = yaml.safe_dump({"backend": "recorded", "recorded": section}, sort_keys=False, default_flow_style=None)
+    (folder / CONFIG_FILE).write_text(f"# Reads what was exported here.\n{text}", encoding="utf-8")
+    yield f"{folder / CONFIG_FILE}: reads them"
+
+
+def _entry(run: Run, name: str) -> dict[str, Any]:
+    entry: dict[str, Any] = {"file": name}
+    if run.use != "auto":
+        entry["use"] = run.use
+    if run.min_rate_rad_s:
+        entry["min_rate_rad_s"] = run.min_rate_rad_s
+    if run.added_inertia_kg_m2:
+        entry["added_inertia_kg_m2"] = run.added_inertia_kg_m2
+    return entry

@@ -1,0 +1,174 @@
+"""What the operator sees while a campaign runs, on stderr.
+
+Nothing here may hold up a tick: a terminal that is stopped (Ctrl-S) or slow blocks whoever writes to it. So a
+thread writes, and the loop only hands over short lines. A terminal that is gone is a reason to stop.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from queue import SimpleQueue
+from typing import TextIO
+
+from rig.excitation import PlannedSet
+from rig.sequencer import Observer, Progress
+from rig.sequencer.recorder import SetStatistics
+
+BAR_WIDTH = 24  # characters
+MOST_WAITING = 50  # lines; a terminal that takes none loses bars, not memory
+LAST_WORDS_S = 1.0  # how long a slow terminal is waited for at the end
+LOST = "Stopped because its terminal is gone"
+
+
+def plain(text: str) -> str:
+    """``text`` without what could steer a terminal: names come out of files."""
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
+def discard_typed_ahead(stream: TextIO) -> None:
+    """Drop what was typed on a terminal and not read yet: it answers no question that was asked later.
+
+    Nothing is dropped where ``stream`` is no terminal.
+    """
+    if not stream.isatty():
+        return
+    if sys.platform == "win32":
+        import msvcrt
+
+        while msvcrt.kbhit():
+            msvcrt.getwch()
+        return
+    import termios
+
+    with contextlib.suppress(termios.error):
+        termios.tcflush(stream.fileno(), termios.TCIFLUSH)
+
+
+class Terminal:
+    """A stream that never keeps its writer waiting.
+
+    Parameters
+    ----------
+    stream
+        Where to write.
+    quiet
+        Say nothing of how it goes. Errors do not pass through here.
+    """
+
+    def __init__(self, stream: TextIO, quiet: bool = False) -> None:
+        self.quiet = quiet
+        self.has_bars = stream.isatty() and not quiet
+        self.on_loss: Callable[[str], None] = lambda why: None  # called once, from the writing thread
+        self._stream = stream
+        self._lines: SimpleQueue[str | threading.Event | None] = SimpleQueue()
+        self._is_open_line = False
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """While this holds, lines are written; what still waits is written at the end, if it can be."""
+        thread = threading.Thread(target=self._write, name="terminal", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            self._end_line()
+            self._lines.put(None)
+            thread.join(LAST_WORDS_S)
+
+    def _write(self) -> None:
+        lost = False
+        while (item := self._lines.get()) is not None:
+            if isinstance(item, threading.Event):
+                item.set()
+            elif not lost:
+                try:
+                    self._stream.write(item)
+                    self._stream.flush()
+                except (OSError, ValueError):
+                    lost = True
+                    self.on_loss(LOST)
+
+    def show(self, text: str) -> None:
+        """Say something in a line of its own, unless quiet. Safe from a signal handler."""
+        if not self.quiet:
+            self._end_line()
+            self._lines.put(text + "\n")
+
+    def show_always(self, text: str) -> None:
+        """Say something in a line of its own, even if quiet."""
+        self._end_line()
+        self._lines.put(text + "\n")
+
+    def note(self, text: str) -> None:
+        """Say what is being worked on: in passing on a terminal, a line each elsewhere."""
+        if self.has_bars:
+            self.overwrite(text)
+        else:
+            self.show(text)
+
+    def overwrite(self, text: str) -> None:
+        """Put ``text`` in the place of the line that was put here last."""
+        if self.has_bars and self._lines.qsize() < MOST_WAITING:
+            self._is_open_line = True
+            self._lines.put(f"\r\x1b[K{text}")
+
+    def _end_line(self) -> None:
+        if self._is_open_line:
+            self._is_open_line = False
+            self._lines.put("\n")
+
+    def clear_line(self) -> None:
+        """Take back the line that was put here last."""
+        if self._is_open_line:
+            self._is_open_line = False
+            self._lines.put("\r\x1b[K")
+
+    def flush(self) -> None:
+        """Wait until what was told is written, but not for ever; then others may write there."""
+        self.clear_line()
+        written = threading.Event()
+        self._lines.put(written)
+        written.wait(LAST_WORDS_S)
+
+
+class SetBars(Observer):
+    """A bar a set on a terminal, a line a set elsewhere."""
+
+    def __init__(self, terminal: Terminal) -> None:
+        self._terminal = terminal
+        self._head = ""
+
+    def probed(self, finding: str) -> None:
+        """What the probe found."""
+        self._terminal.show(plain(finding))
+
+    def set_begins(self, planned: PlannedSet, number: int, count: int) -> None:
+        """Which set it is."""
+        self._head = f"set {number}/{count}  {plain(planned.name)}"
+
+    def progress(self, progress: Progress) -> None:
+        """Where it stands."""
+        p = progress
+        figures = _figures(p.late_max_s, p.missed_ticks, p.drops, p.peak_torque_nm)
+        bar = _bar(p.time_s / p.duration_s)
+        self._terminal.overwrite(f"{self._head} {bar} {p.time_s:5.1f}/{p.duration_s:g} s  {figures}")
+
+    def set_ends(self, statistics: SetStatistics) -> None:
+        """How it went."""
+        s = statistics
+        figures = _figures(s.late.max_s, s.missed_ticks, s.drops, s.peak_torque_nm)
+        self._terminal.clear_line()
+        self._terminal.show(f"{self._head} {_bar(1.0) if s.complete else 'CUT SHORT'} {figures}")
+
+
+def _bar(part: float) -> str:
+    full = round(BAR_WIDTH * min(1.0, max(0.0, part)))
+    return f"[{'#' * full}{'-' * (BAR_WIDTH - full)}]"
+
+
+def _figures(late_s: float, missed: int, drops: int, peak_nm: float) -> str:
+    return f"late {late_s * 1e3:.2f} ms  missed {missed}  drops {drops}  peak {peak_nm:.1f} N m"

@@ -1,0 +1,55 @@
+"""Options that several commands share, declared once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ConfigFile = Annotated[Path, typer.Argument(metavar="CONFIG", help="The rig.yaml to work from.", show_default=False)]
+Out = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Results folder; never overwritten. Default: runs/<UTC time>-<config name>/"),
+]
+Resume = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Play only the sets that the campaign in DIR did not finish; DIR stays as it is."),
+]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="The same campaign on the simulated backend.")]
+Emulate = Annotated[bool, typer.Option("--emulate", help="The bench against devices emulated at wire level.")]
+Yes = Annotated[
+    bool, typer.Option("--yes", help="Apply REAL torque without asking; a follow-up only if the file says auto.")
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="A.B.C=VALUE", help="Override one key of CONFIG; may be repeated."),
+]
+Seed = Annotated[int | None, typer.Option(metavar="N", min=0, max=2**32 - 1, help="Seed of simulation and search.")]
+Quiet = Annotated[
+    bool, typer.Option("--quiet", help="Print only errors and warnings: REAL torque, code that is run, low disk space.")
+]
+
+
+def new_app(help_text: str) -> typer.Typer:
+    """An application whose errors are ours to say."""
+    return typer.Typer(
+        help=help_text,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+
+
+def show_version(wanted: bool) -> None:
+    """Print the version and leave."""
+    if wanted:
+        from commands.terminal.version import version
+
+        typer.echo(f"isp-rig {version()}")
+        raise typer.Exit
+
+
+Version = Annotated[
+    bool, typer.Option("--version", callback=show_version, is_eager=True, help="Print the version and leave.")
+]

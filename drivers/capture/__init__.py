@@ -1,0 +1,1 @@
+"""Raw capture: every byte that crossed the wire, kept with its time."""

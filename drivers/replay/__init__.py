@@ -1,0 +1,5 @@
+"""Replay: a raw capture in the place of the devices."""
+
+from drivers.replay.rig import ReplayRig
+
+__all__ = ["ReplayRig"]

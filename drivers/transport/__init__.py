@@ -1,0 +1,1 @@
+"""Ports and buses: how bytes and frames reach a driver."""

@@ -1,0 +1,25 @@
+"""Pre-flight: what every set would do to the declared platform, before anything moves."""
+
+from rig.preflight.forecast import Peaks
+from rig.preflight.prediction import (
+    Prediction,
+    allowed_peaks,
+    model_hint,
+    peaks,
+    plan,
+    playable_sets,
+    predict,
+    predict_all,
+)
+
+__all__ = [
+    "Peaks",
+    "Prediction",
+    "allowed_peaks",
+    "model_hint",
+    "peaks",
+    "plan",
+    "playable_sets",
+    "predict",
+    "predict_all",
+]
