@@ -1,17 +1,18 @@
 """The pages of docs/effects, one an effect, made from the effect objects themselves.
 
-python benchmarks/effect_pages.py
+python -m benchmarks.effect_pages
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 from ctypes import c_double
 from pathlib import Path
 
 import numpy as np
-from line_chart import Line, panel, svg
 
+from benchmarks.line_chart import Line, panel, svg
 from rig import effects
 from rig.dynamics.filters import run_filter
 from rig.dynamics.native import addresses
@@ -150,7 +151,7 @@ def index() -> str:
     out = [
         "# Effects", "",
         "One object each in `rig/effects/`, read by simulator, identifier, report and these pages",
-        "(`python benchmarks/effect_pages.py`). [An effect of your own](your-own.md) is a file of thirty lines;",
+        "(`python -m benchmarks.effect_pages`). [An effect of your own](your-own.md) is a file of thirty lines;",
         "[a measured channel](channels.md) (a current, a temperature, another axis) may be a cause too.", "",
         "| effect | family | equation |", "|---|---|---|",
     ]  # fmt: skip
@@ -162,6 +163,7 @@ def index() -> str:
 
 def main() -> None:
     """Write all pages and pictures."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     (FOLDER / "figures").mkdir(parents=True, exist_ok=True)
     for name in effects.names():
         effect = effects.get(name)
