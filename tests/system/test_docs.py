@@ -1,0 +1,156 @@
+"""The documentation: its paths and links exist, its commands run, its records have one form."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+TOPS = ("rig", "drivers", "identify", "sim_backend", "commands", "benchmarks")
+TOUR = ROOT / "docs" / "how-a-campaign-flows.md"
+DECISIONS = ROOT / "docs" / "decisions"
+RECORDS = sorted(DECISIONS.glob("[0-9]*.md"))
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+WITH_COMMANDS = (*PAGES, *sorted((ROOT / "benchmarks").rglob("*.md")))
+SECTIONS = ["Status", "Context", "Decision", "Consequences"]
+MOST_WORDS = 450
+HELP_WITHIN_S = 120.0  # a busy machine takes seconds to import what a command needs
+
+
+def text_of(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
+
+
+def name_of(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def packages() -> list[str]:
+    """Every folder with modules in it, as `identify/select`."""
+    folders = {p.parent for top in TOPS for p in (ROOT / top).rglob("*.py") if "__pycache__" not in p.parts}
+    return sorted(name_of(folder) for folder in folders)
+
+
+def named_in_code_marks(path: Path) -> set[str]:
+    return {match.strip("/") for match in re.findall(r"`([^`\n]+)`", text_of(path))}
+
+
+def paths_in(path: Path) -> list[str]:
+    """Names in code marks that are a path from the root of the tree; `rig/effects/<name>.py` is a pattern, not a path."""
+    first = (*TOPS, "docs", "tests", "examples")
+    found = (n for n in named_in_code_marks(path) if "/" in n and n.split("/")[0] in first)
+    return sorted(n for n in found if not set("<>{} *") & set(n))
+
+
+@cache
+def anchors(page: Path) -> set[str]:
+    """What the headings of a page are called in links, as code hosts make them."""
+    out: set[str] = set()
+    for heading in re.findall(r"^#+ +(.+)$", text_of(page), re.M):
+        words = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading).lower().replace("`", "")
+        out.add(re.sub(r"[^\w\- ]", "", words).strip().replace(" ", "-"))
+    return out
+
+
+def links() -> list[tuple[Path, str]]:
+    found = []
+    for page in PAGES:
+        prose = re.sub(r"^```.*?^```$", "", text_of(page), flags=re.M | re.S)
+        found += [(page, target) for target in re.findall(r"\]\(([^)\s]+)\)", prose)]
+    return [(page, target) for page, target in found if not re.match(r"[a-z]+:", target)]
+
+
+def documented_commands() -> list[str]:
+    """Every command in the pages, cut down to what answers --help: program, module or subcommand."""
+    found: set[str] = set()
+    for page in WITH_COMMANDS:
+        text = text_of(page)
+        found |= {f"python {script}" for script in re.findall(r"\bpython3? (benchmarks/[\w/]+\.py)", text)}
+        found |= {f"python -m {module}" for module in re.findall(r"\bpython3? -m (benchmarks[\w.]+\w)", text)}
+        blocks = "\n".join(re.findall(r"^```sh\n(.*?)^```$", text, re.M | re.S))
+        indented = "\n".join(re.findall(r"^ {4}(\S.*)$", text, re.M))
+        marked = "\n".join(re.findall(r"`([^`\n]+)`", text))
+        lines = "\n".join((blocks, indented, marked))
+        found |= set(re.findall(r"(?:^|[ /])(identify-run)(?= |$)", lines, re.M))
+        found |= {f"rig {sub}" for sub in re.findall(r"(?:^|bin/)rig ([a-z]+)\b", lines, re.M)}
+    return sorted(found)
+
+
+def process_of(command: str) -> list[str]:
+    """The same command with this interpreter, so that it runs wherever the tests do."""
+    program, *rest = shlex.split(command)
+    if program == "python":
+        return [sys.executable, *rest]
+    module, _, function = scripts()[program].partition(":")
+    return [sys.executable, "-c", f"import sys; from {module} import {function}; sys.exit({function}())", *rest]
+
+
+def scripts() -> dict[str, str]:
+    """Program -> entry point, as `pyproject.toml` declares them."""
+    section = text_of(ROOT / "pyproject.toml").split("[project.scripts]")[1].split("\n[")[0]
+    return dict(re.findall(r'^([\w-]+) = "([^"]+)"', section, re.M))
+
+
+@pytest.mark.parametrize("package", packages())
+def test_the_tour_names_every_package(package: str) -> None:
+    assert package in named_in_code_marks(TOUR), f"add a line for {package} to {name_of(TOUR)}"
+
+
+@pytest.mark.parametrize("path", paths_in(TOUR))
+def test_every_path_in_the_tour_exists(path: str) -> None:
+    assert (ROOT / path).exists(), f"{name_of(TOUR)} names {path}, which has moved or is gone"
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if p != TOUR], ids=name_of)
+def test_every_path_on_a_page_exists(page: Path) -> None:
+    made = re.compile(r"drivers/gyroscopes/hashgyro\.py")  # the worked example of a new driver
+    gone = [path for path in paths_in(page) if not (ROOT / path).exists() and not made.fullmatch(path)]
+    assert not gone, f"{name_of(page)} names what has moved or is gone: {', '.join(gone)}"
+
+
+@pytest.mark.parametrize("record", RECORDS, ids=lambda path: path.name)
+def test_a_decision_record_has_its_four_sections_and_fits_a_page(record: Path) -> None:
+    assert re.findall(r"^## (.+)$", text_of(record), re.M) == SECTIONS
+    assert len(text_of(record).split()) <= MOST_WORDS
+
+
+def test_the_index_lists_every_decision_record_by_its_title() -> None:
+    index = text_of(DECISIONS / "README.md")
+    for record in RECORDS:
+        number, title = re.findall(r"^# (\d+)\. (.+)$", text_of(record), re.M)[0]
+        assert int(number) == int(record.name[:4])
+        assert f"| [{number}]({record.name}) | {title} |" in index
+
+
+@pytest.mark.parametrize(
+    ("page", "target"), links(), ids=lambda value: name_of(value) if isinstance(value, Path) else value
+)
+def test_every_link_leads_somewhere(page: Path, target: str) -> None:
+    file, _, anchor = target.partition("#")
+    leads_to = (page.parent / file).resolve() if file else page
+    assert leads_to.exists(), f"{name_of(page)} links {target}"
+    if anchor:
+        assert anchor in anchors(leads_to), f"{name_of(page)} links {target}: no such heading"
+
+
+@pytest.mark.parametrize("command", documented_commands())
+def test_every_documented_command_answers_help(command: str) -> None:
+    done = subprocess.run(
+        [*process_of(command), "--help"],
+        cwd=ROOT, capture_output=True, text=True, timeout=HELP_WITHIN_S, stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "usage" in done.stdout.lower()
+
+
+def test_help_was_asked_of_both_programs_and_the_benchmarks() -> None:
+    commands = documented_commands()
+    assert "identify-run" in commands and "rig check" in commands
+    assert any(command.startswith("python -m benchmarks.") for command in commands)
+    assert not any(command.startswith("python benchmarks/") for command in commands)
