@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
@@ -20,6 +21,7 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
 WITH_COMMANDS = (*PAGES, *sorted((ROOT / "benchmarks").rglob("*.md")))
 SECTIONS = ["Status", "Context", "Decision", "Consequences"]
 MOST_WORDS = 450
+PLAIN = {"COLUMNS": "200", "NO_COLOR": "1", "TERM": "dumb"}  # options in help neither coloured nor cut
 HELP_WITHIN_S = 120.0  # a busy machine takes seconds to import what a command needs
 
 
@@ -42,7 +44,7 @@ def named_in_code_marks(path: Path) -> set[str]:
 
 
 def paths_in(path: Path) -> list[str]:
-    """Names in code marks that are a path from the root of the tree; `rig/effects/<name>.py` is a pattern, not a path."""
+    """Names in code marks that are a path from the root; `rig/effects/<name>.py` is a pattern and no path."""
     first = (*TOPS, "docs", "tests", "examples")
     found = (n for n in named_in_code_marks(path) if "/" in n and n.split("/")[0] in first)
     return sorted(n for n in found if not set("<>{} *") & set(n))
@@ -66,20 +68,24 @@ def links() -> list[tuple[Path, str]]:
     return [(page, target) for page, target in found if not re.match(r"[a-z]+:", target)]
 
 
-def documented_commands() -> list[str]:
-    """Every command in the pages, cut down to what answers --help: program, module or subcommand."""
-    found: set[str] = set()
+PROGRAM = re.compile(
+    r"(?:(?:^|bin/)(identify-run(?=\s|$)|rig [a-z]+\b)|\bpython3? (-m benchmarks[\w.]+\w|benchmarks/[\w/]+\.py))(.*)"
+)
+
+
+def documented_commands() -> dict[str, set[str]]:
+    """Every command in the pages, cut down to what answers --help, with the options that the pages give it."""
+    found: dict[str, set[str]] = {}
     for page in WITH_COMMANDS:
         text = text_of(page)
-        found |= {f"python {script}" for script in re.findall(r"\bpython3? (benchmarks/[\w/]+\.py)", text)}
-        found |= {f"python -m {module}" for module in re.findall(r"\bpython3? -m (benchmarks[\w.]+\w)", text)}
-        blocks = "\n".join(re.findall(r"^```sh\n(.*?)^```$", text, re.M | re.S))
-        indented = "\n".join(re.findall(r"^ {4}(\S.*)$", text, re.M))
-        marked = "\n".join(re.findall(r"`([^`\n]+)`", text))
-        lines = "\n".join((blocks, indented, marked))
-        found |= set(re.findall(r"(?:^|[ /])(identify-run)(?= |$)", lines, re.M))
-        found |= {f"rig {sub}" for sub in re.findall(r"(?:^|bin/)rig ([a-z]+)\b", lines, re.M)}
-    return sorted(found)
+        blocks = [line for block in re.findall(r"^```sh\n(.*?)^```$", text, re.M | re.S) for line in block.splitlines()]
+        indented, marked = re.findall(r"^ {4}(\S.*)$", text, re.M), re.findall(r"`([^`\n]+)`", text)
+        for line in "&&".join((*blocks, *indented, *marked)).split("&&"):
+            if match := PROGRAM.search(line.strip()):
+                program, script, rest = match.groups()
+                command = program or f"python {script}"
+                found.setdefault(command, set()).update(re.findall(r"--[a-z][\w-]*", rest))
+    return found
 
 
 def process_of(command: str) -> list[str]:
@@ -128,9 +134,7 @@ def test_the_index_lists_every_decision_record_by_its_title() -> None:
         assert f"| [{number}]({record.name}) | {title} |" in index
 
 
-@pytest.mark.parametrize(
-    ("page", "target"), links(), ids=lambda value: name_of(value) if isinstance(value, Path) else value
-)
+@pytest.mark.parametrize(("page", "target"), links(), ids=lambda v: v if isinstance(v, str) else name_of(v))
 def test_every_link_leads_somewhere(page: Path, target: str) -> None:
     file, _, anchor = target.partition("#")
     leads_to = (page.parent / file).resolve() if file else page
@@ -139,18 +143,20 @@ def test_every_link_leads_somewhere(page: Path, target: str) -> None:
         assert anchor in anchors(leads_to), f"{name_of(page)} links {target}: no such heading"
 
 
-@pytest.mark.parametrize("command", documented_commands())
-def test_every_documented_command_answers_help(command: str) -> None:
+@pytest.mark.parametrize(("command", "options"), sorted(documented_commands().items()))
+def test_every_documented_command_answers_help_and_has_its_documented_options(command: str, options: set[str]) -> None:
     done = subprocess.run(
-        [*process_of(command), "--help"],
-        cwd=ROOT, capture_output=True, text=True, timeout=HELP_WITHIN_S, stdin=subprocess.DEVNULL,
+        [*process_of(command), "--help"], check=False, cwd=ROOT, capture_output=True, text=True,
+        env={**os.environ, **PLAIN}, timeout=HELP_WITHIN_S, stdin=subprocess.DEVNULL,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "usage" in done.stdout.lower()
+    unknown = sorted(options - set(re.findall(r"--[a-z][\w-]*", done.stdout)))
+    assert not unknown, f"{command} has no {', '.join(unknown)}"
 
 
-def test_help_was_asked_of_both_programs_and_the_benchmarks() -> None:
+def test_both_programs_and_the_benchmarks_are_documented_and_benchmarks_as_modules() -> None:
     commands = documented_commands()
-    assert "identify-run" in commands and "rig check" in commands
+    assert {"identify-run", "rig check", "rig play"} <= set(commands)
     assert any(command.startswith("python -m benchmarks.") for command in commands)
     assert not any(command.startswith("python benchmarks/") for command in commands)
