@@ -88,6 +88,12 @@ def documented_commands() -> dict[str, set[str]]:
     return found
 
 
+def benchmarks() -> dict[str, set[str]]:
+    """Every benchmark that can be started, documented on a page or in its own first lines only."""
+    programs = (p for p in sorted((ROOT / "benchmarks").rglob("*.py")) if '__name__ == "__main__"' in text_of(p))
+    return {f"python -m {name_of(p).removesuffix('.py').replace('/', '.')}": set() for p in programs}
+
+
 def process_of(command: str) -> list[str]:
     """The same command with this interpreter, so that it runs wherever the tests do."""
     program, *rest = shlex.split(command)
@@ -143,8 +149,8 @@ def test_every_link_leads_somewhere(page: Path, target: str) -> None:
         assert anchor in anchors(leads_to), f"{name_of(page)} links {target}: no such heading"
 
 
-@pytest.mark.parametrize(("command", "options"), sorted(documented_commands().items()))
-def test_every_documented_command_answers_help_and_has_its_documented_options(command: str, options: set[str]) -> None:
+@pytest.mark.parametrize(("command", "options"), sorted({**benchmarks(), **documented_commands()}.items()))
+def test_every_command_answers_help_and_has_its_documented_options(command: str, options: set[str]) -> None:
     done = subprocess.run(
         [*process_of(command), "--help"], check=False, cwd=ROOT, capture_output=True, text=True,
         env={**os.environ, **PLAIN}, timeout=HELP_WITHIN_S, stdin=subprocess.DEVNULL,
@@ -160,3 +166,5 @@ def test_both_programs_and_the_benchmarks_are_documented_and_benchmarks_as_modul
     assert {"identify-run", "rig check", "rig play"} <= set(commands)
     assert any(command.startswith("python -m benchmarks.") for command in commands)
     assert not any(command.startswith("python benchmarks/") for command in commands)
+    own = [name_of(p) for p in (ROOT / "benchmarks").rglob("*.py") if "python benchmarks/" in text_of(p)]
+    assert not own, f"write `python -m benchmarks.NAME` in {', '.join(own)}"
