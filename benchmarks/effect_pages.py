@@ -127,7 +127,8 @@ def page(effect: Effect) -> str:
         f"# {effect.name}", "", effect.meaning, "", f"    {effect.equation}", "",
         "th angle in rad, w rate in rad/s, t time in s from the start of the run, M torque on the shaft in N m.",
         f"Acts {where}.",
-        "", f"![{effect.name}](figures/{effect.name}.svg)", "", f"Drawn for {drawn} and a motion of 0.16 rad at 1 Hz.", "",
+        "", f"![{effect.name}](figures/{effect.name}.svg)", "",
+        f"Drawn for {drawn} and a motion of 0.16 rad at 1 Hz.", "",
         f"**Family** {effect.family} · **Source** {effect.source}", "", f"**Sign** {effect.sign}", "",
         "| parameter | unit | bounds | how found | key in rig.yaml | meaning |", "|---|---|---|---|---|---|", *rows,
     ]  # fmt: skip
