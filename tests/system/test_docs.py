@@ -7,10 +7,15 @@ import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
+from typing import get_args, get_origin
 
 import pytest
+from pydantic import BaseModel
+
+from rig.config.root import Config
 
 ROOT = Path(__file__).parents[2]
 TOPS = ("rig", "drivers", "identify", "sim_backend", "commands", "benchmarks")
@@ -124,6 +129,38 @@ def test_every_path_on_a_page_exists(page: Path) -> None:
     made = re.compile(r"drivers/gyroscopes/hashgyro\.py")  # the worked example of a new driver
     gone = [path for path in paths_in(page) if not (ROOT / path).exists() and not made.fullmatch(path)]
     assert not gone, f"{name_of(page)} names what has moved or is gone: {', '.join(gone)}"
+
+
+def types_in(annotation: object) -> list[object]:
+    """The type of a key, or all those inside a union, a list or a mapping."""
+    return [annotation, *(found for inner in get_args(annotation) for found in types_in(inner))]
+
+
+def is_key(dotted: str) -> bool:
+    """Whether rig.yaml has such a key; below a mapping whose keys the user chooses anything may stand."""
+    within: list[object] = [Config]
+    for part in dotted.split("."):
+        sections = [t for t in within if isinstance(t, type) and issubclass(t, BaseModel)]
+        holders = [section for section in sections if part in section.model_fields]
+        if not holders:
+            return any(get_origin(t) is Mapping for t in within)
+        within = [t for holder in holders for t in types_in(holder.model_fields[part].annotation)]
+    return True
+
+
+def test_keys_are_told_from_what_is_none() -> None:
+    assert is_key("identify.follow_up") and is_key("bench.amplifier.watchdog_ms") and is_key("model.effects.own.level")
+    assert not is_key("identify.follow_up.planner") and not is_key("identify.candidate")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_key_of_rig_yaml_on_a_page_exists(page: Path) -> None:
+    keys = {
+        n for n in named_in_code_marks(page) if re.fullmatch(rf"(?:{'|'.join(Config.model_fields)})(?:\.[a-z_]+)+", n)
+    }
+    files = {n for n in keys if n.endswith((".py", ".yaml", ".html"))}
+    unknown = sorted(n for n in keys - files if not is_key(n))
+    assert not unknown, f"{name_of(page)} names keys that rig.yaml has not: {', '.join(unknown)}"
 
 
 @pytest.mark.parametrize("record", RECORDS, ids=lambda path: path.name)
