@@ -1,6 +1,6 @@
 """Unknown torque delays from 0 to 3 ms: how well they, and the damping that they bend, are recovered.
 
-python benchmarks/delays.py --runs 10
+python -m benchmarks.delays --runs 10
 
 The motion is the closed solution, shifted; the fit knows nothing of the delay but that there may be one.
 """
@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from campaigns import DELAY, DELAY_NAME, TRUTH, clean_rates, structure_with, traces_from, white
 from threadpoolctl import threadpool_limits
 
+from benchmarks.campaigns import DELAY, DELAY_NAME, TRUTH, clean_rates, structure_with, traces_from, white
 from identify.estimate.cross_validation import horizon_s, start_values
 from identify.estimate.final_fit import by_output_error
 from identify.estimate.initial_guess import best_rho, first_guess

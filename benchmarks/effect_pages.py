@@ -1,17 +1,18 @@
 """The pages of docs/effects, one an effect, made from the effect objects themselves.
 
-python benchmarks/effect_pages.py
+python -m benchmarks.effect_pages
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 from ctypes import c_double
 from pathlib import Path
 
 import numpy as np
-from line_chart import Line, panel, svg
 
+from benchmarks.line_chart import Line, panel, svg
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.filters import run_filter
@@ -112,21 +113,22 @@ def page(effect: Effect) -> str:
     """The page of one effect as markdown."""
     rows = [
         f"| `{p.name}` | {p.unit} | {_bounds(p)} | {'solved' if p.linear else 'searched'}"
-        f"{', one a run' if p.per_run else ''} | `{p.key}` | {p.meaning} |"
+        f"{', one per run' if p.per_run else ''} | `{p.key}` | {p.meaning} |"
         for p in effect.parameters
     ]
     drawn = ", ".join(f"{k} {v:g}" for k, v in SIZES[effect.name].items())
     where = {
-        Place.DRIVE: "between the torque asked for and the shaft",
+        Place.DRIVE: "between the commanded torque and the shaft",
         Place.LOAD: "at the shaft, beside J a + C w + K th",
         Place.FRICTION: "at the shaft, against the rate; sticking and breaking away included",
-        Place.SENSOR: "between the rate and what the gyro reports",
+        Place.SENSOR: "between the rate and the gyro's reading",
     }[effect.place]
     out = [
         f"# {effect.name}", "", effect.meaning, "", f"    {effect.equation}", "",
         "th angle in rad, w rate in rad/s, t time in s from the start of the run, M torque on the shaft in N m.",
         f"Acts {where}.",
-        "", f"![{effect.name}](figures/{effect.name}.svg)", "", f"Drawn: {drawn}, swinging 0.16 rad at 1 Hz.", "",
+        "", f"![{effect.name}](figures/{effect.name}.svg)", "",
+        f"Drawn for {drawn} and a motion of 0.16 rad at 1 Hz.", "",
         f"**Family** {effect.family} · **Source** {effect.source}", "", f"**Sign** {effect.sign}", "",
         "| parameter | unit | bounds | how found | key in rig.yaml | meaning |", "|---|---|---|---|---|---|", *rows,
     ]  # fmt: skip
@@ -139,9 +141,9 @@ def page(effect: Effect) -> str:
     out += [f"- `{wider}`, which contains it." for wider in effects.names() if effect.name in effects.get(wider).nests]
     out += [f"- `{low}` is looked for first: a constant before a slope." for low in effect.lower_order]
     if effect.separated_by:
-        out.append(f"- What separates it: {effect.separated_by}.")
+        out.append(f"- Experiments that separate it: {effect.separated_by}.")
     if effect.name == "rate_bias":
-        out.append("- Nothing that matters: it is fitted as a nuisance in every run of a gyro.")
+        out.append("- With nothing: it is fitted as a nuisance parameter in every run of a gyro.")
     return "\n".join([*out, ""])
 
 
@@ -150,8 +152,9 @@ def index() -> str:
     out = [
         "# Effects", "",
         "One object each in `rig/effects/`, read by simulator, identifier, report and these pages",
-        "(`python benchmarks/effect_pages.py`). [An effect of your own](your-own.md) is a file of thirty lines;",
-        "[a measured channel](channels.md) (a current, a temperature, another axis) may be a cause too.", "",
+        "(`python -m benchmarks.effect_pages`). [An effect of your own](your-own.md) is a file of thirty lines;",
+        "[a measured channel](channels.md) (a current, a temperature, another axis) may be a cause too.",
+        "[How an effect is named](../how-an-effect-is-named.md) says when the identifier reports one.", "",
         "| effect | family | equation |", "|---|---|---|",
     ]  # fmt: skip
     for name in effects.names():
@@ -162,6 +165,7 @@ def index() -> str:
 
 def main() -> None:
     """Write all pages and pictures."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     (FOLDER / "figures").mkdir(parents=True, exist_ok=True)
     for name in effects.names():
         effect = effects.get(name)

@@ -1,6 +1,6 @@
 """How close the estimates come to the Cramer-Rao bound: root mean square error over bound, in simulated campaigns.
 
-python benchmarks/efficiency.py --runs 200
+python -m benchmarks.efficiency --runs 200
 
 The bound is that of the same model with its nuisances (start angle, start rate, gyro bias of every set)
 counted in; beside it stands the bound with these known.
@@ -14,7 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from campaigns import (
+from threadpoolctl import threadpool_limits
+
+from benchmarks.campaigns import (
     DELAY,
     DELAY_NAME,
     SIGMA_RAD_S,
@@ -27,8 +29,6 @@ from campaigns import (
     traces_from,
     white,
 )  # fmt: skip
-from threadpoolctl import threadpool_limits
-
 from identify.bounds.identifiability import Information, information_of, together
 from identify.model.parameters import Name
 from identify.signals.trace import Trace

@@ -1,6 +1,6 @@
 """What happens when something fails: each fault at random moments, as the emulated drive saw it.
 
-    python benchmarks/faults.py [--times 3] [--jobs 2] [--out TABLE.md] [FAULT ...]
+    python -m benchmarks.faults [--times 3] [--jobs 2] [--out TABLE.md] [FAULT ...]
 
 `rig play` plays on devices that `rig emulate` emulates, each a process of its own; some way into the set something is
 done to either. From the drive's own events comes when the torque was zero, from the host's files when it knew and what

@@ -1,6 +1,6 @@
 """How far the genetic algorithm stays from the optimum, before any polish.
 
-python benchmarks/genetic_gap.py
+python -m benchmarks.genetic_gap
 
 The linear model: the paper's second experiment (500 individuals, 600 generations) against the closed form.
 One shape parameter, gains and J, C, K solved inside (variable projection): against the best of 50 local searches.
@@ -14,10 +14,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from campaigns import SETS, SIGMA_RAD_S, TRUTH, clean_rates, run_of, times, traces_from, white
 from scipy.optimize import minimize_scalar
 from threadpoolctl import threadpool_limits
 
+from benchmarks.campaigns import SETS, SIGMA_RAD_S, TRUTH, clean_rates, run_of, times, traces_from, white
 from identify.estimate.initial_guess import best_rho, first_guess
 from identify.estimate.regression import Regression, normal, solve
 from identify.genetic.algorithm import search

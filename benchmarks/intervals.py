@@ -1,6 +1,6 @@
 """How often the 95 % intervals hold the truth, over simulated campaigns.
 
-python benchmarks/intervals.py --white 500 --real 200 --lost 200 --gyro ../shared/data/adis16405_gyro/gyro_counts.npz
+python -m benchmarks.intervals --white 500 --real 200 --lost 200 --gyro GYRO.npz
 
 White noise; the noise of a real MEMS gyro at rest, scaled to 0.05 deg/s, each of its 100 Hz samples used as one
 of 1 kHz; and white noise with 2 % of the samples lost. Intervals are those of the final fit, noise estimated
@@ -15,9 +15,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from campaigns import SIGMA_RAD_S, TRUTH, clean_rates, regression_start, structure_with, times, traces_from, white
 from threadpoolctl import threadpool_limits
 
+from benchmarks.campaigns import (
+    SIGMA_RAD_S,
+    TRUTH,
+    clean_rates,
+    regression_start,
+    structure_with,
+    times,
+    traces_from,
+    white,
+)
 from identify.estimate.cross_validation import horizon_s
 from identify.estimate.final_fit import by_output_error
 from rig.arrays import Array

@@ -1,6 +1,6 @@
 """kill -9 at random moments of a run: is the torque off every time, and is every recording there?
 
-    python benchmarks/kills.py [--times 200] [--jobs 2]
+    python -m benchmarks.kills [--times 200] [--jobs 2]
 
 `rig play` plays on devices that `rig emulate` emulates; at a random moment between the start of the host and the end
 of its campaign it is killed. A kill passes where the emulated drive is at zero torque within 120 ms (the heartbeat

@@ -1,6 +1,6 @@
 """Lateness of the bench's 1 kHz loop against a bare deadline loop, in alternating pairs.
 
-    python benchmarks/lateness.py [--pairs 10] [--seconds 60] [CONFIG]
+    python -m benchmarks.lateness [--pairs 10] [--seconds 60] [CONFIG]
 
 The bench side is the product: sequencer, guard, gyro and drive through their drivers, raw capture to disk,
 devices emulated in another process. The bare side waits for the same deadlines and does nothing. Both ask for

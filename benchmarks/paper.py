@@ -1,6 +1,6 @@
 """The paper's figures and tables, made anew beside the published numbers: docs/paper.md.
 
-python benchmarks/paper.py [--results FOLDER]
+python -m benchmarks.paper [--results FOLDER]
 
 Plays `examples/table1.yaml` and `examples/table2.yaml` for five seeds of the gyro's noise each (about eight
 minutes on two cores). With --results, campaigns that stand in that folder already are read and not played again.
@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from line_chart import panel, stacked, svg
 
+from benchmarks.line_chart import panel, stacked, svg
 from identify.bounds.identifiability import of_planned
 from identify.estimate.regression import Regression, fit
 from identify.model.structure import Structure

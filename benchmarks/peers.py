@@ -1,7 +1,7 @@
 """The same campaigns through other tools: one table, one command.
 
 pip install lmfit jax-sysid     # into an environment of their own: they hold numpy and scipy back
-python benchmarks/peers.py --runs 3
+python -m benchmarks.peers --runs 3
 
 Each tool fits J, C, K, (where there is one) the delay, and start angle, start rate and bias of every set, by output
 error. The peers are given an exact simulation (scipy's first-order hold on a torque upsampled by a cubic spline;
@@ -19,7 +19,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from campaigns import (
+from scipy import optimize, signal
+from scipy.interpolate import CubicSpline
+from threadpoolctl import threadpool_limits
+
+from benchmarks.campaigns import (
     DELAY_NAME,
     SAMPLE_S,
     SETS,
@@ -32,10 +36,6 @@ from campaigns import (
     traces_from,
     white,
 )
-from scipy import optimize, signal
-from scipy.interpolate import CubicSpline
-from threadpoolctl import threadpool_limits
-
 from identify.bounds.identifiability import information_of, together
 from identify.signals.trace import Trace
 from rig.arrays import Array

@@ -1,12 +1,12 @@
 """How exact the simulated motion is: error of the rate against far finer steps, as a table and a figure.
 
-python benchmarks/plant_accuracy.py docs/figures/plant_accuracy.svg
+python -m benchmarks.plant_accuracy docs/figures/plant_accuracy.svg
 """
 
 from __future__ import annotations
 
+import argparse
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -91,10 +91,13 @@ def svg(found: dict[str, list[float]], played_parts: int) -> str:
 
 def main() -> None:
     """Print the table; write the figure where a path is given."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("figure", nargs="?", type=Path, help="SVG file to write")
+    figure: Path | None = parser.parse_args().figure
     found = {name: errors_deg_s(platform, held) for name, (platform, held) in CASES.items()}
     print(table(found))
-    if len(sys.argv) > 1:
-        Path(sys.argv[1]).write_text(svg(found, Plant(Platform(), 1e-3).parts), encoding="utf-8")
+    if figure is not None:
+        figure.write_text(svg(found, Plant(Platform(), 1e-3).parts), encoding="utf-8")
 
 
 if __name__ == "__main__":

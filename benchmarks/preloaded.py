@@ -9,6 +9,7 @@ one thread, reads requests as JSON lines and answers each with one:
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import signal
@@ -156,6 +157,7 @@ def _load() -> None:
 
 def main() -> None:
     """Serve until standard input ends."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     _load()
     codes: dict[int, int] = {}
     for line in sys.stdin:

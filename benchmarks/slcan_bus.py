@@ -1,6 +1,6 @@
 """Own slcan bus against python-can's on the same pseudo terminal: frames a second and CPU a frame, one run.
 
-    python benchmarks/slcan_bus.py [--frames 20000] [--rounds 5]
+    python -m benchmarks.slcan_bus [--frames 20000] [--rounds 5]
 
 A child process plays the adapter: it answers commands and, told to, writes frames as fast as they are
 taken. Both buses receive the same frames in alternation; ratios within a round cancel what else the

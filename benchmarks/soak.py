@@ -1,6 +1,6 @@
 """Half an hour on the emulated bench at 1 kHz: does memory grow, does torque drift from what was sent?
 
-    python benchmarks/soak.py [--minutes 30]
+    python -m benchmarks.soak [--minutes 30]
 
 `rig play` plays sets of a minute each on devices that `rig emulate` emulates. Once a second the resident memory of
 the host is read; afterwards, from its raw capture, every torque that was sent is held against the one that the drive

@@ -1,6 +1,6 @@
 """The declared Stribeck model of the paper (Eq. 7), on data that an independent event-driven integrator made.
 
-python benchmarks/stribeck.py
+python -m benchmarks.stribeck
 
 Declared values are wrong by the given factors; the declared model, and no other effect, is fitted. Residuals
 are those of a free run over each whole set from one fitted start state, over the gyro's noise.
@@ -15,9 +15,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from campaigns import SETS, SIGMA_RAD_S, TRUTH, run_of, times
-from stick_slip import StickSlip
 
+from benchmarks.campaigns import SETS, SIGMA_RAD_S, TRUTH, run_of, times
+from benchmarks.stick_slip import StickSlip
 from identify.pipeline import identify
 from rig.arrays import Array
 from rig.config.identify import IdentifyConfig

@@ -1,4 +1,4 @@
-"""Play an excitation file on a hidden platform: `python benchmarks/blind/play.py TRUTH.json EXCITATION.yaml --out DIR`.
+"""Play an excitation file on a hidden platform: `python -m benchmarks.blind.play TRUTH.json EXCITATION.yaml --out DIR`.
 
 The file is what a planner writes: a rig.yaml with an `excitation:` section, or that section alone. The result is
 a folder that `identify-run` reads; with `--add CASE` it holds the runs of that case as well.

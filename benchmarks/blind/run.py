@@ -1,4 +1,4 @@
-"""The blind bench: `python benchmarks/blind/run.py --seed N --cases 40 --out DIR`.
+"""The blind bench: `python -m benchmarks.blind.run --seed N --cases 40 --out DIR`.
 
 Every case is generated, given to `identify-run` as a folder of recordings, and scored. DIR/cases holds what the
 tool reads, DIR/truth what it does not, DIR/results what it wrote. A bench that was stopped goes on where it was.
