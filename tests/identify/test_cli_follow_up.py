@@ -114,7 +114,7 @@ def test_where_the_file_says_auto_it_is_played_and_everything_is_identified_agai
     assert follow_up["played"] is True
     assert follow_up["separated"] == [{"effect": "coulomb_friction", "rival": "stribeck_friction"}]
     assert set(follow_up["error"]) == {"before", "after", "after_follow_up"}
-    assert "without follow-up" in done.stdout and "told apart now" in done.stdout
+    assert "without follow-up" in done.stdout and "can be distinguished now" in done.stdout
     assert "without follow-up" in (out / "report.html").read_text(encoding="utf-8")
 
 
@@ -297,7 +297,7 @@ def test_a_second_one_is_played_only_where_it_promises_more_and_never_a_third(
     assert done.exit_code == 0, done.output
     assert len(names(out)) == runs and len(identifier.given) == runs - 1
     assert result(out)["follow_up"]["separated"] == []
-    assert "still open" in done.stdout
+    assert "still cannot be distinguished" in done.stdout
 
 
 def test_recordings_of_ones_own_get_the_file(tmp_path: Path, stub: Stub) -> None:

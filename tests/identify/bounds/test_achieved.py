@@ -47,13 +47,13 @@ def test_a_fit_at_the_bound_is_as_good_as_the_sensor_allows() -> None:
     assert FOUND.after is not None
     at_bound = {n: estimate(p.value, total.expected[n] * p.value, p.unit) for n, p in FOUND.after.parameters.items()}
     again = hindsight(replace(FOUND, after=replace(FOUND.after, parameters=at_bound)), RECORDING)[-1]
-    assert "as good as the sensor allows" in again.sentence
+    assert "at the sensor's limit" in again.sentence
     assert again.achieved == pytest.approx(again.expected)
 
 
 def test_a_fit_far_above_the_bound_is_limited_by_the_model() -> None:
     total = hindsight(reached(FOUND, 0.02), RECORDING)[-1]
-    assert "what the model leaves unexplained is the limit" in total.sentence
+    assert "the limit is the unexplained residual" in total.sentence
     assert "the fit reaches 2.0 %" in total.sentence
 
 

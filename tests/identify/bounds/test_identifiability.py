@@ -77,8 +77,8 @@ def test_information_of_several_sets_adds() -> None:
 def test_the_five_sets_determine_everything_alone_and_together() -> None:
     lines = told(*sines(*SETS))
     assert not any("cannot" in line or "NOT" in line for line in lines)
-    assert any(line.startswith("all sets together: J 0.0") and "rank 3 of 3" in line for line in lines)
-    assert "an unknown torque delay would be told to" in lines[-1]
+    assert any(line.startswith("all sets together: expected J +-0.0") and "rank 3 of 3" in line for line in lines)
+    assert "if the delay is also fitted: delay +-" in lines[-1]
 
 
 def test_one_steady_sine_with_soft_start_does_not_separate_inertia_from_stiffness() -> None:
@@ -97,7 +97,7 @@ def test_a_second_frequency_is_named_as_the_cure() -> None:
 
 
 def test_one_steady_sine_does_not_separate_a_delay_from_damping() -> None:
-    assert any("delay cannot be told from damping" in line for line in told(*sines((60.0, 6.0), soft_start_s=2.0)))
+    assert any("delay cannot be separated from damping" in line for line in told(*sines((60.0, 6.0), soft_start_s=2.0)))
 
 
 def test_a_set_below_the_noise_is_told_how_much_more_torque_it_needs() -> None:
@@ -110,14 +110,14 @@ def test_a_set_below_the_noise_is_told_how_much_more_torque_it_needs() -> None:
 
 def test_without_stiffness_the_smallest_that_would_show_is_said() -> None:
     lines = told(*sines((0.1, 1.0)), platform=replace(PAPER, stiffness_nm_rad=0.0))
-    assert any("stiffness is declared as 0: below" in line and "cannot be told from none" in line for line in lines)
+    assert any("declared as 0: below" in line and "cannot be distinguished from zero" in line for line in lines)
     assert not any("NOT determined" in line or "nan" in line for line in lines)
 
 
 def test_a_free_decay_without_torque_gives_ratios_only() -> None:
     run = decay_run(PAPER, duration_s=5.0)
     lines = of_recorded_campaign(Recording((run,)), PAPER)
-    assert any("without torque only ratios show, C/J" in line and "K/J" in line for line in lines)
+    assert any("without torque only ratios can be determined; expected C/J" in line and "K/J" in line for line in lines)
     assert not any("cannot" in line for line in lines)
 
 
@@ -131,7 +131,7 @@ def test_a_delay_and_an_effect_are_parameters_like_any_other() -> None:
 
 
 def test_a_gyro_that_does_not_say_its_noise_is_assumed_to_be_the_papers() -> None:
-    assert "0.05 deg/s a sample, assumed" in told(*sines((20.0, 1.0)), noise=None)[0]
+    assert "0.05 deg/s a sample (assumed" in told(*sines((20.0, 1.0)), noise=None)[0]
 
 
 def test_two_copies_of_a_parameter_have_rank_one_less_and_no_bound() -> None:

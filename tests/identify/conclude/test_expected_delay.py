@@ -32,7 +32,7 @@ def test_fitted_expected_corrections_and_the_difference_are_told() -> None:
     assert delay_lines(with_delay(1.23e-4), INFO) == (
         "Fitted: 0.1230 ± 0.0020 ms (95 %); the drivers expect 0 ms, their own corrections made (gyro group delay "
         "2.2 ms, torque as sent).",
-        "0.123 ms of it lie where no driver can see: bus, amplifier or sensor.",
+        "0.123 ms is not explained by known device delays: look at the bus, the amplifier and the sensor.",
     )
 
 

@@ -29,7 +29,7 @@ def test_of_a_clean_platform_with_white_noise_nothing_is_said(seed: int) -> None
     assert not told(found.direction) and not told(found.memory, WORTH_OF_PAST)
     assert found.free_lines == ()
     (only,) = diagnosis_sentences(found, "rotary")
-    assert "nothing in it stands out" in only
+    assert "no structure stands out" in only
 
 
 @pytest.mark.parametrize("name", ["cubic_stiffness", "torque_saturation", "backlash", "coulomb_friction"])

@@ -145,7 +145,7 @@ def test_where_the_limits_leave_too_little_nothing_is_planned_and_the_verdict_sa
     found, recording = case("coulomb_friction")
     follow_up = plan_follow_up(found, recording, Peaks(0.04, 0.3, 5.0), RATE_HZ, 12.0)
     assert follow_up is not None and follow_up.plan is None
-    assert f"{LEAST:g} are needed" in follow_up.unparted[0].reason
+    assert f"{LEAST:g} is needed" in follow_up.unparted[0].reason
     assert "No follow-up for" in with_follow_up(found, follow_up).verdict.sentences[-1]
 
 
@@ -167,7 +167,7 @@ def test_without_torque_nothing_is_planned_and_the_reason_is_said() -> None:
     free = replace(recording, runs=tuple(replace(r, torque_nm=None, torque_time_s=None) for r in recording.runs))
     follow_up = plan_follow_up(found, free, ALLOWED, RATE_HZ, 12.0)
     assert follow_up is not None and follow_up.plan is None
-    assert "no torque was recorded" in follow_up.unparted[0].reason
+    assert "without a recorded torque" in follow_up.unparted[0].reason
 
 
 def test_a_rival_that_the_finished_model_excludes_is_not_planned_for() -> None:

@@ -77,7 +77,7 @@ def test_what_was_played_stands_in_result_and_summary() -> None:
     assert len(set(errors)) == 3
     said = " ".join(summary(found).split())
     assert "declared model without follow-up after follow-up noise floor" in said
-    assert "Coulomb friction and Stribeck friction are told apart now." in said
+    assert "Coulomb friction and Stribeck friction can be distinguished now." in said
 
 
 def test_where_the_campaign_was_not_accepted_the_plan_is_what_to_run_next() -> None:

@@ -18,8 +18,8 @@ def test_a_person_hears_verdict_parameters_errors_sets_and_outcome() -> None:
         "+822 %",
         "held-out rate, free run",
         "0.0008727",
-        "Damping C: the declared model alone reads it 822 % too high.",
-        "Presliding friction would explain these data about as well as Coulomb friction.",
+        "Damping C: fitted without the missing effects it is 822 % too high.",
+        "Presliding friction explains these data about as well as Coulomb friction.",
         "undetermined",
         "Max_Error",
     ):

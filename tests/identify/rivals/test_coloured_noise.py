@@ -21,7 +21,7 @@ from rig.errors import RecordingError
 from rig.recording.run import Array, Recording, Run
 from tests.identify.simulated import DECLARED, NOISE_RAD_S, SETS, TRUTH, Effects, sine_run, white
 
-ONCE_MORE = "once more"
+ONCE_MORE = "repeating with coloured noise"
 
 
 def passed(order: int, hertz: float) -> Callable[[Array], Array]:

@@ -92,5 +92,5 @@ def test_two_runs_of_which_one_had_more_torque_are_no_second_resonance() -> None
     assert found.verdict.effects == ()
     assert found.verdict.unexplained
     assert not found.accepted
-    assert "The runs do not agree" in found.verdict.left_open
+    assert "The runs disagree with each other" in found.verdict.left_open
     assert "multisine" in " ".join(next_steps(found))

@@ -100,9 +100,9 @@ def test_a_winding_that_warms_is_named_as_what_lowers_the_torque_with_its_slope(
 
 
 def test_the_verdict_says_at_which_temperature_the_parameters_hold() -> None:
-    said = [s for s in of_the_magnet().verdict.sentences if "counts from" in s]
+    said = [s for s in of_the_magnet().verdict.sentences if "is relative to" in s]
     assert len(said) == 1
-    assert float(said[0].split("counts from ")[1].split(":")[0]) == pytest.approx(21.0, abs=0.02)
+    assert float(said[0].split("is relative to ")[1].split(":")[0]) == pytest.approx(21.0, abs=0.02)
 
 
 @pytest.mark.slow

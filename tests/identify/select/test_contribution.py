@@ -68,4 +68,4 @@ def test_every_named_effect_says_what_it_contributes_and_a_declared_one_does_not
     assert written["effects"] == ["coulomb_friction"]
     assert list(written["contribution"]) == ["coulomb_friction"]
     assert written["contribution"]["coulomb_friction"] > 10.0
-    assert "Without it, all else fitted anew" in summary(found)
+    assert "Without it, even after refitting" in summary(found)

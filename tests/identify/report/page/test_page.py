@@ -132,10 +132,13 @@ def test_residuals_are_drawn_against_time_angle_rate_and_frequency(found: Identi
 
 
 def test_the_page_says_where_the_residual_of_either_model_lives(page: str) -> None:
-    before, after = page.index("Where it lives: declared model"), page.index("Where it lives: final model")
+    before, after = (
+        page.index("What the residual contains: declared model"),
+        page.index("What the residual contains: final model"),
+    )
     assert before < page.index("in odd harmonics (3rd") < after
     assert before < page.index("changes sign with the direction of motion") < after
-    assert after < page.index("nothing in it stands out of that")
+    assert after < page.index("no structure stands out of it")
 
 
 def test_a_gap_between_the_two_directions_of_motion_is_drawn(found: Identification) -> None:
@@ -183,4 +186,4 @@ def test_it_is_written_whatever_is_missing(found: Identification, change: dict[s
 
 def test_an_effect_is_explained_with_its_equation_and_source(page: str) -> None:
     assert "T = level * sgn(w)" in page
-    assert "Without it, all else fitted anew, the held-out error is 230 times as large." in page
+    assert "Without it, even after refitting, the error on held-out data is 230 times larger." in page
