@@ -10,13 +10,14 @@ from threadpoolctl import threadpool_limits
 
 from identify.conclude.conclusion import Case, conclude
 from identify.conclude.declared_values import declared_values
-from identify.conclude.error_figures import floor_of, measure
+from identify.conclude.error_figures import floor_of, in_torque, measure
 from identify.estimate.cross_validation import Judged, horizon_s
 from identify.estimate.final_fit import Fitted, by_output_error, by_regression, noise_of_all
 from identify.estimate.initial_guess import Start, first_guess
 from identify.genetic.per_set import each_set
 from identify.model.structure import Structure, shape_values
 from identify.results import (
+    UNITS,
     Identification,
     ParameterEstimate,
     SetResult,
@@ -34,6 +35,8 @@ from identify.runs.usable import runs_used
 from identify.select import decay_search
 from identify.select.candidates import Candidates
 from identify.select.contribution import contributions
+from identify.select.disturbance_limited import regime_of
+from identify.select.field_search import Found, search_in_torque
 from identify.select.fitter import Fits
 from identify.select.free_run_search import FineSearch
 from identify.select.search_state import Search
@@ -125,15 +128,13 @@ class _Identifier:
     def run(self) -> Identification:
         """The whole way; where somebody stops it in the middle, what there is so far."""
         shapes = {n: shape_values(n, _plain(self.declared, n)) for n in self.structure.effects}
+        if not self.torque_free and self._disturbance_limited():
+            return self._in_torque(shapes)
         horizon = horizon_s(self.start.platform, self.traces)
         traces, parts = self._searched()
         fitting = pieces(traces, parts.fit, 3.0 * horizon)
         judging = pieces(traces, parts.judge, 3.0 * horizon, 5_000)
-        asked = self.settings.candidates
-        allowed = [
-            n for n in (effects.known() if asked is None else asked)
-            if effects.get(n).reads is None or n in self.offer.candidates
-        ]  # fmt: skip
+        allowed = self._allowed()
         loop = Loop(fitting, judging, self.start, allowed, self.say, traces)
         d = self.declared
         try:
@@ -169,6 +170,30 @@ class _Identifier:
             if not found.verdict.effects:  # the search may have been about to name what this model lacks
                 found = replace(found, verdict=replace(found.verdict, sentences=(NOTHING_YET,)))
             return replace(found, aborted=True, accepted=False, reasons=(STOPPED,))
+
+    def _disturbance_limited(self) -> bool:
+        """Whether a torque that nobody recorded, and not the sensor's noise, limits these runs."""
+        self.say("looking at what limits these runs: the sensor's noise, or a torque that was not recorded")
+        regime = regime_of(self.traces, self.split, Structure(self.declared.terms), self.start)
+        if regime.disturbance_limited:
+            self.say("a torque that was not recorded limits these runs, not the sensor's noise")
+        return regime.disturbance_limited
+
+    def _in_torque(self, shapes: dict[str, tuple[float, ...]]) -> Identification:
+        """The way for measured data: what the model lacks is told by the torque that it leaves."""
+        unit = UNITS[self.recording.axis]["torque"]
+        found = search_in_torque(
+            self.traces, self.split, self.structure, shapes, self.start, self._allowed(), unit, self.say
+        )  # fmt: skip
+        return self._report(found.search, found.before, found.after, measured=found)
+
+    def _allowed(self) -> list[str]:
+        """Names of the effects that may be named."""
+        asked = self.settings.candidates
+        return [
+            n for n in (effects.known() if asked is None else asked)
+            if effects.get(n).reads is None or n in self.offer.candidates
+        ]  # fmt: skip
 
     def _doubted(self, search: Search, fits: Fits, before: Fitted, after: Fitted) -> Fitted:
         """The final fit, or another one where something else may pass for what was found."""
@@ -217,13 +242,21 @@ class _Identifier:
         traces = one_noise(prepared, noise is not None)
         return traces, split(traces, self.settings.holdout)
 
-    def _report(self, search: Search, before: Fitted, after: Fitted, in_full: bool = True) -> Identification:
+    def _report(
+        self, search: Search, before: Fitted, after: Fitted, in_full: bool = True,
+        measured: Found | None = None,
+    ) -> Identification:  # fmt: skip
         changed = after.structure != self.structure
         after = after if changed else before
         cutoff = self.start.cutoff_hz
         measured_before = measure(self.traces, self.split, before, cutoff)
         measured_after = measure(self.traces, self.split, after, cutoff) if changed else measured_before
         floor = floor_of(self.traces, self.split, after, cutoff, self.recording.noise is not None)
+        if measured is not None:
+            measured_before, measured_after = (
+                in_torque(m, e) for m, e in zip((measured_before, measured_after), measured.in_torque, strict=True)
+            )
+            floor = replace(floor, residual_rms_torque=measured.in_torque[1].floor_nm)
         if self.colour is not None:
             floor = replace(floor, holdout_rate_rms=self.colour.rms)
         per_set: tuple[SetResult, ...] = ()
@@ -239,7 +272,7 @@ class _Identifier:
             )  # fmt: skip
         case = Case(
             self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
-            self.declared, self.left_out, self.colour,
+            self.declared, self.left_out, self.colour, measured.disturbance if measured else None,
         )  # fmt: skip
         scale = self._torque_scale(after) if in_full else None
         return conclude(case, search, before, after, measured_before, measured_after, floor, per_set, joint, scale)

@@ -46,6 +46,7 @@ class Errors:
     residual_torque_relative: float | None
     holdout_torque_relative: float | None
     lowpass_hz: float | None  # cut-off of the zero-phase low-pass behind the torque figures
+    holdout_measure: str = "holdout_rate_rms"  # which held-out figure decided between models
 
 
 @dataclass(frozen=True)
@@ -223,6 +224,46 @@ class Unparted:
 
 
 @dataclass(frozen=True)
+class Dependence:
+    """What the torque that is left goes with, as a free-form term beside the model shows it."""
+
+    on: str  # "angle", "rate", "direction", "torque", "time", "history"
+    torque_rms: float  # of that part, N m
+    relative: float  # over the torque
+    false_alarm: float  # how often chance alone would show as much
+    at: tuple[float, ...] = ()  # where the term is shown ...
+    shape_nm: tuple[float, ...] = ()  # ... and the torque there
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """What is left after the final model, told as a torque.
+
+    Attributes
+    ----------
+    torque_rms
+        Root mean square, the sensor's part taken off, in the unit of the torque.
+    relative
+        The same over the torque.
+    depends_on
+        What of it goes with something; the rest is noise, and in the intervals.
+    moves_percent
+        How far J, C and K move with the free-form terms of what it depends on beside the model.
+    """
+
+    torque_rms: float
+    unit: str
+    relative: float
+    depends_on: tuple[Dependence, ...] = ()
+    moves_percent: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def material_percent(self) -> float:
+        """The part that goes with something, in percent of the torque."""
+        return 100.0 * sum(d.relative**2 for d in self.depends_on) ** 0.5
+
+
+@dataclass(frozen=True)
 class FollowUpPlan:
     """The excitation that parts what the data so far cannot."""
 
@@ -274,6 +315,8 @@ class Identification:
     residual_before: ResidualDiagnosis | None = None
     residual_after: ResidualDiagnosis | None = None  # None where nothing was added or dropped
     torque_scale: ParameterEstimate | None = None  # shaft's over recorded; where runs carry a known added inertia
+    disturbance: Disturbance | None = None  # None without a torque
+    note: str = ""  # why an error in the table grew although the model is better
     scale_shows: bool = False  # whether runs carry one, so that a scale of the torque is no part of J, C and K
 
     @property

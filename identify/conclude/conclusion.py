@@ -9,6 +9,7 @@ import numpy as np
 
 from identify.bounds.damping_or_lag import lag_for_damping
 from identify.bounds.undetermined import of_another_run, open_phases, undetermined
+from identify.conclude.acceptance import grown, too_much_left
 from identify.conclude.declared_values import declared_values, kept_as_declared
 from identify.conclude.error_figures import Measured
 from identify.conclude.next_steps import opposite_signs, unexplained_reason
@@ -20,6 +21,7 @@ from identify.model.parameters import Name, platform_of
 from identify.model.structure import Structure
 from identify.results import (
     UNITS,
+    Disturbance,
     GeneticRun,
     Identification,
     ModelResult,
@@ -64,6 +66,7 @@ class Case:
     declared: Platform
     left_out: tuple[str, ...] = ()  # which runs, and why, in words
     colour: Colour | None = None  # of the sensor's noise, where it is not white
+    disturbance: Disturbance | None = None  # what is left, where that is a torque and not the sensor's noise
 
 
 def conclude(
@@ -84,9 +87,12 @@ def conclude(
         result_before = _to_build_on(case, before, result_before)
     final = result_after or result_before
     ratio = _ratio(case, after, search)
-    unexplained = ratio > UNEXPLAINED
+    measured = case.disturbance  # of runs that a torque limits; else the sensor's noise does
+    unexplained = ratio > UNEXPLAINED if measured is None else bool(measured.depends_on)
     verdict = Verdict(
-        effects=tuple(e for e in search.best.structure.effects if e not in case.structure.effects),
+        effects=tuple(
+            dict.fromkeys(effects.first_of(e) for e in search.best.structure.effects if e not in case.structure.effects)
+        ),
         confusable_with=search.rivals,
         never_separable=inseparable(search.best.structure, max(t.travel_deg for t in case.traces)),
         unexplained_fraction=_fraction(measured_before, measured_after, floor) if unexplained else 0.0,
@@ -106,20 +112,35 @@ def conclude(
     ]  # fmt: skip
     reasons += [f"{x.name} is not determined: {x.reason}" for x in final.not_determined]
     reference, per_set = _against_reference(case, per_set)
+    material = measured is None and unexplained
+    if measured is not None:
+        reasons += too_much_left(measured, case.settings.accept, case.recording.axis)
     found = Identification(
-        accepted=not reasons and not unexplained, reasons=(), axis=case.recording.axis, before=result_before,
+        accepted=not reasons and not material, reasons=(), axis=case.recording.axis, before=result_before,
         verdict=verdict, after=result_after, noise_floor=floor, per_set=per_set, joint=joint,
         traces=_series(case, measured_before, measured_after), holdout_note=_note(case, after),
         max_error_percent=reference, torque_free=case.torque_free, torque_scale=torque_scale,
-        scale_shows=loads_differ(case.traces),
+        scale_shows=loads_differ(case.traces), disturbance=measured or _at_the_sensor(case, measured_after, floor),
+        note=grown(result_before, result_after),
     )  # fmt: skip
-    if unexplained:
+    if material:
         reasons.insert(0, unexplained_reason(ratio, found))
     if opposite_signs(found):
         reasons.insert(0, SENTENCE)
     found = replace(found, accepted=not reasons, reasons=tuple(reasons))
     said = (*sentences_of(found), *_about_damping(case, after, final))
     return with_diagnosis(replace(found, verdict=replace(verdict, sentences=said)))
+
+
+def _at_the_sensor(case: Case, measured: Measured, floor: NoiseFloor) -> Disturbance | None:
+    """What is left as a torque where the sensor's noise limits the runs; None without a torque."""
+    left, least, relative = (
+        measured.errors.residual_rms_torque, floor.residual_rms_torque, measured.errors.residual_torque_relative
+    )  # fmt: skip
+    if left is None or least is None or not relative:
+        return None
+    size = float(np.sqrt(max(left**2 - least**2, 0.0)))
+    return Disturbance(size, UNITS[case.recording.axis]["torque"], size * relative / left)
 
 
 def _about_damping(case: Case, after: Fitted, final: ModelResult) -> tuple[str, ...]:
@@ -164,7 +185,9 @@ def _share_of_white(case: Case) -> float:
 
 def _model(case: Case, fitted: Fitted, measured: Measured, dropped: tuple[NotReported, ...]) -> ModelResult:
     parameters: dict[str, ParameterEstimate] = {}
-    of_effects: dict[str, dict[str, ParameterEstimate]] = {e: {} for e in fitted.structure.effects}
+    of_effects: dict[str, dict[str, ParameterEstimate]] = {
+        effects.first_of(e): {} for e in fitted.structure.effects
+    }  # fmt: skip
     lost, open_ = _lost(case, fitted), open_phases(fitted)
     for name in fitted.names:
         if name in lost or of_another_run(name, _runs_fitted(case)):
@@ -175,7 +198,8 @@ def _model(case: Case, fitted: Fitted, measured: Measured, dropped: tuple[NotRep
             parameters[_label(case, name)] = estimate
         else:
             key = name[1] if len(name) == 2 else f"{name[1]}_run_{int(name[2]) + 1}"
-            of_effects[name[0]][key] = estimate
+            first = effects.first_of(name[0])
+            of_effects[first][key if first == name[0] else f"{key}_{name[0].removeprefix(first + '_')}"] = estimate
     missing = tuple(NotReported(_label(case, name), why) for name, why in lost.items())
     platform = _platform(case, fitted, fitted.values)
     return ModelResult(parameters, of_effects, measured.errors, dropped, missing, _correlation(fitted), platform)
@@ -192,7 +216,8 @@ def _runs_fitted(case: Case) -> set[int]:
 
 
 def _lost(case: Case, fitted: Fitted) -> dict[Name, str]:
-    return undetermined(fitted, _runs_fitted(case), len(case.traces) == 1)
+    alone = len(case.traces) == 1 and case.disturbance is None  # a measured run is no single tone
+    return undetermined(fitted, _runs_fitted(case), alone)
 
 
 def _label(case: Case, name: Name) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from identify.genetic.per_set import linear_traces
 from identify.model.structure import Structure
 from identify.results import Errors, NoiseFloor
 from identify.runs.holdout import Split
+from identify.select.field_search import TorqueErrors
 from identify.signals.trace import Trace
 from rig.recording.run import Array
 
@@ -53,6 +54,16 @@ def measure(traces: Sequence[Trace], split: Split, fitted: Fitted, cutoff_hz: fl
         lowpass_hz=cutoff_hz if everything else None,
     )
     return Measured(errors, parts, simulated)
+
+
+def in_torque(measured: Measured, found: TorqueErrors) -> Measured:
+    """The same with the torque figures of a search in torque, of the samples where the platform moves."""
+    errors = replace(
+        measured.errors, residual_rms_torque=found.residual_nm, residual_torque_relative=found.relative,
+        holdout_torque_relative=found.held_relative, lowpass_hz=found.cutoff_hz,
+        holdout_measure="holdout_torque_relative",
+    )  # fmt: skip
+    return replace(measured, errors=errors)
 
 
 def _inside(trace: Trace, cutoff_hz: float) -> Any:

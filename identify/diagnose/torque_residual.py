@@ -76,14 +76,14 @@ def torque_residual(
         shape = tuple(v for v, p in zip(given, effect.parameters, strict=True) if not p.linear)
         for i, (v, p) in enumerate(zip(given, effect.parameters, strict=True)):
             if p.linear:
-                extra += v * _at_samples(trace.effect_pieces(effect, shape, i), len(angle))
+                extra += v * at_samples(trace.effect_pieces(effect, shape, i), len(angle))
         for term in effect.leans_on:
             unit = {"inertia": -3, "damping": -2, "stiffness": -1}[term]
             pieces = trace.effect_pieces(effect, shape, unit)
-            extra += values.get((term,), 0.0) * _at_samples(pieces, len(angle))
+            extra += values.get((term,), 0.0) * at_samples(pieces, len(angle))
     asked = trace.torque_pieces(tuple(drive))
     assert asked is not None
-    applied = _at_samples(asked[0], len(angle), asked[1])
+    applied = at_samples(asked[0], len(angle), asked[1])
     torque = low_pass(applied, cutoff_hz, trace.step_s)
     residual = torque - model - low_pass(extra, cutoff_hz, trace.step_s)
     if trace.biased:
@@ -101,7 +101,7 @@ def _value(values: dict[Name, float], effect: str, parameter: str, run: int) -> 
     return values.get((effect, parameter), values.get((effect, parameter, str(run)), 0.0))
 
 
-def _at_samples(pieces: Array | None, n: int, upsampling: int = UPSAMPLING) -> Array:
+def at_samples(pieces: Array | None, n: int, upsampling: int = UPSAMPLING) -> Array:
     """A piecewise polynomial at the sample instants, shape (n,)."""
     if pieces is None:
         return np.zeros(n)

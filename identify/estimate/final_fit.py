@@ -83,7 +83,7 @@ def by_regression(
     runs = 1 + max(t.number for t in traces)
     values = start_values(solution, shapes, runs)
     covariance, determined = _regression_covariance(traces, solution, use)
-    free = _free_run(traces, structure, values, everything)
+    free = free_run_of(traces, structure, values, everything)
     values = _own_gains_of(free, values)
     limited = free is not None and free.sigma < NEAR_FLOOR * noise_of_all(traces)
     found = [n for n in values if len(n) > 1 and n not in solution.labels and n in shape_errors]
@@ -93,9 +93,10 @@ def by_regression(
     return Fitted(structure, values, covariance, names, solution.rms, free, limited, determined, "regression")
 
 
-def _free_run(
+def free_run_of(
     traces: Sequence[Trace], structure: Structure, values: Mapping[Name, float], use: Sequence[Any]
 ) -> Estimate | None:
+    """The model simulated over the whole of each run, start states fitted; None where it runs away."""
     names = tuple(values)
     held = Estimate(structure, names, np.array(list(values.values())), np.inf, 0, np.zeros((0, 0)), (), True)
     free = evaluate(held, traces, use)
@@ -138,7 +139,7 @@ def by_output_error(
             best = trial
     # Only the model itself leads a decay astray, and near the noise a few disturbed moments do: whole runs decide.
     if not straight and (torque_free or at_once.sigma < FEW_NOISES * noise):
-        held = _free_run(traces, structure, dict(zip(best.names, best.values.tolist(), strict=True)), use)
+        held = free_run_of(traces, structure, dict(zip(best.names, best.values.tolist(), strict=True)), use)
         if held is None or at_once.sigma < FREER * held.sigma:
             best = at_once
     values = dict(zip(best.names, best.values.tolist(), strict=True))
@@ -151,7 +152,7 @@ def by_output_error(
         best = whole = sharpened(whole, traces, use, fixed)
         values = dict(zip(best.names, best.values.tolist(), strict=True))
     same = all(np.array_equal(u, e) for u, e in zip(use, everything, strict=True))
-    free = whole if whole is not None and same else _free_run(traces, structure, values, everything)
+    free = whole if whole is not None and same else free_run_of(traces, structure, values, everything)
     values = _own_gains_of(free, values)
     limited = whole is not None and whole.sigma <= NEAR_FLOOR * noise
     method = "output error over whole runs" if whole is not None else f"output error over {horizon:.3g} s"
@@ -191,6 +192,12 @@ def _sandwich(parts: Sequence[tuple[Array, Array]], sigma: float) -> tuple[Array
     ratio = np.diag(by_spectrum) / np.maximum(np.diag(by_blocks), 1e-300)
     wider = np.sqrt(np.maximum(1.0, ratio))
     return by_blocks * np.outer(wider, wider), determined
+
+
+def covariance_of(parts: Sequence[tuple[Array, Array]], fitted: int) -> tuple[Array, tuple[bool, ...]]:
+    """Covariance of least squares from every run's columns (m, p) and residual (m,), coloured or not."""
+    covariance, determined = _sandwich(parts, _rms(parts, fitted))
+    return covariance, tuple(determined)
 
 
 def _coloured(columns: Array, residual: Array) -> Array:

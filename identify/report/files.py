@@ -15,6 +15,7 @@ from identify.model.parameters import with_inertia
 from identify.report.json_values import finite
 from identify.report.page import report_html
 from identify.results import (
+    Disturbance,
     Errors,
     FollowUp,
     FollowUpPlan,
@@ -51,6 +52,8 @@ def result_json(identification: Identification) -> dict[str, Any]:
         "verdict": _verdict(identification.verdict),
         "after": _model(identification.after) if identification.after else None,
         "noise_floor": dict(vars(identification.noise_floor)),
+        "disturbance": _disturbance(identification.disturbance),
+        "note": identification.note,
         "residual": _residual(identification),
         "per_set": [_set(one) for one in identification.per_set],
         "set_scatter": identification.set_scatter,
@@ -80,6 +83,12 @@ def _model(model: ModelResult) -> dict[str, Any]:
         "not_determined": _listed(model.not_determined),
         "correlation": model.correlation,
     }
+
+
+def _disturbance(found: Disturbance | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return dict(vars(found)) | {"depends_on": [dict(vars(d)) for d in found.depends_on]}
 
 
 def _residual(identification: Identification) -> dict[str, Any]:

@@ -34,10 +34,20 @@ class ReferenceConfig(Section):
     stiffness_nm_rad: Positive | None = None
 
 
+class AcceptConfig(Section):
+    """How much may be left that depends on something, for a model to be accepted."""
+
+    torque_percent: Annotated[float, Field(gt=0, le=100)] = 5.0  # of the torque
+    inertia_percent: Positive = 2.0  # by which it may move J, C and K
+    damping_percent: Positive = 10.0
+    stiffness_percent: Positive = 2.0
+
+
 class IdentifyConfig(Section):
     """How to identify and when to accept."""
 
     genetic: GeneticConfig = GeneticConfig()
+    accept: AcceptConfig = AcceptConfig()
     j_dec: Positive | None = None  # None: from the noise floor
     reference: ReferenceConfig | None = None
     # Further readings of a bench, or of a recording.h5, that may serve as causes.

@@ -6,6 +6,7 @@ Effects from outside the package (installed ones, and files that a rig.yaml name
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -42,6 +43,9 @@ _MODULES = {
     "periodic_disturbance": "periodic_disturbance",
 }
 
+# A motor has several: each further order of the same torque is an effect of its own, which no list shows.
+_FURTHER = {f"cogging_{k}": "cogging" for k in range(2, 7)}
+
 
 def names() -> tuple[str, ...]:
     """Names of all effects, in the order of the docs, those from outside the package last; none of channels."""
@@ -65,6 +69,8 @@ def get(name: str) -> Effect:
     """
     if name in _MODULES:
         return _own(name)
+    if name in _FURTHER:
+        return _further(name)
     return _channels.get(name) if name in _channels.names() else _outside.get(name)
 
 
@@ -72,6 +78,21 @@ def get(name: str) -> Effect:
 def _own(name: str) -> Effect:
     effect: Effect = import_module(f"rig.effects.{_MODULES[name]}").EFFECT
     return effect
+
+
+@cache
+def _further(name: str) -> Effect:
+    return replace(_own(_FURTHER[name]), name=name)
+
+
+def further(name: str) -> tuple[str, ...]:
+    """The effects that are more of the same, in the order in which they are added; empty for most."""
+    return tuple(more for more, first in _FURTHER.items() if first == name)
+
+
+def first_of(name: str) -> str:
+    """The effect that an effect is more of; itself for most."""
+    return _FURTHER.get(name, name)
 
 
 def read_file(path: Path) -> str:
@@ -109,6 +130,6 @@ def file_of(name: str) -> Path | None:
 
 
 __all__ = [
-    "Effect", "Parameter", "Place", "Scale", "declare_channels", "file_of", "filter_kernel", "get", "kernel", "known",
-    "names", "of_channel", "read_file",
+    "Effect", "Parameter", "Place", "Scale", "declare_channels", "file_of", "filter_kernel", "first_of",
+    "further", "get", "kernel", "known", "names", "of_channel", "read_file",
 ]  # fmt: skip

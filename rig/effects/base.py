@@ -63,6 +63,7 @@ class Scale:
     natural_frequency_hz: float
     excitation_hz: tuple[float, ...] = ()
     lines_hz: tuple[float, ...] = ()  # spectral lines of the current residual
+    orders: tuple[float, ...] = ()  # lines of the current residual against the angle, periods a turn
     rings_hz: tuple[float, ...] = ()  # what of the current residual rings where runs begin
     ringing_hz: float = 0.0  # strongest spectral line of the measured motion next to the natural frequency
 

@@ -17,9 +17,9 @@ def _orders(scale: Scale) -> tuple[float, ...]:
     lowest = max(1.0, 0.5 * math.pi / scale.angle_rad)
     highest = min(400.0, 60.0 / scale.angle_rad)
     if scale.angle_rad > math.pi:
-        return tuple(float(n) for n in range(1, 31))
+        return (*(float(n) for n in range(1, 31)), *scale.orders)
     count = 24
-    return tuple(lowest * (highest / lowest) ** (i / (count - 1)) for i in range(count))
+    return (*(lowest * (highest / lowest) ** (i / (count - 1)) for i in range(count)), *scale.orders)
 
 
 EFFECT = Effect(

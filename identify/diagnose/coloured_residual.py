@@ -1,0 +1,106 @@
+"""Least squares with bounds and a coloured residual, and the lines in it: the arithmetic behind a search in torque."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from rig.arrays import Array
+
+ORDER = 24  # of the autoregression: six periods of the cut-off, at four samples each
+ROUNDS = 3  # of fitting the autoregression and the parameters in turn
+LINES = 4  # that are looked for in a run
+
+
+def lines(x: Array, values: Array, highest: float) -> list[tuple[float, float]]:
+    """Size and frequency of the strongest lines of a signal that is read at places in ascending order."""
+    even = np.linspace(x[0], x[-1], len(x))
+    window = np.interp(even, x, values) * np.hanning(len(x))
+    size = np.abs(np.fft.rfft(window, 4 * len(x))) / np.sqrt(len(x))
+    f = np.arange(len(size)) / (4.0 * len(x)) * (len(x) - 1) / max(float(x[-1] - x[0]), 1e-300)
+    inside = (f > 1.5 / max(float(x[-1] - x[0]), 1e-300)) & (f < highest)
+    peaks = find_peaks(size * inside)[0]
+    return [(float(size[k]), float(f[k])) for k in peaks[np.argsort(size[peaks])[-LINES:]]]
+
+
+def strongest(found: list[tuple[float, float]]) -> tuple[float, ...]:
+    return tuple(f for _, f in sorted(found, reverse=True)[: 2 * LINES])
+
+
+def standard_errors(values: Sequence[float]) -> float:
+    return float(np.mean(values) / max(float(np.std(values, ddof=1)), 1e-300) * np.sqrt(len(values)))
+
+
+def rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
+
+
+def bounded(g: Array, b: Array, low: Array) -> Array:
+    """Least squares from normal equations with lower bounds: what would go below is held at its bound."""
+    size = np.sqrt(np.maximum(np.diag(g), 1e-300))
+    g, b = g / np.outer(size, size), b / size
+    bound = np.where(np.isfinite(low), low * size, -np.inf)
+    held = np.zeros(len(b), dtype=bool)
+    x = np.zeros(len(b))
+    for _ in range(len(b) + 1):
+        free = ~held
+        x[held] = bound[held]
+        if not np.any(free):
+            break
+        right = b[free] - g[np.ix_(free, held)] @ x[held]
+        x[free] = np.linalg.lstsq(g[np.ix_(free, free)], right, rcond=1e-12)[0]
+        wrong = free & (x < bound)
+        if not np.any(wrong):
+            break
+        held |= wrong
+    return np.asarray(x / size)
+
+
+def coloured_cost(a: Array, y: Array, run: Array, x: Array, given: Array | None) -> tuple[float, Array]:
+    """Minus twice the log-likelihood with an autoregressive residual, parameters refitted behind its filter once."""
+    r = y - a @ x
+    order = min(ORDER, len(r) // 50)
+    if order < 1:
+        return float(len(r) * np.log(max(float(np.mean(r * r)), 1e-300))), np.ones(1)
+    filters = autoregression(r, run, order) if given is None else given
+    order = len(filters) - 1
+
+    def whitened(m: Array) -> Array:
+        out = []
+        for k in np.unique(run):
+            part = m[run == k]
+            if len(part) <= order:
+                continue
+            out.append(sum(f * part[order - i : len(part) - i] for i, f in enumerate(filters)))
+        return np.concatenate(out)
+
+    best = np.inf
+    for _ in range(1 if given is not None else ROUNDS):
+        e = whitened(y)
+        if a.shape[1]:
+            w = np.column_stack([whitened(a[:, k]) for k in range(a.shape[1])])
+            size = np.linalg.norm(w, axis=0)
+            size = np.where(size > 0.0, size, 1.0)
+            x = np.linalg.lstsq(w / size, e, rcond=1e-9)[0] / size
+            e = e - w @ x
+        cost = float(len(e) * np.log(max(float(np.mean(e * e)), 1e-300)))
+        if cost < best:
+            best, kept = cost, filters
+        if given is None:
+            filters = autoregression(y - a @ x, run, order)
+    return best, kept
+
+
+def autoregression(r: Array, run: Array, order: int) -> Array:
+    """Coefficients of the filter that whitens a residual, (order + 1,), the first one."""
+    past, now = [], []
+    for k in np.unique(run):
+        part = r[run == k]
+        if len(part) > order:
+            past.append(np.column_stack([part[order - i : len(part) - i] for i in range(1, order + 1)]))
+            now.append(part[order:])
+    p, n = np.concatenate(past), np.concatenate(now)
+    g = p.T @ p + 1e-9 * float(n @ n) * np.eye(order)
+    return np.concatenate([[1.0], -np.linalg.solve(g, p.T @ n)])

@@ -1,0 +1,163 @@
+"""Torque, motion and the torque of effects behind one low-pass, at the samples where the platform moves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from identify.diagnose.torque_residual import at_samples, motion
+from identify.model.parameters import Name
+from identify.model.structure import UNIT, Shapes, Structure
+from identify.runs.holdout import Split
+from identify.signals.low_pass import low_pass
+from identify.signals.trace import UPSAMPLING, Trace
+from rig import effects
+from rig.arrays import Array
+from rig.effects.base import Effect, Place, Scale
+from rig.platform import TERMS
+
+SAMPLES_A_PERIOD = 4.0  # of the cut-off: what the low-pass passed needs no more
+EDGE_PERIODS = 3.0  # of the cut-off, left out at both ends of a run
+FOLDS, BLOCKS = 3, 9  # a third of the runs, or of the blocks of each run, is held out in turn
+STILL, STILL_PERIODS = 5.0, 0.5  # standard deviations of the smoothed rate, for so many periods of the cut-off
+AROUND_REVERSAL, MOST_AROUND = 0.6, 0.35  # periods of the cut-off left out either side, up to a share of samples
+
+
+class TorqueBand:
+    """The columns of structures in torque over a set of runs, at the samples where the platform moves.
+
+    Parameters
+    ----------
+    traces, split
+        The runs, and which of their samples fit and which judge.
+    cutoff_hz
+        Of the low-pass.
+    scale
+        How large the motion is: where shapes are looked for.
+    """
+
+    def __init__(self, traces: Sequence[Trace], split: Split, cutoff_hz: float, scale: Scale) -> None:
+        self.traces, self.cutoff_hz, self.scale = list(traces), cutoff_hz, scale
+        self.runs = 1 + max(t.number for t in traces)
+        step = max(1, int(1.0 / (SAMPLES_A_PERIOD * cutoff_hz * traces[0].step_s)))
+        self._rows = [self._rows_of(t, step) for t in traces]
+        declared = any(t.run.use == "holdout" for t in traces)
+        fit = [np.asarray(m)[r] for m, r in zip(split.fit, self._rows, strict=True)]
+        judge = [np.asarray(m)[r] for m, r in zip(split.judge, self._rows, strict=True)]
+        used = np.concatenate([f | j for f, j in zip(fit, judge, strict=True)])
+        self._used = used
+        if declared:
+            self._by_block = self._by_run = [np.concatenate(judge)]
+        else:
+            blocks = np.concatenate([self._block_of(i) + i for i in range(len(traces))])
+            runs = np.concatenate([np.full(len(r), i) for i, r in enumerate(self._rows)])
+            self._by_block = [used & (blocks % FOLDS == k) for k in range(FOLDS)]
+            several = len(traces) >= FOLDS
+            self._by_run = [used & (runs % FOLDS == k) for k in range(FOLDS)] if several else self._by_block
+        self._judged = np.any(self._by_block, axis=0)
+        self._cache: dict[Any, Array] = {}
+        self.torque_nm = float(np.sqrt(np.mean(np.concatenate([self._target(i, ()) for i in range(len(traces))]) ** 2)))
+
+    def _block_of(self, i: int) -> Any:
+        """Which block of its run every sample belongs to."""
+        return np.minimum(self._rows[i] * BLOCKS // max(len(self.traces[i].measured), 1), BLOCKS - 1)
+
+    def _rows_of(self, t: Trace, step: int) -> Any:
+        edge = int(np.ceil(EDGE_PERIODS / (self.cutoff_hz * t.step_s)))
+        n = len(t.measured)
+        rows = np.arange(0, n, step)
+        inside = (rows >= edge) & (rows < n - edge) if n > 20 * edge else np.ones(len(rows), dtype=bool)
+        return rows[inside & t.keep[rows] & ~self._standing(t)[rows]]
+
+    def _standing(self, t: Trace) -> Any:
+        """Samples at which the platform stands or turns back, (n,).
+
+        Static friction holds it there with any torque that it takes; and when exactly friction changes its sign, behind
+        the low-pass, decides over more torque there than all that one wants to see. Where it turns back so often that
+        little else is left, those moments stay.
+        """
+        rate, left = t.fine[1][::UPSAMPLING], t.fine[4]
+        slow = np.abs(rate) < STILL * left
+        shortest = max(3, int(STILL_PERIODS / (self.cutoff_hz * t.step_s)))
+        out = np.zeros(len(slow), dtype=bool)
+        edges = np.diff(np.concatenate([[0], slow.astype(np.int8), [0]]))
+        for a, b in zip(np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0], strict=True):
+            if b - a >= shortest:
+                out[max(0, a - shortest) : b + shortest] = True
+        reach = int(np.ceil(AROUND_REVERSAL / (self.cutoff_hz * t.step_s)))
+        turned = np.nonzero(np.diff(np.sign(rate)) != 0)[0]
+        near = np.zeros(len(slow), dtype=bool)
+        for k in turned:
+            near[max(0, k - reach + 1) : k + reach + 1] = True
+        return out | near if np.mean(near & t.keep) < MOST_AROUND * np.mean(t.keep) else out
+
+    def _passed(self, i: int, values: Array) -> Array:
+        return low_pass(values, self.cutoff_hz, self.traces[i].step_s)[self._rows[i]]
+
+    def _kept(self, key: Any, make: Any) -> Array:
+        if key not in self._cache:
+            if len(self._cache) > 3000:
+                self._cache.clear()
+            self._cache[key] = make()
+        return self._cache[key]
+
+    @cached_property
+    def _motion(self) -> list[tuple[Array, Array, Array]]:
+        return [tuple(x[r] for x in motion(t, self.cutoff_hz)) for t, r in zip(self.traces, self._rows, strict=True)]
+
+    def _target(self, i: int, drive: tuple[tuple[str, tuple[float, ...]], ...]) -> Array:
+        def make() -> Array:
+            t = self.traces[i]
+            pieces = t.torque_pieces(drive)
+            if pieces is None:
+                return np.zeros(len(self._rows[i]))
+            return self._passed(i, at_samples(pieces[0], len(t.measured), pieces[1]))
+
+        return self._kept(("torque", i, drive), make)
+
+    def _of_effect(self, i: int, effect: Effect, shape: tuple[float, ...], unit: int) -> Array:
+        t = self.traces[i]
+        return self._kept(
+            (i, effect.name, shape, unit),
+            lambda: self._passed(i, at_samples(t.effect_pieces(effect, shape, unit), len(t.measured))),
+        )
+
+    def _columns(self, i: int, structure: Structure, shapes: Shapes) -> tuple[Array, list[Name], Array]:
+        """Columns and their names, and the target, of one run; what is free in the run stands behind the names."""
+        t = self.traces[i]
+        angle, rate, acceleration = self._motion[i]
+        terms = {"inertia": acceleration, "damping": rate, "stiffness": angle}
+        out: dict[Name, Array] = {(k,): terms[k].copy() for k in TERMS if k in structure.terms}
+        drive = tuple((n, tuple(shapes[n])) for n in structure.effects if effects.get(n).place is Place.DRIVE)
+        for name in structure.effects:
+            effect = effects.get(name)
+            if effect.place in (Place.DRIVE, Place.SENSOR):
+                continue
+            shape = tuple(shapes.get(name, ()))
+            for k, p in enumerate(effect.parameters):
+                if p.linear:
+                    key = (name, p.name, str(t.number)) if p.per_run else (name, p.name)
+                    out[key] = self._of_effect(i, effect, shape, k)
+            for term in effect.leans_on:
+                if (term,) in out:
+                    out[(term,)] = out[(term,)] + self._of_effect(i, effect, shape, UNIT[term])
+        target = self._target(i, drive)
+        if t.run.added_inertia_kg_m2:
+            target = target - t.run.added_inertia_kg_m2 * acceleration
+        own = []
+        if t.biased:
+            for a, b in t.stretches:
+                here = (self._rows[i] >= a) & (self._rows[i] <= b)
+                own += [here.astype(float), here * (self._rows[i] - a) * t.step_s]
+        return np.column_stack([*out.values(), *own]) if out or own else np.zeros((len(target), 0)), list(out), target
+
+    def series(self) -> tuple[Array, Array, Array, Array, Array, Array]:
+        """Angle, rate, acceleration, torque, time and number of the run at every sample behind the low-pass."""
+        motions = [np.concatenate([m[k] for m in self._motion]) for k in range(3)]
+        torque = np.concatenate([self._target(i, ()) for i in range(len(self.traces))])
+        time = np.concatenate([r * t.step_s for r, t in zip(self._rows, self.traces, strict=True)])
+        run = np.concatenate([np.full(len(r), i) for i, r in enumerate(self._rows)])
+        return motions[0], motions[1], motions[2], torque, time, run

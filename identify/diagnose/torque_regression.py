@@ -1,0 +1,286 @@
+"""Least squares in torque along the measured motion: what a model explains in the band that matters (Eq. 8-10).
+
+Torque, motion and the torque of every effect pass one zero-phase low-pass; what is left of the torque is the
+disturbance and, in its upper part, the sensor's noise. On measured data, where a disturbance is far larger than what
+the sensor adds, this is nearly the maximum-likelihood estimate, it is linear, and what it leaves is in newton metres.
+The residual is coloured: its likelihood is that of an autoregression fitted beside the parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from identify.diagnose.coloured_residual import bounded, coloured_cost, lines, rms, standard_errors, strongest
+from identify.diagnose.torque_band import TorqueBand
+from identify.model.effect_torque import torque_along
+from identify.model.parameters import Name
+from identify.model.structure import Shapes, Structure
+from rig import effects
+from rig.arrays import Array
+from rig.effects.base import Place
+
+BLOCK, BLOCKS_A_RUN, FEWEST_BLOCKS = 8, 24, 8  # samples behind the low-pass in a block, and how many blocks
+FEWEST_FOR_LINES, LEAST_TRAVEL_RAD = 64, 0.5  # samples, and travel to show a line against the angle
+EVALUATIONS = 30  # of a shape search
+BEYOND = 4.0  # times the outermost starting values: how far a shape may wander
+
+
+@dataclass(frozen=True)
+class TorqueFit:
+    """One structure fitted in torque.
+
+    Attributes
+    ----------
+    values
+        Parameters by name, shapes included.
+    fitted_nm, held_nm
+        Root mean square residual on the samples fitted and on those held out, N m.
+    cost
+        Minus twice the logarithm of the likelihood with a coloured residual, on all samples.
+    count
+        Samples behind the low-pass.
+    """
+
+    structure: Structure
+    shapes: dict[str, tuple[float, ...]]
+    values: dict[Name, float]
+    fitted_nm: float
+    held_nm: float
+    cost: float
+    count: int
+    residuals: list[Array]
+    held: list[Array]  # residuals of samples by a fit that did not see them
+    filters: Array  # of the autoregression
+
+    @property
+    def penalised(self) -> float:
+        """The cost with every parameter paid for."""
+        return self.cost + len(self.values) * float(np.log(max(self.count, 2)))
+
+
+class TorqueRegression(TorqueBand):
+    """Fits structures in torque over a set of runs."""
+
+    def following(self, fit: TorqueFit, columns: Array) -> tuple[TorqueFit, Array]:
+        """A model whose residual is followed by further columns, and their gains; the model stays as it is."""
+        r = np.concatenate(fit.residuals)
+        used, low = self._used, np.full(columns.shape[1], -np.inf)
+
+        def gains(rows: Any) -> Array:
+            a = columns[rows]
+            return bounded(
+                a.T @ a + 1e-9 * np.eye(a.shape[1]) * float(np.mean(np.sum(a * a, axis=0))), a.T @ r[rows], low
+            )
+
+        g = gains(used)
+        held = np.concatenate(fit.held).copy()
+        for fold in self._by_run:
+            held[fold] -= (columns @ gains(used & ~fold))[fold]
+        left = r - columns @ g
+        ends = np.cumsum([len(x) for x in fit.residuals])[:-1]
+        return replace(
+            fit, fitted_nm=rms(left[used]), held_nm=rms(held[self._judged]), residuals=np.split(left, ends),
+            held=np.split(held, ends),
+        ), g  # fmt: skip
+
+    def left_by(self, structure: Structure, values: Mapping[Name, float]) -> float:
+        """Root mean square residual at given parameters, biases fitted, N m."""
+        columns, residuals, _ = self.linear_parts(structure, values)
+        return rms(np.concatenate(residuals)) if columns else float("nan")
+
+    def linear_parts(
+        self, structure: Structure, values: Mapping[Name, float]
+    ) -> tuple[list[Array], list[Array], list[Name]]:  # fmt: skip
+        """Columns and residual of every run at given parameters, biases projected out, and the columns' names."""
+        shapes = {
+            n: tuple(values[(n, p.name)] for p in effects.get(n).parameters if not p.linear) for n in structure.effects
+        }
+        parts = [self._columns(i, structure, shapes) for i in range(len(self.traces))]
+        names: list[Name] = list(dict.fromkeys(n for _, own, _ in parts for n in own))
+        used = np.split(self._used, np.cumsum([len(r) for r in self._rows])[:-1])
+        columns, residuals = [], []
+        for (a, own, y), rows in zip(parts, used, strict=True):
+            wide = np.zeros((len(y), len(names)))
+            wide[:, [names.index(n) for n in own]] = a[:, : len(own)]
+            r = y - wide @ np.array([values.get(n, 0.0) for n in names])
+            free = a[:, len(own) :]
+            both = np.column_stack([wide, r])[rows]
+            if free.shape[1]:
+                q = np.linalg.qr(free[rows])[0]
+                both = both - q @ (q.T @ both)
+            columns.append(both[:, :-1])
+            residuals.append(both[:, -1])
+        return columns, residuals, names
+
+    def moved_by(self, fit: TorqueFit, torque: Array) -> dict[Name, float]:
+        """How far the parameters move where a torque, one value a sample, is taken off what they explain."""
+        parts = [self._columns(i, fit.structure, fit.shapes) for i in range(len(self.traces))]
+        names = list(dict.fromkeys(n for _, own, _ in parts for n in own if len(n) < 3))
+        wide = np.concatenate([a[:, [own.index(n) for n in names]] for a, own, _ in parts])[self._used]
+        x = bounded(wide.T @ wide, wide.T @ torque[self._used], np.full(len(names), -np.inf))
+        return dict(zip(names, x.tolist(), strict=True))
+
+    def solve(self, structure: Structure, shapes: Shapes, filters: Array | None = None) -> TorqueFit:
+        """One structure at given shapes; gains within their bounds.
+
+        ``filters`` is an autoregression of the residual from elsewhere, for the cost; it is the fit's own where None.
+        """
+        parts = [self._columns(i, structure, shapes) for i in range(len(self.traces))]
+        names: list[Name] = list(dict.fromkeys(n for _, own, _ in parts for n in own))
+        extra = sum(a.shape[1] - len(own) for a, own, _ in parts)
+        wide, target, at = [], [], len(names)
+        for a, own, y in parts:
+            full = np.zeros((len(y), len(names) + extra))
+            full[:, [names.index(n) for n in own]] = a[:, : len(own)]
+            more = a.shape[1] - len(own)
+            full[:, at : at + more] = a[:, len(own) :]
+            at += more
+            wide.append(full)
+            target.append(y)
+        a, y = np.concatenate(wide), np.concatenate(target)
+        low = np.array([self._low(n) for n in names] + [-np.inf] * extra)
+        folds = self._by_block if extra or any(len(n) == 3 for n in names) else self._by_run
+        used = self._used
+        x = bounded(a[used].T @ a[used], a[used].T @ y[used], low)
+        held = y - a @ x
+        for fold in folds:
+            others = used & ~fold
+            held[fold] = (y - a @ bounded(a[others].T @ a[others], a[others].T @ y[others], low))[fold]
+        r = y - a @ x
+        # A drive that passes on little of the torque leaves little of it unexplained: what counts is the share.
+        scale = self.torque_nm / max(rms(y - self._taken(parts, names, x, a)), 1e-300)
+        r, held = scale * r, scale * held
+        values = dict(zip(names, x[: len(names)].tolist(), strict=True))
+        for name in structure.effects:
+            shape_names = [p.name for p in effects.get(name).parameters if not p.linear]
+            values |= {(name, k): v for k, v in zip(shape_names, shapes.get(name, ()), strict=True)}
+        ends = np.cumsum([len(t) for t in target])[:-1]
+        run = np.concatenate([np.full(len(t), i) for i, t in enumerate(target)])
+        cost, filters = coloured_cost(scale * a[used], scale * y[used], run[used], x, filters)
+        return TorqueFit(
+            structure, {k: tuple(v) for k, v in shapes.items()}, values, rms(r[used]), rms(held[self._judged]), cost,
+            int(used.sum()), np.split(r, ends), np.split(held, ends), filters,
+        )  # fmt: skip
+
+    @staticmethod
+    def _taken(parts: Any, names: Sequence[Name], x: Array, a: Array) -> Array:
+        """What effects that feed on the torque itself take of it, (n,)."""
+        mine = [k for k, n in enumerate(names) if len(n) > 1 and feeds_on_torque(n[0])]
+        return np.asarray(a[:, mine] @ x[mine]) if mine else np.zeros(len(a))
+
+    @staticmethod
+    def _low(name: Name) -> float:
+        if len(name) == 1:
+            return 0.0 if name[0] == "inertia" else -np.inf
+        return next(p for p in effects.get(name[0]).parameters if p.name == name[1]).low
+
+    def lines(self, fit: TorqueFit) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The strongest lines of a residual: over time in Hz, and over the angle in periods a turn."""
+        hz: list[tuple[float, float]] = []
+        orders: list[tuple[float, float]] = []
+        for i, (t, r) in enumerate(zip(self.traces, fit.residuals, strict=True)):
+            if len(r) < FEWEST_FOR_LINES:
+                continue
+            time = self._rows[i] * t.step_s
+            hz += lines(time, r, self.cutoff_hz)
+            angle = self._motion[i][0]
+            travel = float(np.ptp(angle))
+            if travel > LEAST_TRAVEL_RAD:
+                ordered = np.argsort(angle)
+                most = min(400.0, 0.2 * len(r) / travel * 2.0 * np.pi)
+                orders += [
+                    (size, 2.0 * np.pi * f) for size, f in lines(angle[ordered], r[ordered], most / (2.0 * np.pi))
+                ]
+        return strongest(hz), strongest(orders)
+
+    def with_effect(self, base: TorqueFit, name: str) -> TorqueFit | None:
+        """The structure with one effect more, at its best shapes: a grid, then a local search."""
+        effect = effects.get(name)
+        if effect.place is Place.SENSOR:
+            return None
+        axes = [p for p in effect.parameters if not p.linear]
+        starts = [p.start(self.scale) if p.start else (1.0,) for p in axes]
+        structure = base.structure.plus(name)
+
+        def at(shape: tuple[float, ...]) -> TorqueFit:
+            return self.solve(structure, {**base.shapes, name: shape})
+
+        tried = [at(tuple(shape)) for shape in product(*starts)]
+        if not tried:
+            return None
+        tried = [f for f in tried if in_order(f.values, name)]
+        if not tried:
+            return None
+        best = min(tried, key=lambda f: f.fitted_nm)
+        if not axes:
+            return best
+        bounds = [
+            (max(p.low, min(s) / BEYOND, 1e-12), min(p.high, BEYOND * max(s)))
+            for p, s in zip(axes, starts, strict=True)
+        ]
+
+        def inside(u: Any) -> tuple[float, ...]:
+            return tuple(float(np.clip(np.exp(x), lo, hi)) for x, (lo, hi) in zip(u, bounds, strict=True))
+
+        begin: Any = np.log(np.maximum(best.shapes[name], 1e-12))
+        simplex = np.vstack([begin, begin + 0.25 * np.eye(len(begin))])
+        options: Any = {"maxfev": EVALUATIONS, "initial_simplex": simplex, "xatol": 1e-3}
+        found: Any = minimize(lambda u: at(inside(u)).fitted_nm, begin, method="Nelder-Mead", options=options)
+        polished = at(inside(found.x))
+        return polished if polished.fitted_nm < best.fitted_nm and in_order(polished.values, name) else best
+
+    def sureness(self, base: TorqueFit, richer: TorqueFit) -> tuple[float, float]:
+        """Standard errors by which the squared residual on held-out samples is lower, block by block.
+
+        Of the falls, and of the falls of their logarithms: a few blocks with all of the torque must not hide that all
+        others gain.
+        """
+        fall, ratio = [], []
+        ends = np.cumsum([len(r) for r in self._rows])[:-1]
+        for old, new, judged in zip(base.held, richer.held, np.split(self._judged, ends), strict=True):
+            before, after = old[judged] ** 2, new[judged] ** 2
+            if len(before):
+                count = max(1, min(BLOCKS_A_RUN, len(before) // BLOCK))
+                pairs = zip(np.array_split(before, count), np.array_split(after, count), strict=True)
+                powers = np.array([(np.mean(x), np.mean(y)) for x, y in pairs])
+                fall += (powers[:, 0] - powers[:, 1]).tolist()
+                ratio += np.log(np.maximum(powers[:, 0], 1e-300) / np.maximum(powers[:, 1], 1e-300)).tolist()
+        if len(fall) < FEWEST_BLOCKS or np.mean(fall) <= 0.0:
+            return 0.0, 0.0
+        return standard_errors(fall), standard_errors(ratio)
+
+    def evidence(self, base: TorqueFit, richer: TorqueFit) -> float:
+        """Fall of the penalised cost, the residual's colour taken from either model, whichever does better."""
+        behind = self.solve(richer.structure, richer.shapes, base.filters)
+        return base.penalised - min(richer.penalised, behind.penalised)
+
+
+@lru_cache(maxsize=256)
+def feeds_on_torque(name: str) -> bool:
+    """Whether an effect on the shaft changes with the torque itself, as friction under load does."""
+    effect = effects.get(name)
+    if effect.place in (Place.DRIVE, Place.SENSOR) or effect.states or effect.reads is not None:
+        return False
+    p = np.array([1.0, 1.0, 1.0, *(1.0 if q.linear else max(q.low, 0.1) for q in effect.parameters)])
+    one, out = np.full(2, 0.1), np.zeros(2)
+    torque_along(effect.kernel.address, one, one, one, np.array([1.0, 3.0]), 1.0, np.zeros(0), 1, p, False, 1.0, out)
+    return bool(out[0] != out[1])
+
+
+def in_order(values: Mapping[Name, float], name: str) -> bool:
+    """Whether of every ordered pair of an effect the first is the smaller (static friction is at least Coulomb's)."""
+    pairs = effects.get(name).ordered
+    return all(values.get((name, a), 0.0) <= values.get((name, b), 0.0) * (1.0 + 1e-9) for a, b in pairs)
+
+
+def gains_at_zero(values: Mapping[Name, float], name: str) -> bool:
+    """Whether an effect was fitted to nothing: all its gains at zero."""
+    gains = [values.get((name, p.name), 0.0) for p in effects.get(name).parameters if p.linear and not p.per_run]
+    return bool(gains) and not any(gains)

@@ -1,0 +1,100 @@
+"""A model fitted to recordings: its parameters, its noise, its likelihood."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from identify.model.parameters import Name, platform_of
+from identify.model.structure import Structure
+from identify.simulate.shots import Shots
+from rig.arrays import Array
+from rig.dynamics.predictor import Noise
+from rig.platform import Platform
+
+SINGULAR = 1e-12  # smallest over largest eigenvalue of the scaled information that still determines a direction
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Every reading predicted one sample ahead, one array a run.
+
+    Attributes
+    ----------
+    innovations
+        Measured minus predicted, in units of the reading, (n,) each.
+    variance
+        Of the innovations, over the variance of one reading's noise, (n,) each.
+    disturbance_nm
+        The torque nobody recorded, as the innovations show it: its slow part and, sample by sample, the torque that
+        the correction of the rate stands for, (n,) each.
+    """
+
+    innovations: list[Array]
+    variance: list[Array]
+    disturbance_nm: list[Array]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted by prediction error.
+
+    Attributes
+    ----------
+    names, vector
+        Parameters in a fixed order and their values, (p,).
+    noise
+        Torque disturbance in relation to the sensor's noise.
+    shots
+        The runs with their start states and biases.
+    cost
+        Minus twice the logarithm of the likelihood, up to a constant of the samples.
+    count
+        Samples that were fitted.
+    variance
+        Of one reading's noise, as the innovations show it.
+    information
+        Of the parameters, start states and biases eliminated, for readings of unit variance, (p, p).
+    """
+
+    structure: Structure
+    names: tuple[Name, ...]
+    vector: Array
+    noise: Noise
+    shots: tuple[Shots, ...]
+    cost: float
+    count: int
+    variance: float
+    information: Array
+    prediction: Prediction
+
+    @cached_property
+    def values(self) -> dict[Name, float]:
+        """Parameters by name."""
+        return dict(zip(self.names, self.vector.tolist(), strict=True))
+
+    @property
+    def penalised(self) -> float:
+        """The cost with every parameter paid for (Schwarz 1978)."""
+        return self.cost + len(self.vector) * float(np.log(max(self.count, 2)))
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the parameters, (p, p); directions that the data leave open are left out."""
+        scale = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
+        scaled = self.information / np.outer(scale, scale)
+        if not np.all(np.isfinite(scaled)):
+            return np.full_like(scaled, np.inf)
+        inverse = np.linalg.pinv(scaled, rcond=SINGULAR, hermitian=True)
+        return np.asarray(inverse / np.outer(scale, scale) * self.variance)
+
+    def std_error(self, name: Name) -> float:
+        """One standard error of a parameter."""
+        i = self.names.index(name)
+        return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+
+    def platform(self, run: int = 0, added: float = 0.0) -> Platform:
+        """The fitted platform, as it stood in one run."""
+        return platform_of(self.structure, self.names, self.vector, run, added)

@@ -1,0 +1,125 @@
+"""A recording made smaller for a search: sampled no faster than it moves, and the spans of it that tell most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy import signal
+
+from identify.runs.holdout import Split
+from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace
+from rig.arrays import Array
+
+ENOUGH = 20_000  # samples that a search looks at; the final fit takes all
+SAMPLES_A_PERIOD = 8.0  # of the fastest motion that stands above the noise: beyond, a sample tells nothing new
+SHORTEST_SPAN = 1_500  # samples: slow effects need a span to show in
+COLUMNS = 5  # acceleration, rate, angle, direction, constant
+PLACES = 12  # where a span may begin
+
+
+def reduced(traces: Sequence[Trace], split: Split, enough: int = ENOUGH) -> tuple[list[Trace], Split]:
+    """The same runs with about ``enough`` samples, and the split of these.
+
+    Every run is first filtered and decimated, all of it; what is still too long is cut to the span in which inertia,
+    damping, stiffness and dry friction are best told apart, and where there are many runs, to some of them.
+    """
+    factor = min(_decimation(t) for t in traces)
+    total = sum(t.count for t in traces)
+    factor = max(1, min(factor, int(np.ceil(total / enough))))
+    few = [decimated(t, factor) for t in traces]
+    fit = [_every(m, factor, len(t.measured)) & t.keep for m, t in zip(split.fit, few, strict=True)]
+    judge = [_every(m, factor, len(t.measured)) & t.keep for m, t in zip(split.judge, few, strict=True)]
+    wanted = max(enough // max(len(few), 1), SHORTEST_SPAN)
+    chosen = range(len(few))
+    if wanted * len(few) > 1.5 * enough:
+        count = max(2, enough // wanted)
+        fitting = [i for i in chosen if np.any(fit[i])]
+        judging = [i for i in chosen if np.any(judge[i]) and i not in fitting]
+        picked = {*_spread(fitting, count), *_spread(judging, max(1, count // 3))}
+        chosen = sorted(picked)  # type: ignore[assignment]
+    out, fits, judges = [], [], []
+    told: Array = 1e-6 * np.eye(COLUMNS)
+    for i in chosen:
+        t = few[i]
+        first, last, told = _span(t, wanted, told)
+        piece = t if (first, last) == (0, len(t.measured) - 1) else t.piece(first, last)
+        if not piece.stretches:
+            continue
+        out.append(piece)
+        fits.append(fit[i][first : last + 1])
+        judges.append(judge[i][first : last + 1])
+    return out, Split(fits, judges, [t.keep for t in out], split.note)
+
+
+def thinned(traces: Sequence[Trace], masks: Sequence[Any], most: int) -> tuple[list[Trace], list[Any]]:
+    """The whole of all runs, filtered and decimated as far as their motion allows and ``most`` samples ask for."""
+    total = sum(t.count for t in traces)
+    factor = max(1, min(*(_decimation(t) for t in traces), int(np.ceil(total / most))))
+    few = [decimated(t, factor) for t in traces]
+    return few, [_every(m, factor, len(t.measured)) & t.keep for m, t in zip(masks, few, strict=True)]
+
+
+def _spread(items: Sequence[int], count: int) -> list[int]:
+    if not items:
+        return []
+    return [items[i] for i in np.unique(np.linspace(0, len(items) - 1, min(count, len(items))).astype(int))]
+
+
+def _decimation(trace: Trace) -> int:
+    """How many samples may become one: none that the motion needs, nor one that a known filter of the sensor does."""
+    if trace.run.rate_corner_hz:
+        return 1
+    return max(1, int(1.0 / (SAMPLES_A_PERIOD * trace.cutoff_hz * trace.step_s)))
+
+
+def decimated(trace: Trace, factor: int) -> Trace:
+    """A trace sampled every so manyth time, low-passed before; its torque stays as it was recorded."""
+    if factor <= 1:
+        return trace
+    order = 4 * factor
+    weights = signal.firwin(2 * order + 1, 0.8 / factor)
+    y = np.convolve(np.pad(trace.measured, order, mode="reflect", reflect_type="odd"), weights, mode="valid")
+    keep = _every(trace.keep, factor, len(y[::factor]))
+    measured = y[::factor]
+    stretches = [(-(-a // factor), b // factor) for a, b in trace.stretches]
+    stretches = [(a, min(b, len(measured) - 1)) for a, b in stretches if b - a + 1 >= SHORTEST_STRETCH]
+    inside = np.zeros(len(measured), dtype=bool)
+    for a, b in stretches:
+        inside[a : b + 1] = True
+    return replace(
+        trace, measured=measured, keep=keep & inside, stretches=stretches, step_s=factor * trace.step_s,
+        noise=trace.noise * float(np.sqrt(np.sum(weights**2))), motion=None, _series={},
+    )  # fmt: skip
+
+
+def _every(mask: Any, factor: int, count: int) -> Any:
+    """Which of every so many samples have all their neighbours."""
+    if factor <= 1:
+        return mask
+    half = factor // 2
+    whole = np.convolve(np.pad(~mask, half, constant_values=False).astype(int), np.ones(2 * half + 1, int), "valid")
+    return (whole == 0)[::factor][:count]
+
+
+def _span(trace: Trace, wanted: int, told: Array) -> tuple[int, int, Array]:
+    """First and last sample of the span of a length that adds most to what other runs tell, and that with it."""
+    n = len(trace.measured)
+    angle, rate, time, _torque, _ = (x[::UPSAMPLING] if isinstance(x, np.ndarray) else x for x in trace.fine)
+    acceleration = np.gradient(rate, time)
+    slow = 0.02 * float(np.max(np.abs(rate))) + 1e-300
+    columns = np.stack([acceleration, rate, angle - np.mean(angle), np.tanh(rate / slow), np.ones(n)], axis=1)
+    columns = columns / (np.sqrt(np.mean(columns**2, axis=0)) + 1e-300)
+    columns[~trace.keep] = 0.0
+
+    def with_span(first: int) -> Array:
+        part = columns[first : first + wanted]
+        return np.asarray(told + part.T @ part / wanted)
+
+    if n <= 1.25 * wanted:
+        return 0, n - 1, told + columns.T @ columns / wanted
+    places = np.linspace(0, n - wanted, PLACES).astype(int).tolist()
+    first = max(places, key=lambda at: float(np.linalg.slogdet(with_span(at))[1]))
+    return first, first + wanted - 1, with_span(first)

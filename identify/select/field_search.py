@@ -1,0 +1,179 @@
+"""The search where a torque that nobody recorded limits the runs: in torque, the final models by prediction error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from identify.diagnose.disturbance import disturbance_of
+from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
+from identify.diagnose.torque_residual import torque_noise_floor
+from identify.estimate.by_prediction_error import by_prediction_error
+from identify.estimate.cross_validation import Judged
+from identify.estimate.final_fit import Fitted, covariance_of, free_run_of
+from identify.estimate.initial_guess import Start, scale_of
+from identify.estimate.output_error import Estimate
+from identify.model.parameters import names_of
+from identify.model.structure import Structure
+from identify.results import Candidate, Disturbance
+from identify.runs.holdout import Split
+from identify.runs.observability import why_unseen
+from identify.runs.reduced import reduced
+from identify.select.search_state import Search
+from identify.select.torque_search import TorqueSearch, Weighed
+from identify.signals.trace import Trace, loads_differ
+from rig import effects
+
+HIGHEST = 0.2  # of the sample rate of what is searched: the low-pass cuts off no higher
+NOT_BETTER = 0.98  # of the declared model's held-out residual: above, the model that was found is none
+NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
+PERCENT = 100.0
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the search found.
+
+    Attributes
+    ----------
+    search
+        Candidates, rivals and what was dropped, for the report.
+    before, after
+        The declared model and the final one, fitted.
+    in_torque
+        How far both are from the torque.
+    disturbance
+        What the final model leaves.
+    """
+
+    search: Search
+    before: Fitted
+    after: Fitted
+    disturbance: Disturbance
+    in_torque: tuple[TorqueErrors, TorqueErrors]
+
+
+@dataclass(frozen=True)
+class TorqueErrors:
+    """How far a model is from the torque, behind the low-pass, where the platform moves and does not turn back."""
+
+    residual_nm: float
+    relative: float
+    held_relative: float  # by fits that did not see the samples
+    floor_nm: float
+    cutoff_hz: float
+
+
+def search_in_torque(
+    traces: Sequence[Trace], split: Split, structure: Structure, shapes: dict[str, tuple[float, ...]], start: Start,
+    allowed: Sequence[str], unit: str, say: Callable[[str], None],
+) -> Found:  # fmt: skip
+    """Find what the declared model lacks, and fit both models with their disturbance.
+
+    Parameters
+    ----------
+    structure, shapes
+        The declared model, and the shapes of its effects.
+    start
+        A first idea of the platform.
+    allowed
+        Names of the effects that may be named.
+    unit
+        Of the torque.
+    """
+    few, parts = reduced(traces, split)
+    scale = scale_of(few, start.platform, ())
+    cutoff = min(start.cutoff_hz, HIGHEST / few[0].step_s)
+    regression = TorqueRegression(few, parts, cutoff, scale)
+    base = regression.solve(structure, shapes)
+    floor = torque_noise_floor(few, base.values, cutoff, [t.keep for t in few])
+    acceleration = float(np.sqrt(np.mean(regression.series()[2] ** 2)))
+    offered = [n for n in allowed if n not in structure.effects and _possible(n, traces)]
+    search = TorqueSearch(regression, base, floor, acceleration, offered, say)
+    best = search.run()
+    if best.held_nm > NOT_BETTER * base.held_nm and best.structure.effects == structure.effects:
+        best = base
+    say(f"final fit with {', '.join(best.structure.effects) or 'fewer terms'}")
+    before = _final(regression, base, traces, split)
+    after = before if best.structure == structure else _final(regression, best, traces, split)
+    left = disturbance_of(regression, best, floor, unit)
+
+    def errors(fit: TorqueFit) -> TorqueErrors:
+        size = regression.torque_nm
+        return TorqueErrors(fit.fitted_nm, fit.fitted_nm / size, fit.held_nm / size, floor, cutoff)
+
+    return Found(_told(search, structure, base, best), before, after, left, (errors(base), errors(best)))
+
+
+def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> Fitted:
+    """The final fit by prediction error, or in torque where that leaves clearly less of it.
+
+    Prediction error is the better estimate as long as what is left is a disturbance. Where it is a torque that goes
+    with something, prediction error weighs the frequencies at which the model happens to be right and gives the rest
+    away; least squares in torque does the least harm to the parameters.
+    """
+    fitted, _ = by_prediction_error(traces, fit.structure, fit.values, split.final, split.everything)
+    left = regression.left_by(fit.structure, fitted.values)
+    if left <= NO_WORSE * fit.fitted_nm:
+        return fitted
+    columns, residuals, names = regression.linear_parts(fit.structure, fit.values)
+    covariance, determined = covariance_of(list(zip(columns, residuals, strict=True)), len(names))
+    shapes = [n for n in fit.values if n not in names]
+    covariance = block_diag(covariance, np.diag([fitted.std_error(n) ** 2 for n in shapes])) if shapes else covariance
+    values = {n: fit.values[n] for n in (*names, *shapes)}
+    free = free_run_of(traces, fit.structure, values, split.everything)
+    return Fitted(
+        fit.structure, values, covariance, (*names, *shapes), fit.fitted_nm, free, False,
+        (*determined, *(True for _ in shapes)), "least squares in torque",
+    )  # fmt: skip
+
+
+def _possible(name: str, traces: Sequence[Trace]) -> bool:
+    needs = effects.get(name).needs_added_inertia
+    return not why_unseen(name, traces) and (not needs or loads_differ(traces))
+
+
+def _judged(fit: TorqueFit, runs: int) -> Judged:
+    names = names_of(fit.structure, runs)
+    values = np.array([fit.values.get(n, 0.0) for n in names])
+    estimate = Estimate(
+        fit.structure, names, values, fit.fitted_nm, fit.count, np.zeros((len(names),) * 2), (), True
+    )  # fmt: skip
+    return Judged(fit.structure, estimate, np.array([fit.held_nm**2]), np.ones(1))
+
+
+def _told(search: TorqueSearch, structure: Structure, base: TorqueFit, best: TorqueFit) -> Search:
+    """What was looked at, as the report tells it."""
+    runs = search.regression.runs
+    found = Search(_judged(base, runs), _judged(best, runs), 0.0, search.floor_nm)
+    named = [e for e in best.structure.effects if e not in structure.effects]
+    for number, looks in enumerate(search.rounds, 1):
+        chosen = search.choice(looks)
+        for look in looks:
+            found.candidates.append(Candidate(look.effect, number, -look.evidence, None, _status(look, chosen, named)))
+        if chosen is not None and chosen.effect in named:
+            rivals = [w.effect for w in looks if w is not chosen and search.as_good(w, chosen)]
+            if rivals:
+                found.rivals[chosen.effect] = tuple(r for r in rivals if r not in named)
+    found.rivals = {k: v for k, v in found.rivals.items() if v}
+    for term in structure.terms:
+        if term not in best.structure.terms:
+            found.dropped.append((term, "on samples not fitted it carries no torque that the others do not"))
+    for name in named:
+        rest = {k: v for k, v in best.shapes.items() if k != name}
+        without = search.regression.solve(best.structure.minus(name), rest)
+        found.contribution[name] = without.held_nm / max(best.held_nm, 1e-300)
+    return found
+
+
+def _status(look: Weighed, chosen: Weighed | None, named: Sequence[str]) -> str:
+    if chosen is not None and look.effect == chosen.effect:
+        return "added" if look.effect in named else "added, then no longer needed"
+    if look.counts:
+        return "carries less than what was added"
+    if look.sureness >= 4.0 and look.weight > 0.0:
+        return f"proven but small: {PERCENT * look.weight:.0f} % of what is left"
+    return "no better"

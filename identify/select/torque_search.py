@@ -1,0 +1,182 @@
+"""Which effects carry the torque that the declared model leaves: a stepwise search in torque, in the band that matters.
+
+A name takes weight and evidence. Weight is the share of the held-out residual's power, the sensor's part taken off,
+that an effect takes away; evidence is that the squared residual falls all over the held-out samples, block by block. Of
+candidates that carry nearly as much the simplest is taken, of these the likeliest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+
+from identify.diagnose.torque_regression import TorqueFit, TorqueRegression, gains_at_zero
+from rig import effects
+from rig.effects.base import Place
+
+WEIGHT = 0.25  # share of what is left that an effect has to take away to be named: below, it is true but small
+SURE = 4.0  # standard errors, over blocks of the held-out samples, by which the squared residual must fall: 3e-5
+RICHER = 0.5  # share of what its special case leaves that a richer effect has to take away to be named in its place
+AS_HEAVY = 0.05  # of what is left: candidates that differ by less carry the same torque
+RIVAL = 0.02  # of what is left: rivals carry as much as what was taken, to that
+TOLD_APART = 10.0  # fall of the penalised cost that parts two candidates (Kass and Raftery 1995: very strong)
+INERTIA_MATTERS = 0.2  # of the torque: below, the motion hardly shows the inertia
+MOST = 6  # effects that one recording is believed to show
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """One candidate on top of a model.
+
+    Attributes
+    ----------
+    weight
+        Share of the held-out residual's power, the sensor's part taken off, that it takes away.
+    evidence
+        Fall of the penalised cost with a coloured residual.
+    sureness
+        Standard errors by which the squared residual falls, over blocks of the held-out samples: of the falls, or of
+        their logarithms, whichever is more.
+    sureness_by_size
+        Of the falls alone: what a few moments decide has little of it.
+    """
+
+    effect: str
+    fit: TorqueFit
+    weight: float
+    evidence: float
+    sureness: float
+    sureness_by_size: float
+
+    @property
+    def counts(self) -> bool:
+        """Whether it is proven and carries enough to be named."""
+        flexible = effects.get(self.effect).resembles_much  # its shape was looked for on the held-out samples, too
+        return self.weight >= WEIGHT and (self.sureness_by_size if flexible else self.sureness) >= SURE
+
+
+@dataclass
+class TorqueSearch:
+    """The search and what it found.
+
+    Attributes
+    ----------
+    regression
+        Fits in torque over the runs that are searched.
+    floor_nm
+        What the sensor's noise alone leaves in the residual, root mean square.
+    acceleration
+        Root mean square of the motion's acceleration, rad/s^2.
+    allowed
+        Names of the effects that may be named.
+    """
+
+    regression: TorqueRegression
+    base: TorqueFit
+    floor_nm: float
+    acceleration: float
+    allowed: Sequence[str]
+    say: Callable[[str], None] = lambda text: None
+    rounds: list[tuple[Weighed, ...]] = field(default_factory=list)
+
+    def run(self) -> TorqueFit:
+        """Add effects as long as one carries weight, then drop what no longer does."""
+        now = self.without_soaking_stiffness(self.base)
+        while len(now.structure.effects) < MOST + len(self.base.structure.effects):
+            looks = self.looks(now)
+            self.rounds.append(tuple(looks))
+            chosen = self.choice(looks)
+            if chosen is None:
+                break
+            self.say(f"added {chosen.effect}: {100.0 * chosen.weight:.0f} % of the residual torque on held-out data")
+            now = self.pruned(self.without_soaking_stiffness(chosen.fit))
+        return now
+
+    def left(self, fit: TorqueFit) -> float:
+        """Held-out power of the residual above the sensor's."""
+        return max(fit.held_nm**2 - self.floor_nm**2, 1e-4 * self.floor_nm**2)
+
+    def weighed(self, name: str, now: TorqueFit, fit: TorqueFit) -> Weighed:
+        """A candidate's weight and evidence on top of a model."""
+        share = 1.0 - self._smaller_inertia(now, fit) * self.left(fit) / self.left(now)
+        worth = share > 0.2 * WEIGHT
+        evidence = self.regression.evidence(now, fit) if worth else 0.0
+        by_size, by_ratio = self.regression.sureness(now, fit) if worth else (0.0, 0.0)
+        return Weighed(name, fit, share, evidence, max(by_size, by_ratio), by_size)
+
+    def _smaller_inertia(self, now: TorqueFit, fit: TorqueFit) -> float:
+        """By how much more a smaller inertia makes of the same torque, in acceleration and squared.
+
+        Where inertia takes a good part of the torque it is the motion that has to be explained: with no inertia left,
+        and a friction that feeds on the torque, any torque explains itself.
+        """
+        old, new = (f.values.get(("inertia",), 0.0) for f in (now, fit))
+        if old * self.acceleration < INERTIA_MATTERS * self.regression.torque_nm or new >= old:
+            return 1.0
+        return float((old / max(new, 1e-9 * old)) ** 2)
+
+    def looks(self, now: TorqueFit) -> list[Weighed]:
+        """All candidates on top of a model, the heaviest first."""
+        spring = "stiffness" in now.structure.terms
+        answers = now.values.get(("inertia",), 0.0) * self.acceleration > INERTIA_MATTERS * self.regression.torque_nm
+        have = now.structure.effects
+        more = [m for n in have for m in effects.further(effects.first_of(n)) if m not in have][:1]
+        names = [
+            n for n in (*(a for a in self.allowed if a not in have), *more)
+            if (spring or effects.get(n).family != "restoring torque")
+            and (answers or effects.get(n).place is not Place.DRIVE)  # a late torque shows in what it sets in motion
+            and not set(effects.get(n).nests) & set(have)  # what holds one that is there is asked in its place
+        ]  # fmt: skip
+        lines_hz, orders = self.regression.lines(now)
+        self.regression.scale = replace(self.regression.scale, lines_hz=lines_hz, orders=orders)
+        with ThreadPoolExecutor(2) as workers:
+            fits = list(workers.map(lambda n: self.regression.with_effect(now, n), names))
+        found = [
+            self.weighed(n, now, f) for n, f in zip(names, fits, strict=True)
+            if f is not None and not gains_at_zero(f.values, n)
+        ]  # fmt: skip
+        return sorted(found, key=lambda w: -w.weight)
+
+    @staticmethod
+    def choice(looks: Sequence[Weighed]) -> Weighed | None:
+        """The candidate to add: of the heaviest the likeliest, of these the simplest."""
+        good = [w for w in looks if w.counts]
+        if not good:
+            return None
+        heaviest = max(good, key=lambda w: w.weight)
+        near = [w for w in good if w.weight > heaviest.weight - AS_HEAVY]
+        near += [w for w in good if w.effect in effects.get(heaviest.effect).nests and _holds(w, heaviest)]
+        return min(near, key=lambda w: (len(w.fit.values), -w.evidence))
+
+    def without_soaking_stiffness(self, now: TorqueFit) -> TorqueFit:
+        """The same without a stiffness that carries no torque of its own, or that pushes where a spring pulls."""
+        if "stiffness" not in now.structure.terms:
+            return now
+        without = self.regression.solve(now.structure.minus("stiffness"), now.shapes)
+        share = 1.0 - self.left(now) / self.left(without)
+        by_size, by_ratio = self.regression.sureness(without, now)
+        pulls = now.values[("stiffness",)] > 0.0
+        return now if pulls and share >= WEIGHT and max(by_size, by_ratio) >= SURE else without
+
+    @staticmethod
+    def as_good(look: Weighed, chosen: Weighed) -> bool:
+        """Whether a candidate carried as much as the one that was taken and is as likely: the data do not decide."""
+        return look.counts and look.weight > chosen.weight - RIVAL and look.evidence > chosen.evidence - TOLD_APART
+
+    def pruned(self, now: TorqueFit) -> TorqueFit:
+        """The same without the effects that no longer carry anything beside the others."""
+        for name in now.structure.effects:
+            if name in self.base.structure.effects:
+                continue
+            shapes = {k: v for k, v in now.shapes.items() if k != name}
+            without = self.regression.solve(now.structure.minus(name), shapes)
+            if not self.weighed(name, without, now).counts:
+                self.say(f"dropped {name}: the others carry its torque")
+                return self.pruned(without)
+        return now
+
+
+def _holds(simple: Weighed, rich: Weighed) -> bool:
+    """Whether the richer effect carries too little beside its special case to be named in its place."""
+    return (1.0 - rich.weight) > (1.0 - RICHER) * (1.0 - simple.weight)
