@@ -89,6 +89,7 @@ class Verdict:
     contribution: Mapping[str, float] = field(default_factory=dict)  # effect -> held-out error without it / with it
     left_open: str = ""  # what was found and may be either of two things, in words
     tells_apart: str = ""  # what would tell which
+    explained_fraction: float = 0.0  # of the residual's power above the noise floor, that the final model takes away
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from identify.results import Errors, Identification, NotReported, ParameterEstimate
+from identify.results import Disturbance, Errors, Identification, NotReported, ParameterEstimate
 
 SYMBOLS = {
     "inertia": "J",
@@ -179,6 +179,20 @@ def pairs(several: Mapping[str, Sequence[str]]) -> list[str]:
 def not_reported(several: Sequence[NotReported]) -> list[str]:
     """Parameters that stand in no table, with the reason, one sentence each."""
     return [capital(f"{plain(item.name.replace('.', ', '))}: {item.reason}") for item in several]
+
+
+def left_over(left: Disturbance, axis: str) -> str:
+    """What is left after the final model, in one sentence: how large a torque, and what it goes with."""
+    torque = "force" if axis == "linear" else "torque"
+    size = f"{number(left.torque_rms, 2)} {unit(left.unit)} rms, {number(100.0 * left.relative, 2)} % of the {torque}"
+    if not left.depends_on:
+        return (
+            f"What is left is a {torque} of {size}; it depends on nothing that was tried: noise, and in the intervals."
+        )
+    each = joined([f"{number(100.0 * d.relative, 2)} % with the {d.on}" for d in left.depends_on])
+    moved = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in left.moves_percent.items()])
+    told = f" A free-form term of that beside the model moves {moved}." if moved else ""
+    return f"What is left is a {torque} of {size}; part of it goes with something: {each}.{told}"
 
 
 def without(times: float) -> str:

@@ -103,6 +103,7 @@ def conclude(
         contribution=search.contribution,
         left_open=search.left_open,
         tells_apart=search.tells_apart,
+        explained_fraction=1.0 - _fraction(measured_before, measured_after, floor) if changed else 0.0,
     )
     reasons = []
     searched = [g for g in (*(s.genetic for s in per_set), joint) if g is not None]

@@ -12,6 +12,7 @@ from identify.wording import (
     capital,
     half_interval,
     joined,
+    left_over,
     number,
     percent,
     plain,
@@ -38,8 +39,7 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
         why = "what was found may not be an effect of the platform." if found.verdict.left_open else ""
         out.append(
             "No effect is named: "
-            + (why or "no candidate explains the residual." if found.verdict.unexplained
-               else "the declared model already reaches the noise floor.")
+            + (why or _nothing_named(found))
         )  # fmt: skip
     out += [found.verdict.left_open] if found.verdict.left_open else []
     out += _bent(found)
@@ -53,7 +53,9 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
         )
     out += _known_badly(found)
     out += _unseen_scale(found)
-    if found.verdict.unexplained:
+    if found.disturbance is not None and _decided_in_torque(found):
+        out.append(left_over(found.disturbance, found.axis))
+    elif found.verdict.unexplained:
         out.append(
             f"{number(100.0 * found.verdict.unexplained_fraction, 2)} % of the residual above the noise floor is "
             "unexplained; the plots show what it depends on."
@@ -75,6 +77,19 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
         for pair, why in found.verdict.never_separable.items()
     ]
     return tuple(out)
+
+
+def _decided_in_torque(found: Identification) -> bool:
+    return found.final.error.holdout_measure == "holdout_torque_relative"
+
+
+def _nothing_named(found: Identification) -> str:
+    """Why no effect is named."""
+    if _decided_in_torque(found):
+        return "no candidate takes a quarter of the torque that is left, all over the record."
+    if found.verdict.unexplained:
+        return "no candidate explains the residual."
+    return "the declared model already reaches the noise floor."
 
 
 def _unseen_scale(found: Identification) -> list[str]:

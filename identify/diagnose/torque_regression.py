@@ -232,7 +232,11 @@ class TorqueRegression(TorqueBand):
         begin: Any = np.log(np.maximum(best.shapes[name], 1e-12))
         simplex = np.vstack([begin, begin + 0.25 * np.eye(len(begin))])
         options: Any = {"maxfev": EVALUATIONS, "initial_simplex": simplex, "xatol": 1e-3}
-        found: Any = minimize(lambda u: at(inside(u)).fitted_nm, begin, method="Nelder-Mead", options=options)
+
+        def loss(u: Any) -> float:
+            return at(inside(u)).fitted_nm
+
+        found: Any = minimize(loss, begin, method="Nelder-Mead", options=options)
         polished = at(inside(found.x))
         return polished if polished.fitted_nm < best.fitted_nm and in_order(polished.values, name) else best
 

@@ -22,7 +22,7 @@ from identify.estimate.output_error import held_still, shots_for
 from identify.model.parameters import Name, bounds_of, equations_of, names_of, ordered
 from identify.model.structure import Structure
 from identify.signals.trace import Trace
-from identify.simulate.shots import Shots
+from identify.simulate.shots import RUNAWAY, Shots
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.predictor import Gains, Noise, gains_of, predict_ahead
@@ -79,6 +79,7 @@ class PredictionError:
         self.workers = ThreadPoolExecutor(2)
         self._most_white = MOST_TORQUE
 
+    @RUNAWAY
     def cost_at(self, fit: Fit, noise: Noise) -> float:
         """The cost of a fit with another noise."""
         squares, logs = 0.0, 0.0
@@ -131,6 +132,7 @@ class PredictionError:
                     break
             return descent.found()
 
+    @RUNAWAY
     def look(self, s: Shots, structure: Structure, names: Sequence[Name], x: Array, noise: Noise, bias: float) -> Look:
         """One run predicted at a parameter vector."""
         equations = equations_of(structure, names, x, s.number, s.added)
@@ -194,7 +196,7 @@ class _Descent:
         self.noise = p.within(noise or p.on_grid(lambda q: self._cost(self._looks(self.x, p.within(q), self.bias))))
         self.looks = self._looks(self.x, self.noise, self.bias)
         self.cost = self._cost(self.looks)
-        self.information = np.zeros((len(self.x), len(self.x)))
+        self.information: Array = np.zeros((len(self.x), len(self.x)))
         self._calm = 0
 
     def _unit(self, name: Name) -> float:
@@ -213,6 +215,7 @@ class _Descent:
                           range(len(self.shots)))
         )  # fmt: skip
 
+    @RUNAWAY
     def _cost(self, looks: Sequence[Look]) -> float:
         squares = sum(
             float(np.sum(q.innovations[w] ** 2 / q.variance[w])) for q, w in zip(looks, self.weights, strict=True)
@@ -222,6 +225,7 @@ class _Descent:
         log = sum(float(np.sum(np.log(q.variance[w]))) for q, w in zip(looks, self.weights, strict=True))
         return float(self.count * np.log(squares / self.count) + log)
 
+    @RUNAWAY
     def _columns(self, i: int) -> tuple[Array, Array, Array]:
         """Of one run: what parameters, noise and bias do to the scaled innovations, these, and d mean log variance."""
         p, s, base, w = self.problem, self.shots[i], self.looks[i], self.weights[i]
@@ -275,7 +279,7 @@ class _Descent:
         if not (np.all(np.isfinite(a)) and np.all(np.isfinite(b))):
             return False
         self.information = _without(a, p)
-        size = np.sqrt(np.maximum(np.diag(a), 1e-300))
+        size: Array = np.sqrt(np.maximum(np.diag(a), 1e-300))
         free = np.concatenate([~self.still, np.ones(3, dtype=bool)]) & (np.diag(a) > 0.0)
         scaled, right_side = (a / np.outer(size, size))[np.ix_(free, free)], (b / size)[free]
         logs = np.log(_three(self.noise))

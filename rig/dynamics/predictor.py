@@ -77,6 +77,8 @@ def _riccati(phi, q, h, p, keep, first, last, gain, variance):  # type: ignore[n
                     g[a] += p[a, b] * h[b]
             for a in range(n):
                 s += h[a] * g[a]
+            if not s >= 1.0:
+                s = np.inf  # the linear part ran away: nothing is predicted from here
             variance[i] = s
             if keep[i]:
                 change = 0.0
@@ -91,6 +93,9 @@ def _riccati(phi, q, h, p, keep, first, last, gain, variance):  # type: ignore[n
             else:
                 calm = 0
             p = phi @ p @ phi.T + q
+            for a in range(n):
+                for b in range(a):
+                    p[a, b] = p[b, a] = 0.5 * (p[a, b] + p[b, a])
         elif keep[i]:
             variance[i] = variance[i - 1]
             gain[i, :] = gain[i - 1, :]

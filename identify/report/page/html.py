@@ -35,6 +35,7 @@ from identify.wording import (
     capital,
     half_interval,
     joined,
+    left_over,
     not_reported,
     number,
     pairs,
@@ -141,6 +142,9 @@ def _errors(identification: Identification, gallery: Gallery) -> Markup:
         if identification.verdict.unexplained
         else "The residual is at the noise floor: nothing significant is unexplained."
     )
+    left = identification.disturbance
+    if left is not None and identification.final.error.holdout_measure == "holdout_torque_relative":
+        state = left_over(left, identification.axis)
     figures = [gallery.place(figure) for figure in residual_figures(identification)]
     return section(
         "residual",
