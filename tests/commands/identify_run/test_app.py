@@ -312,6 +312,6 @@ def test_bad_usage_ends_in_2_without_a_traceback(arguments: list[str]) -> None:
     assert "Traceback" not in done.output
 
 
-def test_the_version_is_told() -> None:
+def test_the_version_is_printed() -> None:
     done = command(app, "--version")
     assert (done.exit_code, done.stdout.split()[0]) == (0, "isp-rig")
