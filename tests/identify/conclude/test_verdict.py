@@ -45,7 +45,7 @@ def test_a_rival_is_named_with_what_would_separate_it() -> None:
     verdict = replace(FOUND.verdict, confusable_with={"coulomb_friction": ("stribeck_friction",)})
     said = sentences_of(replace(FOUND, verdict=verdict))[0]
     assert "cannot exclude Stribeck friction" in said
-    assert "slow ramp" in said
+    assert "ramp slowly" in said
 
 
 def test_opposite_signs_are_the_first_thing_said() -> None:
