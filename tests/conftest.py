@@ -21,6 +21,7 @@ for _name in ("SIGHUP", "SIGTERM"):
 # Tests with deadlines of their own, by the beginning of their path: beside another one they would be late.
 WITH_DEADLINES = (
     "drivers/amplifiers",
+    "drivers/bench",
     "drivers/capture",
     "drivers/gyroscopes/test_gyro_line",
     "drivers/replay",

@@ -1,111 +1,27 @@
-"""A follow-up at the command line: who is asked, what is kept, and what stands where it is cut short."""
+"""A follow-up at the command line: who is asked, what is played, what is kept."""
 
 from __future__ import annotations
 
-import json
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import pytest
 
 from commands.identify_run.app import app
 from commands.rig.app import app as rig_app
-from identify.results import FollowUp, FollowUpPlan, Identification, Parting
-from rig.config.identify import IdentifyConfig
-from rig.errors import DeviceFault
-from rig.interface import Exchange, GyroSample, Statement, Torque, TorqueSample
-from rig.platform import Platform
+from rig.interface import Statement, Torque
 from rig.recording.hdf5 import read_recording_h5
-from rig.recording.run import Recording
+from tests.commands.identify_run.follow_ups import AUTO, Stub, doubtful, names, plan_of, result, sure
 from tests.commands.support import TWO_SETS, command, put_on_stage, write_config
-from tests.identify.sample import sample
 from tests.rig.scripted import ScriptedRig
-
-FIRST_S = 0.5 + 0.4 + 0.05 + 0.2 + 0.4 + 0.05  # how long the two sets take on the sequencer's clock
-AUTO = ("--set", "identify.follow_up=auto")
-ENTRY = {"kind": "sine", "torque_nm": 5.0, "frequency_hz": 11.0, "duration_s": 0.4, "name": "follow-up: 11 Hz"}
-
-
-def plan_of(number: int = 1, separation: float = 900.0, torque_nm: float = 5.0) -> FollowUpPlan:
-    name = "follow-up" if number == 1 else f"follow-up {number}"
-    entry = ENTRY | {"name": f"{name}: 11 Hz", "torque_nm": torque_nm}
-    excitation = {"sample_rate_hz": 1000.0, "rest_s": 0.2, "sets": [entry]}
-    partings = (Parting("coulomb_friction", "stribeck_friction", separation),)
-    return FollowUpPlan(excitation, partings, 0.4, "A sine parts Coulomb friction from Stribeck friction.")
-
-
-def doubtful() -> Identification:
-    """Accepted, but one name has a rival."""
-    found = sample(2.0)[0]
-    confusable = {"coulomb_friction": ("stribeck_friction",), "torque_delay": ()}
-    return replace(found, verdict=replace(found.verdict, confusable_with=confusable))
-
-
-def sure() -> Identification:
-    found = sample(2.0)[0]
-    confusable: dict[str, tuple[str, ...]] = {"coulomb_friction": (), "torque_delay": ()}
-    return replace(found, verdict=replace(found.verdict, confusable_with=confusable))
-
-
-class Answers:
-    """Stands in for the loop: one answer after the other, the last one for good."""
-
-    def __init__(self, *answers: Identification | BaseException) -> None:
-        self.given: list[Recording] = []
-        self._answers = list(answers)
-
-    def __call__(
-        self, recording: Recording, declared: Platform, settings: IdentifyConfig,
-        progress: Callable[[str], None] | None = None,
-    ) -> Identification:  # fmt: skip
-        self.given.append(recording)
-        answer = self._answers.pop(0) if len(self._answers) > 1 else self._answers[0]
-        if isinstance(answer, BaseException):
-            raise answer
-        return answer
-
-
-Stub = Callable[..., Answers]
-
-
-@pytest.fixture
-def stub(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stub]:
-    """Let the loop answer as told, and the planner plan what is given (one plan a call)."""
-
-    def made(*answers: Identification | BaseException, plans: tuple[FollowUpPlan, ...] = (plan_of(),)) -> Answers:
-        loop, identifier = ModuleType("identify.pipeline"), Answers(*answers)
-        loop.identify = identifier  # type: ignore[attr-defined]
-        monkeypatch.setitem(sys.modules, "identify.pipeline", loop)
-        left = list(plans)
-
-        def plan(found: Identification, *_: Any) -> FollowUp | None:
-            doubt = any(found.verdict.confusable_with.values())
-            return FollowUp(left.pop(0) if left else None) if doubt else None
-
-        monkeypatch.setattr("identify.follow_up.planner.plan_follow_up", plan)
-        monkeypatch.setattr("identify.follow_up.rounds.errors_on", lambda model, found, recording: found.before.error)
-        return identifier
-
-    yield made
-
-
-def result(out: Path) -> dict[str, Any]:
-    return dict(json.loads((out / "result.json").read_text(encoding="utf-8")))
-
-
-def names(out: Path) -> list[str]:
-    return [run.name for run in read_recording_h5(out / "recording.h5").runs]
 
 
 def test_where_the_file_says_auto_it_is_played_and_everything_is_identified_again(tmp_path: Path, stub: Stub) -> None:
     identifier, out = stub(doubtful(), sure()), tmp_path / "out"
     done = command(app, write_config(tmp_path), *AUTO, "--out", out)
     assert done.exit_code == 0, done.output
-    assert [[run.name for run in r.runs] for r in identifier.given] == [
+    assert identifier.runs == [
         ["5 Hz", "7 Hz"], ["5 Hz", "7 Hz", "follow-up: 11 Hz"]
     ]  # fmt: skip
     assert done.stderr.count("Torque is SIMULATED") == 2  # pre-flight and statement anew
@@ -208,83 +124,6 @@ def test_without_yes_real_torque_is_asked_for_each_time(
     out = tmp_path / "out"
     assert command(app, write_config(tmp_path), "--yes", "--out", out).exit_code == 0
     assert asked == ["REAL, yes False"]  # --yes is no answer where the file says ask
-
-
-def test_a_trip_in_the_follow_up_keeps_the_first_results_and_every_sample(
-    tmp_path: Path, stub: Stub, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    plays = 0
-
-    def count() -> None:
-        nonlocal plays
-        plays += 1
-
-    def too_fast(now_s: float) -> Exchange | None:
-        if plays and now_s > FIRST_S + 0.7:
-            return Exchange((GyroSample(now_s, 9.0, True),), (TorqueSample(now_s, 1.0),))
-        return None
-
-    rig = ScriptedRig(lambda now_s: too_fast(now_s + FIRST_S * plays), on_disarm=count)
-    put_on_stage(monkeypatch, rig)
-    identifier, out = stub(doubtful()), tmp_path / "out"
-    done = command(app, write_config(tmp_path), *AUTO, "--out", out)
-    assert done.exit_code == 4, done.output
-    assert rig.torque_nm == 0.0
-    assert len(identifier.given) == 1
-    content = result(out)
-    assert content["verdict"]["effects"] == ["coulomb_friction", "torque_delay"] and content["aborted"] is True
-    assert content["follow_up"]["played"] is False and "cut short" in content["follow_up"]["note"]
-    assert names(out) == ["5 Hz", "7 Hz", "follow-up: 11 Hz"]
-
-
-def test_a_fault_in_the_follow_up_ends_in_3(tmp_path: Path, stub: Stub, monkeypatch: pytest.MonkeyPatch) -> None:
-    def silent(now_s: float) -> None:
-        if rig.log.count("open") == 2 and now_s > 0.7:
-            raise DeviceFault("the drive fell silent")
-
-    rig = ScriptedRig(silent)
-    put_on_stage(monkeypatch, rig)
-    stub(doubtful())
-    done = command(app, write_config(tmp_path), *AUTO, "--out", tmp_path / "out")
-    assert done.exit_code == 3, done.output
-    assert "the drive fell silent" in done.stderr
-    assert result(tmp_path / "out")["after"] is not None
-
-
-def test_one_that_the_preflight_refuses_is_not_played_and_nothing_is_lost(tmp_path: Path, stub: Stub) -> None:
-    identifier = stub(doubtful(), plans=(plan_of(torque_nm=349.0),))
-    out = tmp_path / "out"
-    done = command(app, write_config(tmp_path), *AUTO, "--out", out)
-    assert done.exit_code == 0, done.output
-    assert len(identifier.given) == 1
-    assert "nothing was moved" in result(out)["follow_up"]["note"]
-    assert names(out) == ["5 Hz", "7 Hz"] and not (out / "follow_up.journal").exists()
-
-
-@pytest.mark.parametrize(("error", "code"), [(KeyboardInterrupt(), 130), (DeviceFault("no emulators"), 3)])
-def test_what_ends_a_follow_up_before_it_begins_leaves_the_first_results(
-    tmp_path: Path, stub: Stub, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int
-) -> None:
-    stub(doubtful())
-
-    def fail(*_: Any) -> None:
-        raise error
-
-    monkeypatch.setattr("commands.campaign.follow_up.play", fail)
-    out = tmp_path / "out"
-    done = command(app, write_config(tmp_path), *AUTO, "--out", out)
-    assert done.exit_code == code, done.output
-    assert result(out)["aborted"] is True and "was not played" in result(out)["follow_up"]["note"]
-    assert names(out) == ["5 Hz", "7 Hz"]
-
-
-def test_ctrl_c_while_all_the_data_are_identified_leaves_the_first_results(tmp_path: Path, stub: Stub) -> None:
-    stub(doubtful(), KeyboardInterrupt())
-    out = tmp_path / "out"
-    assert command(app, write_config(tmp_path), *AUTO, "--out", out).exit_code == 130
-    content = result(out)
-    assert content["aborted"] is True and content["verdict"]["effects"] == ["coulomb_friction", "torque_delay"]
-    assert names(out) == ["5 Hz", "7 Hz", "follow-up: 11 Hz"]
 
 
 @pytest.mark.parametrize(("second", "runs"), [(5000.0, 4), (100.0, 3)])
