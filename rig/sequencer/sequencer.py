@@ -38,8 +38,10 @@ REST_PERIOD_S = 0.01  # ticks of zero torque may be slower; they still feed the 
 BIAS_WINDOW_S = 1.0  # of a rest, at its end
 PROGRESS_S = 0.1  # between two reports to the observer: ten a second is what an eye follows
 LOOK_S = 0.25  # after the probe: how often to ask whether the ring has died out
-# Standstill: a mean rate below either; tuned by hand, not derived: a debt.
-# Standstill: a mean rate below either; tuned by hand, not derived: a debt.
+# Standstill after the probe: no sample of the last LOOK_S is faster than the larger of the two. Noise alone exceeds six
+# standard deviations in one of a million looks (500 samples). 0.5 deg/s is where the guard takes a platform to move
+# (MOVES_RAD_S); the paper's platform (29 Hz) then swings by 0.003 deg. More lets a set begin while the platform rings
+# (tests/rig/sequencer fails at 4 deg/s), less waits for longer, at most for a rest.
 STILL_SIGMAS, STILL_RAD_S = 6.0, math.radians(0.5)
 
 
