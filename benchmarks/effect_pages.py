@@ -118,14 +118,15 @@ def page(effect: Effect) -> str:
     ]
     drawn = ", ".join(f"{k} {v:g}" for k, v in SIZES[effect.name].items())
     where = {
-        Place.DRIVE: "between the commanded torque and the shaft",
-        Place.LOAD: "at the shaft, beside J a + C w + K th",
-        Place.FRICTION: "at the shaft, against the rate; sticking and breaking away included",
-        Place.SENSOR: "between the rate and the gyro's reading",
+        Place.DRIVE: "between the recorded torque and the shaft",
+        Place.LOAD: "at the shaft: J a + C w + K th + T = M",
+        Place.FRICTION: "at the shaft: J a + C w + K th + T = M; the platform may stick and break away",
+        Place.SENSOR: "between the rate and the reading of the gyro",
     }[effect.place]
     out = [
         f"# {effect.name}", "", effect.meaning, "", f"    {effect.equation}", "",
-        "th angle in rad, w rate in rad/s, t time in s from the start of the run, M torque on the shaft in N m.",
+        "th: angle in rad, w: rate in rad/s, a: acceleration in rad/s^2, t: time in s from the start of the run,",
+        "M: torque on the shaft in N m.",
         f"Acts {where}.",
         "", f"![{effect.name}](figures/{effect.name}.svg)", "",
         f"Drawn for {drawn} and a motion of 0.16 rad at 1 Hz.", "",
@@ -134,16 +135,16 @@ def page(effect: Effect) -> str:
     ]  # fmt: skip
     out += ["", "## What it is confused with", ""]
     out += [
-        f"- `{rival}`, {'always: ' if alike.travel_deg == math.inf else ''}{alike.why}."
+        f"- `{rival}`{', always' if alike.travel_deg == math.inf else ''}: {alike.why}."
         for rival, alike in (effect.never_separable or {}).items()
     ]
     out += [f"- `{simpler}`, which it contains as a special case." for simpler in effect.nests]
     out += [f"- `{wider}`, which contains it." for wider in effects.names() if effect.name in effects.get(wider).nests]
-    out += [f"- `{low}` is looked for first: a constant before a slope." for low in effect.lower_order]
+    out += [f"- `{low}` has to be in the model first." for low in effect.lower_order]
     if effect.separated_by:
-        out.append(f"- Experiments that separate it: {effect.separated_by}.")
+        out.append(f"- To distinguish it {effect.separated_by}.")
     if effect.name == "rate_bias":
-        out.append("- With nothing: it is fitted as a nuisance parameter in every run of a gyro.")
+        out.append("- Nothing: it is fitted as a nuisance parameter in every run measured by a gyro.")
     return "\n".join([*out, ""])
 
 

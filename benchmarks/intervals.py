@@ -1,9 +1,9 @@
 """How often the 95 % intervals hold the truth, over simulated campaigns.
 
-python -m benchmarks.intervals --white 500 --real 200 --lost 200 --gyro GYRO.npz
+python -m benchmarks.intervals --white 500 --lost 200 --real 200 --gyro GYRO.npz
 
-White noise; the noise of a real MEMS gyro at rest, scaled to 0.05 deg/s, each of its 100 Hz samples used as one
-of 1 kHz; and white noise with 2 % of the samples lost. Intervals are those of the final fit, noise estimated
+White noise; white noise with 2 % of the samples lost; and, if --gyro is given, the noise of a real gyro at rest,
+scaled to 0.05 deg/s, each of its samples used as one of 1 kHz. Intervals are those of the final fit, noise estimated
 from the data.
 """
 
@@ -31,7 +31,7 @@ from identify.estimate.cross_validation import horizon_s
 from identify.estimate.final_fit import by_output_error
 from rig.arrays import Array
 
-GYRO = Path(__file__).parents[2] / "shared/data/adis16405_gyro/gyro_counts.npz"
+GYRO_ARRAY = "gyro_counts"
 LOST_SHARE = 0.02
 Z95 = 1.96
 Noise = Callable[[np.random.Generator], list[Array]]
@@ -53,10 +53,23 @@ class Coverage:
 
 
 def gyro_noise(path: Path) -> Noise:
-    """Stretches of a real gyro's record, rescaled as one to the standard deviation of the white noise."""
-    counts = np.load(path)["gyro_counts"].astype(float)
-    scaled = SIGMA_RAD_S * (counts - counts.mean(axis=0)) / counts.std(axis=0)
+    """Stretches of a real gyro's record, rescaled as one to the standard deviation of the white noise.
+
+    The file holds an array ``gyro_counts`` of shape (samples, axes), recorded at rest and longer than a set.
+
+    Raises
+    ------
+    ValueError
+        Where it does not.
+    """
+    with np.load(path) as file:
+        if GYRO_ARRAY not in file:
+            raise ValueError(f"{path} has no array {GYRO_ARRAY}: save the gyro's samples at rest under that name")
+        counts = file[GYRO_ARRAY].astype(float)
     n = len(times())
+    if counts.ndim != 2 or len(counts) <= n:
+        raise ValueError(f"{path}: {GYRO_ARRAY} has shape {counts.shape}, needed is (more than {n} samples, axes)")
+    scaled = SIGMA_RAD_S * (counts - counts.mean(axis=0)) / counts.std(axis=0)
 
     def draw(rng: np.random.Generator) -> list[Array]:
         starts = rng.integers(0, len(scaled) - n, len(clean_rates()))
@@ -112,11 +125,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     for name, runs in (("white", 500), ("real", 200), ("lost", 200)):
         parser.add_argument(f"--{name}", type=int, default=runs)
-    parser.add_argument("--gyro", type=Path, default=GYRO)
+    parser.add_argument("--gyro", type=Path, help=f"NPZ file with {GYRO_ARRAY}: a gyro at rest, shape (samples, axes)")
     given = parser.parse_args()
     found = []
     with threadpool_limits(1):
-        if given.real and given.gyro.exists():
+        if given.real and given.gyro:
             found.append(measure("real gyro", gyro_noise(given.gyro), given.real, False))
             print(text(found[-1:]), flush=True)
         if given.lost:

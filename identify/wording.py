@@ -15,7 +15,9 @@ SYMBOLS = {
     "damping_over_inertia": "C/J",
     "stiffness_over_inertia": "K/J",
 }
-UNCHANGED_PERCENT = 1e-6
+MOST_DIGITS = 7  # significant digits: torque and gyro scales are never calibrated better than 1e-6
+NORMAL_95 = 1.96  # half a 95 % interval in standard errors
+TWO_DIGITS_UP_TO = 3.55  # leading digits of an uncertainty, rule of the Particle Data Group: 1.0 to 3.5 get two digits
 _TITLES = {"rotary": "rotary inertia", "linear": "mass"}
 
 
@@ -38,6 +40,11 @@ def plain(name: str) -> str:
     return words
 
 
+def sentence(words: str) -> str:
+    """With a capital at its beginning and a full stop at its end."""
+    return f"{capital(words.rstrip(' .'))}." if words else ""
+
+
 def capital(words: str) -> str:
     """With a capital to begin the sentence; what stands behind it is left alone."""
     return words[:1].upper() + words[1:]
@@ -57,13 +64,6 @@ def number(value: float | None, digits: int = 4) -> str:
     return f"{value:.{digits - 1}e}"
 
 
-def digits_for(value: float, uncertainty: float) -> int:
-    """Significant digits of ``value`` that show two of its uncertainty: between 3 and 9."""
-    if not (math.isfinite(value) and math.isfinite(uncertainty)) or value == 0.0 or uncertainty <= 0.0:
-        return 4
-    return min(9, max(3, math.floor(math.log10(abs(value))) - math.floor(math.log10(uncertainty)) + 2))
-
-
 def readable(estimate: ParameterEstimate) -> ParameterEstimate:
     """A time below a tenth of a second in ms; all else as it is."""
     if estimate.unit != "s" or not 0.0 < abs(estimate.value) < 0.1:
@@ -78,20 +78,48 @@ def readable(estimate: ParameterEstimate) -> ParameterEstimate:
     )
 
 
+def _last_place(estimate: ParameterEstimate) -> int | None:
+    """Power of ten of the last digit that half the 95 % interval supports; None without an interval."""
+    half = half_interval(estimate)
+    if not math.isfinite(half):
+        half = NORMAL_95 * estimate.std_error
+    if not (math.isfinite(estimate.value) and math.isfinite(half)) or half <= 0.0:
+        return None
+    order = math.floor(math.log10(half))
+    place = order - 1 if half / 10.0**order < TWO_DIGITS_UP_TO else order
+    return max(place, _order(estimate.value) - MOST_DIGITS + 1) if estimate.value else place
+
+
+def _order(value: float) -> int:
+    return math.floor(math.log10(abs(value)))
+
+
+def _as_value(x: float, estimate: ParameterEstimate) -> str:
+    """``x``, a bound or half an interval, with the last digit at the place of the estimate's."""
+    place = _last_place(estimate)
+    if place is None or not math.isfinite(x):
+        return number(x)
+    if not -5 <= max(_order(estimate.value) if estimate.value else place, place) < 7:
+        return number(x, max(1, _order(x) - place + 1) if x else 1)
+    return f"{round(x, -place) + 0.0:.{max(0, -place)}f}"  # + 0.0: no minus before a zero
+
+
 def value_of(estimate: ParameterEstimate) -> str:
-    """The value with as many digits as its standard error deserves."""
-    return number(estimate.value, digits_for(estimate.value, estimate.std_error))
+    """The value, with its last digit where the 95 % interval has its first or second."""
+    return _as_value(estimate.value, estimate)
+
+
+def half_of(estimate: ParameterEstimate) -> str:
+    """Half the 95 % interval with the decimals of the value: the 0.00012 of 0.02030 ± 0.00012."""
+    half = half_interval(estimate)
+    shown = _as_value(half, estimate)
+    return shown if half == 0.0 or not math.isfinite(half) or float(shown) else number(half, 2)
 
 
 def interval_of(estimate: ParameterEstimate) -> str:
     """The 95 % interval with the decimals of the value: "0.01999 to 0.02001"."""
-    shown = value_of(estimate)
-    decimals = len(shown.partition(".")[2])
-    if "e" in shown or not all(math.isfinite(bound) for bound in estimate.ci95):
-        digits = digits_for(estimate.value, estimate.std_error)
-        low, high = (number(bound, digits) for bound in estimate.ci95)
-        return f"{low} to {high}"
-    return f"{estimate.ci95[0]:.{decimals}f} to {estimate.ci95[1]:.{decimals}f}"
+    low, high = (_as_value(bound, estimate) for bound in estimate.ci95)
+    return f"{low} to {high}"
 
 
 def half_interval(estimate: ParameterEstimate) -> float:
@@ -104,7 +132,7 @@ def with_interval(estimate: ParameterEstimate) -> str:
     low, high = (abs(bound - estimate.value) for bound in estimate.ci95)
     if not (math.isfinite(low) and math.isfinite(high)) or abs(high - low) > 0.2 * max(high, low):
         return f"{value_of(estimate)} ({interval_of(estimate)})"
-    return f"{value_of(estimate)} ± {number(half_interval(estimate), 2)}"
+    return f"{value_of(estimate)} ± {half_of(estimate)}"
 
 
 def printable(words: str) -> str:
@@ -112,11 +140,16 @@ def printable(words: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in words)
 
 
+def signed(value: float, digits: int = 4) -> str:
+    """``digits`` significant digits behind a sign: "-215200", "+4.200"."""
+    return f"{'+' if value > 0 else '-' if value < 0 else ''}{number(abs(value), digits)}"
+
+
 def percent(value: float | None) -> str:
     """With a sign and two or three digits that matter: "+412 %", "-0.013 %"."""
     if value is None or not math.isfinite(value):
         return "-"
-    return f"{'+' if value > 0 else '-' if value < 0 else ''}{number(abs(value), 3 if abs(value) >= 10 else 2)} %"
+    return f"{signed(value, 3 if abs(value) >= 10 else 2)} %"
 
 
 def errors_in_turn(identification: Identification) -> dict[str, Errors]:
@@ -140,26 +173,6 @@ def bent_percent(identification: Identification) -> dict[str, float]:
     before, after = identification.before.parameters, identification.after.parameters
     shared = [name for name in before if name in after and after[name].value != 0.0]
     return {name: 100.0 * (before[name].value / after[name].value - 1.0) for name in shared}
-
-
-def bent_sentences(identification: Identification) -> list[str]:
-    """What the missing effects did to each parameter of the declared model, largest first, one sentence each."""
-    bent = sorted(bent_percent(identification).items(), key=lambda item: -abs(item[1]))
-    said = []
-    for name, off in bent:
-        if abs(off) < UNCHANGED_PERCENT:
-            said.append(f"{capital(title(name, identification.axis))}: unchanged by the added effects.")
-            continue
-        before, after = (model.parameters[name] for model in (identification.before, identification.final))
-        within = abs(before.value - after.value) <= 2.0 * math.hypot(before.std_error, after.std_error)
-        size = percent(abs(off)).lstrip("+")
-        note = " (within its uncertainty)" if within else ""
-        way = "high" if off > 0 else "low"
-        said.append(
-            f"{capital(title(name, identification.axis))}: "
-            f"fitted without the missing effects it is {size} too {way}{note}."
-        )
-    return said
 
 
 def frequency(value: float | None) -> str:

@@ -21,13 +21,16 @@ for _name in ("SIGHUP", "SIGTERM"):
 # Tests with deadlines of their own, by the beginning of their path: beside another one they would be late.
 WITH_DEADLINES = (
     "drivers/amplifiers",
+    "drivers/bench",
     "drivers/capture",
     "drivers/gyroscopes/test_gyro_line",
     "drivers/replay",
     "drivers/test_",
     "drivers/timing",
     "drivers/transport",
-    "commands/",
+    "commands/campaign",
+    "commands/rig",
+    "commands/terminal",
     "rig/config/test_malformed",
     "rig/recording/test_flushing",
     "rig/recording/test_journal",

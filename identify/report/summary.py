@@ -19,8 +19,6 @@ from identify.results import Identification, ParameterEstimate
 from identify.wording import (
     SYMBOLS,
     bent_percent,
-    bent_sentences,
-    capital,
     errors_in_turn,
     not_reported,
     number,
@@ -29,6 +27,7 @@ from identify.wording import (
     plain,
     printable,
     readable,
+    sentence,
     title,
     unit,
     value_of,
@@ -68,7 +67,7 @@ def summary(
 def _whole(identification: Identification, info: Mapping[str, Any]) -> Group:
     final, verdict = identification.final, identification.verdict
     floor = identification.noise_floor
-    note = printable(capital(identification.holdout_note))
+    note = printable(sentence(identification.holdout_note))
     parts: list[RenderableType] = [
         *_listed("Verdict", verdict.sentences, bullet=""),
         Text(),
@@ -77,7 +76,6 @@ def _whole(identification: Identification, info: Mapping[str, Any]) -> Group:
         _errors(identification),
         Padding(Text(f"The noise floor is {floor.source}. {note}"), (0, 0, 0, 2)),
         *_listed("Torque delay", delay_lines(identification, info), bullet=""),
-        *_listed("What the missing effects did to the fit", bent_sentences(identification)),
         *_listed("Dropped: not supported by the data", not_reported(final.dropped)),
         *_listed("Not determined by these data", not_reported(final.not_determined)),
         *_listed("Cannot be distinguished on these data", pairs(verdict.confusable_with)),

@@ -12,6 +12,9 @@ kernels end to end, ``z_at`` where each kernel's begin; ``p`` the parameter vect
 where each begins. LOAD kernels come first, FRICTION kernels from ``loads`` on. Behind the last parameter
 vector of ``p`` stands for every internal state the angle over which it follows the motion, infinite where it follows
 something else, and before these their least.
+
+One step and the loops over many stand in one file: Numba's cache checks the file of the function that is called, so a
+change of the step would not reach loops of another file that are compiled already.
 """
 
 from __future__ import annotations

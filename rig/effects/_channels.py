@@ -1,4 +1,4 @@
-"""Effects whose cause is a further measured channel: made at run time, one for every way a channel may act.
+"""Effects whose cause is a further measured channel: made at run time, one for each way in which a channel may act.
 
 A kernel sees its channel in ``p``: behind the effect's own parameters stand the address of a table of
 factor * (x - reference), the number of its entries a second, and how many there are. The table begins with the
@@ -87,10 +87,10 @@ class _Way:
     lower_order: tuple[str, ...] = ()
 
 
-_ALONE = "from what the library has beside it: a run in which {x} changes by itself"
+_ALONE = "from other effects: record a run in which {x} changes by itself"
 _WAYS = {
     "torque": _Way(
-        _torque, Place.LOAD, "T = slope * (x - x0)", "A torque that follows {x}: coupling, tilt, a cable.",
+        _torque, Place.LOAD, "T = slope * (x - x0)", "A torque proportional to {x}: coupling, tilt, a cable.",
         "Resisting: positive with {x} above x0.", "N*m", "nm", _ALONE, "coupling",
     ),
     "stiffness": _Way(
@@ -103,19 +103,21 @@ _WAYS = {
     ),
     "gain": _Way(
         _gain, Place.LOAD, "M = [1 + slope * (x - x0)] * torque",
-        "The torque that an ampere gives changes with {x}: magnets weaken as they warm.",
-        "The recorded torque is right at x0; a negative slope gives less.", "1", "1", _ALONE, "drive",
+        "The torque per ampere changes with {x}: magnets weaken as they warm.",
+        "The recorded torque is right at x0; with a negative slope the shaft gets less above x0.", "1", "1", _ALONE,
+        "drive",
     ),
     "friction": _Way(
         _torque, Place.FRICTION, "T = slope * (x - x0) * sgn(w)", "Dry friction changes with {x}.",
-        "coulomb_friction has the level at x0; a negative slope takes from it.", "N*m", "nm", _ALONE, "friction",
+        "coulomb_friction is the level at x0; a negative slope lowers it above x0.", "N*m", "nm", _ALONE, "friction",
         ("coulomb_friction",),
     ),
     "drive": _Way(
         _drive, Place.LOAD, "M = torque + share * (factor * x - torque)",
-        "The shaft gets the torque of {x}, and not the recorded one, where the two differ.",
-        "One: the shaft follows {x} alone; zero: the recorded torque.", "1", "", "from a lag or limit of the drive: "
-        "torques at which {x} departs from the recorded torque in another way", "drive",
+        "The torque on the shaft is that of {x}, not the recorded one, where the two differ.",
+        "1: the shaft follows {x} alone; 0: it follows the recorded torque.", "1", "",
+        "from a lag or limit of the drive: play torques at which {x} differs from the recorded torque in another way",
+        "drive",
     ),
 }  # fmt: skip
 _MADE: dict[str, Effect] = {}

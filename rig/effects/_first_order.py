@@ -11,7 +11,8 @@ from rig.effects.base import Scale, filter_kernel
 def lag(x, step, state, p):  # type: ignore[no-untyped-def]
     """First-order lag, exact for an input that follows a parabola through the last three samples.
 
-    A straight line between them is too low by (w h)^2 / 12, which is seen in J and K where the sensor is good.
+    With straight lines between the samples the gain would be too low by (w h)^2 / 12 (w: frequency in rad/s, h: step),
+    which a low-noise sensor shows in J and K.
     """
     tau = p[0]
     if tau <= 1e-9:
@@ -28,10 +29,10 @@ def lag(x, step, state, p):  # type: ignore[no-untyped-def]
 
 
 def remembers(step_s: float, values: tuple[float, ...]) -> int:
-    """How many numbers the lag keeps: its output and two samples."""
+    """Number of states of the lag: its output and two input samples."""
     return 3
 
 
 def times(scale: Scale) -> tuple[float, ...]:
-    """Time constants to begin from."""
+    """Time constants from which the search starts."""
     return tuple(scale.step_s * f for f in (0.3, 1.0, 3.0, 10.0))

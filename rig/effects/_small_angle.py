@@ -1,12 +1,13 @@
-"""Up to which travel gravity and a polynomial spring are one torque."""
+"""Up to which travel the torque of gravity cannot be told from that of a polynomial spring."""
 
 from __future__ import annotations
 
 from rig.effects.base import Alike
 
-TRAVEL_DEG = 15.0  # the paper's 10, a start transient, and what the drift of an integrated rate adds
-_CURE = "turning the base or swinging farther tells them apart"
+# Degrees to either side: the paper's platform moves 10, the start transient and the drift of an integrated rate add 5.
+TRAVEL_DEG = 15.0
+_CURE = "turn the base of the platform, or swing farther"
 
-# The next term of either series adds less than a ten-thousandth of the torque there.
-SINE = Alike("sin(th) is th - th^3/6", TRAVEL_DEG, _CURE)
-COSINE = Alike("cos(th) is 1 - th^2/2", TRAVEL_DEG, _CURE)
+# At 15 deg the next term of either series, th^5/120 or th^4/24, is below 2e-4 of the torque.
+SINE = Alike("sin(th) equals th - th^3/6", TRAVEL_DEG, _CURE)
+COSINE = Alike("cos(th) equals 1 - th^2/2", TRAVEL_DEG, _CURE)

@@ -1,4 +1,4 @@
-"""Actuator lag: the current follows its command through the winding's time constant."""
+"""Actuator lag: the torque follows the recorded torque through a first-order low-pass."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ EFFECT = Effect(
     name="actuator_lag",
     family="drive",
     place=Place.DRIVE,
-    equation="time * d(torque)/dt + torque = torque before the lag",
-    source="first-order low-pass; electric time constant L_a / R_m of Fig. 2-3",
-    meaning="An amplifier without (or with a slow) current loop: L/R, or the loop's own bandwidth.",
-    sign="A time constant, never negative.",
+    equation="time * dM/dt + M = torque",
+    source="first-order low-pass; electric time constant L_a / R_m of Fig. 2-3 of the paper",
+    meaning="The motor current lags its set value: L/R of the winding, or the bandwidth of the current loop.",
+    sign="Never negative: M follows later than the recorded torque.",
     parameters=(
         Parameter(
             "time",
@@ -28,8 +28,9 @@ EFFECT = Effect(
     filter_states=remembers,
     never_separable={
         "sensor_lag": Alike(
-            "a lag in the torque and a lag in the gyro answer alike", cure="measure the current, or use a second sensor"
+            "a lag in the torque and an equal one in the gyro give the same response from torque to rate",
+            cure="measure the motor current, or add a second sensor",
         )
     },
-    separated_by="from a delay: higher frequencies",
+    separated_by="from a delay: excite at higher frequencies",
 )

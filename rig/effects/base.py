@@ -1,6 +1,6 @@
 """What an effect is: one object that simulator, identifier, report and docs all read.
 
-An effect acts at one of four places between commanded torque and measured rate:
+An effect acts at one of four places between recorded torque and measured rate:
 
     torque_nm -> DRIVE filters -> J a + C w + K th + LOAD torques + FRICTION sgn(w) = M -> SENSOR filters -> rate
 
@@ -53,7 +53,7 @@ class Place(Enum):
 
 @dataclass(frozen=True)
 class Scale:
-    """How large the motion is: from it an effect proposes where to look for its shape parameters."""
+    """How large the motion is: from it an effect chooses starting values of its shape parameters."""
 
     angle_rad: float
     rate_rad_s: float
@@ -64,7 +64,7 @@ class Scale:
     excitation_hz: tuple[float, ...] = ()
     lines_hz: tuple[float, ...] = ()  # spectral lines of the current residual
     orders: tuple[float, ...] = ()  # lines of the current residual against the angle, periods a turn
-    rings_hz: tuple[float, ...] = ()  # what of the current residual rings where runs begin
+    rings_hz: tuple[float, ...] = ()  # frequencies that decay in the residual after the start of runs
     ringing_hz: float = 0.0  # strongest spectral line of the measured motion next to the natural frequency
 
 
@@ -85,7 +85,7 @@ class Parameter:
     suffix: str = ""  # unit suffix of the rig.yaml key, e.g. "nm"
     start: Callable[[Scale], tuple[float, ...]] | None = None
     per_run: bool = False  # takes a value of its own in every run (the phase of a disturbance)
-    neutral: float = 0.0  # at which the effect is none
+    neutral: float = 0.0  # value at which the effect vanishes
 
     @property
     def key(self) -> str:
@@ -94,14 +94,14 @@ class Parameter:
 
 
 class LargeStart(NamedTuple):
-    """Where the fit of an effect may begin: terms of the platform, own parameters."""
+    """Starting values for the fit of an effect: terms of the platform, and own parameters."""
 
     terms: Mapping[str, float]
     own: Mapping[str, float]
 
 
 class Alike(NamedTuple):
-    """Why no torque-to-rate data can tell two effects apart, and up to which travel to either side that holds."""
+    """Why no data of torque and rate can tell two effects apart, up to which travel to either side, and the cure."""
 
     because: str
     travel_deg: float = math.inf
@@ -109,7 +109,7 @@ class Alike(NamedTuple):
 
     @property
     def why(self) -> str:
-        """One clause for report and docs: within what, why, and what parts them."""
+        """One clause for report and docs: within which travel, why, and what separates them."""
         within = f"within {self.travel_deg:g} deg " if math.isfinite(self.travel_deg) else ""
         return f"{within}{self.because}" + (f"; {self.cure}" if self.cure else "")
 
@@ -135,33 +135,33 @@ class Effect:
     filter_states: Callable[[float, tuple[float, ...]], int] | None = None
     rest_state: Callable[[float, float], tuple[float, ...]] | None = None  # of angle and rate at the start
     fastest_rad_s: Callable[[tuple[float, ...]], float] | None = None  # of (J, C, K, *values): sets the step
-    # Of the same: the angle over which its states follow the motion, where that is what they follow.
+    # Of the same: the angle over which its states follow the motion, if they follow the angle and not time.
     follows_within_rad: Callable[[tuple[float, ...]], float] | None = None
     kinks: Callable[[tuple[float, ...]], tuple[float, ...]] | None = None  # angles at which its torque bends
-    bends_torque: bool = False  # a drive effect that puts corners into a smooth torque
-    leans_on: tuple[str, ...] = ()  # terms of the platform that scale its torque (backlash: the stiffness)
+    bends_torque: bool = False  # a drive effect that makes a smooth torque non-smooth (corners)
+    leans_on: tuple[str, ...] = ()  # terms of the platform on which its torque depends (backlash: the stiffness)
     ordered: tuple[tuple[str, str], ...] = ()  # pairs of parameters of which the first is the smaller
-    lower_order: tuple[str, ...] = ()  # effects that come first by marginality: a constant before a slope
+    lower_order: tuple[str, ...] = ()  # effects that have to be in the model first: a constant before a slope
     nests: tuple[str, ...] = ()  # simpler effects that this one contains as a special case
-    never_separable: Mapping[str, Alike] | None = None  # rival -> why no torque-to-rate data can tell
-    # Of its own values: what a rival that no data exclude has in its place, and what that adds to J, C, K.
+    never_separable: Mapping[str, Alike] | None = None  # rival -> why no data of torque and rate can tell them apart
+    # By rival of never_separable, from its own values: the values of that rival, and what the change adds to J, C, K.
     as_rival: Mapping[str, Callable[[tuple[float, ...]], LargeStart]] | None = None
-    needs_added_inertia: bool = False  # shows only where runs carry a known inertia besides the platform's own
-    # Of (J, C, K) and the scale: terms of the platform and own parameters to begin from where the effect is large.
+    needs_added_inertia: bool = False  # determined only if some runs have a known inertia mounted
+    # From (J, C, K) and the scale: starting values of the platform and of the effect if the effect is large.
     large_starts: Callable[[tuple[float, float, float], Scale], tuple[LargeStart, ...]] | None = None
-    # Of (J, C, K), its own values where a fit has ended and the scale there: where else its minimum may lie.
+    # From fitted (J, C, K), fitted own values and the scale: starting values near other possible minima.
     other_minima: Callable[[tuple[float, float, float], tuple[float, ...], Scale], tuple[LargeStart, ...]] | None = None
-    resembles_much: bool = False  # its shapes make it follow whatever else is missing
-    sought_alone: bool = False  # beside any other one of its shapes takes what that one leaves: no half of a pair
-    separated_by: str = ""
+    resembles_much: bool = False  # flexible enough to fit the residual that another missing effect leaves
+    sought_alone: bool = False  # never proposed in a pair: with some shape it fits what any other effect leaves
+    separated_by: str = ""  # "from RIVAL: experiment, as an imperative; from ..."
     reads: Channel | None = None  # the measured channel that it is an effect of
 
     def per_inertia(self, parameter: Parameter) -> bool:
-        """Whether a decay without torque shows only the ratio of a parameter to the inertia: all that is a torque."""
+        """Whether a free decay determines only the ratio of a parameter to the inertia, as of every torque."""
         return self.place in (Place.LOAD, Place.FRICTION) and parameter.unit.startswith(("N", "kg"))
 
     def alike(self, rival: str, travel_deg: float) -> str:
-        """Why no data within a travel can tell it from a rival; empty where the data decide."""
+        """Why no data within a travel can tell it from a rival; empty if data can."""
         found = (self.never_separable or {}).get(rival)
         return found.why if found is not None and travel_deg <= found.travel_deg else ""
 

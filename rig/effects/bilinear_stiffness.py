@@ -1,4 +1,4 @@
-"""Bilinear stiffness: another K on each side of zero."""
+"""Bilinear stiffness: a different K on each side of zero."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ EFFECT = Effect(
     equation="T = step * max(th, 0)",
     source="Shaw and Holmes 1983, piecewise linear oscillator",
     meaning="A support or cable that acts on one side only.",
-    sign="K is the stiffness at negative angle; step is added at positive angle.",
+    sign="K is the stiffness at negative angles; step is added at positive angles.",
     parameters=(
         Parameter(
             "step",
             "N*m/rad",
-            "stiffness added at positive angle",
+            "stiffness added at positive angles",
             linear=True,
             low=-float("inf"),
             suffix="nm_rad",
@@ -30,5 +30,5 @@ EFFECT = Effect(
     ),
     kernel=_torque,
     kinks=lambda values: (0.0,),
-    separated_by="from quadratic stiffness: small and large amplitudes",
+    separated_by="from quadratic stiffness: excite at a small and at a large amplitude",
 )

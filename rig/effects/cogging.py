@@ -1,4 +1,4 @@
-"""Cogging: a torque that repeats with the angle."""
+"""Cogging: a torque that is periodic in the angle."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-unt
 
 
 def _orders(scale: Scale) -> tuple[float, ...]:
-    # Fewer than half a period over the travel is a polynomial; more than a hundred is noise.
+    # With less than half a period over the travel the torque is like a polynomial spring, with more than some twenty
+    # like noise.
     lowest = max(1.0, 0.5 * math.pi / scale.angle_rad)
     highest = min(400.0, 60.0 / scale.angle_rad)
     if scale.angle_rad > math.pi:
@@ -28,15 +29,17 @@ EFFECT = Effect(
     place=Place.LOAD,
     equation="T = sine * sin(order * th) + cosine * cos(order * th)",
     source="Hanselman, Brushless Motors, cogging torque as a Fourier series in the angle",
-    meaning="Magnets that prefer some angles to others.",
-    sign="Resisting; the phase is counted from the encoder's zero, or from the rest angle of a gyro-only run.",
+    meaning="The magnets of the motor pull the rotor towards the slots, so that it prefers some angles.",
+    sign="Resisting, like K th; th is counted from the zero of the encoder, with a gyro alone from the rest angle "
+    "before the run.",
     parameters=(
         Parameter("sine", "N*m", "sine part", linear=True, low=-float("inf"), suffix="nm"),
         Parameter("cosine", "N*m", "cosine part", linear=True, low=-float("inf"), suffix="nm"),
-        Parameter("order", "1/rad", "periods a turn", low=0.5, high=2000.0, start=_orders),
+        Parameter("order", "1/rad", "periods per turn", low=0.5, high=2000.0, start=_orders),
     ),
     kernel=_torque,
     resembles_much=True,
     sought_alone=True,
-    separated_by="from backlash and cubic stiffness: several amplitudes, slow motion through the whole travel",
+    separated_by="from backlash and cubic stiffness: excite at several amplitudes, and move slowly through the whole "
+    "travel",
 )

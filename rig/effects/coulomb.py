@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from rig.effects.base import Effect, LargeStart, Parameter, Place, Scale, kernel
 
-LARGER = (3.0, 8.0)  # times the level that a model sees which never stuck: it thinks little of a lot of friction
+# Factors on the fitted level from which the fit is started again: a fit in which the platform never sticks may end at
+# a level that is far too low.
+LARGER = (3.0, 8.0)
 
 
 @kernel
@@ -27,5 +29,5 @@ EFFECT = Effect(
     parameters=(Parameter("level", "N*m", "friction level", linear=True, suffix="nm"),),
     kernel=_level,
     other_minima=_others,
-    separated_by="from Stribeck and presliding friction: slow ramp, hold and release; several amplitudes",
+    separated_by="from Stribeck and presliding friction: ramp slowly, hold and release; excite at several amplitudes",
 )

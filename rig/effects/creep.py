@@ -1,4 +1,4 @@
-"""Creep (standard linear solid): a spring that relaxes."""
+"""Creep (standard linear solid): a spring that relaxes under load."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ EFFECT = Effect(
     place=Place.LOAD,
     equation="T = stiffness * (th - z), dz/dt = (th - z) / time",
     source="Zener 1948, standard linear solid (Maxwell branch beside the spring)",
-    meaning="Elastomers and adhesives: under load the spring yields slowly.",
-    sign="Resisting, like K th; K is the relaxed stiffness.",
+    meaning="Elastomers and adhesives yield slowly under load.",
+    sign="Resisting, like K th; K is the stiffness after relaxation.",
     parameters=(
-        Parameter("stiffness", "N*m/rad", "stiffness that relaxes", linear=True, suffix="nm_rad"),
+        Parameter("stiffness", "N*m/rad", "additional stiffness that relaxes", linear=True, suffix="nm_rad"),
         Parameter("time", "s", "relaxation time", low=1e-5, high=1e4, suffix="s", start=_times),
     ),
     kernel=_torque,
@@ -37,5 +37,5 @@ EFFECT = Effect(
     rest_state=lambda angle, rate: (angle,),
     fastest_rad_s=lambda values: 0.3 / values[4],
     resembles_much=True,
-    separated_by="from damping: several frequencies; from drift: a hold at constant torque",
+    separated_by="from damping: excite at several frequencies; from stiffness drift: hold a constant torque",
 )

@@ -25,6 +25,7 @@ EFFECT = Effect(
     kernel=_torque,
     never_separable={"unbalance": SINE},
     separated_by=(
-        "from unbalance: turn the platform's base, or swing farther; from backlash: small and large amplitudes"
+        "from unbalance: turn the base of the platform, or swing farther; "
+        "from backlash: excite at a small and at a large amplitude"
     ),
 )

@@ -1,4 +1,4 @@
-"""Directional damping: another C in each direction."""
+"""Directional damping: a different C in each direction."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ EFFECT = Effect(
     place=Place.LOAD,
     equation="T = step * max(w, 0)",
     source="asymmetric viscous friction, as observed on electro-mechanical positioning systems",
-    meaning="Seals, worm gears and one-way lubrication: damping differs with the direction.",
-    sign="C is the damping at negative rate; step is added at positive rate.",
+    meaning="Seals, worm gears and one-way lubrication: the damping depends on the direction of motion.",
+    sign="C is the damping at negative rates; step is added at positive rates.",
     parameters=(
         Parameter(
             "step",
             "N*m*s/rad",
-            "damping added at positive rate",
+            "damping added at positive rates",
             linear=True,
             low=-float("inf"),
             suffix="nm_s_rad",
@@ -30,5 +30,5 @@ EFFECT = Effect(
     ),
     kernel=_torque,
     lower_order=("torque_offset",),
-    separated_by="from damping: motion in both directions at several speeds",
+    separated_by="from damping: move in both directions at several speeds",
 )

@@ -1,4 +1,4 @@
-"""Flexible mode: a second inertia that hangs on a spring of its own."""
+"""Flexible mode: a second inertia, coupled to the shaft by a spring and a damper."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 from rig.effects.base import Effect, LargeStart, Parameter, Place, Scale, kernel
 
-LIGHT, QUARTER, HEAVY = 0.03, 0.25, 0.5  # of the inertia
+LIGHT, QUARTER, HEAVY = 0.03, 0.25, 0.5  # share of the second inertia in the total inertia
 
 
 @kernel
@@ -26,7 +26,7 @@ def _frequencies(scale: Scale) -> tuple[float, ...]:
 
 
 def _large(jck: tuple[float, float, float], scale: Scale) -> tuple[LargeStart, ...]:
-    """A quarter of the inertia on a spring somewhat above the natural frequency: slow motion moves both as one."""
+    """A quarter of the inertia on a mode somewhat above the natural frequency: in slow motion both move as one."""
     inertia, _, stiffness = jck
     if stiffness <= 0.0:
         return ()
@@ -38,10 +38,11 @@ def _large(jck: tuple[float, float, float], scale: Scale) -> tuple[LargeStart, .
 
 
 def _others(jck: tuple[float, float, float], own: tuple[float, ...], scale: Scale) -> tuple[LargeStart, ...]:
-    """Other modes that slow torque hardly tells from this one: it sees the inertias' sum and inertia / frequency^2.
+    """Other modes with nearly the same response at low frequency, from which the fit is started again.
 
-    Which of them rings shows beside false minima. A sharp one above all torque rings where runs begin and is seen there
-    alone, at the frequency of the inertias against each other.
+    An excitation below the mode determines only the sum of the inertias and inertia / frequency^2. A lightly damped
+    mode above all excitation shows only in the transient at the beginning of a run, at the frequency at which the two
+    inertias swing against each other with the shaft free.
     """
     inertia, frequency, ratio = own
     both, out = jck[0] + inertia, []
@@ -61,16 +62,16 @@ EFFECT = Effect(
     name="flexible_mode",
     family="structure",
     place=Place.LOAD,
-    equation="T = inertia * x, x = W^2 (th - q) + 2 ratio W (w - dq/dt), d2q/dt2 = x, W = 2 pi frequency",
+    equation="T = inertia * x, x = d2q/dt2 = W^2 (th - q) + 2 ratio W (w - dq/dt), W = 2 pi frequency, q: its angle",
     source="two-inertia system; Ewins, Modal Testing",
-    meaning="A payload or arm on a soft mount: a second resonance.",
-    sign="J is the inertia on the shaft; the second inertia is added by the effect.",
+    meaning="A payload or arm on a soft mount adds a second resonance.",
+    sign="J is the inertia fixed to the shaft; the effect adds the second inertia.",
     parameters=(
         Parameter("inertia", "kg*m^2", "second inertia", linear=True, suffix="kg_m2"),
         Parameter(
             "frequency",
             "Hz",
-            "its natural frequency on the fixed shaft",
+            "its natural frequency with the shaft held",
             low=0.05,
             high=1e5,
             suffix="hz",
@@ -85,5 +86,5 @@ EFFECT = Effect(
     large_starts=_large,
     resembles_much=True,
     other_minima=_others,
-    separated_by="from inertia: frequencies on both sides of the mode; a multisine or chirp",
+    separated_by="from inertia: excite with a multisine or chirp, below and above the frequency of the mode",
 )

@@ -1,4 +1,4 @@
-"""Hysteresis (Bouc-Wen): a restoring torque that remembers where the motion last turned."""
+"""Hysteresis (Bouc-Wen): a restoring torque that depends on where the motion last reversed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from rig.effects.base import Effect, Parameter, Place, Scale, kernel
 @kernel
 def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
     z = state[0]
-    beyond = max(abs(z) - 1.0, 0.0)  # of the limit: a stage of a step may be, and must not be flung back by a power
+    # |z| <= 1, but a stage of an integration step may exceed it: there the power is continued by its tangent.
+    beyond = max(abs(z) - 1.0, 0.0)
     size = min(abs(z), 1.0) ** p[5] + p[5] * beyond
     same = 1.0 if rate * z > 0.0 else -1.0
     dstate[0] = rate / p[4] * (1.0 - size * (p[6] * same + 1.0 - p[6]))
@@ -30,8 +31,8 @@ EFFECT = Effect(
     place=Place.LOAD,
     equation="T = level * z, dz/dt = w / yield_angle * [1 - |z|^exponent (share * sgn(w z) + 1 - share)]",
     source="Bouc 1967, Wen 1976, with z scaled to its limit: share = beta / (beta + gamma)",
-    meaning="Wire-rope isolators, elastomers and flexures with internal slip: the loop of torque over angle.",
-    sign="Resisting, like K th; K is the parallel spring alone.",
+    meaning="Wire-rope isolators, elastomers and flexures with internal slip: torque over angle is a loop.",
+    sign="Resisting, like K th; K is the spring beside the loop.",
     parameters=(
         Parameter("level", "N*m", "torque at which the loop saturates", linear=True, suffix="nm"),
         Parameter(
@@ -44,7 +45,7 @@ EFFECT = Effect(
             start=_yield_angles,
         ),
         Parameter("exponent", "1", "sharpness of the knee", low=1.0, high=6.0, start=lambda scale: (1.0, 2.0)),
-        Parameter("share", "1", "beta / (beta + gamma)", low=0.0, high=1.0, start=lambda scale: (0.5,)),
+        Parameter("share", "1", "shape: beta / (beta + gamma)", low=0.0, high=1.0, start=lambda scale: (0.5,)),
     ),
     kernel=_torque,
     states=1,
@@ -52,5 +53,5 @@ EFFECT = Effect(
     follows_within_rad=lambda values: values[4] / values[5],
     nests=("presliding_friction",),
     resembles_much=True,
-    separated_by="from presliding friction: repeats at several amplitudes",
+    separated_by="from presliding friction: repeat at several amplitudes",
 )

@@ -1,4 +1,4 @@
-"""Load-dependent friction: a level that grows with the torque that passes through."""
+"""Load-dependent friction: a friction level proportional to the torque on the shaft."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ EFFECT = Effect(
     place=Place.FRICTION,
     equation="T = factor * |M| * sgn(w)",
     source="gear and bearing friction: Hamon, Gautier, Garrec 2010, load-dependent Coulomb friction",
-    meaning="Gears and loaded bearings: the transmitted torque presses the rubbing surfaces together.",
+    meaning="Gears and loaded bearings: the transmitted torque presses the sliding surfaces together.",
     sign="Resisting: it opposes the rate.",
-    parameters=(Parameter("factor", "1", "friction per transmitted torque", linear=True, high=0.5),),
+    parameters=(Parameter("factor", "1", "friction torque over transmitted torque", linear=True, high=0.5),),
     kernel=_level,
-    separated_by="from Coulomb friction: repeats at another amplitude",
+    separated_by="from Coulomb friction: repeat at another amplitude",
 )

@@ -1,4 +1,4 @@
-"""Periodic disturbance: a torque from outside at a frequency of its own."""
+"""Periodic disturbance: a sinusoidal torque from outside, at a frequency of its own."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _frequencies(scale: Scale) -> tuple[float, ...]:
 
 
 def _large(jck: tuple[float, float, float], scale: Scale) -> tuple[LargeStart, ...]:
-    """A strong tone that the model without it has taken for the resonance, which lies elsewhere."""
+    """For a strong tone that a fit without it mistook for the resonance: start with a resonance elsewhere."""
     if scale.ringing_hz <= 0.0:
         return ()
     return tuple(LargeStart({"inertia": n * jck[0]}, {"frequency": scale.ringing_hz}) for n in (0.4, 2.5))
@@ -30,8 +30,8 @@ EFFECT = Effect(
     place=Place.LOAD,
     equation="T = sine * sin(2 pi frequency t) + cosine * cos(2 pi frequency t)",
     source="a spectral line that is not locked to the excitation",
-    meaning="Pumps, fans, mains hum and neighbours.",
-    sign="Resisting; the phase is free in every run, t counted from its start.",
+    meaning="A torque from outside: pumps, fans, mains hum, machines nearby.",
+    sign="Resisting; amplitude and phase are fitted in every run, t is counted from its start.",
     parameters=(
         Parameter("sine", "N*m", "sine part", linear=True, low=-float("inf"), suffix="nm", per_run=True),
         Parameter("cosine", "N*m", "cosine part", linear=True, low=-float("inf"), suffix="nm", per_run=True),
@@ -42,8 +42,8 @@ EFFECT = Effect(
     large_starts=_large,
     resembles_much=True,
     separated_by=(
-        "from harmonics of friction or stiffness: excite at other frequencies; from a line that the sensor itself "
-        "shows (an aliased vibration, pickup): a torque that begins with the run moves the platform from rest, and a "
-        "known inertia changes how far it moves it; where neither shows, it is left open and not named"
+        "from harmonics of friction or stiffness: excite at other frequencies; from a spectral line of the sensor "
+        "itself (an aliased vibration, pickup): switch the source on with the run, at rest, or add a known inertia in "
+        "some runs; if the data show neither, the line is reported and its cause left open"
     ),
 )

@@ -1,4 +1,4 @@
-"""Presliding friction (Dahl): before it slides, the contact bends like a spring."""
+"""Presliding friction (Dahl): before it slides, the contact deforms like a spring."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ def _displacements(scale: Scale) -> tuple[float, ...]:
 
 def _fastest(values: tuple[float, ...]) -> float:
     inertia, _, _, level, displacement = values
-    # The bristles' spring, and their bending at 8 rad/s; a faster motion has bent them before a fine step ends.
+    # The natural frequency of J on the stiffness of the contact; and fine steps in which a platform at 8 rad/s moves by
+    # at most ``displacement``. A faster one bends the contact within a step: follows_within_rad bounds its state.
     return max((abs(level) / displacement / inertia) ** 0.5, 0.5 / displacement)
 
 
@@ -27,10 +28,10 @@ EFFECT = Effect(
     place=Place.LOAD,
     equation="T = level * z, dz/dt = (w - |w| z) / displacement",
     source="Dahl 1968; LuGre (Canudas de Wit 1995) without Stribeck effect and micro-damping",
-    meaning="Rolling and rubbing contacts that creep elastically before they slip; a hysteresis at reversals.",
-    sign="Resisting: z follows the sign of the rate; K is the parallel spring alone.",
+    meaning="Rolling and sliding contacts deform elastically before they slip: a hysteresis at every reversal.",
+    sign="Resisting: z follows the sign of the rate; K does not include the stiffness of the contact.",
     parameters=(
-        Parameter("level", "N*m", "sliding level", linear=True, suffix="nm"),
+        Parameter("level", "N*m", "friction level once it slides", linear=True, suffix="nm"),
         Parameter(
             "displacement",
             "rad",
@@ -46,5 +47,5 @@ EFFECT = Effect(
     fastest_rad_s=_fastest,
     follows_within_rad=lambda values: values[4],
     nests=("coulomb_friction",),
-    separated_by="from Coulomb friction and hysteresis: repeats at a small amplitude",
+    separated_by="from Coulomb friction and hysteresis: repeat at a small amplitude",
 )

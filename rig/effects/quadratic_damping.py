@@ -1,4 +1,4 @@
-"""Quadratic damping: windage."""
+"""Quadratic damping: drag that grows with the square of the speed."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ EFFECT = Effect(
     place=Place.LOAD,
     equation="T = factor * w |w|",
     source="turbulent drag; ISO 80000-11 drag factor",
-    meaning="Air or oil that is churned: drag grows with the square of the speed.",
+    meaning="Drag of air or of churned oil: it grows with the square of the speed.",
     sign="Resisting: it opposes the rate.",
     parameters=(Parameter("factor", "N*m*s^2/rad^2", "drag factor", linear=True, suffix="nm_s2_rad2"),),
     kernel=_torque,
-    separated_by="from damping: repeats at another amplitude, or a free decay",
+    separated_by="from damping: repeat at another amplitude, or record a free decay",
 )

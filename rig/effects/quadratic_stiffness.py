@@ -18,12 +18,13 @@ EFFECT = Effect(
     equation="T = factor * th^2",
     source="Duffing 1918; Nayfeh and Mook, Nonlinear Oscillations, chapter 4",
     meaning="Preloaded springs and flexures that are stiffer on one side.",
-    sign="Resisting, like K th; the angle is counted from the rest angle at the start of the run.",
+    sign="factor > 0: stiffer at positive angles, softer at negative ones. th is counted from the rest angle before "
+    "the run.",
     parameters=(
         Parameter("factor", "N*m/rad^2", "torque per angle^2", linear=True, low=-float("inf"), suffix="nm_rad2"),
     ),
     kernel=_torque,
     lower_order=("torque_offset",),
     never_separable={"unbalance": COSINE},
-    separated_by="from unbalance: turn the platform's base, or swing farther",
+    separated_by="from unbalance: turn the base of the platform, or swing farther",
 )

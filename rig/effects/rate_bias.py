@@ -1,4 +1,4 @@
-"""Rate bias: the gyro's zero error, always absorbed as a nuisance and never a verdict."""
+"""Rate bias: the zero error of the gyro, fitted in every run and never reported as a missing effect."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EFFECT = Effect(
     equation="measured rate = w + bias",
     source="zero-rate output of a gyroscope (IEEE Std 952)",
     meaning="The gyro reads a rate at standstill.",
-    sign="Added to the rate.",
+    sign="Added to the true rate.",
     parameters=(
         Parameter("bias", "rad/s", "zero-rate output", linear=True, low=-float("inf"), suffix="rad_s", per_run=True),
     ),

@@ -1,4 +1,4 @@
-"""Sensor lag: the gyro's own low-pass filter."""
+"""Sensor lag: the low-pass filter in the gyro."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ EFFECT = Effect(
     name="sensor_lag",
     family="sensor",
     place=Place.SENSOR,
-    equation="time * d(rate)/dt + rate = rate before the lag",
+    equation="time * d(measured rate)/dt + measured rate = w",
     source="first-order low-pass; its -3 dB frequency in a data sheet is 1 / (2 pi time)",
-    meaning="The bandwidth of the gyro or of its output filter.",
-    sign="A time constant, never negative.",
+    meaning="The gyro or its output filter has a limited bandwidth.",
+    sign="Never negative: the measured rate follows later than w.",
     parameters=(
         Parameter(
             "time",
@@ -28,8 +28,9 @@ EFFECT = Effect(
     filter_states=remembers,
     never_separable={
         "actuator_lag": Alike(
-            "a lag in the gyro and a lag in the torque answer alike", cure="measure the current, or use a second sensor"
+            "a lag in the gyro and an equal one in the torque give the same response from torque to rate",
+            cure="measure the motor current, or add a second sensor",
         )
     },
-    separated_by="from a delay: higher frequencies",
+    separated_by="from a delay: excite at higher frequencies",
 )

@@ -1,4 +1,4 @@
-"""Stiffness drift: K changes while the run goes on."""
+"""Stiffness drift: K changes during the run."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ EFFECT = Effect(
     place=Place.LOAD,
     equation="T = slope * t * th, t counted from the start of each run",
     source="first-order expansion of K(t)",
-    meaning="Warming flexures and settling cables: the spring is not the same at the end of the run.",
+    meaning="Warming flexures and settling cables: K at the end of a run is not K at its start.",
     sign="K is the stiffness at the start of the run; a positive slope stiffens.",
     parameters=(
         Parameter(
@@ -29,5 +29,5 @@ EFFECT = Effect(
         ),
     ),
     kernel=_torque,
-    separated_by="from cubic stiffness: constant amplitude for longer",
+    separated_by="from cubic stiffness: record longer at constant amplitude",
 )

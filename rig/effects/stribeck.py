@@ -22,7 +22,7 @@ EFFECT = Effect(
     place=Place.FRICTION,
     equation="T = [coulomb + (static - coulomb) exp(-(w / speed)^2)] sgn(w)",
     source="Eq. 7 of the paper; its viscous term sigma w is collinear with C w and is part of C",
-    meaning="Lubricated contact: breaking away takes more torque than sliding on.",
+    meaning="Lubricated contacts: breaking away takes more torque than sliding.",
     sign="Resisting: it opposes the rate; static is at least coulomb.",
     parameters=(
         Parameter("coulomb", "N*m", "level at high speed (M_c)", linear=True, suffix="nm"),
@@ -32,5 +32,5 @@ EFFECT = Effect(
     kernel=_level,
     ordered=(("coulomb", "static"),),
     nests=("coulomb_friction",),
-    separated_by="from Coulomb friction: sets that linger at low speed; a slow ramp, hold and release",
+    separated_by="from Coulomb friction: spend more time at low speed; ramp slowly, hold and release",
 )

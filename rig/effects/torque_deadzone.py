@@ -1,4 +1,4 @@
-"""Torque dead zone: small torques do not arrive."""
+"""Torque dead zone: small torques do not reach the shaft."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ EFFECT = Effect(
     place=Place.DRIVE,
     equation="M = torque - clip(torque, -width, width)",
     source="PWM dead time, cross-over of the output stage",
-    meaning="The amplifier's dead time swallows small torques.",
-    sign="A magnitude, the same in both directions.",
+    meaning="The output stage of the amplifier does not pass small torques (dead time, crossover).",
+    sign="Never negative; the same in both directions.",
     parameters=(
         Parameter(
             "width",
@@ -30,5 +30,5 @@ EFFECT = Effect(
     ),
     kernel=_dead,
     bends_torque=True,
-    separated_by="from backlash and Coulomb friction: several frequencies",
+    separated_by="from backlash and Coulomb friction: excite at several frequencies",
 )

@@ -1,4 +1,4 @@
-"""Torque delay: the torque acts later than its time stamp says (or the gyro reports later)."""
+"""Torque delay: the torque acts later than its time stamp says, or the rate is stamped too late."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from rig.effects.base import Effect, Parameter, Place, filter_kernel
 
 @filter_kernel
 def _delay(x, step, state, p):  # type: ignore[no-untyped-def]
-    """Ring buffer read by a cubic through four samples: right to 1e-7 for the torques of a bench."""
+    """Ring buffer, read by a cubic through four samples: relative error 1e-7 for the torques of a bench."""
     late = p[0] / step
     n = int(late) + 5
     head = (int(state[n]) + 1) % n
@@ -32,14 +32,15 @@ EFFECT = Effect(
     family="drive",
     place=Place.DRIVE,
     equation="M(t) = torque(t - delay)",
-    source="transport delay of bus, amplifier and sensor; in a torque-to-rate record they are one number",
-    meaning="Time stamps that disagree: bus, amplifier, the gyro's own filter. 1 ms adds K * 1 ms to C.",
-    sign="Positive: the motion follows later than the torque's time stamp.",
+    source="transport delay of bus, amplifier and sensor: torque and rate show only their sum",
+    meaning="Time stamps of torque and rate disagree: bus, amplifier, filter of the gyro. If it is not modelled, 1 ms "
+    "adds K * 1 ms to C at frequencies well below the resonance.",
+    sign="Positive: the motion follows later than the time stamp of the torque says.",
     parameters=(
         Parameter(
             "delay",
             "s",
-            "time by which the torque acts later",
+            "by how much later the torque acts",
             low=0.0,
             high=0.2,
             suffix="s",
@@ -48,5 +49,5 @@ EFFECT = Effect(
     ),
     kernel=_delay,
     filter_states=lambda step_s, values: int(values[0] / step_s) + 6,
-    separated_by="from damping: several frequencies; from a lag: higher frequencies",
+    separated_by="from damping: excite at several frequencies; from a lag: excite at higher frequencies",
 )

@@ -1,4 +1,4 @@
-"""Torque offset: a constant torque besides the commanded one."""
+"""Torque offset: a constant torque in addition to the recorded one."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ EFFECT = Effect(
     family="drive",
     place=Place.LOAD,
     equation="T = level",
-    source="offset of the current sensor or a constant load",
-    meaning="A current sensor's zero error, a hanging weight, a preload. With a gyro and a spring "
-    "it only shifts the unseen rest angle.",
+    source="zero error of the current sensor, or a constant load",
+    meaning="Zero error of the current sensor, a hanging weight, a preload. On a platform with a spring it only "
+    "shifts the rest angle, which a gyro alone does not measure.",
     sign="Resisting: a positive level pushes towards negative angles.",
     parameters=(Parameter("level", "N*m", "constant torque", linear=True, low=-float("inf"), suffix="nm"),),
     kernel=_torque,
-    separated_by="from asymmetric friction: motion in both directions; an encoder, or no spring",
+    separated_by="from asymmetric friction: move in both directions; use an encoder, or a platform without a spring",
 )

@@ -1,10 +1,11 @@
-"""Torque saturation: the drive cannot give what was asked."""
+"""Torque saturation: the drive cannot give the torque that was commanded."""
 
 from __future__ import annotations
 
 from rig.effects.base import Effect, Parameter, Place, filter_kernel
 
-# Of the largest torque asked for: a limit just below it clips one set for an instant, and shows at no other value.
+# Shares of the largest torque from which the search starts. They are close together near 1: a limit just below the
+# largest torque clips one set only briefly, and the fit improves only very near the right value.
 FRACTIONS = (0.5, 0.7, 0.8, 0.87, 0.92, 0.95, 0.97, 0.98, 0.987, 0.993, 0.997)
 
 
@@ -19,8 +20,8 @@ EFFECT = Effect(
     place=Place.DRIVE,
     equation="M = clip(torque, -limit, limit)",
     source="current limit of the amplifier, or saturating iron",
-    meaning="The drive's current limit cuts the peaks.",
-    sign="A magnitude, the same in both directions.",
+    meaning="The current limit of the drive cuts off the peaks of the torque.",
+    sign="Never negative; the same in both directions.",
     parameters=(
         Parameter(
             "limit",
@@ -33,5 +34,5 @@ EFFECT = Effect(
     ),
     kernel=_clip,
     bends_torque=True,
-    separated_by="from cubic stiffness: several frequencies at the same amplitude",
+    separated_by="from cubic stiffness: excite at several frequencies with the same torque amplitude",
 )

@@ -1,4 +1,4 @@
-"""Torque scale: the torque on the shaft is not the one that was recorded, by a constant factor."""
+"""Torque scale: the torque on the shaft is a constant factor times the recorded one."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ EFFECT = Effect(
     family="drive",
     place=Place.DRIVE,
     equation="M = scale * torque",
-    source="torque constant of the motor (Eq. 6), gear ratio, current sensor's gain",
-    meaning="A torque constant or a current gain that is off by a few per cent.",
-    sign="A factor; one where the recorded torque is the shaft's.",
+    source="torque constant of the motor (Eq. 6 of the paper), gear ratio, gain of the current sensor",
+    meaning="The torque constant or the gain of the current sensor is wrong by a few per cent.",
+    sign="1: the recorded torque is that of the shaft; above 1 the shaft gets more.",
     parameters=(
         Parameter(
             "scale",
             "1",
-            "torque on the shaft over torque recorded",
+            "torque on the shaft over recorded torque",
             low=0.02,
             high=50.0,
             start=lambda scale: (1.01,),
@@ -31,5 +31,5 @@ EFFECT = Effect(
     ),
     kernel=_scaled,
     needs_added_inertia=True,
-    separated_by="from J, C and K: runs with a known inertia added (added_inertia_kg_m2)",
+    separated_by="from J, C and K: add a known inertia in some runs (added_inertia_kg_m2)",
 )

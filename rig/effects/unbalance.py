@@ -1,4 +1,4 @@
-"""Unbalance: gravity on a centre of mass off the axis."""
+"""Unbalance: gravity acts on a centre of mass that is off the axis."""
 
 from __future__ import annotations
 
@@ -29,8 +29,9 @@ EFFECT = Effect(
     place=Place.LOAD,
     equation="T = sine * sin(th) + cosine * cos(th)",
     source="m g r sin(th + phase), expanded",
-    meaning="The load is not balanced: gravity pulls it towards its lowest point.",
-    sign="Resisting, like K th: sine > 0 where th = 0 hangs down. Within a small travel sine is part of K.",
+    meaning="The load is not balanced: gravity turns its centre of mass towards the lowest point.",
+    sign="Resisting, like K th: sine > 0 if the load hangs down at th = 0. Within a small travel sine cannot be told "
+    "from K.",
     parameters=(
         Parameter("sine", "N*m", "m g r cos(phase)", linear=True, low=-float("inf"), suffix="nm"),
         Parameter("cosine", "N*m", "m g r sin(phase)", linear=True, low=-float("inf"), suffix="nm"),
@@ -41,5 +42,5 @@ EFFECT = Effect(
         "cubic_stiffness": SINE,
     },
     as_rival={"cubic_stiffness": _as_cubic, "quadratic_stiffness": _as_quadratic},
-    separated_by="turn the platform's base, or swing farther",
+    separated_by="from quadratic and cubic stiffness: turn the base of the platform, or swing farther",
 )

@@ -26,7 +26,11 @@ from rig.platform import Platform
 CORNER_RAD_S = 2.0 * math.pi * 20.0  # of each of the three stages: little of what a lag of the drive turns is left
 DELAYS_S = (0.0, 0.003, 0.006)  # of the torque behind its command, as in rig.guard.motion
 FACTOR = 2.5  # J and K may be wrong by so much: two, and what effects that nobody declared do to them
-BLOCK_S, MEMORY_S = 0.02, 0.2  # between two fits, and their fading memory, s; tuned by hand, not derived: a debt
+# Between two fits: 20 samples of 1 kHz share the cost of one. Not critical: tests/rig/guard holds from 5 to 50 ms.
+BLOCK_S = 0.02
+# Fading memory of the fits. Longer sees a reversed sign later (0.5 s: no longer within a second), shorter holds less
+# of a slow set from which to tell four coefficients apart. tests/rig/guard holds from 0.05 to 0.3 s.
+MEMORY_S = 0.2
 LONGEST_GAP_S = 0.006  # between samples: the filters are too coarse for slower gyros, which are not judged
 FADES_S = 0.1  # of the filters: after so long nothing is left of where they began
 SWEEPS = 6  # of the coordinate descent, which starts from the last fit
@@ -34,7 +38,9 @@ TURNED_LEAVES = 0.3  # of the torque, at most
 LEAVES_MORE, TIMES_AS_MUCH = 0.2, 1.5  # what upright leaves at least, beside what turned round leaves
 PASSED_SHARE = 0.3  # of the torque's change that the filters let through: beyond some 18 Hz a second mode turns signs
 LEAST_SHARE = 0.05  # of the most torque that there was in such moments of the set
-BLOCKS_IN_A_ROW = 4  # 80 ms of the same verdict; tuned by hand, not derived: a debt
+# 80 ms of the same verdict, so that a single fit (an impact, a stick) is none; as much is added until a reversed sign
+# is seen. Not critical: tests/rig/guard holds from 1 to 12.
+BLOCKS_IN_A_ROW = 4
 UPRIGHT, TURNED = 0, 1
 WAYS = (1.0, -1.0)
 

@@ -22,10 +22,12 @@ _KNOWN_FACTORS = (
     (2 * np.pi, "the rate is in turns per second", "recorded.scale.rate: 6.28319"),
     (1 / (2 * np.pi), "the angle is in turns", "recorded.scale.angle: 6.28319"),
 )
+# Noise in the integrated rate alone lowers the factor to the square of the correlation: to 0.98 where that is 0.99, to
+# 0.81 where it is 0.9. So a deviation of the factor from 1 counts if it is larger than 0.02 and 0.19.
 SURE_CORRELATION = 0.99  # both channels show the same motion, delays and noise aside
-SURE_DEVIATION = 0.05  # of the factor from 1: more than a scale that is merely calibrated badly
-LIKELY_CORRELATION = 0.9  # tuned by hand, not derived: a debt
-LIKELY_DEVIATION = 0.3  # tuned by hand, not derived: a debt
+SURE_DEVIATION = 0.05  # also more than a scale that is merely calibrated badly
+LIKELY_CORRELATION = 0.9
+LIKELY_DEVIATION = 0.3
 # Four samples a second or fewer: no platform with a spring is seen through that.
 SLOWEST_STEP_S = 0.25
 

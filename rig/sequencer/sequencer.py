@@ -19,11 +19,12 @@ import numpy as np
 from rig.clock import Clock
 from rig.errors import Aborted, DeviceFault, RigError, SafetyTrip
 from rig.excitation import PlannedSet
-from rig.guard import Guard, Rest, Tick, Trip
+from rig.guard import Guard, Rest
 from rig.interface import Rig
 from rig.recording.journal import Journal
 from rig.recording.retiming import NO_RETIMING
 from rig.recording.run import Recording
+from rig.sequencer.guarded_tick import GuardedTick
 from rig.sequencer.observer import Observer, Progress
 from rig.sequencer.probe import Probe
 from rig.sequencer.recorder import SetRecorder, SetStatistics
@@ -37,8 +38,10 @@ REST_PERIOD_S = 0.01  # ticks of zero torque may be slower; they still feed the 
 BIAS_WINDOW_S = 1.0  # of a rest, at its end
 PROGRESS_S = 0.1  # between two reports to the observer: ten a second is what an eye follows
 LOOK_S = 0.25  # after the probe: how often to ask whether the ring has died out
-# Standstill: a mean rate below either; tuned by hand, not derived: a debt.
-# Standstill: a mean rate below either; tuned by hand, not derived: a debt.
+# Standstill after the probe: no sample of the last LOOK_S is faster than the larger of the two. Noise alone exceeds six
+# standard deviations in one of a million looks (500 samples). 0.5 deg/s is where the guard takes a platform to move
+# (MOVES_RAD_S); the paper's platform (29 Hz) then swings by 0.003 deg. More lets a set begin while the platform rings
+# (tests/rig/sequencer fails at 4 deg/s), less waits for longer, at most for a rest.
 STILL_SIGMAS, STILL_RAD_S = 6.0, math.radians(0.5)
 
 
@@ -103,9 +106,8 @@ class Sequencer:
         self._rest_s = rest_s
         self._journal = journal
         self._observer = observer or Observer()
-        self._stop = stop
         self._probe, self._keep_runs = probe, keep_runs
-        self._verdict_s: float | None = None
+        self._guarded = GuardedTick(rig, clock, guard, stop)
         self._recorders: list[SetRecorder] = []
         self._statistics: list[SetStatistics] = []
         self._still: deque[tuple[float, float]] = deque()
@@ -134,20 +136,20 @@ class Sequencer:
             cause = _with_context(error)
         if cause is not None and self._journal is not None:
             with contextlib.suppress(RigError):
-                self._journal.event(self._now_s(), str(cause), {"aborted": True, "verdict_s": self._verdict_s})
+                self._journal.event(self._now_s(), str(cause), {"aborted": True, "verdict_s": self._guarded.verdict_s})
         better = log_time_corrections(self._rig, self._journal, self._now_s)
         info = {"backend": str(self._rig.statement()), "aborted": str(cause) if cause else None}
         played = (one.run(better.get(one.start_s, NO_RETIMING)) for one in self._recorders)
         runs = tuple(run for run in played if run is not None)
         recording = Recording(runs, noise=self._rig.noise_rad_s, info=info)
-        return Campaign(recording, tuple(self._statistics), cause, self._verdict_s)
+        return Campaign(recording, tuple(self._statistics), cause, self._guarded.verdict_s)
 
     def _now_s(self) -> float:
         """For what is said on the way out: a replay has no more time to give."""
         try:
             return self._clock.now_s()
         except RigError:
-            return self._verdict_s or 0.0
+            return self._guarded.verdict_s or 0.0
 
     def _play_probe(self) -> None:
         """Small pulses and what they tell, then rest until the platform is still. Raises SafetyTrip."""
@@ -163,13 +165,13 @@ class Sequencer:
             deadline_s = start_s + tick * self._period_s
             now_s = self._clock.wait_until(deadline_s)
             at_s, late_s = now_s - start_s, now_s - deadline_s
-            seen = self._exchange(now_s, late_s, self._period_s, probe.torque(at_s), None)
+            seen = self._guarded.exchange(now_s, late_s, self._period_s, probe.torque(at_s), None)
             probe.take(at_s, start_s, seen)
             tick += 1 + int(late_s / self._period_s + 1e-9)
         try:
             finding = probe.finding()
         except SafetyTrip:
-            self._note_verdict()
+            self._guarded.note_verdict()
             raise
         now_s = self._clock.now_s()
         self._observer.probed(finding)
@@ -187,12 +189,6 @@ class Sequencer:
             if all(abs(rate - rest.bias_rad_s) < still_rad_s for _, rate in self._still):
                 break
         self._hold_zero(SETTLE_S, REST_PERIOD_S)
-
-    def _note_verdict(self) -> None:
-        """The instant at which the first error was known; it ends up in the journal and in ``Campaign``."""
-        if self._verdict_s is None:
-            with contextlib.suppress(RigError):
-                self._verdict_s = self._clock.now_s()
 
     def _play_set(self, planned: PlannedSet) -> None:
         start_s = self._clock.now_s() + self._period_s
@@ -226,53 +222,11 @@ class Sequencer:
             playing = at_s < duration_s - 1e-6
             torque_nm = float(planned.torque(at_s)) if playing else 0.0
             late_s = now_s - deadline_s
-            self._exchange(now_s, late_s, period_s, torque_nm, recorder)
+            self._guarded.exchange(now_s, late_s, period_s, torque_nm, recorder)
             tick += 1 + int(late_s / period_s + 1e-9)
             if at_s - reported_s >= PROGRESS_S:
                 reported_s = at_s
                 self._tell(planned, recorder, at_s)
-
-    def _exchange(
-        self, now_s: float, late_s: float, period_s: float, torque_nm: float, recorder: SetRecorder | None
-    ) -> Tick:
-        """One tick: permission, exchange, record, verdict."""
-        reason = self._stop()
-        if reason is not None:
-            self._note_verdict()
-            raise Aborted(f"{reason}: torque is off; what was recorded until then is kept.")
-        trip = self._guard.permit(torque_nm, now_s, late_s)
-        if trip is not None:
-            raise self._tripped(trip)
-        try:
-            reply = self._rig.exchange(now_s, torque_nm)
-        except BaseException as error:
-            self._note_verdict()
-            stall = self._stall_behind(error, now_s, late_s)
-            if stall is None:
-                raise
-            raise stall from None
-        tick = Tick(now_s, late_s, period_s, torque_nm, reply.gyro, reply.torque, reply.channels)
-        if recorder is not None:
-            recorder.take(tick)
-        trip = self._guard.look(tick)
-        if trip is not None:
-            raise self._tripped(trip)
-        return tick
-
-    def _stall_behind(self, error: BaseException, now_s: float, late_s: float) -> SafetyTrip | None:
-        """The stall that a fault followed from: a drive that has heard nothing meanwhile complains of just that."""
-        if not isinstance(error, DeviceFault) or self._verdict_s is None:
-            return None
-        trip = self._guard.permit(0.0, now_s, late_s + self._verdict_s - now_s)
-        return None if trip is None else SafetyTrip(f"{self._tripped(trip)} Consequence: {error}")
-
-    def _tripped(self, trip: Trip) -> SafetyTrip:
-        self._note_verdict()
-        try:
-            self._rig.torque_off()  # the shortest road: before anything is formatted or written
-        except RigError as fault:
-            return SafetyTrip(f"Tripped on {trip} Torque off could not be sent: {fault}")
-        return SafetyTrip(f"Torque is off. Tripped on {trip}")
 
     def _hold_zero(self, duration_s: float, period_s: float, recorder: SetRecorder | None = None) -> None:
         """Zero torque for a while, guarded, the gyro listened to for its bias."""
@@ -285,7 +239,7 @@ class Sequencer:
             deadline_s += period_s
             now_s = self._clock.wait_until(deadline_s)
             late_s = now_s - deadline_s
-            tick = self._exchange(now_s, late_s, period_s, 0.0, recorder)
+            tick = self._guarded.exchange(now_s, late_s, period_s, 0.0, recorder)
             deadline_s += period_s * int(late_s / period_s + 1e-9)
             still.extend((time_s, rate) for time_s, rate, valid in tick.gyro if valid)
             while still and still[0][0] < now_s - BIAS_WINDOW_S:

@@ -17,7 +17,7 @@ from rig.guard import Guard
 from rig.guard.base import Rest, Tick
 from rig.interface import GyroSample, TorqueSample
 from rig.platform import Platform
-from rig.sequencer.probe import estimate_inertia
+from rig.sequencer.pulse_inertia import estimate_inertia
 
 LENGTH_S = 0.5  # every check has given a verdict by then
 FREQUENCY_HZ = 5.0  # any frequency serves: nothing is judged here

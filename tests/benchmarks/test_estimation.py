@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
+import re
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -15,6 +16,7 @@ from rig.dynamics import TorqueSignal, simulate
 from rig.platform import Platform
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
+GYRO = Path(__file__).parents[3] / "shared" / "data" / "adis16405_gyro" / "gyro_counts.npz"
 
 
 @pytest.fixture
@@ -57,13 +59,24 @@ def test_intervals_hold_where_samples_are_lost(load: Any) -> None:
     assert "| lost | 2 |" in intervals.text([found])
 
 
+@pytest.mark.skipif(not GYRO.exists(), reason="the record of a real gyro is not beside this checkout")
 def test_real_gyro_noise_has_the_size_of_the_white_one(load: Any) -> None:
-    intervals: ModuleType = load("intervals")
-    if not intervals.GYRO.exists():
-        pytest.skip("the record of a real gyro is not beside the project")
-    stretches = intervals.gyro_noise(intervals.GYRO)(np.random.default_rng(1))
+    stretches = load("intervals").gyro_noise(GYRO)(np.random.default_rng(1))
     assert len(stretches) == 5
     assert np.mean([np.std(s) for s in stretches]) == pytest.approx(math.radians(0.05), rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("arrays", "said"),
+    [({"counts": np.zeros((20_000, 3))}, "has no array gyro_counts"), ({"gyro_counts": np.zeros((50, 3))}, "(50, 3)")],
+)
+def test_a_gyro_record_that_cannot_be_used_is_refused_with_what_is_needed(
+    load: Any, tmp_path: Path, arrays: dict[str, Any], said: str
+) -> None:
+    path = tmp_path / "gyro.npz"
+    np.savez(path, **arrays)
+    with pytest.raises(ValueError, match=re.escape(said)):
+        load("intervals").gyro_noise(path)
 
 
 @pytest.mark.parametrize("delay_ms", [0.0, pytest.param(0.137, marks=pytest.mark.slow), 2.5])

@@ -4,7 +4,20 @@ from __future__ import annotations
 
 import pytest
 
-from identify.wording import interval_of, joined, number, percent, plain, readable, title, unit, value_of, with_interval
+from identify.wording import (
+    interval_of,
+    joined,
+    number,
+    percent,
+    plain,
+    readable,
+    sentence,
+    signed,
+    title,
+    unit,
+    value_of,
+    with_interval,
+)
 from tests.identify.sample import estimate
 
 
@@ -27,20 +40,49 @@ def test_numbers_stay_short(value: float | None, digits: int, shown: str) -> Non
     assert number(value, digits) == shown
 
 
-def test_a_value_has_the_digits_that_its_standard_error_deserves() -> None:
-    assert value_of(estimate(677.3123456, 0.012)) == "677.312"
-    assert value_of(estimate(677.3123456, 40.0)) == "677"
-    assert interval_of(estimate(0.045, 0.0005)) == "0.04402 to 0.04598"
-    assert interval_of(estimate(-0.274, 0.144)) == "-0.556 to 0.008"
+@pytest.mark.parametrize(
+    ("value", "std_error", "shown"),
+    [
+        (677.3123456, 0.012, "677.312 ± 0.024"),
+        (0.0447084, 6e-6, "0.044708 ± 0.000012"),
+        (0.599959, 4.2e-5, "0.59996 ± 0.00008"),
+        (677.3123456, 40.0, "680 ± 80"),
+        (123456.0, 3000.0, "123000 ± 6000"),
+        (-0.274, 0.144, "-0.27 ± 0.28"),
+        (9.99999, 0.4, "10.0 ± 0.8"),
+        (1e-7, 0.02, "0.00 ± 0.04"),
+        (-0.001, 0.02, "0.00 ± 0.04"),
+        (0.0, 0.02, "0.00 ± 0.04"),
+        (1.5e-9, 2e-10, "1.5e-09 ± 4e-10"),
+        (2.5e9, 1e7, "2.500e+09 ± 2.0e+07"),
+        (5.0, 0.0, "5.000 ± 0"),
+    ],
+)
+def test_a_value_ends_where_its_interval_begins(value: float, std_error: float, shown: str) -> None:
+    assert with_interval(estimate(value, std_error)) == shown
+
+
+def test_no_interval_is_narrow_enough_for_more_than_seven_digits() -> None:
+    assert with_interval(estimate(681.20091234, 1e-8)) == "681.2009 ± 2.0e-08"
+    assert with_interval(estimate(0.020300003, 6.1e-8)) == "0.02030000 ± 0.00000012"
+
+
+def test_an_interval_has_the_decimals_of_its_value() -> None:
+    assert interval_of(estimate(0.045, 0.0005)) == "0.0440 to 0.0460"
+    assert interval_of(estimate(-0.274, 0.144)) == "-0.56 to 0.01"
 
 
 def test_an_uneven_or_open_interval_is_written_with_both_ends() -> None:
     assert with_interval(estimate(2.0, 0.01)) == "2.000 ± 0.020"
     uneven = estimate(2.0, 0.01)
     object.__setattr__(uneven, "ci95", (1.9, 2.5))
-    assert with_interval(uneven) == "2.000 (1.900 to 2.500)"
+    assert with_interval(uneven) == "2.00 (1.90 to 2.50)"
     object.__setattr__(uneven, "ci95", (1.9, float("inf")))
     assert with_interval(uneven) == "2.000 (1.900 to unbounded)"
+
+
+def test_what_is_negative_or_positive_by_nature_carries_its_sign() -> None:
+    assert [signed(x) for x in (-7936814889.9, 4.2, 0.0)] == ["-7.937e+09", "+4.200", "0"]
 
 
 @pytest.mark.parametrize(("value", "shown"), [(822.1, "+822 %"), (-0.0987, "-0.099 %"), (0.0, "0 %"), (None, "-")])
@@ -56,8 +98,8 @@ def test_names_and_units_are_those_of_the_field() -> None:
 
 def test_a_short_time_is_read_in_milliseconds_and_a_long_one_in_seconds() -> None:
     short = readable(estimate(6e-4, 4e-7, "s"))
-    assert f"{value_of(short)} {short.unit}" == "0.60000 ms"
-    assert interval_of(short) == "0.59922 to 0.60078"
+    assert f"{value_of(short)} {short.unit}" == "0.6000 ms"
+    assert interval_of(short) == "0.5992 to 0.6008"
     assert readable(estimate(0.89, 0.01, "s")).unit == "s"
     assert readable(estimate(0.02, 0.01, "N*m")).unit == "N*m"
 
@@ -67,3 +109,10 @@ def test_a_short_time_is_read_in_milliseconds_and_a_long_one_in_seconds() -> Non
 )
 def test_lists_read_like_speech(words: list[str], said: str) -> None:
     assert joined(words) == said
+
+
+@pytest.mark.parametrize(
+    ("words", "said"), [("held out.", "Held out."), ("blocks 3 and 9", "Blocks 3 and 9."), ("", "")]
+)
+def test_a_sentence_begins_with_a_capital_and_ends_with_one_full_stop(words: str, said: str) -> None:
+    assert sentence(words) == said

@@ -31,9 +31,9 @@ from identify.results import Identification
 from identify.wording import (
     SYMBOLS,
     bent_percent,
-    bent_sentences,
     capital,
     half_interval,
+    half_of,
     joined,
     left_over,
     not_reported,
@@ -41,6 +41,7 @@ from identify.wording import (
     pairs,
     percent,
     plain,
+    sentence,
     unit,
     value_of,
 )
@@ -104,7 +105,6 @@ def _verdict(identification: Identification, recording: Recording, gallery: Gall
         _tiles(identification),
         parameter_table(identification),
         _titled("Torque delay", delay_lines(identification, recording.info)),
-        _titled("What the missing effects did to the fit", bent_sentences(identification)),
         _titled("Dropped: not supported by the data", missing[0]),
         _titled("Not determined by these data", missing[1]),
         gallery.place(estimates_figure(identification)),
@@ -127,7 +127,7 @@ def _tiles(identification: Identification) -> Markup:
                 "div",
                 element("span", SYMBOLS.get(name, plain(name)), class_="symbol"),
                 element("span", value_of(found), element("small", f" {unit(found.unit)}"), class_="value"),
-                element("span", f"± {number(half, 2)} (95 %)" if math.isfinite(half) else "", class_="half"),
+                element("span", f"± {half_of(found)} (95 %)" if math.isfinite(half) else "", class_="half"),
                 element("span", before, class_="bent"),
                 class_="tile",
             )
@@ -151,7 +151,7 @@ def _errors(identification: Identification, gallery: Gallery) -> Markup:
         "What is left unexplained",
         paragraph(state),
         error_table(identification),
-        paragraph(capital(identification.holdout_note), class_="note"),
+        paragraph(sentence(identification.holdout_note), class_="note"),
         *_where_it_lives(identification),
         *figures,
     )

@@ -14,12 +14,13 @@ from identify.wording import (
     capital,
     errors_in_turn,
     frequency,
-    half_interval,
+    half_of,
     interval_of,
     number,
     percent,
     plain,
     readable,
+    signed,
     title,
     told_apart,
     unit,
@@ -29,6 +30,7 @@ from identify.wording import (
 from rig import effects
 
 ROWS = 60  # of the candidates, best first
+BIC_DIGITS = 4  # significant digits: tells candidates of one round apart
 SCREENED = "screened out"
 
 
@@ -122,7 +124,7 @@ def candidate_table(candidates: Sequence[Candidate], floor: float) -> Markup:
         [
             plain(c.effect),
             str(c.round),
-            f"{c.delta_bic:+.1f}",
+            signed(c.delta_bic, BIC_DIGITS),
             number(c.holdout_rate_rms),
             _times(c.holdout_rate_rms, floor),
             element("span", c.status, class_="added") if c.status == "added" else c.status,
@@ -196,7 +198,7 @@ def set_table(identification: Identification) -> Markup:
 def _with_half(estimate: ParameterEstimate | None) -> Piece:
     if estimate is None:
         return "not determined"
-    return join([value_of(estimate), element("small", f" ± {number(half_interval(estimate), 2)}")])
+    return join([value_of(estimate), element("small", f" ± {half_of(estimate)}")])
 
 
 def correlation_table(correlation: Mapping[str, float]) -> Markup:

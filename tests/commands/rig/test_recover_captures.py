@@ -14,15 +14,18 @@ from rig.recording.hdf5 import read_recording_h5
 from rig.recording.journal import Journal
 from rig.recording.load import read_recording
 from tests.commands.support import command
-from tests.drivers.replay import test_capture_and_replay as wires
+from tests.drivers.wireless import played_in_two_sets, wireless_bench
 
-bench = wires.bench
+
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> BenchRig:
+    return wireless_bench(monkeypatch, tmp_path)
 
 
 @pytest.fixture
 def only_raw(bench: BenchRig, tmp_path: Path) -> Path:
     """A results folder of which nothing but raw/wire.cap is left."""
-    wires.played_in_two_sets(bench)
+    played_in_two_sets(bench)
     (tmp_path / "left" / "raw").mkdir(parents=True)
     shutil.copy(tmp_path / "raw" / "wire.cap", tmp_path / "left" / "raw")
     return tmp_path / "left"

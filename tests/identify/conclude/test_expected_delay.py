@@ -38,7 +38,7 @@ def test_fitted_expected_corrections_and_the_difference_are_told() -> None:
 
 def test_a_delay_that_agrees_with_what_is_expected_is_told_without_a_conclusion() -> None:
     (line,) = delay_lines(with_delay(1.0e-6), INFO)
-    assert line.startswith("Fitted: 0.00100 ± 0.0020 ms (95 %); the drivers expect 0 ms")
+    assert line.startswith("Fitted: 0.0010 ± 0.0020 ms (95 %); the drivers expect 0 ms")
 
 
 def test_corrections_that_are_too_large_are_said_to_be() -> None:

@@ -129,14 +129,14 @@ def test_high_frequencies_part_a_delay_from_a_lag() -> None:
 def test_for_what_no_torque_and_rate_can_part_nothing_is_planned(rival: str) -> None:
     follow_up = planned_for(rival)
     assert follow_up.plan is None
-    assert "turning the base" in follow_up.unparted[0].reason or "second sensor" in follow_up.unparted[0].reason
+    assert "turn the base" in follow_up.unparted[0].reason or "second sensor" in follow_up.unparted[0].reason
 
 
 def test_gravity_and_a_bent_spring_are_planned_for_where_the_travel_allowed_parts_them() -> None:
     found, recording = case("unbalance")
     wide = plan_follow_up(found, recording, Peaks(40.0, 2000.0, 330.0), RATE_HZ, 12.0)
     assert wide is not None
-    assert not any("turning the base" in one.reason for one in wide.unparted)
+    assert not any("turn the base" in one.reason for one in wide.unparted)
     assert never_reason("quadratic_stiffness", "unbalance", 10.0)
     assert not never_reason("unbalance", "cubic_stiffness", 40.0)
 

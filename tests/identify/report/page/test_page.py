@@ -20,6 +20,7 @@ from identify.report.page.markup import Markup, element, table
 from identify.report.page.motion import RUNS, motion_figures, stretches
 from identify.report.page.residual import residual_figures, spectrum
 from identify.results import FreeLine, Identification
+from identify.wording import MOST_DIGITS
 from rig.recording.run import Array
 from tests.identify.sample import SIGMA, sample, unhappy
 
@@ -57,6 +58,13 @@ def test_its_own_data_stay_small(page: str) -> None:
 def test_the_verdict_in_words_stands_before_everything_else(page: str) -> None:
     assert page.index("Coulomb friction is missing: 1.1998 N·m") < page.index("<table")
     assert "ACCEPTED" in page
+
+
+def test_no_number_has_more_digits_than_an_interval_supports(page: str) -> None:
+    body = page[page.index("<body") :].partition('id="origin"')[0]
+    visible = re.sub(r"<(script|style).*?</\1>|<[^>]*>", " ", body, flags=re.DOTALL)
+    digits = [n.replace(".", "").lstrip("0") for n in re.findall(r"(?<![\w.])\d[\d.]*", visible)]
+    assert max(len(n) for n in digits) == MOST_DIGITS
 
 
 def test_a_campaign_that_is_not_accepted_says_why_and_what_next() -> None:
