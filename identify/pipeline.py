@@ -173,6 +173,8 @@ class _Identifier:
 
     def _disturbance_limited(self) -> bool:
         """Whether a torque that nobody recorded, and not the sensor's noise, limits these runs."""
+        if self.colour is not None:
+            return False  # what is left was recognised as the sensor's own noise
         self.say("looking at what limits these runs: the sensor's noise, or a torque that was not recorded")
         regime = regime_of(self.traces, self.split, Structure(self.declared.terms), self.start)
         if regime.disturbance_limited:
