@@ -49,6 +49,7 @@ class TorqueBand:
         judge = [np.asarray(m)[r] for m, r in zip(split.judge, self._rows, strict=True)]
         used = np.concatenate([f | j for f, j in zip(fit, judge, strict=True)])
         self._used = used
+        self._fitted = used & ~np.concatenate(judge) if declared else used  # what was declared as held out fits nothing
         if declared:
             self._by_block = self._by_run = [np.concatenate(judge)]
         else:

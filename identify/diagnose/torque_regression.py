@@ -79,7 +79,7 @@ class TorqueRegression(TorqueBand):
                 a.T @ a + 1e-9 * np.eye(a.shape[1]) * float(np.mean(np.sum(a * a, axis=0))), a.T @ r[rows], low
             )
 
-        g = gains(used)
+        g = gains(self._fitted)
         held = np.concatenate(fit.held).copy()
         for fold in self._by_run:
             held[fold] -= (columns @ gains(used & ~fold))[fold]
@@ -148,7 +148,8 @@ class TorqueRegression(TorqueBand):
         low = np.array([self._low(n) for n in names] + [-np.inf] * extra)
         folds = self._by_block if extra or any(len(n) == 3 for n in names) else self._by_run
         used = self._used
-        x = bounded(a[used].T @ a[used], a[used].T @ y[used], low)
+        fitting = self._fitted
+        x = bounded(a[fitting].T @ a[fitting], a[fitting].T @ y[fitting], low)
         held = y - a @ x
         for fold in folds:
             others = used & ~fold
@@ -165,7 +166,7 @@ class TorqueRegression(TorqueBand):
         run = np.concatenate([np.full(len(t), i) for i, t in enumerate(target)])
         cost, filters = coloured_cost(scale * a[used], scale * y[used], run[used], x, filters)
         return TorqueFit(
-            structure, {k: tuple(v) for k, v in shapes.items()}, values, rms(r[used]), rms(held[self._judged]), cost,
+            structure, {k: tuple(v) for k, v in shapes.items()}, values, rms(r[fitting]), rms(held[self._judged]), cost,
             int(used.sum()), np.split(r, ends), np.split(held, ends), filters,
         )  # fmt: skip
 

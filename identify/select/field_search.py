@@ -28,6 +28,9 @@ from identify.signals.trace import Trace, loads_differ
 from rig import effects
 
 HIGHEST = 0.2  # of the sample rate of what is searched: the low-pass cuts off no higher
+MUCH_LEFT = 0.05  # of the torque: where nothing explains that, a wider band is looked at
+# Times the cut-off at which the sensor's noise is ten times as much torque: an angle is differentiated twice.
+WIDER = {"angle": 10.0**0.4, "rate": 10.0 ** (2.0 / 3.0)}
 NOT_BETTER = 0.98  # of the declared model's held-out residual: above, the model that was found is none
 NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
 PERCENT = 100.0
@@ -86,26 +89,36 @@ def search_in_torque(
     """
     few, parts = reduced(traces, split)
     scale = scale_of(few, start.platform, ())
-    cutoff = min(start.cutoff_hz, HIGHEST / few[0].step_s)
-    regression = TorqueRegression(few, parts, cutoff, scale)
-    base = regression.solve(structure, shapes)
-    floor = torque_noise_floor(few, base.values, cutoff, [t.keep for t in few])
-    acceleration = float(np.sqrt(np.mean(regression.series()[2] ** 2)))
     offered = [n for n in allowed if n not in structure.effects and _possible(n, traces)]
-    search = TorqueSearch(regression, base, floor, acceleration, offered, say)
-    best = search.run()
+
+    def searched(cutoff_hz: float) -> tuple[TorqueSearch, TorqueFit]:
+        regression = TorqueRegression(few, parts, cutoff_hz, scale)
+        base = regression.solve(structure, shapes)
+        floor = torque_noise_floor(few, base.values, cutoff_hz, [t.keep for t in few])
+        acceleration = float(np.sqrt(np.mean(regression.series()[2] ** 2)))
+        search = TorqueSearch(regression, base, floor, acceleration, offered, say)
+        return search, search.run()
+
+    highest = HIGHEST / few[0].step_s
+    search, best = searched(min(start.cutoff_hz, highest))
+    left = best.held_nm / search.regression.torque_nm
+    if best.structure.effects == structure.effects and left > MUCH_LEFT:
+        wider = min(WIDER[few[0].channel] * start.cutoff_hz, highest)
+        say(f"nothing found up to {start.cutoff_hz:.3g} Hz: looking up to {wider:.3g} Hz")
+        search, best = searched(wider)
+    regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
     if best.held_nm > NOT_BETTER * base.held_nm and best.structure.effects == structure.effects:
         best = base
     say(f"final fit with {', '.join(best.structure.effects) or 'fewer terms'}")
     before = _final(regression, base, traces, split)
     after = before if best.structure == structure else _final(regression, best, traces, split)
-    left = disturbance_of(regression, best, floor, unit)
+    disturbance = disturbance_of(regression, best, floor, unit)
 
     def errors(fit: TorqueFit) -> TorqueErrors:
         size = regression.torque_nm
         return TorqueErrors(fit.fitted_nm, fit.fitted_nm / size, fit.held_nm / size, floor, cutoff)
 
-    return Found(_told(search, structure, base, best), before, after, left, (errors(base), errors(best)))
+    return Found(_told(search, structure, base, best), before, after, disturbance, (errors(base), errors(best)))
 
 
 def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> Fitted:

@@ -15,9 +15,9 @@ from identify.diagnose.torque_regression import TorqueFit, TorqueRegression, gai
 from rig import effects
 from rig.effects.base import Place
 
-WEIGHT = 0.25  # share of what is left that an effect has to take away to be named: below, it is true but small
+WEIGHT = 0.20  # share of what is left that an effect has to take away to be named: below, it is true but small
 SURE = 4.0  # standard errors, over blocks of the held-out samples, by which the squared residual must fall: 3e-5
-RICHER = 0.5  # share of what its special case leaves that a richer effect has to take away to be named in its place
+RICHER = 0.6  # share of what its special case leaves that a richer effect has to take away to be named in its place
 AS_HEAVY = 0.05  # of what is left: candidates that differ by less carry the same torque
 RIVAL = 0.02  # of what is left: rivals carry as much as what was taken, to that
 TOLD_APART = 10.0  # fall of the penalised cost that parts two candidates (Kass and Raftery 1995: very strong)
