@@ -31,7 +31,6 @@ HIGHEST = 0.2  # of the sample rate of what is searched: the low-pass cuts off n
 MUCH_LEFT = 0.05  # of the torque: where nothing explains that, a wider band is looked at
 # Times the cut-off at which the sensor's noise is ten times as much torque: an angle is differentiated twice.
 WIDER = {"angle": 10.0**0.4, "rate": 10.0 ** (2.0 / 3.0)}
-NOT_BETTER = 0.98  # of the declared model's held-out residual: above, the model that was found is none
 NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
 PERCENT = 100.0
 
@@ -107,8 +106,6 @@ def search_in_torque(
         say(f"nothing found up to {start.cutoff_hz:.3g} Hz: looking up to {wider:.3g} Hz")
         search, best = searched(wider)
     regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
-    if best.held_nm > NOT_BETTER * base.held_nm and best.structure.effects == structure.effects:
-        best = base
     say(f"final fit with {', '.join(best.structure.effects) or 'fewer terms'}")
     before = _final(regression, base, traces, split)
     after = before if best.structure == structure else _final(regression, best, traces, split)

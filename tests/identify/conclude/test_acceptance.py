@@ -1,0 +1,37 @@
+"""What is left is accepted as long as it is immaterial."""
+
+from __future__ import annotations
+
+import pytest
+
+from identify.conclude.acceptance import too_much_left
+from identify.results import Dependence, Disturbance
+from identify.wording import left_over
+from rig.config.identify import AcceptConfig
+
+RATE = Dependence("rate", 0.03, 0.03, 1e-9)
+
+
+def test_a_disturbance_that_goes_with_nothing_is_no_reason_however_large() -> None:
+    assert too_much_left(Disturbance(0.5, "N*m", 0.5), AcceptConfig(), "rotary") == []
+
+
+@pytest.mark.parametrize(
+    ("left", "words"),
+    [
+        (Disturbance(0.1, "N*m", 0.1, (Dependence("rate", 0.06, 0.06, 1e-9),)), "identify.accept.torque_percent"),
+        (Disturbance(0.1, "N*m", 0.1, (RATE,), {"inertia": 2.5}), "identify.accept.inertia_percent"),
+        (Disturbance(0.1, "N*m", 0.1, (RATE,), {"damping": 11.0}), "identify.accept.damping_percent"),
+    ],
+)
+def test_each_limit_is_named_where_it_is_passed(left: Disturbance, words: str) -> None:
+    (reason,) = too_much_left(left, AcceptConfig(), "rotary")
+    assert words in reason
+    assert "rate" in reason
+
+
+def test_within_all_limits_it_is_accepted_and_told_in_a_sentence() -> None:
+    left = Disturbance(0.1, "N*m", 0.1, (RATE,), {"inertia": 1.0, "damping": 5.0})
+    assert too_much_left(left, AcceptConfig(), "rotary") == []
+    assert "3.0 % with the rate" in left_over(left, "rotary")
+    assert "J by 1.0 %" in left_over(left, "rotary")

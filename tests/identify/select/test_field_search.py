@@ -1,0 +1,64 @@
+"""The search on measured data: what carries the torque that is left is named, and nothing besides."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+
+from identify.pipeline import identify
+from identify.results import Identification
+from rig.config.identify import IdentifyConfig
+from rig.platform import Platform
+from tests.identify.servo import Servo
+
+DECLARED = Platform(1e-3, 1e-3, 1.0)
+
+
+@cache
+def found_in(servo: Servo) -> Identification:
+    return identify(servo.recording(2), DECLARED, IdentifyConfig())
+
+
+class Hidden(dict[str, dict[str, float]]):
+    """Effects that a cache can hold."""
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(tuple(sorted((k, tuple(sorted(v.items()))) for k, v in self.items())))
+
+
+PLAIN = Servo()
+RUBBING = Servo(effects=Hidden(coulomb_friction={"level": 0.02}))
+TILTED = Servo(effects=Hidden(coulomb_friction={"level": 0.02}, torque_offset={"level": 0.01}))
+
+
+def right(found: Identification, servo: Servo) -> None:
+    """Inertia is right, and a spring that is not there is not claimed."""
+    assert found.final.parameters["inertia"].value == pytest.approx(servo.inertia, rel=0.01)
+    assert "stiffness" not in found.final.parameters
+    assert found.accepted
+
+
+def test_a_servo_with_nothing_hidden_is_accepted_and_nothing_is_named() -> None:
+    found = found_in(PLAIN)
+    assert found.verdict.effects == ()
+    assert found.disturbance is not None
+    assert found.disturbance.relative == pytest.approx(0.008, rel=0.8)
+    right(found, PLAIN)
+
+
+def test_coulomb_friction_of_a_servo_is_named_alone_and_what_is_left_is_told() -> None:
+    found = found_in(RUBBING)
+    assert found.verdict.effects == ("coulomb_friction",)
+    assert found.final.effect_parameters["coulomb_friction"]["level"].value == pytest.approx(0.02, rel=0.05)
+    assert found.final.error.holdout_measure == "holdout_torque_relative"
+    assert any(s.startswith("What is left is a torque of") for s in found.verdict.sentences)
+    right(found, RUBBING)
+
+
+@pytest.mark.slow
+def test_friction_and_a_constant_torque_are_both_named() -> None:
+    found = found_in(TILTED)
+    assert set(found.verdict.effects) == {"coulomb_friction", "torque_offset"}
+    assert found.verdict.explained_fraction > 0.9
+    right(found, TILTED)
