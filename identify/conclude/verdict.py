@@ -86,7 +86,7 @@ def _decided_in_torque(found: Identification) -> bool:
 def _nothing_named(found: Identification) -> str:
     """Why no effect is named."""
     if _decided_in_torque(found):
-        return "no candidate takes a quarter of the torque that is left, all over the record."
+        return "no candidate explains a fifth of the torque that is left throughout the record."
     if found.verdict.unexplained:
         return "no candidate explains the residual."
     return "the declared model already reaches the noise floor."
