@@ -147,7 +147,9 @@ class TorqueSearch:
         heaviest = max(good, key=lambda w: w.weight)
         near = [w for w in good if w.weight > heaviest.weight - AS_HEAVY]
         near += [w for w in good if w.effect in effects.get(heaviest.effect).nests and _holds(w, heaviest)]
-        return min(near, key=lambda w: (len(w.fit.values), -w.evidence))
+        chosen = min(near, key=lambda w: (len(w.fit.values), -w.evidence))
+        lower = [w for w in good if w.effect in effects.get(chosen.effect).lower_order]  # a constant before a slope
+        return lower[0] if lower else chosen
 
     def without_soaking_stiffness(self, now: TorqueFit) -> TorqueFit:
         """The same without a stiffness that carries no torque of its own, or that pushes where a spring pulls."""
@@ -167,7 +169,9 @@ class TorqueSearch:
     def pruned(self, now: TorqueFit) -> TorqueFit:
         """The same without the effects that no longer carry anything beside the others."""
         for name in now.structure.effects:
-            if name in self.base.structure.effects:
+            if name in self.base.structure.effects or any(
+                name in effects.get(e).lower_order for e in now.structure.effects
+            ):
                 continue
             shapes = {k: v for k, v in now.shapes.items() if k != name}
             without = self.regression.solve(now.structure.minus(name), shapes)
