@@ -18,6 +18,10 @@ for _name in ("SIGHUP", "SIGTERM"):
     if hasattr(signal, _name):
         signal.signal(getattr(signal, _name), signal.SIG_DFL)
 
+# A worker has one processor: threads of the linear algebra would only wait for each other. Before numpy is imported.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # Tests with deadlines of their own, by the beginning of their path: beside another one they would be late.
 WITH_DEADLINES = (
     "drivers/amplifiers",

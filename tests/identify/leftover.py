@@ -45,8 +45,12 @@ def _leftover(effects: str, seed: int) -> tuple[list[RunTraces], float]:
 
 def diagnosed(effects: Effects | None = None, seed: int = 0) -> ResidualDiagnosis:
     """What is said of the leftover."""
-    runs, over = leftover(effects, seed)
-    return diagnosis_of(runs, over)
+    return _diagnosed(json.dumps(effects), seed)
+
+
+@cache
+def _diagnosed(effects: str, seed: int) -> ResidualDiagnosis:
+    return diagnosis_of(*_leftover(effects, seed))
 
 
 def diagnosis_of(runs: Sequence[RunTraces], over_floor: float = 1.0) -> ResidualDiagnosis:

@@ -21,7 +21,7 @@ def share(found: Share | None) -> float:
     return found.share if told(found) and found is not None else 0.0
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", [0, 1, 2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 10))])
 def test_of_a_clean_platform_with_white_noise_nothing_is_said(seed: int) -> None:
     found = diagnosed(seed=seed)
     assert found.harmonics is not None
