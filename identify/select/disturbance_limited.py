@@ -24,9 +24,9 @@ from rig.platform import TERMS
 
 SAMPLES = 8_000  # looked at: a white torque shows in a few thousand
 LEAST = 1e-5  # of the torque: a white torque below that is none
-INSISTS = 300.0  # fall of the cost: a missing effect nearly random in its band showed 200, measured rigs 383 and more
+INSISTS = 220.0  # fall of the cost: a missing effect nearly random in its band showed 200, a servo with 1 % ripple 244
 MOST_LEFT = 0.15  # of the torque: a model that leaves that much is no small effect short of the sensor's noise
-STEPS = 10  # of the fit
+STEPS = 15  # of the fit
 
 
 @dataclass(frozen=True)
