@@ -46,7 +46,7 @@ def parameter_table(identification: Identification) -> Markup:
         rows.append([*row, _unit_of(name, before, after)])
     rows += _effect_rows(before, after)
     head = ["", "declared model", "95 % interval"]
-    head += ["final model", "95 % interval", "fitted without them: off by"] if after else []
+    head += ["final model", "95 % interval", "declared model: off by"] if after else []
     return table(
         [*head, "unit"],
         rows,
