@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from identify.conclude.conclusion import Case, conclude
 from identify.conclude.declared_values import declared_values
 from identify.conclude.error_figures import floor_of, in_torque, measure
-from identify.estimate.cross_validation import Judged, horizon_s
+from identify.estimate.cross_validation import Judged
 from identify.estimate.final_fit import Fitted, by_output_error, by_regression, noise_of_all
 from identify.estimate.initial_guess import Start, first_guess
 from identify.genetic.per_set import each_set
@@ -27,22 +27,20 @@ from identify.rivals.coloured_noise import Colour, with_noise_known
 from identify.rivals.tone_origin import TONE, standing_line, told
 from identify.rivals.whiteness_test import too_much_for
 from identify.runs.clipping import full_scale_of
-from identify.runs.holdout import Split, pieces, split
+from identify.runs.holdout import Split, split
 from identify.runs.measured_channels import offer_of, with_causes
 from identify.runs.observability import why_unseen
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
 from identify.runs.usable import runs_used
-from identify.select import decay_search
-from identify.select.candidates import Candidates
 from identify.select.contribution import contributions
 from identify.select.disturbance_limited import regime_of
 from identify.select.field_search import Found, search_in_torque
 from identify.select.fitter import Fits
-from identify.select.free_run_search import FineSearch
+from identify.select.free_decay import FreeDecay
 from identify.select.search_state import Search
-from identify.select.short_horizon_search import Loop
-from identify.signals.prepare import one_noise, prepare
-from identify.signals.trace import Trace, loads_differ
+from identify.select.sensor_limited import SensorLimited
+from identify.signals.prepare import prepare
+from identify.signals.trace import loads_differ
 from rig import effects
 from rig.config.identify import IdentifyConfig
 from rig.effects.base import Place
@@ -51,6 +49,7 @@ from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
 TWICE_THE_NOISE = 2.0
+NEARLY_ALL = 0.9  # of what the declared model leaves: without white torque a missing effect is a function of the motion
 MUCH_CLOSER = 0.5  # times the free-run error of the other fit
 STOPPED = "the search was interrupted; missing effects are not yet determined"
 NOTHING_YET = (
@@ -130,46 +129,59 @@ class _Identifier:
         shapes = {n: shape_values(n, _plain(self.declared, n)) for n in self.structure.effects}
         if not self.torque_free and self._disturbance_limited():
             return self._in_torque(shapes)
-        horizon = horizon_s(self.start.platform, self.traces)
-        traces, parts = self._searched()
-        fitting = pieces(traces, parts.fit, 3.0 * horizon)
-        judging = pieces(traces, parts.judge, 3.0 * horizon, 5_000)
-        allowed = self._allowed()
-        loop = Loop(fitting, judging, self.start, allowed, self.say, traces)
-        d = self.declared
+        return self._decay(shapes) if self.torque_free else self._at_the_sensor(shapes)
+
+    def _at_the_sensor(self, shapes: dict[str, tuple[float, ...]]) -> Identification:
+        """The way where nothing but the sensor's noise limits what is seen; in torque where that does not come true."""
+        search: SensorLimited | None = None
         try:
             self.say("fitting the declared model")
-            nominal = (d.inertia_kg_m2, d.damping_nm_s_rad, d.stiffness_nm_rad)
-            on_offer = Candidates(traces, parts, allowed, self.structure.effects)
-            fine = FineSearch(on_offer, self.say, declared_values(d, self.torque_free))
-
-            def take_over(found: Search) -> bool:
-                over = self.torque_free and decay_search.take_over(on_offer, found, self.say)
-                if over and found.best.sigma > decay_search.STILL_COARSE * on_offer.fits.noise:
-                    return True  # whole runs have had their say, and the noise is not what is left
-                return fine.take_over(found) or over
-
-            search = loop.run(self.structure, shapes, nominal, take_over)
-            had = search.best.structure.effects
-            search.drop_a_bad_lot()
-            if search.best.structure.effects != had:
-                self.say(f"rejected: {', '.join(had)}; together they still leave too much unexplained")
-            before = self._before(search)
-            after = self._after(search) if search.best.structure != self.structure else before
-            after = self._doubted(search, on_offer.fits, before, after)
-            named = [e for e in after.structure.effects if e not in self.structure.effects]
-            on_offer.fits.horizon, start = search.horizon, search.base.values()
-            search.contribution = contributions(on_offer.fits, after.structure, after.values, named, start)
-            return self._report(search, before, after)
+            search = SensorLimited.of(
+                self.traces, self.split, self.structure, declared_values(self.declared, self.torque_free), self.start,
+                self._allowed(), self.say,
+            )  # fmt: skip
+            if not search.run() and self.colour is None:
+                self.say("more is left than the sensor's noise: looking at it as a torque")
+                return self._in_torque(shapes, NEARLY_ALL)
+            fits = Fits(self.traces, self.split, len(self.structure.effects) + 1)
+            return self._concluded(search.found, fits)
         except (Aborted, KeyboardInterrupt):
-            if loop.so_far is None:
+            if search is None:
                 raise
-            self.say("stopped: reporting what was found so far")
-            search = loop.so_far
-            found = self._report(search, self._regressed(search.base), self._regressed(search.best), in_full=False)
-            if not found.verdict.effects:  # the search may have been about to name what this model lacks
-                found = replace(found, verdict=replace(found.verdict, sentences=(NOTHING_YET,)))
-            return replace(found, aborted=True, accepted=False, reasons=(STOPPED,))
+            return self._stopped(search.found)
+
+    def _decay(self, shapes: dict[str, tuple[float, ...]]) -> Identification:
+        """The way for runs without torque, which are judged by how they swing on alone."""
+        decay = FreeDecay(
+            self.traces, self.split, self.start, self._allowed(), self.structure, self.recording.noise is not None,
+            self.settings.holdout, self.say,
+        )  # fmt: skip
+        try:
+            self.say("fitting the declared model")
+            found = decay.run(shapes, self.declared, declared_values(self.declared, self.torque_free))
+            return self._concluded(found, decay.on_offer.fits)
+        except (Aborted, KeyboardInterrupt):
+            if decay.so_far is None:
+                raise
+            return self._stopped(decay.so_far)
+
+    def _concluded(self, search: Search, fits: Fits) -> Identification:
+        """Final fits, what else might pass for what was found, and the report."""
+        before = self._before(search)
+        after = self._after(search) if search.best.structure != self.structure else before
+        after = self._doubted(search, fits, before, after)
+        named = [e for e in after.structure.effects if e not in self.structure.effects]
+        fits.horizon, start = search.horizon, search.base.values()
+        search.contribution = contributions(fits, after.structure, after.values, named, start)
+        return self._report(search, before, after)
+
+    def _stopped(self, search: Search) -> Identification:
+        """What there is where somebody stops the search."""
+        self.say("stopped: reporting what was found so far")
+        found = self._report(search, self._regressed(search.base), self._regressed(search.best), in_full=False)
+        if not found.verdict.effects:  # the search may have been about to name what this model lacks
+            found = replace(found, verdict=replace(found.verdict, sentences=(NOTHING_YET,)))
+        return replace(found, aborted=True, accepted=False, reasons=(STOPPED,))
 
     def _disturbance_limited(self) -> bool:
         """Whether a torque that nobody recorded, and not the sensor's noise, limits these runs."""
@@ -181,11 +193,12 @@ class _Identifier:
             self.say("a torque that was not recorded limits these runs, not the sensor's noise")
         return regime.disturbance_limited
 
-    def _in_torque(self, shapes: dict[str, tuple[float, ...]]) -> Identification:
+    def _in_torque(self, shapes: dict[str, tuple[float, ...]], least_explained: float = 0.0) -> Identification:
         """The way for measured data: what the model lacks is told by the torque that it leaves."""
         unit = UNITS[self.recording.axis]["torque"]
         found = search_in_torque(
-            self.traces, self.split, self.structure, shapes, self.start, self._allowed(), unit, self.say
+            self.traces, self.split, self.structure, shapes, self.start, self._allowed(), unit, self.say,
+            least_explained,
         )  # fmt: skip
         return self._report(found.search, found.before, found.after, measured=found)
 
@@ -231,18 +244,6 @@ class _Identifier:
         start = {**search.base.values(), **{n: v for n, v in search.best.values().items() if n[0] in (*TERMS, *found)}}
         fitted = None if set(found) <= set(base.effects) else fits.whole(replace(base, effects=found), start)
         return search.base if fitted is None else fitted.judged()
-
-    def _searched(self) -> tuple[list[Trace], Split]:
-        """What the search looks at: of a slow decay that was sampled fast only every so manyth sample."""
-        runs = [t.run for t in self.traces]
-        j, _, k = self.start.platform
-        few = decay_search.thinned(runs, float(np.sqrt(max(k / j, 0.0)) / (2.0 * np.pi))) if self.torque_free else runs
-        if all(a is b for a, b in zip(few, runs, strict=True)):
-            return self.traces, self.split
-        noise = self.recording.noise
-        prepared = [prepare(r, t.number, noise) for r, t in zip(few, self.traces, strict=True)]
-        traces = one_noise(prepared, noise is not None)
-        return traces, split(traces, self.settings.holdout)
 
     def _report(
         self, search: Search, before: Fitted, after: Fitted, in_full: bool = True,

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,18 +26,47 @@ from identify.simulate.shots import RUNAWAY, Shots
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.predictor import Gains, Noise, gains_of, predict_ahead
+from rig.effects.base import Place
 
 STEP = 1e-6  # relative step of the differences
-NOISE_STEP = 0.05  # step of the differences in the logarithms of the noise's three numbers
+STRIDE, SHORTEST_STRIDE, LONGEST_STRIDE = 1.5, 0.2, 7.0  # of the logarithms of the noise's three numbers
+GROWTH, SHRINKAGE = 2.5, 0.5  # of a stride that led down, and of one that did not
 LONGEST_SHARE = 0.2  # of the longest run: a disturbance slower than that is a constant
 SHORTEST_SAMPLES = 4.0  # time constant of a disturbance, in samples: a faster one is white
 LEAST_TORQUE, MOST_TORQUE = 1e-7, 10.0  # of the torque: how large a disturbance may be
 ENOUGH = 0.5  # fall of the cost below which a fit has arrived
+DOWN = (1e-3, 1e-6, 1e-10)  # times the disturbance: how far below a model is looked at with parameters that follow
+FAR = 2.0  # times the sensor's variance: less of a disturbance is found step by step
+DIRECTIONS = ((1.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # in which a noise is looked for
 FURTHER = (  # times white density, slow variance and time constant: where else a noise is looked for
     (0.01, 1.0, 1.0), (0.1, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 0.1, 1.0), (1.0, 10.0, 1.0),
     (1.0, 0.1, 0.1), (1.0, 1.0, 0.1), (1.0, 0.03, 0.01), (1.0, 1.0, 10.0),
 )  # fmt: skip
+# Of the motion, root mean square, by which a start state may be off: the smoothed motion is worst where a run begins.
+START_RATE, START_ANGLE, UNKNOWN_ANGLE = 0.1, 0.05, 1.0
 TRIALS = 7  # step lengths tried before a direction is given up
+
+
+@dataclass(frozen=True)
+class Columns:
+    """One run's derivatives at a fit, of the samples that count.
+
+    Attributes
+    ----------
+    columns
+        What the parameters do to the scaled innovations, (n, p).
+    bias
+        What the run's bias does, (n,); zeros where it has none.
+    scaled
+        Innovations over their standard deviation, (n,).
+    variance
+        Of the innovations, (n,).
+    """
+
+    columns: Array
+    bias: Array
+    scaled: Array
+    variance: Array
 
 
 @dataclass(frozen=True)
@@ -89,6 +118,12 @@ class PredictionError:
             logs += float(np.sum(np.log(look.variance[s.weight])))
         return fit.count * float(np.log(squares / fit.count)) + logs if np.isfinite(squares) else np.inf
 
+    def columns_at(self, fit: Fit) -> list[Columns]:
+        """Derivatives of every run's innovations where a fit stands."""
+        with np.errstate(all="ignore"):
+            descent = _Descent(self, fit.structure, fit.values, fit.noise, fit.shots, ())
+            return descent.columns()
+
     def white(self, share: float) -> float:
         """Density of a white torque that is this share of the torque, as ``Noise`` has it."""
         return (share * self.torque_nm) ** 2 * 2.0 * self.step_s / self.reading_variance
@@ -127,9 +162,14 @@ class PredictionError:
         self._most_white = most_white
         with np.errstate(all="ignore"):
             descent = _Descent(self, structure, start, noise, carry, fixed)
-            for left in range(iterations, 0, -1):
-                if not descent.step() and (left == 1 or not descent.other_noise()):
+            left = descent.down(iterations)
+            while left > 0 and descent.sticks:  # where a run begins stuck is another place with another friction
+                values = dict(zip(descent.names, descent.x.tolist(), strict=True))
+                again = _Descent(self, structure, values, descent.noise, descent.found().shots, fixed)
+                left = again.down(left)
+                if not again.cost < descent.cost - ENOUGH:
                     break
+                descent = again
             return descent.found()
 
     @RUNAWAY
@@ -151,8 +191,9 @@ class PredictionError:
 
     def start_variance(self, trace: Trace) -> tuple[float, float]:
         """Of angle and rate at the start of a stretch, read off the smoothed motion; over that of one reading."""
-        rate = (2.0 * trace.fine[4]) ** 2 + (0.01 * self.rate_rad_s) ** 2
-        angle = 4.0 * trace.noise**2 if trace.channel == "angle" else (0.3 * self.angle_rad) ** 2
+        rate = (2.0 * trace.fine[4]) ** 2 + (START_RATE * self.rate_rad_s) ** 2
+        known = trace.channel == "angle"
+        angle = 4.0 * trace.noise**2 + ((START_ANGLE if known else UNKNOWN_ANGLE) * self.angle_rad) ** 2
         return angle / self.reading_variance, rate / self.reading_variance
 
     def on_grid(self, cost: Callable[[Noise], float]) -> Noise:
@@ -188,8 +229,9 @@ class _Descent:
         still = [*fixed, *([("inertia",)] if p.torque_free else [])]
         self.still = held_still(self.names, p.traces, p.use, still)
         self.scale = np.maximum(np.abs(self.x), [self._unit(n) for n in self.names])
-        self.shots = shots_for(p.traces, structure, self.names, self.x, None, p.use, carry, p.coarse)
-        self.bias: Array = np.array([s.bias for s in self.shots])
+        self.shots = shots_for(p.traces, structure, self.names, self.x, None, p.use, None, p.coarse)
+        # Start states are not carried over: where a run begins stuck is a matter of the friction that is tried.
+        self.bias: Array = np.array([s.bias for s in (carry or self.shots)])
         self.damping = 1e-4
         self.weights = [s.weight for s in self.shots]
         self.count = int(sum(w.sum() for w in self.weights))
@@ -198,6 +240,7 @@ class _Descent:
         self.cost = self._cost(self.looks)
         self.information: Array = np.zeros((len(self.x), len(self.x)))
         self._calm = 0
+        self._ways, self._strides = [-1.0, -1.0, -1.0, 1.0], np.full(len(DIRECTIONS), STRIDE)
 
     def _unit(self, name: Name) -> float:
         """What changes the torque by about itself: the scale of a parameter that is zero."""
@@ -226,13 +269,12 @@ class _Descent:
         return float(self.count * np.log(squares / self.count) + log)
 
     @RUNAWAY
-    def _columns(self, i: int) -> tuple[Array, Array, Array]:
-        """Of one run: what parameters, noise and bias do to the scaled innovations, these, and d mean log variance."""
+    def _columns(self, i: int) -> Columns:
+        """Derivatives of one run's scaled innovations, where the descent stands."""
         p, s, base, w = self.problem, self.shots[i], self.looks[i], self.weights[i]
         root = np.sqrt(base.variance[w])
-        z = base.innovations[w] / root
-        columns = np.zeros((len(z), len(self.x) + 4))
-        logs = np.zeros(len(self.x) + 4)
+        scaled = base.innovations[w] / root
+        columns, ones = np.zeros((len(scaled), len(self.x))), np.zeros(len(scaled))
         for k, name in enumerate(self.names):
             if self.still[k] or (len(name) == 3 and int(name[2]) != s.number):
                 continue
@@ -241,72 +283,98 @@ class _Descent:
             moved[k] += h
             other = p.look(s, self.structure, self.names, moved, self.noise, self.bias[i])
             columns[:, k] = -(other.innovations[w] - base.innovations[w]) / h / root
-        at = len(self.x)
-        for k, key in enumerate(("white", "slow", "time_constant_s")):
-            changed = replace(self.noise, **{key: getattr(self.noise, key) * float(np.exp(NOISE_STEP))})
-            other = p.look(s, self.structure, self.names, self.x, changed, self.bias[i])
-            columns[:, at + k] = -(other.innovations[w] / np.sqrt(other.variance[w]) - z) / NOISE_STEP
-            logs[at + k] = float(np.sum(np.log(other.variance[w]) - np.log(base.variance[w]))) / NOISE_STEP
         if s.trace.biased:
             h = 1e-4 * p.rate_rad_s
             other = p.look(s, self.structure, self.names, self.x, self.noise, self.bias[i] + h)
-            columns[:, at + 3] = -(other.innovations[w] - base.innovations[w]) / h / root
-        return columns, z, logs
+            ones = -(other.innovations[w] - base.innovations[w]) / h / root
+        return Columns(columns, ones, scaled, base.variance[w])
+
+    @property
+    def sticks(self) -> bool:
+        """Whether the model has dry friction."""
+        return any(effects.get(e).place is Place.FRICTION for e in self.structure.effects)
+
+    def down(self, steps: int) -> int:
+        """Steps until it has arrived; how many are left."""
+        for left in range(steps, 0, -1):
+            if not self.step() and (left == 1 or not self.other_noise()):
+                return left - 1
+        return 0
+
+    def columns(self) -> list[Columns]:
+        """Derivatives of every run, where the descent stands."""
+        return list(self.problem.workers.map(self._columns, range(len(self.shots))))
 
     def step(self) -> bool:
         """One step down; False where it has arrived, or none leads there."""
         if not np.isfinite(self.cost):
             return False
-        parts = list(self.problem.workers.map(self._columns, range(len(self.shots))))
+        before = self.cost
+        moved = self._parameters_down()
+        settled = self._noise_down()
+        self._calm = self._calm + 1 if before - self.cost < ENOUGH and (settled or not moved) else 0
+        return self._calm < 2 and (moved or before - self.cost > 0.0 or not settled)
+
+    def _parameters_down(self) -> bool:
+        """One step of parameters and biases, the noise held."""
         p = len(self.x)
-        log = np.sum([q[2] for q in parts], axis=0)[p : p + 3] / max(self.count, 1)
-        a, b = np.zeros((p + 3, p + 3)), np.zeros(p + 3)
+        a, b = np.zeros((p, p)), np.zeros(p)
         biases = []
-        for columns, z, _ in parts:
-            wide = columns[:, : p + 3].copy()
-            wide[:, p:] -= 0.5 * np.outer(z, log)
-            one = columns[:, p + 3]
+        for part in self.columns():
+            wide, z, one = part.columns, part.scaled, part.bias
             pivot = float(one @ one)
-            if pivot > 0.0:
-                across, right = one @ wide, float(one @ z)
-                a += wide.T @ wide - np.outer(across, across) / pivot
-                b += wide.T @ z - across * right / pivot
-                biases.append((across / pivot, right / pivot))
-            else:
-                a += wide.T @ wide
-                b += wide.T @ z
-                biases.append((np.zeros(p + 3), 0.0))
+            across, own = (one @ wide / pivot, float(one @ z) / pivot) if pivot > 0.0 else (np.zeros(p), 0.0)
+            a += wide.T @ wide - pivot * np.outer(across, across)
+            b += wide.T @ z - pivot * across * own
+            biases.append((across, own))
         if not (np.all(np.isfinite(a)) and np.all(np.isfinite(b))):
             return False
-        self.information = _without(a, p)
+        self.information = a
         size: Array = np.sqrt(np.maximum(np.diag(a), 1e-300))
-        free = np.concatenate([~self.still, np.ones(3, dtype=bool)]) & (np.diag(a) > 0.0)
+        free = ~self.still & (np.diag(a) > 0.0)
         scaled, right_side = (a / np.outer(size, size))[np.ix_(free, free)], (b / size)[free]
-        logs = np.log(_three(self.noise))
         for _ in range(TRIALS):
-            d = np.zeros(p + 3)
+            d = np.zeros(p)
             d[free] = np.linalg.lstsq(scaled + self.damping * np.eye(len(right_side)), right_side, rcond=1e-14)[0]
-            d /= size
-            x = ordered(self.names, np.clip(self.x + d[:p], self.low, self.high))
-            noise = self.problem.within(Noise(*np.exp(logs + np.clip(d[p:], -2.0, 2.0)).tolist()))
-            taken = np.concatenate([x - self.x, d[p:]])
-            bias = self.bias + np.array([own - share @ taken for share, own in biases])
-            looks = self._looks(x, noise, bias)
+            x = ordered(self.names, np.clip(self.x + d / size, self.low, self.high))
+            bias = self.bias + np.array([own - share @ (x - self.x) for share, own in biases])
+            looks = self._looks(x, self.noise, bias)
             cost = self._cost(looks)
-            if cost < self.cost + 1e-9 * abs(self.cost):
-                fall = self.cost - cost
-                self.x, self.noise, self.bias, self.looks, self.cost = x, noise, bias, looks, cost
+            if cost < self.cost:
+                self.x, self.bias, self.looks, self.cost = x, bias, looks, cost
                 self.damping = max(self.damping / 10.0, 1e-9)
-                self._calm = self._calm + 1 if fall < ENOUGH else 0
-                return self._calm < 2
+                return True
             self.damping = max(10.0 * self.damping, 1e-3)
         return False
+
+    def _noise_down(self) -> bool:
+        """One step along each of the noise's logarithms; True where none is left that matters.
+
+        Parameters and noise are all but independent in this likelihood, and a look at another noise costs one
+        prediction.
+        """
+        for k, direction in enumerate(DIRECTIONS):
+            for way in (self._ways[k], -self._ways[k]):
+                logs = np.log(_three(self.noise)) + way * self._strides[k] * np.array(direction)
+                noise = self.problem.within(Noise(*np.exp(logs).tolist()))
+                if noise == self.noise:
+                    continue
+                looks = self._looks(self.x, noise, self.bias)
+                cost = self._cost(looks)
+                if cost < self.cost - 0.1 * ENOUGH:
+                    self.noise, self.looks, self.cost = noise, looks, cost
+                    self._ways[k], self._strides[k] = way, min(GROWTH * self._strides[k], LONGEST_STRIDE)
+                    break
+            else:
+                self._strides[k] = max(SHRINKAGE * self._strides[k], SHORTEST_STRIDE)
+        return bool(np.all(self._strides <= 2.0 * SHORTEST_STRIDE))
 
     def other_noise(self) -> bool:
         """Whether a noise that is quite another one is likelier; if so the descent goes on from there.
 
         Beside the right one the likelihood is a quadratic in its logarithms; far off it is flat, or has a valley for
-        a disturbance that is slow and another for one that is fast.
+        a disturbance that is slow and another for one that is fast. A model that is nearly right shows what it can do
+        without a disturbance only once its parameters have followed.
         """
         before = self.cost
         for factors in FURTHER:
@@ -315,8 +383,29 @@ class _Descent:
             cost = self._cost(looks)
             if cost < self.cost - ENOUGH:
                 self.noise, self.looks, self.cost = noise, looks, cost
-        self._calm = 0
+        here = self._place()
+        if (
+            float(np.median(np.concatenate([q.variance[w] for q, w in zip(self.looks, self.weights, strict=True)])))
+            > FAR
+        ):
+            for factor in DOWN:
+                self._go(here)
+                self.noise = self.problem.within(
+                    Noise(factor * here[0].white, factor * here[0].slow, here[0].time_constant_s)
+                )
+                self.looks = self._looks(self.x, self.noise, self.bias)
+                self.cost, self.damping = self._cost(self.looks), 1e-4
+                if not (self._parameters_down() and self._parameters_down() and self.cost < here[-1] - ENOUGH):
+                    self._go(here)
+                here = self._place()
+        self._calm, self._strides = 0, np.full(len(DIRECTIONS), STRIDE)
         return self.cost < before - ENOUGH
+
+    def _place(self) -> tuple[Noise, Array, Array, list[Look], float]:
+        return self.noise, self.x, self.bias, self.looks, self.cost
+
+    def _go(self, place: tuple[Noise, Array, Array, list[Look], float]) -> None:
+        self.noise, self.x, self.bias, self.looks, self.cost = place
 
     def found(self) -> Fit:
         """The fit where the descent stands."""
@@ -343,11 +432,3 @@ def _three(noise: Noise) -> tuple[float, float, float]:
 def replace_bias(s: Shots, bias: float) -> Shots:
     """The same run with another bias."""
     return Shots(s.trace, s.grid, s.first, s.starts, bias, s.weight, s.rests)
-
-
-def _without(a: Array, p: int) -> Array:
-    """Information of the first ``p`` unknowns, the others eliminated."""
-    rest = a[p:, p:]
-    size = np.sqrt(np.maximum(np.diag(rest), 1e-300))
-    inverse = np.linalg.pinv(rest / np.outer(size, size), rcond=1e-9, hermitian=True) / np.outer(size, size)
-    return np.asarray(a[:p, :p] - a[:p, p:] @ inverse @ a[p:, :p])

@@ -116,9 +116,9 @@ def told(apart: RunsApart, linear: bool) -> tuple[str, str]:
         f"The runs disagree with each other, and no effect of the platform is needed to explain it: a {what} that was "
         f"{joined(parts)} than recorded explains all that the declared model leaves."
     ), (
-        f"Compare {runs} with the other runs: the amplifier's gain and limits, and how torque and rate are stamped "
-        "against each other. Play them again; one set that holds all their frequencies (a multisine) would tell an "
-        "effect of the platform from a run that differs."
+        f"Compare {runs} with the other runs: the amplifier's gain and limits, and the time stamps of torque and "
+        "rate. Play them again; one set with all their frequencies (a multisine) would separate an effect of the "
+        "platform from a run that differs."
     )
 
 

@@ -38,18 +38,16 @@ FOLDS = (
     "for pickup on the cable."
 )
 MOUNT = "Repeat a set with a known mass on the platform (added_inertia_kg_m2)"
-HEAVIER = (
-    "The known mass that was mounted does not tell: the line has to be as strong in every run, and the mass heavier"
-)
+HEAVIER = "The known mass does not decide it: the line has to be as strong in every run, and the mass heavier"
 DIFFERS = (
-    "Compare {runs} with the others: the amplifier's gain and limits, and how torque and rate are stamped against each "
-    "other. Play that set again, with one of the others at its frequency; leave the run out if it does not repeat."
+    "Compare {runs} with the others: the amplifier's gain and limits, and the time stamps of torque and rate. "
+    "Play that set again, with one of the others at its frequency; leave the run out if it does not repeat."
 )
 TELLS = (
-    ": that changes how far a {kind} moves it, and nothing in the sensor. Or switch the source on with the run, at "
-    "rest. Or record at another sample rate, at which an aliased vibration moves. If you know that it is a {kind} (a "
-    "pump, a fan), declare it: model.effects.periodic_disturbance: {{sine_nm: {torque:.3g}, cosine_nm: 0, "
-    "frequency_hz: {hertz:.6g}}}."
+    ": that changes how far a {kind} moves the platform, but not a line of the sensor. Or switch the source on with "
+    "the run, at rest. Or record at another sample rate: an aliased vibration then changes its frequency. If you know "
+    "that it is a {kind} (a pump, a fan), declare it: model.effects.periodic_disturbance: {{sine_nm: {torque:.3g}, "
+    "cosine_nm: 0, frequency_hz: {hertz:.6g}}}."
 )
 
 
@@ -141,8 +139,8 @@ def told(line: Line, axis: str, channel: str = "rate") -> tuple[str, str]:
     name = f"A steady line at {line.frequency_hz:.5g} Hz" + (f" (only in {joined(line.only)})" if line.only else "")
     if line.in_sensor:
         return (
-            f"{name}, {rate}, is the sensor's own and no {'force' if linear else 'torque'}: runs with a known added "
-            "mass show it as large as the others."
+            f"{name}, {rate}, comes from the sensor and is no {'force' if linear else 'torque'}: in runs with a "
+            "known added mass it is as large as in the others."
         ), FOLDS
     if line.of_torque:
         one, what = len(line.only) == 1, "force" if linear else "torque"
@@ -152,13 +150,13 @@ def told(line: Line, axis: str, channel: str = "rate") -> tuple[str, str]:
             "came at another moment."
         ), DIFFERS.format(runs=joined(line.only))
     why = (
-        "It stood in its steady motion when the runs began, and then both look the same."
+        "The platform already moved steadily with it when the runs began, so the two look the same."
         if line.stood
-        else "The runs do not begin at rest, and then both look the same."
+        else "The runs do not begin at rest, so the two look the same."
     )
     kind = "force" if linear else "torque"
     return (
-        f"{name} is left open: a {kind} of {torque} on the platform, or {rate} of the sensor's own (a vibration above "
+        f"{name} is left open: a {kind} of {torque} on the platform, or {rate} from the sensor (a vibration above "
         f"half of the sample rate that folds back, pickup). {why}"
     ), (HEAVIER if line.loaded else MOUNT) + TELLS.format(kind=kind, torque=line.torque_nm, hertz=line.frequency_hz)
 

@@ -18,6 +18,8 @@ SAMPLES_A_PERIOD = 8.0  # of the fastest motion that stands above the noise: bey
 SHORTEST_SPAN = 1_500  # samples: slow effects need a span to show in
 COLUMNS = 5  # acceleration, rate, angle, direction, constant
 PLACES = 12  # where a span may begin
+# The low-pass before a decimation: flat to 1e-5 up to 0.6 of the new Nyquist frequency and 100 dB down above it.
+PASSED, KAISER, REACH = 0.8, 10.0, 16  # cut-off over the new Nyquist frequency, window, samples to either side
 
 
 def reduced(traces: Sequence[Trace], split: Split, enough: int = ENOUGH) -> tuple[list[Trace], Split]:
@@ -79,11 +81,12 @@ def decimated(trace: Trace, factor: int) -> Trace:
     """A trace sampled every so manyth time, low-passed before; its torque stays as it was recorded."""
     if factor <= 1:
         return trace
-    order = 4 * factor
-    weights = signal.firwin(2 * order + 1, 0.8 / factor)
+    order = REACH * factor
+    weights = signal.firwin(2 * order + 1, PASSED / factor, window=("kaiser", KAISER))
     y = np.convolve(np.pad(trace.measured, order, mode="reflect", reflect_type="odd"), weights, mode="valid")
-    keep = _every(trace.keep, factor, len(y[::factor]))
     measured = y[::factor]
+    keep = _every(trace.keep, factor, len(measured))
+    keep[:REACH] = keep[len(measured) - REACH :] = False  # there the filter reaches beyond the run
     stretches = [(-(-a // factor), b // factor) for a, b in trace.stretches]
     stretches = [(a, min(b, len(measured) - 1)) for a, b in stretches if b - a + 1 >= SHORTEST_STRETCH]
     inside = np.zeros(len(measured), dtype=bool)

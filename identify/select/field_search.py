@@ -71,7 +71,7 @@ class TorqueErrors:
 
 def search_in_torque(
     traces: Sequence[Trace], split: Split, structure: Structure, shapes: dict[str, tuple[float, ...]], start: Start,
-    allowed: Sequence[str], unit: str, say: Callable[[str], None],
+    allowed: Sequence[str], unit: str, say: Callable[[str], None], least_explained: float = 0.0,
 ) -> Found:  # fmt: skip
     """Find what the declared model lacks, and fit both models with their disturbance.
 
@@ -85,6 +85,9 @@ def search_in_torque(
         Names of the effects that may be named.
     unit
         Of the torque.
+    least_explained
+        Share of the power that the declared model leaves, which everything named together explains at least. Without a
+        disturbance what the library lacks is always resembled by something in it.
     """
     few, parts = reduced(traces, split)
     scale = scale_of(few, start.platform, ())
@@ -106,6 +109,9 @@ def search_in_torque(
         say(f"nothing found up to {start.cutoff_hz:.3g} Hz: looking up to {wider:.3g} Hz")
         search, best = searched(wider)
     regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
+    if search.left(best) > (1.0 - least_explained) * search.left(base) and best.structure != structure:
+        say(f"rejected: {', '.join(best.structure.effects)}; together they still leave too much unexplained")
+        best = base
     say(f"final fit with {', '.join(best.structure.effects) or 'fewer terms'}")
     before = _final(regression, base, traces, split)
     after = before if best.structure == structure else _final(regression, best, traces, split)

@@ -110,7 +110,7 @@ def test_a_known_mass_shows_a_torque_and_a_line_of_the_sensor() -> None:
     sensor = found_in([heard(*one, seed=k, added=m) for k, (one, m) in enumerate(zip(SETS, loads, strict=True))])
     assert sensor.verdict.effects == ()
     assert sensor.verdict.unexplained
-    assert "is the sensor's own and no torque" in sensor.verdict.left_open
+    assert "comes from the sensor and is no torque" in sensor.verdict.left_open
     assert not any("tell whether" in reason for reason in sensor.reasons)
 
 

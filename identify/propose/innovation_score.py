@@ -1,0 +1,212 @@
+"""What every candidate could take of what a model predicts wrongly, without fitting it (score test).
+
+The model is fitted by prediction error. A candidate's direction is what a little of it changes in the innovations; the
+model's own parameters and the runs' biases are projected out of it. The part of the innovations along what is left is
+the candidate's gain in log-likelihood (Rao 1948; Engle 1984). A torque that the model lacks is taken up by the
+predictor's disturbance, so the prediction stays near the data and the scores mean something from the first round on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.estimate.fit import Fit
+from identify.estimate.prediction_error import PredictionError
+from identify.model.parameters import Name, bounds_of, names_of
+from identify.propose.screening import grid_of
+from identify.simulate.shots import RUNAWAY
+from rig import effects
+from rig.arrays import Array
+from rig.effects.base import Effect, Place, Scale
+
+LITTLE = 1e-3  # of the torque: how much of a candidate is tried
+SCALED = (0.1, 10.0)  # by how much a score may scale a shape that means "none" at zero
+SHAPES = 3  # of a candidate that are kept to begin a fit from
+SINGULAR = 1e-9  # of the largest eigenvalue
+
+Push = tuple[dict[Name, float], bool]  # parameter values of a little of a candidate, and whether it may turn its sign
+
+
+@dataclass(frozen=True)
+class Score:
+    """One candidate at one set of shapes.
+
+    Attributes
+    ----------
+    gain
+        Expected fall of the cost (minus twice the log-likelihood).
+    start
+        Its parameter values for a fit to begin from.
+    """
+
+    effect: str
+    gain: float
+    start: dict[Name, float]
+    shape: tuple[float, ...] = ()
+
+
+class InnovationScores:
+    """Gains of candidates on top of one model.
+
+    Parameters
+    ----------
+    problem
+        The runs, and how they are predicted.
+    fit
+        The model.
+    scale
+        How large the motion is.
+    """
+
+    def __init__(self, problem: PredictionError, fit: Fit, scale: Scale) -> None:
+        self.problem, self.fit, self.scale = problem, fit, scale
+        parts = problem.columns_at(fit)
+        self.ones = [p.bias for p in parts]
+        self.base = [p.scaled for p in parts]
+        self.variance = [p.variance for p in parts]
+        columns = np.concatenate([self._apart(p.columns, i) for i, p in enumerate(parts)])
+        rest = np.concatenate([self._apart(p.scaled[:, None], i)[:, 0] for i, p in enumerate(parts)])
+        self.lost = not (np.all(np.isfinite(columns)) and np.all(np.isfinite(rest)))  # the model runs away
+        if self.lost:
+            return
+        size = np.sqrt(np.maximum(np.sum(columns**2, axis=0), 1e-300))
+        u, s, _ = np.linalg.svd(columns / size, full_matrices=False)
+        self.basis = u[:, s > 1e-7 * max(float(s[0]) if len(s) else 0.0, 1e-300)]
+        self.residual = rest - self.basis @ (self.basis.T @ rest)
+        self.square = float(self.residual @ self.residual)
+
+    def _apart(self, values: Array, run: int) -> Array:
+        """Without what the run's bias can follow."""
+        one = self.ones[run]
+        power = float(one @ one)
+        return values - np.outer(one, one @ values) / power if power > 0.0 else values
+
+    def all(self, names: Sequence[str]) -> list[list[Score]]:
+        """Every candidate at its best shapes, the largest gain first; of each a few shapes to begin from."""
+        if self.lost:
+            return []
+        tasks = [(effects.get(n), shape) for n in names for shape in grid_of(effects.get(n), self.scale)]
+        with np.errstate(all="ignore"):
+            found = [s for s in self.problem.workers.map(lambda t: self.score(*t), tasks) if s is not None]
+        of: dict[str, list[Score]] = {}
+        for s in sorted(found, key=lambda s: -s.gain):
+            of.setdefault(s.effect, []).append(s)
+        return sorted((v[:SHAPES] for v in of.values()), key=lambda v: -v[0].gain)
+
+    @RUNAWAY
+    def score(self, effect: Effect, shape: tuple[float, ...]) -> Score | None:
+        """One candidate at given shapes; None where it does nothing."""
+        pushes = self._pushes(effect, shape)
+        columns = [c for c in (self._direction(effect, push) for push, _ in pushes) if c is not None]
+        if not columns or len(columns) != len(pushes):
+            return None
+        wide = np.stack(columns, axis=1)
+        wide = wide - self.basis @ (self.basis.T @ wide)
+        size = np.sqrt(np.sum(wide**2, axis=0))
+        if not np.all(np.isfinite(size)) or np.any(size <= 0.0):
+            return None
+        square, along = wide.T @ wide / np.outer(size, size), wide.T @ self.residual / size
+        lowest = np.array([-np.inf if free else 0.0 for _, free in pushes])
+        share, fall = bounded(square, along, lowest)
+        gain = self._gain(fall)
+        gainless = not any(p.linear for p in effect.parameters)
+        if gainless:
+            as_it_is = self._gain(float(2.0 * along[0] * size[0] - size[0] ** 2))
+            if as_it_is > 0.5 * gain:  # where it does as well at its own size, that is a better place to begin
+                return Score(effect.name, max(gain, as_it_is), dict(pushes[0][0]), shape)
+        return Score(effect.name, gain, _start(effect, pushes, share / size), shape)
+
+    def _gain(self, fall: float) -> float:
+        count = len(self.residual)
+        return float(-count * np.log(max(1.0 - fall / self.square, 1e-12))) if fall > 0.0 else 0.0
+
+    def _pushes(self, effect: Effect, shape: tuple[float, ...]) -> list[Push]:
+        """A little of the candidate, once for every gain."""
+        shapes = iter(shape)
+        held: dict[Name, float] = {(effect.name, p.name): next(shapes) for p in effect.parameters if not p.linear}
+        gains = [(i, p) for i, p in enumerate(effect.parameters) if p.linear]
+        if not gains:
+            return [(held, False)]
+        larger = dict(effect.ordered)
+        out: list[Push] = []
+        for i, p in gains:
+            unit = self._unit(effect, shape, i)
+            if unit == 0.0:
+                continue
+            little = LITTLE * self.problem.torque_nm / unit
+            for run in self.fit.shots if p.per_run else self.fit.shots[:1]:
+                push = dict(held)
+                own = (effect.name, p.name, str(run.number)) if p.per_run else (effect.name, p.name)
+                push[own] = little
+                if p.name in larger:
+                    push[(effect.name, larger[p.name])] = little
+                out.append((push, p.low < 0.0))
+        return out
+
+    def _unit(self, effect: Effect, shape: tuple[float, ...], gain: int) -> float:
+        """Root mean square torque of a gain of one along the measured motion."""
+        if effect.place in (Place.DRIVE, Place.SENSOR):
+            return 1.0
+        for trace in self.problem.traces:
+            pieces = trace.effect_pieces(effect, shape, gain)
+            if pieces is not None:
+                size = float(np.sqrt(np.mean(pieces[:, 0] ** 2)))
+                if size > 0.0:
+                    return size
+        return 0.0
+
+    def _direction(self, effect: Effect, push: dict[Name, float]) -> Array | None:
+        """What the push changes in the scaled innovations of all runs, biases projected out."""
+        fit = self.fit
+        structure = fit.structure.plus(effect.name)
+        names = names_of(structure, self.problem.runs)
+        vector = np.array([fit.values.get(n, push.get(n, 0.0)) for n in names])
+        own = {int(n[2]) for n in push if len(n) == 3}
+        out: list[Array] = []
+        for i, s in enumerate(fit.shots):
+            if own and s.number not in own:
+                out.append(np.zeros(len(self.base[i])))
+                continue
+            look = self.problem.look(s, structure, names, vector, fit.noise, s.bias)
+            moved = look.innovations[s.weight] / np.sqrt(look.variance[s.weight])
+            change = self.base[i] - moved
+            if not np.all(np.isfinite(change)):
+                return None
+            out.append(self._apart(change[:, None], i)[:, 0])
+        return np.concatenate(out)
+
+
+def _start(effect: Effect, pushes: Sequence[Push], share: Array) -> dict[Name, float]:
+    out: dict[Name, float] = {}
+    for (push, _), s in zip(pushes, share, strict=True):
+        for name, value in push.items():
+            p = next(q for q in effect.parameters if q.name == name[1])
+            if p.linear:
+                out[name] = float(np.clip(out.get(name, 0.0) + s * value, *bounds_of(name)))
+            elif len(effect.parameters) == 1 and p.low == 0.0:
+                out[name] = float(np.clip(value * np.clip(s, *SCALED), p.low, p.high))
+            else:
+                out[name] = value
+    for p in effect.parameters:  # gains whose unit does nothing stay at zero
+        if p.linear and not p.per_run:
+            out.setdefault((effect.name, p.name), max(p.low, 0.0))
+    return out
+
+
+def bounded(square: Array, along: Array, lowest: Array) -> tuple[Array, float]:
+    """Least squares with lower bounds of zero on some unknowns, and the fall of the sum of squares."""
+    active = np.ones(len(along), dtype=bool)
+    x = np.zeros(len(along))
+    for _ in range(len(along) + 1):
+        x[:] = 0.0
+        if not np.any(active):
+            break
+        x[active] = np.linalg.pinv(square[np.ix_(active, active)], rcond=SINGULAR, hermitian=True) @ along[active]
+        wrong = active & (x < lowest)
+        if not np.any(wrong):
+            break
+        active &= ~wrong
+    return x, max(0.0, float(2.0 * along @ x - x @ square @ x))

@@ -1,0 +1,127 @@
+"""The search as far as the sensor's noise lets it see: by prediction error, on samples that tell most, decided on all.
+
+What it finds stands where its last model predicts down to the sensor's noise. Where a torque that nobody recorded is
+left it does not: whether that is a disturbance or an effect outside the library is a matter of weight, in torque.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.estimate.cross_validation import Judged, horizon_s
+from identify.estimate.fit import Fit
+from identify.estimate.initial_guess import Start
+from identify.estimate.output_error import Estimate
+from identify.estimate.prediction_error import PredictionError
+from identify.model.parameters import Name
+from identify.model.structure import Structure
+from identify.results import Candidate
+from identify.runs.holdout import Split
+from identify.runs.observability import why_unseen
+from identify.runs.reduced import reduced, thinned
+from identify.select.search_state import Search
+from identify.select.stepwise import AT_NOISE, Stepwise, disturbed
+from identify.signals.trace import Trace, loads_differ
+from rig import effects
+from rig.platform import TERMS
+
+SAMPLES = 10_000  # that the search looks at
+ALL = 40_000  # samples on which rivals are parted
+MORE = 1.5  # times the samples: else there is nothing more to be seen in all of them
+
+
+@dataclass
+class SensorLimited:
+    """The search by prediction error on one recording.
+
+    Attributes
+    ----------
+    stepwise
+        The search over structures.
+    found
+        What it found so far, for the report.
+    """
+
+    stepwise: Stepwise
+    traces: Sequence[Trace]
+    structure: Structure
+
+    @classmethod
+    def of(
+        cls, traces: Sequence[Trace], split: Split, structure: Structure, declared: Mapping[Name, float], start: Start,
+        allowed: Sequence[str], say: Callable[[str], None],
+    ) -> SensorLimited:  # fmt: skip
+        """The search, its first model fitted.
+
+        Parameters
+        ----------
+        declared
+            Values of the declared model: effects begin there, and J, C, K where that fits better.
+        start
+            A first idea of the platform.
+        """
+        few, _ = reduced(traces, split, SAMPLES)
+        problem = PredictionError(few)
+        guessed: dict[Name, float] = {(k,): v for k, v in zip(TERMS, start.platform, strict=True)}
+        first = {**declared, **guessed}
+        base = problem.fit(structure, first)
+        if disturbed(base) > AT_NOISE:  # of two minima this may be the other
+            twin = problem.fit(structure, {**guessed, **declared})
+            base = min((base, twin), key=lambda f: f.cost)
+        count = sum(t.count for t in traces)
+        whole = None
+        if count > MORE * base.count:
+            whole = PredictionError(thinned(traces, split.everything, ALL)[0])
+        offered = [n for n in allowed if n not in structure.effects and _possible(n, traces)]
+        return cls(Stepwise(problem, base, offered, say, whole, count), traces, structure)
+
+    def run(self) -> bool:
+        """Search; whether the last model predicts down to the sensor's noise."""
+        return disturbed(self.stepwise.run()) < AT_NOISE
+
+    @property
+    def found(self) -> Search:
+        """What was looked at so far, as the report tells it."""
+        s = self.stepwise
+        best, base = s.best, s.base
+        horizon = horizon_s(tuple(base.values.get((t,), 0.0) for t in TERMS), self.traces)  # type: ignore[arg-type]
+        noise = float(np.sqrt(np.mean([t.noise**2 for t in self.traces])))
+        found = Search(_judged(base), _judged(best), horizon, noise, free_running=True)
+        named = [e for e in best.structure.effects if e not in base.structure.effects]
+        for r in s.rounds:
+            for score in r.scores:
+                fit = r.tried.get(score.effect)
+                bic = (fit.penalised - r.now.penalised) if fit is not None else -score.gain
+                found.candidates.append(
+                    Candidate(score.effect, r.number, bic, None, _status(score.effect, r.chosen, named, fit))
+                )
+        rivals = {k: s.rivals.get(k, {}) for k in named}
+        found.rivals = {k: tuple(v) for k, v in rivals.items()}
+        found.rival_models = {k: {n: f.platform() for n, f in v.items()} for k, v in rivals.items()}
+        found.dropped = [(n, why) for n, why in s.dropped if n not in (*best.structure.terms, *best.structure.effects)]
+        return found
+
+
+def _status(name: str, chosen: str | None, named: Sequence[str], fit: Fit | None) -> str:
+    if name == chosen:
+        return "added" if name in named else "added, then no longer needed"
+    if fit is None:
+        return "screened out"
+    return "no better" if chosen else "not worth it"
+
+
+def _judged(fit: Fit) -> Judged:
+    """A fit as the final fits and the report see it."""
+    noise = float(np.sqrt(fit.variance * disturbed(fit)))
+    estimate = Estimate(
+        fit.structure, fit.names, fit.vector, noise, fit.count, fit.information, fit.shots, True
+    )  # fmt: skip
+    return Judged(fit.structure, estimate, np.array([noise**2]), np.ones(1))
+
+
+def _possible(name: str, traces: Sequence[Trace]) -> bool:
+    needs = effects.get(name).needs_added_inertia
+    return not why_unseen(name, traces) and (not needs or loads_differ(traces))
