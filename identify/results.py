@@ -226,14 +226,31 @@ class Unparted:
 
 @dataclass(frozen=True)
 class Dependence:
-    """What the torque that is left goes with, as a free-form term beside the model shows it."""
+    """What the torque that is left depends on, as a free-form term beside the model shows it.
 
-    on: str  # "angle", "rate", "direction", "torque", "time", "history"
-    torque_rms: float  # of that part, N m
-    relative: float  # over the torque
-    false_alarm: float  # how often chance alone would show as much
-    at: tuple[float, ...] = ()  # where the term is shown ...
-    shape_nm: tuple[float, ...] = ()  # ... and the torque there
+    Attributes
+    ----------
+    on
+        "angle", "rate", "direction", "torque", "time" or "history".
+    torque_rms
+        Root mean square of that part, N m.
+    relative
+        The same over the torque.
+    false_alarm
+        How often chance alone would show as much.
+    at
+        Where the term's shape is shown: rad, rad/s, N m, seconds since the start of the run, or -1 and 1 for the
+        two directions. Empty for what depends on the past, which no single number describes.
+    shape_nm
+        The torque there, N m, without the constant and the linear part that J, C and K take up.
+    """
+
+    on: str
+    torque_rms: float
+    relative: float
+    false_alarm: float
+    at: tuple[float, ...] = ()
+    shape_nm: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -262,6 +279,15 @@ class Disturbance:
     def material_percent(self) -> float:
         """The part that goes with something, in percent of the torque."""
         return 100.0 * sum(d.relative**2 for d in self.depends_on) ** 0.5
+
+
+@dataclass(frozen=True)
+class Implausible:
+    """Fitted numbers that are off from the declared ones by a factor that a wrong unit or sign would make."""
+
+    parameters: tuple[str, ...]
+    fitted_over_declared: float
+    sentence: str  # with the likely cause
 
 
 @dataclass(frozen=True)
@@ -317,6 +343,8 @@ class Identification:
     residual_after: ResidualDiagnosis | None = None  # None where nothing was added or dropped
     torque_scale: ParameterEstimate | None = None  # shaft's over recorded; where runs carry a known added inertia
     disturbance: Disturbance | None = None  # None without a torque
+    declared: Mapping[str, float] = field(default_factory=dict)  # numbers that somebody gave, by name, in SI units
+    plausibility: tuple[Implausible, ...] = ()
     note: str = ""  # why an error in the table grew although the model is better
     scale_shows: bool = False  # whether runs carry one, so that a scale of the torque is no part of J, C and K
 

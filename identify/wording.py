@@ -18,6 +18,7 @@ SYMBOLS = {
 MOST_DIGITS = 7  # significant digits: torque and gyro scales are never calibrated better than 1e-6
 NORMAL_95 = 1.96  # half a 95 % interval in standard errors
 TWO_DIGITS_UP_TO = 3.55  # leading digits of an uncertainty, rule of the Particle Data Group: 1.0 to 3.5 get two digits
+MANY_TIMES = 3.0  # from here on a factor reads better than a percentage
 _TITLES = {"rotary": "rotary inertia", "linear": "mass"}
 
 
@@ -152,6 +153,16 @@ def percent(value: float | None) -> str:
     return f"{signed(value, 3 if abs(value) >= 10 else 2)} %"
 
 
+def off_by(ratio: float) -> str:
+    """How far a value is off, from it over the right one: "9.8 % too high", "about 16 times too high"."""
+    if ratio < 0.0:
+        return "of the wrong sign"
+    if ratio >= MANY_TIMES:
+        return f"about {number(ratio, 2)} times too high"
+    off = 100.0 * (ratio - 1.0)
+    return f"{percent(abs(off)).lstrip('+')} too {'high' if off > 0 else 'low'}"
+
+
 def errors_in_turn(identification: Identification) -> dict[str, Errors]:
     """What each model in turn leaves, all on the same samples, by what a table calls it.
 
@@ -173,6 +184,16 @@ def bent_percent(identification: Identification) -> dict[str, float]:
     before, after = identification.before.parameters, identification.after.parameters
     shared = [name for name in before if name in after and after[name].value != 0.0]
     return {name: 100.0 * (before[name].value / after[name].value - 1.0) for name in shared}
+
+
+def declared_number(identification: Identification, name: str, estimate: ParameterEstimate | None) -> str:
+    """The number that somebody declared, with the digits that it was given with and in the unit of the row; else ""."""
+    given = identification.declared.get(name)
+    if given is None:
+        return ""
+    shown = estimate if estimate is None else readable(estimate)
+    in_ms = estimate is not None and shown is not None and shown.unit != estimate.unit
+    return f"{1e3 * given if in_ms else given:g}"
 
 
 def frequency(value: float | None) -> str:
@@ -197,19 +218,28 @@ def not_reported(several: Sequence[NotReported]) -> list[str]:
 def left_over(left: Disturbance, axis: str) -> str:
     """What is left after the final model, in one sentence: how large a torque, and what it goes with."""
     torque = "force" if axis == "linear" else "torque"
-    size = f"{number(left.torque_rms, 2)} {unit(left.unit)} rms, {number(100.0 * left.relative, 2)} % of the {torque}"
+    size = f"{number(left.torque_rms, 2)} {unit(left.unit)} rms ({number(100.0 * left.relative, 2)} % of the {torque})"
     if not left.depends_on:
         return (
-            f"What is left is a {torque} of {size}; it depends on nothing that was tried: noise, and in the intervals."
+            f"The final model leaves a {torque} of {size}. It depends on nothing that was tried: it is noise, and the "
+            "intervals include it."
         )
-    each = joined([f"{number(100.0 * d.relative, 2)} % with the {d.on}" for d in left.depends_on])
+    each = joined([f"{number(100.0 * d.relative, 2)} % on the {depends_on(d.on, axis)}" for d in left.depends_on])
     moved = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in left.moves_percent.items()])
-    told = f" A free-form term of that beside the model moves {moved}." if moved else ""
-    return f"What is left is a {torque} of {size}; part of it goes with something: {each}.{told}"
+    told = f" Fitting that part as well changes {moved}." if moved else ""
+    return f"The final model leaves a {torque} of {size}. Part of it depends on something: {each}.{told}"
+
+
+def depends_on(quantity: str, axis: str) -> str:
+    """What a torque depends on, in words: "angle" is "position" on a linear axis, "history" the past motion."""
+    words = {"angle": "position", "rate": "speed", "torque": "force"} if axis == "linear" else {}
+    return "past motion" if quantity == "history" else words.get(quantity, quantity)
 
 
 def without(times: float) -> str:
     """What an effect contributes: the held-out error without it over the one with it."""
+    if times <= 1.0:
+        return "Without it, after refitting, the error on held-out data is no larger."
     return f"Without it, even after refitting, the error on held-out data is {number(times, 3)} times larger."
 
 

@@ -161,6 +161,7 @@ class _CampaignRecorder:
             stop=self._context.stops.poll,
             probe=None if asked is None else Probe(asked, config.limits, platform, self._sets),
             keep_runs=in_memory,
+            declared=platform,
         )
         try:
             with self._context.stops.playing(stage.rig.torque_off):

@@ -19,11 +19,13 @@ if TYPE_CHECKING:
 
 def identified(context: CommandContext, loaded: LoadedConfig, recording: Recording) -> Identification:
     """What the recording shows. ``info``, which quotes the configuration, stays outside."""
+    from identify.conclude.plausibility import with_declared
     from identify.pipeline import identify
 
     config = loaded.config
     blind = dataclasses.replace(recording, info={})
-    return identify(blind, config.model.platform(), config.identify, context.terminal.note)
+    found = identify(blind, config.model.platform(), config.identify, context.terminal.note)
+    return with_declared(found, config.model.declared_numbers)
 
 
 def conclude(

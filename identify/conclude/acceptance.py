@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from identify.results import Disturbance, ModelResult
-from identify.wording import SYMBOLS, joined, number
+from identify.wording import SYMBOLS, depends_on, joined, number
 from rig.config.identify import AcceptConfig
 from rig.platform import TERMS
 
@@ -15,18 +15,19 @@ def too_much_left(left: Disturbance, accept: AcceptConfig, axis: str) -> list[st
     if not left.depends_on:
         return []
     torque = "force" if axis == "linear" else "torque"
-    on = joined(list(dict.fromkeys(d.on for d in left.depends_on)))
+    on = joined(list(dict.fromkeys(depends_on(d.on, axis) for d in left.depends_on)))
     out = []
     if left.material_percent > accept.torque_percent:
         out.append(
-            f"what is left goes with {on} and is {number(left.material_percent, 2)} % of the {torque}; "
-            f"{number(accept.torque_percent, 2)} % is allowed (identify.accept.torque_percent)"
+            f"the {torque} that is left and depends on the {on} is {number(left.material_percent, 2)} % of the "
+            f"{torque}; {number(accept.torque_percent, 2)} % is allowed (identify.accept.torque_percent)"
         )
     for name in TERMS:
         moved, most = left.moves_percent.get(name, 0.0), getattr(accept, f"{name}_percent")
         if moved > most:
             out.append(
-                f"what is left goes with {on} and moves {SYMBOLS[name]} by {number(moved, 2)} %; "
+                f"fitting the {torque} that is left and depends on the {on} changes {SYMBOLS[name]} by "
+                f"{number(moved, 2)} %; "
                 f"{number(most, 2)} % is allowed (identify.accept.{name}_percent)"
             )
     return out
@@ -40,6 +41,6 @@ def grown(before: ModelResult, after: ModelResult | None) -> str:
     if old is None or new is None or new <= GROWN * old:
         return ""
     return (
-        "The held-out free run is further off than that of the declared model: over a whole run a torque that was not "
-        "recorded adds up, and how far it leads astray says little of the model. The torque residual decided."
+        "The final model's held-out error in free run is larger than the declared model's. Over a whole run, a torque "
+        "that was not recorded accumulates, so this error says little about the model; the torque residual decided."
     )

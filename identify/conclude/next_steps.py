@@ -35,19 +35,19 @@ RELEASED_RUN = {  # the same without a motor
 }
 LINEAR = {"rate": "speed", "angle": "position", "torque": "force"}
 OTHERWISE = (
-    "The residual depends on none of rate, angle, torque and time: look in its spectrum and the frequency "
-    "response for where it sits; add a multisine (0.5 Hz to beyond the resonance) if none was played, and one run with "
-    "zero torque and the drive enabled."
+    "The residual depends on none of rate, angle, torque and time: its spectrum and the frequency response show at "
+    "which frequencies it is large. Add a multisine (0.5 Hz to beyond the resonance) if none was played, and one run "
+    "with zero torque and the drive enabled."
 )
 
 
 RELEASED = (
     "The residual depends on neither rate nor angle nor time: release the platform from other angles, record each "
-    "until it rests, and play a campaign with torque: a decay shows ratios only, and few of its causes."
+    "until it rests, and play a campaign with torque: a decay shows only ratios, and few causes."
 )
 COLOURED = (
-    "The noise floor is estimated from the fastest changes alone: where the sensor's own noise is slower than that "
-    "(coloured), this is it. Record the sensor at rest, drive off, and give the noise's root mean square as "
+    "The noise floor is estimated from the fastest changes alone. If the sensor's noise is slower (coloured), the "
+    "residual may be that noise: record the sensor at rest with the drive off, and give the rms of the noise as "
     "recorded.noise."
 )
 NEAR_FLOOR = 4.0  # times the noise floor
@@ -103,7 +103,7 @@ def unexplained_reason(ratio: float, found: Identification) -> str:
     told = f"{share} ({size})" if share else size
     acts = "none of the effects tried describes it"
     if found.verdict.left_open:
-        acts = "part of it is what the verdict leaves open"
+        acts = "the verdict leaves open what part of it is"
     return f"the model leaves {told} unexplained: {acts}"
 
 
@@ -147,14 +147,14 @@ def _by_what_it_goes_with(found: Identification) -> list[str]:
     name, share = next(iter(shares.items()), ("", 0.0))
     late = _begun_in_motion(found.traces)
     if late:
-        late = [f"{capital(joined(late))} {'begins' if len(late) == 1 else 'begin'} in motion: what remembers (creep, "
-                "hysteresis, a second mode) is known from rest only, and is not found there. Begin every recording "
-                "before the torque does."]  # fmt: skip
+        late = [f"{capital(joined(late))} {'begins' if len(late) == 1 else 'begin'} in motion: effects with memory "
+                "(creep, hysteresis, a second mode) cannot be found there, because their start state is known only at "
+                "rest. Start every recording before the torque."]  # fmt: skip
     free = torque_free(found)
     if share < TELLING:
         return [*late, RELEASED if free else OTHERWISE]
     run = RELEASED_RUN[name] if free else RUN[name]
-    told = f"{number(100.0 * share, 2)} % of the residual's power goes with the {name}. {run}"
+    told = f"{number(100.0 * share, 2)} % of the residual's power depends on the {name}. {run}"
     if found.axis == "linear":
         for rotary, linear in LINEAR.items():
             told = told.replace(f" {rotary}", f" {linear}")
@@ -178,6 +178,6 @@ def _to_reach(runs: Sequence[GeneticRun]) -> str:
             "help; look at the residual of these sets first, and record them once more."
         )
     return (
-        f"{capital(joined([r.name for r in runs]))}: the closed-form optimum lies below J_dec, the search has not got "
-        "there: raise identify.genetic.generations or identify.genetic.restarts."
+        f"{capital(joined([r.name for r in runs]))}: the closed-form optimum lies below J_dec, but the search did not "
+        "reach it: raise identify.genetic.generations or identify.genetic.restarts."
     )

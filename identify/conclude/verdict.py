@@ -14,7 +14,7 @@ from identify.wording import (
     joined,
     left_over,
     number,
-    percent,
+    off_by,
     plain,
     readable,
     title,
@@ -47,9 +47,9 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
         scale = found.torque_scale
         off = abs(scale.value - 1.0) > 1.96 * scale.std_error
         out.append(
-            f"From the known added inertia the torque on the shaft is {number(scale.value, 5)} +- "
-            f"{number(1.96 * scale.std_error, 2)} of the recorded one"
-            + ("; J, C and K are that much larger or smaller." if off else ": the torque scale is right.")
+            f"The known added inertia shows that the torque on the shaft is {number(scale.value, 5)} +- "
+            f"{number(1.96 * scale.std_error, 2)} times the recorded one"
+            + ("; J, C and K are larger or smaller by the same factor." if off else ": the torque scale is right.")
         )
     out += _known_badly(found)
     out += _unseen_scale(found)
@@ -71,7 +71,7 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
                 f"{capital(plain(name))} is relative to {number(read.reference, 5)}: J, C and K are the values there."
             )
         elif read is not None and read.kind == "current":
-            out.append(f"{capital(plain(read.name))} counts {number(read.factor, 5)} N m for an ampere.")
+            out.append(f"{capital(plain(read.name))}: one ampere acts as {number(read.factor, 5)} N m.")
     out += [
         f"{capital(joined([plain(n) for n in pair.split(' / ')]))} cannot be separated: {why}."
         for pair, why in found.verdict.never_separable.items()
@@ -86,7 +86,7 @@ def _decided_in_torque(found: Identification) -> bool:
 def _nothing_named(found: Identification) -> str:
     """Why no effect is named."""
     if _decided_in_torque(found):
-        return "no candidate explains a fifth of the torque that is left throughout the record."
+        return "no candidate explains 20 % of the residual torque throughout the record."
     if found.verdict.unexplained:
         return "no candidate explains the residual."
     return "the declared model already reaches the noise floor."
@@ -98,10 +98,10 @@ def _unseen_scale(found: Identification) -> list[str]:
     if found.scale_shows or not given:
         return []
     torque, kind = ("force", "mass") if found.axis == "linear" else ("torque", "inertia")
-    makes = "larger or smaller alike" if len(given) > 1 else "larger or smaller"
+    makes = "by the same factor " if len(given) > 1 else ""
     return [
-        f"A scale error of the {torque} or the sensor makes {joined(given)} {makes} and cannot be seen in these runs; "
-        f"runs with a known added {kind} (added_inertia_kg_m2) show it."
+        f"A scale error of the {torque} or of the sensor changes {joined(given)} {makes}and does not show in these "
+        f"runs. To detect it, add runs with a known added {kind} (added_inertia_kg_m2)."
     ]
 
 
@@ -142,10 +142,9 @@ def _bent(found: Identification) -> list[str]:
         after = found.after.parameters.get(name)
         if after is None or after.value == 0.0:
             continue
-        off = 100.0 * (before.value / after.value - 1.0)
-        if abs(off) >= SHOWN_PERCENT:
-            way = "high" if off > 0 else "low"
-            moved.append(f"{title(name, found.axis)} is {percent(abs(off)).lstrip('+')} too {way}")
+        ratio = before.value / after.value
+        if abs(100.0 * (ratio - 1.0)) >= SHOWN_PERCENT:
+            moved.append(f"{title(name, found.axis)} is {off_by(ratio)}")
     return [f"{_change(found)}, {joined(moved)}."] if moved else []
 
 

@@ -90,7 +90,7 @@ def free_forms(regression: TorqueRegression) -> list[FreeForm]:
         FreeForm("direction", np.tanh(rate / slow)[:, None], np.array([-1.0, 1.0]), np.array([[-1.0], [1.0]])),
     ]  # fmt: skip
     if float(np.max(time)) > 0.0:
-        out.append(_spline("time", time / max(float(np.max(time)), 1e-300)))
+        out.append(_spline("time", time))
     out.append(_history(rate, run, regression))
     return [f for f in out if f.columns.shape[1] > 0 and np.all(np.isfinite(f.columns))]
 

@@ -10,9 +10,9 @@ from identify.wording import number
 
 ENOUGH = 0.5  # of what is left, that it has to make
 TOLD = (
-    "The recorded {torque} carries noise of {noise} {unit} a sample, {passed} {unit} below {cutoff:g} Hz, of the "
-    "{left} {unit} that are left there. Record the {torque} that the drive was asked for instead, or measure it with "
-    "less noise: until then nothing small shows beside that."
+    "The recorded {torque} contains noise of {noise} {unit} rms a sample; {passed} {unit} of it lies below {cutoff:g} "
+    "Hz, where the residual is {left} {unit}. Record the commanded {torque} instead, or measure it with less noise: "
+    "smaller effects are hidden by it."
 )
 
 

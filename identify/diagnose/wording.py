@@ -41,10 +41,10 @@ def _level(found: ResidualDiagnosis, more: bool) -> str:
     if over is None:
         return ""
     if not more and over < AT_THE_NOISE:
-        return f"{what} is at the sensor's noise ({number(over, 3)} times), and no structure stands out of it."
+        return f"{what} is at the level of the sensor's noise ({number(over, 3)} times) and shows no structure."
     looked_for = "harmonics, free lines, direction or memory" if found.direction is not None else "free lines"
     rest = "" if more else f"; it shows no {looked_for}"
-    return f"{what} is {number(over, 3)} times what the sensor's noise leaves{rest}."
+    return f"{what} is {number(over, 3)} times as large as the sensor's noise alone would make it{rest}."
 
 
 def _harmonics(found: Harmonics | None) -> list[str]:
@@ -52,7 +52,9 @@ def _harmonics(found: Harmonics | None) -> list[str]:
         return []
     begin = f"{_percent(found.repeats.share)} of it repeats with the excitation"
     if found.own is None or found.odd is None or found.even is None:
-        return [f"{begin}, which has odd and even multiples itself and so hides which of them the platform makes."]
+        return [
+            f"{begin}. The excitation has odd and even multiples itself, so those of the platform cannot be told apart."
+        ]
     parts, why = [], []
     if told(found.own):
         parts.append(f"{_percent(found.own.share)} at the played frequency")
@@ -80,8 +82,8 @@ def _direction(share: Share | None) -> list[str]:
     if share is None or not told(share):
         return []
     return [
-        f"{_percent(share.share)} of it changes sign with the direction of motion at the same angle: friction, or the "
-        "two branches of a loop."
+        f"{_percent(share.share)} of it changes sign with the direction of motion at the same angle: friction or "
+        "hysteresis."
     ]
 
 
@@ -100,8 +102,8 @@ def _moments(found: Sequence[Moment]) -> list[str]:
     places = [f"{m.run} from {m.from_s:.2f} to {m.to_s:.2f} s ({_percent(m.share)})" for m in found]
     share = _percent(sum(m.share for m in found))
     return [
-        f"{share} of it lies in {joined(places)}: something happened there and at no other time (a touch, "
-        "a slip, the start of a run). Leave it out with from_s or to_s, or record the run again."
+        f"{share} of it lies in {joined(places)}: something happened only then (a touch, a slip, the start "
+        "of a run). Leave it out with from_s or to_s, or record the run again."
     ]
 
 

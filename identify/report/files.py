@@ -53,6 +53,8 @@ def result_json(identification: Identification) -> dict[str, Any]:
         "after": _model(identification.after) if identification.after else None,
         "noise_floor": dict(vars(identification.noise_floor)),
         "disturbance": _disturbance(identification.disturbance),
+        "declared": dict(identification.declared),
+        "plausibility": [dict(vars(one)) for one in identification.plausibility],
         "note": identification.note,
         "residual": _residual(identification),
         "per_set": [_set(one) for one in identification.per_set],
@@ -224,11 +226,11 @@ def _scale_lines(declared: Platform, inertia_declared: bool) -> list[str]:
     if inertia_declared:
         return [
             "No torque was recorded, so only ratios to the inertia are known: the declared inertia sets the scale.",
-            f"All else is in its units only as far as the declared {declared.inertia_kg_m2:g} is right.",
+            f"All other values are right only as far as the declared inertia of {declared.inertia_kg_m2:g} is.",
         ]
     return [
         "ONLY RATIOS TO THE INERTIA ARE KNOWN: no torque was recorded and no inertia declared (model.inertia_kg_m2).",
-        "All below is per unit of inertia. It replays the decay, and tells nothing of what a torque would move:",
+        "All values below are per unit of inertia. They replay the decay but do not say what a torque would move:",
         "`backend: bench` refuses it. Declare the inertia and identify again, or multiply by it all in N m (N m s/rad,",
         "...), set inertia_kg_m2 to it and take inertia_unknown out.",
     ]
@@ -238,9 +240,7 @@ def _standing(item: NotReported) -> str:
     """What the number of a parameter is that the data do not determine."""
     if item.as_declared:
         return "Not determined, kept as declared"
-    return (
-        "Not determined, NOT as declared: fitted, and good together with the others for motion like these runs' alone"
-    )
+    return "Not determined, NOT as declared: fitted, valid only with the other values and for motion like in these runs"
 
 
 def write_results(

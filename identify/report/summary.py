@@ -19,6 +19,7 @@ from identify.results import Identification, ParameterEstimate
 from identify.wording import (
     SYMBOLS,
     bent_percent,
+    declared_number,
     errors_in_turn,
     not_reported,
     number,
@@ -122,20 +123,25 @@ def _table(heading: str, columns: Sequence[str], words: Sequence[int] = (0,)) ->
 def _parameters(identification: Identification) -> Table:
     before, after, bent = identification.before, identification.after, bent_percent(identification)
     names = list(dict.fromkeys([*before.parameters, *(after.parameters if after else ())]))
-    head = ["", "declared model", *(["off by", "final model"] if after else []), "unit"]
+    given = ["declared"] if identification.declared else []
+    head = ["", *given, "declared model", *(["off by", "final model"] if after else []), "unit"]
     table = _table("Parameters, with 95 % intervals", head, words=(0, len(head) - 1))
     for name in names:
         first, last = before.parameters.get(name), (after or before).parameters.get(name)
         more = [percent(bent.get(name)), _estimate(last)] if after else []
         shown = last or first
-        table.add_row(title(name, identification.axis), _estimate(first), *more, unit(shown.unit) if shown else "")
+        number_given = [declared_number(identification, name, None) for _ in given]
+        name_of_row, unit_of_row = title(name, identification.axis), unit(shown.unit) if shown else ""
+        table.add_row(name_of_row, *number_given, _estimate(first), *more, unit_of_row)
     for effect, parameters in (after or before).effect_parameters.items():
         for name, found in parameters.items():
             earlier = before.effect_parameters.get(effect, {}).get(name)
             shown = found if earlier is not None and readable(earlier).unit != readable(found).unit else readable(found)
             first = earlier if earlier is None or shown is found else readable(earlier)
             more = ["", _estimate(shown)] if after else []
-            table.add_row(f"{plain(effect)}, {name.replace('_', ' ')}", _estimate(first), *more, unit(shown.unit))
+            number_given = [declared_number(identification, f"{effect}.{name}", found) for _ in given]
+            name_of_row = f"{plain(effect)}, {name.replace('_', ' ')}"
+            table.add_row(name_of_row, *number_given, _estimate(first), *more, unit(shown.unit))
     return table
 
 

@@ -46,7 +46,7 @@ def refuse_a_moment(traces: Sequence[Trace]) -> None:
     count = sum(t.count for t in traces)
     if count < FEWEST:
         raise RecordingError(
-            f"{count} usable samples in all (needed: {FEWEST}): too few to tell J, C and K from how the runs began; "
+            f"{count} usable samples in all (needed: {FEWEST}): too few to separate J, C and K from the start states; "
             "record longer, at least a few periods of the platform's own ring"
         )
 
@@ -80,6 +80,6 @@ def refuse_lowpass(traces: Sequence[Trace], lowpass_hz: float | None) -> None:
     half_hz = 0.5 / slowest.step_s
     if lowpass_hz is not None and lowpass_hz >= half_hz:
         raise RecordingError(
-            f"identify.lowpass_hz is {lowpass_hz:g}, and {slowest.run.name} holds nothing above {half_hz:g} Hz (half "
-            "of its sample rate): take less, or leave the key out to have it chosen from the data"
+            f"identify.lowpass_hz is {lowpass_hz:g}, and {slowest.run.name} contains nothing above {half_hz:g} Hz "
+            "(half of its sample rate): lower it, or remove the key to have it chosen from the data"
         )

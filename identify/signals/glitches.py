@@ -86,6 +86,5 @@ def told(runs: Sequence[tuple[str, Array]]) -> str:
         return ""
     where = "; ".join(f"{name} at {', '.join(f'{t:.4g}' for t in times)} s" for name, times in found)
     count = sum(len(times) for _, times in found)
-    each = "1 sample stands" if count == 1 else f"{count} samples stand"
-    left = "is" if count == 1 else "are"
-    return f"{each} more than {APART:g} times the noise apart from neighbours that agree and {left} left out: {where}"
+    each, are = ("1 sample deviates", "is") if count == 1 else (f"{count} samples deviate", "are")
+    return f"{each} by more than {APART:g} times the noise from neighbours that agree and {are} left out: {where}"

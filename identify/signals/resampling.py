@@ -90,8 +90,8 @@ def beat_of(name: str, time_s: Array) -> Beat:
     if int(index[-1]) + 1 > MOST_HOLES * len(time_s):
         widest = int(np.argmax(spacing))
         raise RecordingError(
-            f"{name}: {len(time_s)} samples {step:.3g} s apart span {time_s[-1]:.6g} s, with a hole of "
-            f"{spacing[widest]:.6g} s after {time_s[widest]:.6g} s: make two runs of it with from_s and to_s"
+            f"{name}: {len(time_s)} samples {step:.3g} s apart span {time_s[-1]:.6g} s, with a gap of "
+            f"{spacing[widest]:.6g} s after {time_s[widest]:.6g} s: split it into two runs with from_s and to_s"
         )
     if np.max(np.abs(time_s / step - index)) < EVEN * min(1.0, step / 1e-9):
         return Beat(float(time_s[-1] / index[-1]), 0.0, index)
@@ -173,6 +173,6 @@ def told(runs: Sequence[tuple[str, float, bool]]) -> str:
     which = ", ".join(name for name, _ in wrong)
     most = max(scatter_s for _, scatter_s in wrong)
     return (
-        f"Time stamps of {which} scatter by up to {1e6 * most:.3g} us (rms) about an even beat, which the samples "
-        "themselves do not: they were taken as even"
+        f"Time stamps of {which} scatter by up to {1e6 * most:.3g} us (rms) about an even grid, but the motion shows "
+        "that the samples are even: even spacing is assumed"
     )

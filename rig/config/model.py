@@ -44,6 +44,16 @@ class ModelConfig(Section):
         """Whether somebody gave the inertia: neither the default, nor the unit of an earlier decay."""
         return "inertia_kg_m2" in self.model_fields_set and not self.inertia_unknown
 
+    @property
+    def declared_numbers(self) -> dict[str, float]:
+        """What somebody gave, no defaults, in SI units: "inertia", "damping", "stiffness", "effect.parameter"."""
+        if self.inertia_unknown:
+            return {}
+        keys = {"inertia": "inertia_kg_m2", "damping": "damping_nm_s_rad", "stiffness": "stiffness_nm_rad"}
+        terms = {t: float(getattr(self, k)) for t, k in keys.items() if k in self.model_fields_set and t in self.terms}
+        given = {f"{e}.{p}": float(v) for e, values in self.effects.items() for p, v in values.items()}
+        return terms | given
+
     def platform(self) -> Platform:
         """The declared platform; a term that is left out is zero."""
         return Platform(

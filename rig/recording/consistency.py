@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +63,8 @@ def _without_trend(time_s: Array, values: Array) -> Array:
 def check_angle_against_rate(run: Run, path: Path) -> bool:
     """True where angle and rate were seen to agree, False where that cannot be told.
 
-    Raises RecordingError where they disagree by a constant factor, or where the angle wraps.
+    Raises RecordingError where they disagree by a constant factor, where one is the other's column, or where the angle
+    wraps.
     """
     _check_wrap(run, path)
     compared = angle_over_rate(run)
@@ -72,13 +74,26 @@ def check_angle_against_rate(run: Run, path: Path) -> bool:
     deviation = abs(factor - 1)
     sure = abs(correlation) > SURE_CORRELATION and deviation > SURE_DEVIATION
     likely = abs(correlation) > LIKELY_CORRELATION and deviation > LIKELY_DEVIATION
+    if not sure and not likely and abs(correlation) > LIKELY_CORRELATION:
+        return True
+    if _columns_swapped(run):
+        raise RecordingError(
+            f"{path}: the columns of angle and rate seem to be swapped: what was read as the angle is the derivative "
+            "of what was read as the rate: exchange recorded.columns.angle and recorded.columns.rate"
+        )
     if not sure and not likely:
-        return abs(correlation) > LIKELY_CORRELATION
+        return False
     meaning, cure = _meaning(factor)
     raise RecordingError(
         f"{path}: angle and rate disagree: the angle changes {factor:.4g} times as fast as the rate says; "
         f"probably {meaning}: set {cure}"
     )
+
+
+def _columns_swapped(run: Run) -> bool:
+    """Whether angle and rate agree, number for number, once each is taken for the other."""
+    compared = angle_over_rate(replace(run, angle_rad=run.rate_rad_s, rate_rad_s=run.angle_rad))
+    return compared is not None and compared[1] > SURE_CORRELATION and abs(compared[0] - 1) < SURE_DEVIATION
 
 
 def _meaning(factor: float) -> tuple[str, str]:

@@ -26,11 +26,14 @@ class GuardedTick:
     ----------
     verdict_s
         The instant on the clock at which the first error was known, before anything was done about it; None so far.
+    trip
+        The broken limit, where one was.
     """
 
     def __init__(self, rig: Rig, clock: Clock, guard: Guard, stop: Callable[[], str | None]) -> None:
         self._rig, self._clock, self._guard, self._stop = rig, clock, guard, stop
         self.verdict_s: float | None = None
+        self.trip: Trip | None = None
 
     def note_verdict(self) -> None:
         """The instant at which the first error was known; it ends up in the journal and in ``Campaign``."""
@@ -74,6 +77,7 @@ class GuardedTick:
 
     def _tripped(self, trip: Trip) -> SafetyTrip:
         self.note_verdict()
+        self.trip = trip
         try:
             self._rig.torque_off()  # the shortest road: before anything is formatted or written
         except RigError as fault:

@@ -21,9 +21,11 @@ from rig.errors import Aborted, DeviceFault, RigError, SafetyTrip
 from rig.excitation import PlannedSet
 from rig.guard import Guard, Rest
 from rig.interface import Rig
+from rig.platform import Platform
 from rig.recording.journal import Journal
 from rig.recording.retiming import NO_RETIMING
 from rig.recording.run import Recording
+from rig.sequencer.declared_motion import explained
 from rig.sequencer.guarded_tick import GuardedTick
 from rig.sequencer.observer import Observer, Progress
 from rig.sequencer.probe import Probe
@@ -83,6 +85,8 @@ class Sequencer:
     keep_runs
         Whether runs stay in memory; where they do not, the journal has them, and a long campaign needs no more
         memory than a short one.
+    declared
+        The platform that the pre-flight predicted with; a trip then says where it may be wrong.
     """
 
     def __init__(
@@ -98,6 +102,7 @@ class Sequencer:
         stop: Callable[[], str | None] = lambda: None,
         probe: Probe | None = None,
         keep_runs: bool = True,
+        declared: Platform | None = None,
     ) -> None:
         self._rig = rig
         self._clock = clock
@@ -106,7 +111,7 @@ class Sequencer:
         self._rest_s = rest_s
         self._journal = journal
         self._observer = observer or Observer()
-        self._probe, self._keep_runs = probe, keep_runs
+        self._probe, self._keep_runs, self._declared = probe, keep_runs, declared
         self._guarded = GuardedTick(rig, clock, guard, stop)
         self._recorders: list[SetRecorder] = []
         self._statistics: list[SetStatistics] = []
@@ -119,6 +124,7 @@ class Sequencer:
         """
         cause: RigError | None = None
         self._recorders, self._statistics = [], []
+        begun = 0
         try:
             with _without_garbage_collection(), self._rig.opened(), self._rig.armed():
                 self._guard.begin(self._clock.now_s(), Rest())
@@ -129,11 +135,13 @@ class Sequencer:
                     if number > 1:
                         self._hold_zero(self._rest_s, REST_PERIOD_S)
                     self._observer.set_begins(planned, number, len(sets))
+                    begun = number
                     self._play_set(planned)
         except KeyboardInterrupt:
             cause = Aborted("Stopped by Ctrl-C: torque is off; what was recorded until then is kept.")
         except RigError as error:
-            cause = _with_context(error)
+            trip = self._guarded.trip  # torque is off and all is closed: there is time to look at the model
+            cause = explained(_with_context(error), trip, self._declared, sets[:begun], self._rest_s)
         if cause is not None and self._journal is not None:
             with contextlib.suppress(RigError):
                 self._journal.event(self._now_s(), str(cause), {"aborted": True, "verdict_s": self._guarded.verdict_s})

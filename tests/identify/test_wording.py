@@ -8,6 +8,7 @@ from identify.wording import (
     interval_of,
     joined,
     number,
+    off_by,
     percent,
     plain,
     readable,
@@ -17,6 +18,7 @@ from identify.wording import (
     unit,
     value_of,
     with_interval,
+    without,
 )
 from tests.identify.sample import estimate
 
@@ -116,3 +118,17 @@ def test_lists_read_like_speech(words: list[str], said: str) -> None:
 )
 def test_a_sentence_begins_with_a_capital_and_ends_with_one_full_stop(words: str, said: str) -> None:
     assert sentence(words) == said
+
+
+@pytest.mark.parametrize(
+    ("ratio", "words"),
+    [(1.098, "9.8 % too high"), (0.9, "10 % too low"), (2.9, "190 % too high"), (16.43, "about 16 times too high"),
+     (-0.5, "of the wrong sign")],
+)  # fmt: skip
+def test_a_large_error_is_a_factor_and_a_small_one_a_percentage(ratio: float, words: str) -> None:
+    assert off_by(ratio) == words
+
+
+def test_an_effect_without_which_nothing_is_worse_is_not_said_to_make_it_a_fraction_of_times_larger() -> None:
+    assert "no larger" in without(0.31)
+    assert "478 times larger" in without(478.0)

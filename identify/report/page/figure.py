@@ -13,6 +13,7 @@ import numpy as np
 from rig.recording.run import Array
 
 MEASURED, BEFORE, AFTER, FLOOR = "#8a919b", "#d9662b", "#2b7bba", "#3c9d5d"
+NOISE = "rgba(60,157,93,0.22)"  # FLOOR, see-through: where noise alone would lie
 SETS = ("#5b8fd0", "#c9853f", "#4fa57c", "#b05f9c", "#8d8442", "#5aa7b5", "#a3645a", "#7a6fc0")
 Trace = dict[str, Any]
 
@@ -154,3 +155,11 @@ def band(x0: float, x1: float, panel: int = 1) -> dict[str, Any]:
         "y0": 0,
         "y1": 1,
     } | style
+
+
+def noise_band(half: float, panel: int = 1) -> dict[str, Any]:
+    """Everything nearer to zero than ``half``, in the unit of the panel's y axis, as a shape behind the data."""
+    number = "" if panel == 1 else str(panel)
+    style = {"fillcolor": NOISE, "line": {"width": 0}, "layer": "below"}
+    span = {"xref": f"x{number} domain", "yref": f"y{number}", "x0": 0, "x1": 1, "y0": -half, "y1": half}
+    return {"type": "rect"} | span | style

@@ -13,12 +13,14 @@ from identify.diagnose.wording import diagnosis_sentences
 from identify.follow_up.wording import lines as follow_up_lines
 from identify.report.page.convergence import convergence_figure, convergence_table
 from identify.report.page.determined import determined_table
+from identify.report.page.disturbance import disturbance_table, shape_figure
 from identify.report.page.document import Gallery, document
 from identify.report.page.estimates import estimates_figure
 from identify.report.page.markup import Markup, Piece, bullets, element, join, paragraph, section
 from identify.report.page.motion import RUNS, motion_figures
 from identify.report.page.residual import residual_figures
 from identify.report.page.response import response_figure
+from identify.report.page.spectrum import spectrum_figures
 from identify.report.page.tables import (
     candidate_table,
     correlation_table,
@@ -138,18 +140,22 @@ def _tiles(identification: Identification) -> Markup:
 def _errors(identification: Identification, gallery: Gallery) -> Markup:
     share = identification.verdict.unexplained_fraction
     state = (
-        f"Unexplained: the residual stays significantly above the noise floor ({number(100.0 * share, 2)} % of it)."
+        f"Unexplained: the residual stays significantly above the noise floor; {number(100.0 * share, 2)} % of what "
+        "the declared model leaves above it is still there."
         if identification.verdict.unexplained
         else "The residual is at the noise floor: nothing significant is unexplained."
     )
     left = identification.disturbance
     if left is not None and identification.final.error.holdout_measure == "holdout_torque_relative":
         state = left_over(left, identification.axis)
-    figures = [gallery.place(figure) for figure in residual_figures(identification)]
+    drawn = [*residual_figures(identification), *spectrum_figures(identification)]
+    figures = [gallery.place(figure) for figure in drawn]
     return section(
         "residual",
         "What is left unexplained",
         paragraph(state),
+        disturbance_table(identification),
+        gallery.place(shape_figure(identification)),
         error_table(identification),
         paragraph(sentence(identification.holdout_note), class_="note"),
         *_where_it_lives(identification),

@@ -260,8 +260,8 @@ def _caption(sets: Sequence[SetResponse], left_out: Sequence[str]) -> str:
     told = f"Estimated {joined(list(how))}. Lines: J, C, K and the linear effects of each model. "
     if left_out:
         told += (
-            f"{joined([plain(n) for n in left_out])} acts by amplitude and stands in no line: the open circles are the "
-            "model simulated with all its effects, read by the same estimate. "
+            f"{joined([plain(n) for n in left_out])} depends on the amplitude and is in none of the lines: the open "
+            "circles are the model simulated with all its effects, estimated in the same way. "
         )
     pale = sum(int(np.sum(~s.measured.trusted)) for s in sets)
     told += "Off by: distance of simulation and measurement over the larger of the two. "

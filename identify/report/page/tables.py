@@ -12,6 +12,7 @@ from identify.wording import (
     SYMBOLS,
     bent_percent,
     capital,
+    declared_number,
     errors_in_turn,
     frequency,
     half_of,
@@ -39,27 +40,35 @@ def parameter_table(identification: Identification) -> Markup:
     before, after = identification.before, identification.after
     bent = bent_percent(identification)
     names = list(dict.fromkeys([*before.parameters, *(after.parameters if after else ())]))
+    given = ["declared"] if identification.declared else []
     rows: list[list[Piece]] = []
     for name in names:
-        row: list[Piece] = [title(name, identification.axis), *_estimate(before, name)]
+        row: list[Piece] = [title(name, identification.axis)]
+        row += [declared_number(identification, name, None) for _ in given]
+        row += _estimate(before, name)
         row += [*_estimate(after, name), percent(bent.get(name))] if after else []
         rows.append([*row, _unit_of(name, before, after)])
-    rows += _effect_rows(before, after)
-    head = ["", "declared model", "95 % interval"]
+    rows += _effect_rows(identification)
+    head = ["", *given, "declared model", "95 % interval"]
     head += ["final model", "95 % interval", "declared model: off by"] if after else []
     return table(
         [*head, "unit"],
         rows,
-        "Fitted to all samples not declared held out. Declared model: only its own terms, without the added effects.",
+        "Fitted to all samples not declared held out. Declared model: only its own terms, without the added effects."
+        + (" Declared: the numbers under model: in the configuration, which are not used by the fit." if given else ""),
     )
 
 
-def _effect_rows(before: ModelResult, after: ModelResult | None) -> list[list[Piece]]:
+def _effect_rows(identification: Identification) -> list[list[Piece]]:
+    before, after = identification.before, identification.after
     rows: list[list[Piece]] = []
     for effect, parameters in (after or before).effect_parameters.items():
         for name, estimate in parameters.items():
             earlier = before.effect_parameters.get(effect, {}).get(name)
-            cells: list[Piece] = [f"{plain(effect)}, {name.replace('_', ' ')}", *_cells(_scaled_as(earlier, estimate))]
+            cells: list[Piece] = [f"{plain(effect)}, {name.replace('_', ' ')}"]
+            if identification.declared:
+                cells.append(declared_number(identification, f"{effect}.{name}", estimate))
+            cells += _cells(_scaled_as(earlier, estimate))
             cells += [*_cells(readable(estimate)), ""] if after else []
             rows.append([*cells, unit(readable(estimate).unit)])
     return rows

@@ -53,6 +53,17 @@ def test_a_campaign_that_is_accepted_ends_in_0_with_all_results(tmp_path: Path, 
     assert "Coulomb friction is missing" in done.stdout and str(out) in done.stdout
 
 
+def test_numbers_that_the_file_declares_stand_beside_the_fitted_ones_and_defaults_do_not(
+    tmp_path: Path, accepted: Identifier
+) -> None:
+    model = "model: {inertia_kg_m2: 1.163, stiffness_nm_rad: 39030}\n"  # 57.3 times what is fitted
+    done = command(app, write_config(tmp_path, f"{TWO_SETS}{model}"), "--out", tmp_path / "out")
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert result["declared"] == {"inertia": 1.163, "stiffness": 39030.0}
+    assert result["plausibility"][0]["parameters"] == ["inertia", "stiffness"]
+    assert "J and K are about 1/57 of the declared numbers" in " ".join(done.stdout.split())
+
+
 def test_one_that_is_not_accepted_ends_in_1_with_all_results_and_the_reason(
     tmp_path: Path, stubbed: Callable[[Identification], Identifier]
 ) -> None:

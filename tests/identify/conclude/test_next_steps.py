@@ -79,13 +79,13 @@ def test_without_a_motor_the_step_is_a_release_whatever_the_rest_goes_with(rest:
         return replace(t, torque_nm=None, torque_residual_after=None, simulated_after=left)
 
     (step,) = next_steps(replace(LOST, traces=tuple(of(t) for t in LOST.traces[4:])))
-    assert words in step and f"goes with the {rest}" in step
+    assert words in step and f"depends on the {rest}" in step
     assert "torque" not in step and "play" not in step and "ramp_hold_release" not in step
 
 
 def test_a_linear_axis_is_spoken_of_in_its_own_words() -> None:
     (step,) = next_steps(replace(with_rest(LOST, "rate"), axis="linear"))
-    assert "goes with the speed" in step
+    assert "depends on the speed" in step
     assert "half of its force" in step
 
 

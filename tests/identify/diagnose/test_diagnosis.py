@@ -29,7 +29,7 @@ def test_of_a_clean_platform_with_white_noise_nothing_is_said(seed: int) -> None
     assert not told(found.direction) and not told(found.memory, WORTH_OF_PAST)
     assert found.free_lines == ()
     (only,) = diagnosis_sentences(found, "rotary")
-    assert "no structure stands out" in only
+    assert "shows no structure" in only
 
 
 @pytest.mark.parametrize("name", ["cubic_stiffness", "torque_saturation", "backlash", "coulomb_friction"])
@@ -96,7 +96,7 @@ def test_what_knows_only_the_present_is_no_memory(name: str) -> None:
 
 def test_the_sentences_name_shares_orders_and_what_makes_them() -> None:
     said = " ".join(diagnosis_sentences(diagnosed({"cubic_stiffness": VALUES["cubic_stiffness"]}), "rotary"))
-    assert "times what the sensor's noise leaves" in said
+    assert "times as large as the sensor's noise alone" in said
     assert "in odd harmonics (3rd 5" in said
     assert "cubic spring" in said and "even" not in said and "direction" not in said
     pump = diagnosed({"periodic_disturbance": {"sine": 0.08, "cosine": 0.0, "frequency": 17.3}})

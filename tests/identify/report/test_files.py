@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
+from identify.conclude.plausibility import with_declared
 from identify.report.files import final_platform, model_text, result_json, write_results
 from identify.results import Errors, Identification, NotReported
 from rig.config.model import ModelConfig
@@ -39,6 +40,15 @@ def written(found: Identification) -> dict[str, Any]:
 def with_final(found: Identification, **changes: Any) -> Identification:
     """The identification with another final model."""
     return replace(found, after=replace(found.final, **changes))
+
+
+def test_declared_numbers_and_what_is_implausible_beside_them_are_written(found: Identification) -> None:
+    odd = result_json(with_declared(found, {"inertia": 0.0203 * 57.3, "stiffness": 681.2 * 57.3}))
+    assert odd["declared"] == {"inertia": 0.0203 * 57.3, "stiffness": 681.2 * 57.3}
+    (one,) = odd["plausibility"]
+    assert one["parameters"] == ["inertia", "stiffness"]
+    assert one["fitted_over_declared"] == pytest.approx(1 / 57.3, rel=1e-3)
+    assert result_json(found)["plausibility"] == []
 
 
 def test_it_has_the_keys_that_outside_scripts_rely_on(written: dict[str, Any]) -> None:
@@ -175,7 +185,7 @@ def test_without_torque_the_declared_inertia_sets_the_scale_of_all_that_is_a_tor
 def test_without_torque_the_scale_is_said_also_where_no_ratio_stands_in_the_tables(found: Identification) -> None:
     decay = replace(with_final(found, platform=RATIOS, parameters={}), torque_free=True)
     assert "the declared inertia sets the scale" in model_text(decay, DECLARED)
-    assert "declared 0.0185 is right" in model_text(decay, DECLARED)
+    assert "right only as far as the declared inertia of 0.0185 is" in model_text(decay, DECLARED)
 
 
 def test_without_torque_and_without_a_declared_inertia_nothing_in_n_m_is_made_up(found: Identification) -> None:

@@ -66,4 +66,4 @@ def test_what_is_cut_off_bends_no_parameter_and_nothing_is_named_for_it() -> Non
     assert found.accepted and not found.verdict.effects
     for name, true in zip(TERMS, TRUTH, strict=True):
         assert found.before.parameters[name].value == pytest.approx(true, rel=3e-4)
-    assert "stood at its full scale" in found.holdout_note
+    assert "faster than the sensor's full scale" in found.holdout_note

@@ -80,7 +80,7 @@ def test_random_instants_have_no_beat_and_are_laid_on_their_median_spacing() -> 
 
 
 def test_a_hole_of_hours_is_refused_with_the_place_to_cut() -> None:
-    with pytest.raises(RecordingError, match="make two runs of it"):
+    with pytest.raises(RecordingError, match="split it into two runs"):
         beat_of("x", np.concatenate([EVEN, 3600.0 + EVEN]))
 
 

@@ -105,6 +105,22 @@ ARRAYS: dict[str, tuple[Columns, str, str, str, str]] = {
         "the angle never changes (0) and there is no torque",
         "record a run",
     ),
+    "angle and rate swapped": (
+        changed(angle_rad=motion()["rate_rad_s"], rate_rad_s=motion()["angle_rad"]),
+        "",
+        "",
+        "the columns of angle and rate seem to be swapped",
+        "exchange recorded.columns.angle and recorded.columns.rate",
+    ),
+    "angle and rate of several tones swapped": (
+        changed(
+            rate_rad_s=0.05 * np.sin(40 * T) + 0.1 * np.sin(15 * T), angle_rad=2 * np.cos(40 * T) + 1.5 * np.cos(15 * T)
+        ),
+        "",
+        "",
+        "what was read as the angle is the derivative of what was read as the rate",
+        "exchange recorded.columns.angle and recorded.columns.rate",
+    ),
     "angle in degrees": (
         changed(angle_rad=np.degrees(motion()["angle_rad"])),
         "",

@@ -18,7 +18,9 @@ from identify.report.page.document import embedded
 from identify.report.page.estimates import estimates_figure
 from identify.report.page.markup import Markup, element, table
 from identify.report.page.motion import RUNS, motion_figures, stretches
-from identify.report.page.residual import residual_figures, spectrum
+from identify.report.page.residual import residual_figures
+from identify.report.page.spectrum import spectrum, spectrum_figures
+from identify.report.page.tables import parameter_table
 from identify.results import FreeLine, Identification
 from identify.wording import MOST_DIGITS
 from rig.recording.run import Array
@@ -134,9 +136,19 @@ def test_the_spectrum_makes_up_for_samples_that_do_not_count(found: Identificati
     assert np.mean(density) == pytest.approx(2.0 * SIGMA**2 * 1e-3, rel=0.1)
 
 
+def test_declared_numbers_stand_in_a_column_of_their_own(found: Identification) -> None:
+    beside = parameter_table(replace(found, declared={"stiffness": 677.3, "coulomb_friction.level": 1.5})).html
+    assert ">declared</th>" in beside
+    assert ">677.3<" in beside
+    assert ">1.5<" in beside
+    assert ">declared</th>" not in parameter_table(found).html
+
+
 def test_residuals_are_drawn_against_time_angle_rate_and_frequency(found: Identification) -> None:
-    assert len(residual_figures(found)) == 5
-    assert residual_figures(replace(found, traces=())) == []
+    assert len(residual_figures(found)) == 4
+    assert len(spectrum_figures(found)) == 2
+    nothing = replace(found, traces=())
+    assert residual_figures(nothing) == spectrum_figures(nothing) == []
 
 
 def test_the_page_says_where_the_residual_of_either_model_lives(page: str) -> None:
@@ -146,7 +158,7 @@ def test_the_page_says_where_the_residual_of_either_model_lives(page: str) -> No
     )
     assert before < page.index("in odd harmonics (3rd") < after
     assert before < page.index("changes sign with the direction of motion") < after
-    assert after < page.index("no structure stands out of it")
+    assert after < page.index("and shows no structure")
 
 
 def test_a_gap_between_the_two_directions_of_motion_is_drawn(found: Identification) -> None:
@@ -158,7 +170,7 @@ def test_a_gap_between_the_two_directions_of_motion_is_drawn(found: Identificati
 def test_harmonics_and_free_lines_are_marked_in_the_spectrum(found: Identification) -> None:
     assert found.residual_before is not None
     pump = replace(found.residual_before, free_lines=(FreeLine(17.3, 0.1, 5),))
-    figure = residual_figures(replace(found, residual_before=pump))[-1]
+    figure = spectrum_figures(replace(found, residual_before=pump))[-1]
     odd = next(t for t in figure.traces if t["name"] == "odd harmonics")
     assert {1.5, 9.0, 27.0} <= set(np.round(numbers(odd["x"]), 3).tolist())
     assert not any(t["name"] == "even harmonics" for t in figure.traces)

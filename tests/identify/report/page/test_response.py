@@ -36,7 +36,7 @@ def test_measured_declared_and_final_are_drawn_with_gain_phase_deviation_and_coh
     titles = [figure.layout[f"yaxis{n}"]["title"]["text"] for n in ("", "2", "3", "4")]
     assert titles == ["gain (dB)", "phase (deg)", "off by (%)", "coherence"]
     assert "dB re 1 (rad/s)/(N·m)" in str(figure.layout["annotations"])
-    assert "Coulomb friction acts by amplitude" in figure.caption
+    assert "Coulomb friction depends on the amplitude" in figure.caption
 
 
 def test_a_linear_axis_has_its_own_units() -> None:

@@ -1,0 +1,71 @@
+"""What is left after the final model, as a torque: its size, what it depends on, and the shape of each such part."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identify.report.page.figure import AFTER, Figure, Panel, grid, lines, points
+from identify.report.page.markup import Markup, Piece, table
+from identify.report.page.quantities import QUANTITIES, axis
+from identify.results import Dependence, Identification
+from identify.wording import depends_on, number
+
+DIRECTIONS = {"tickvals": [-1, 1], "ticktext": ["backward", "forward"], "range": [-1.5, 1.5]}
+FEWEST_FOR_A_CURVE = 3
+
+
+def disturbance_table(identification: Identification) -> Markup:
+    """Size and share of the torque that is left and of what it depends on; nothing without a torque."""
+    left, q = identification.disturbance, QUANTITIES[identification.axis]
+    if left is None:
+        return Markup("")
+    rows: list[list[Piece]] = [["all of it", number(left.torque_rms, 2), number(100.0 * left.relative, 2), ""]]
+    rows += [
+        [
+            f"depends on the {depends_on(d.on, identification.axis)}", number(d.torque_rms, 2),
+            number(100.0 * d.relative, 2), number(d.false_alarm, 1),
+        ]
+        for d in left.depends_on
+    ]  # fmt: skip
+    return table(
+        ["", f"rms ({q.torque_unit})", f"% of the {q.torque}", "false-alarm rate"],
+        rows,
+        f"The {q.torque} that is left after the final model, without the sensor's noise. What depends on something is "
+        "missing from the model; the rest is noise and is included in the intervals.",
+    )
+
+
+def shape_figure(identification: Identification) -> Figure | None:
+    """One panel for each free-form term that was found; None where none has a shape."""
+    left, q = identification.disturbance, QUANTITIES[identification.axis]
+    shown = [d for d in left.depends_on if len(d.at)] if left is not None else []
+    if not shown:
+        return None
+    drawn, panels = [], []
+    for panel, term in enumerate(shown, 1):
+        x, y = np.array(term.at), np.array(term.shape_nm)
+        draw = lines if len(x) >= FEWEST_FOR_A_CURVE else points
+        size = {"width": 2.2} if draw is lines else {"size": 10, "opacity": 1.0}
+        drawn.append(draw(x, y, f"depends on the {depends_on(term.on, identification.axis)}", AFTER, panel, **size))
+        ticks = {"zeroline": True} | (DIRECTIONS if term.on == "direction" else {})
+        titles = _x_title(term, identification.axis), axis(q.torque, q.torque_unit)
+        panels.append(Panel(*titles, extra_x=ticks, extra_y={"zeroline": True}))
+    names = ", ".join(depends_on(d.on, identification.axis) for d in shown)
+    columns = min(2, len(panels))
+    return Figure(
+        label=f"Shape of the {q.torque} that is left against {names}",
+        heading="Shape of what the model lacks",
+        caption=f"The free-form term (a spline) of the {q.torque} that is left, fitted beside the final model, without "
+        "the constant and the straight line, which the model's own terms take up.",
+        traces=drawn,
+        layout=grid(panels, columns=columns, gap=0.12) | {"showlegend": False},
+        height=110 + 210 * -(-len(panels) // columns),
+    )
+
+
+def _x_title(term: Dependence, kind: str) -> str:
+    q = QUANTITIES[kind]
+    units = {"angle": q.angle_unit, "rate": q.rate_unit, "torque": q.torque_unit}
+    if term.on in units:
+        return axis(depends_on(term.on, kind), units[term.on])
+    return {"time": "time since the start of the run (s)", "direction": "direction of motion"}.get(term.on, term.on)

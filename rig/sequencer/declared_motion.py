@@ -1,0 +1,70 @@
+"""What a trip on travel or rate says of the declared model, where that stayed clear of the limit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from rig.errors import RigError, SafetyTrip
+from rig.excitation import PlannedSet
+from rig.guard import Trip
+from rig.platform import Platform
+from rig.preflight.forecast import Peaks, SetForecast, SetSequence, has_no_restoring_spring
+
+CLEARLY = 0.8  # of the limit: a prediction above it is within what a declared model is good for
+FACTOR = 2.0  # by which each declared number is changed, to see which of them makes the motion larger
+LARGER = 1.1  # times the predicted motion: less does not explain a trip
+NAMED = 2  # suspects in a sentence
+
+
+def explained(
+    error: RigError, trip: Trip | None, declared: Platform | None, sets: Sequence[PlannedSet], rest_s: float
+) -> RigError:
+    """The error of a trip with a sentence on the declared model; any other error as it is.
+
+    Parameters
+    ----------
+    trip
+        The broken limit behind the error, where there is one.
+    declared
+        The platform that the pre-flight predicted with.
+    sets
+        Those played so far; the last is the one that tripped.
+    rest_s
+        Zero torque between sets, in seconds.
+    """
+    if not isinstance(error, SafetyTrip) or trip is None or declared is None or not sets:
+        return error
+    sentence = suspicion(trip, declared, sets, rest_s)
+    return SafetyTrip(f"{error} {sentence}") if sentence else error
+
+
+def suspicion(trip: Trip, declared: Platform, sets: Sequence[PlannedSet], rest_s: float) -> str:
+    """Which declared number may be wrong, in a sentence; empty where the prediction is near the limit, too."""
+    quantity = next((n for n in ("travel_deg", "rate_deg_s") if f"limits.{n}" in trip.limit), None)
+    if quantity is None:
+        return ""
+    predicted = float(getattr(_peaks(declared, sets, rest_s), quantity))
+    if not predicted < CLEARLY * trip.allowed:
+        return ""
+    j, c, k = declared.inertia_kg_m2, declared.damping_nm_s_rad, declared.stiffness_nm_rad
+    others = {
+        "the declared inertia may be too large": replace(declared, inertia_kg_m2=j / FACTOR),
+        "the declared inertia may be too small": replace(declared, inertia_kg_m2=j * FACTOR),
+        "the declared stiffness may be too large": replace(declared, stiffness_nm_rad=k / FACTOR),
+        "the declared damping may be too large": replace(declared, damping_nm_s_rad=c / FACTOR),
+    }
+    larger = {words: float(getattr(_peaks(p, sets, rest_s), quantity)) for words, p in others.items() if p != declared}
+    suspects = [w for w in sorted(larger, key=lambda w: -larger[w]) if larger[w] > LARGER * predicted]
+    what = " or ".join(suspects[:NAMED]) or "the declared model may lack something"
+    return f"The declared model predicted at most {predicted:.3g} {trip.unit} in this set: {what}."
+
+
+def _peaks(platform: Platform, sets: Sequence[PlannedSet], rest_s: float) -> Peaks:
+    """Of the last set; without a spring from where the sets before leave the platform."""
+    if has_no_restoring_spring(platform, rest_s):
+        peaks = SetSequence(platform, sets, rest_s).play([1.0] * len(sets))[-1].peaks
+    else:
+        peaks = SetForecast(platform, sets[-1]).play(1.0).peaks
+    return peaks if all(math.isfinite(x) for x in peaks) else Peaks(math.inf, math.inf, math.inf)

@@ -1,0 +1,90 @@
+"""A trip on travel or rate names the declared number that may be wrong, where the declared model stayed clear of it."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from rig.clock import VirtualClock
+from rig.config.limits import LimitsConfig
+from rig.errors import DeviceFault, SafetyTrip
+from rig.excitation import Sine, planned
+from rig.guard import Guard, Trip
+from rig.interface import Exchange, GyroSample
+from rig.platform import Platform
+from rig.sequencer import Sequencer
+from rig.sequencer.declared_motion import explained, suspicion
+from tests.rig.scripted import ScriptedRig
+
+SLOW = planned((Sine(torque_nm=20, frequency_hz=0.5, duration_s=2.0),))
+FAST = planned((Sine(torque_nm=20, frequency_hz=60, duration_s=0.5),))
+SPRING = Platform(0.02, 0.045, 677.3)  # rings at 29 Hz
+FREE = Platform(0.5, 0.1, 0.0, terms=("inertia", "damping"))
+
+
+def travel(allowed_deg: float) -> Trip:
+    return Trip("travel (limits.travel_deg; 0.1 deg of it is what the gyro may have drifted)", allowed_deg, allowed_deg,
+                "deg", 0.2, "Lower torque_nm.")  # fmt: skip
+
+
+def rate(allowed_deg_s: float) -> Trip:
+    return Trip("rate (limits.rate_deg_s)", allowed_deg_s, allowed_deg_s, "deg/s", 0.2, "Lower torque_nm.")
+
+
+def test_below_the_resonance_it_is_the_stiffness() -> None:
+    said = suspicion(travel(10.0), SPRING, SLOW, 5.0)
+    assert said.startswith("The declared model predicted at most 1.71 ")
+    assert "the declared stiffness may be too large." in said
+
+
+def test_above_the_resonance_and_without_a_spring_it_is_the_inertia() -> None:
+    assert "the declared inertia may be too large" in suspicion(rate(1e4), SPRING, FAST, 5.0)
+    assert suspicion(rate(3e3), FREE, SLOW, 5.0).endswith("the declared inertia may be too large.")
+
+
+def test_a_set_just_below_the_resonance_may_ring_because_the_inertia_is_too_small() -> None:
+    below = planned((Sine(torque_nm=20, frequency_hz=15, duration_s=1.0),))
+    assert "the declared inertia may be too small" in suspicion(travel(90.0), SPRING, below, 5.0)
+
+
+def test_without_a_spring_the_sets_before_count() -> None:
+    twice = suspicion(travel(1e5), FREE, SLOW * 2, 0.5)
+    once = suspicion(travel(1e5), FREE, SLOW, 0.5)
+    assert twice != once
+
+
+def test_a_prediction_near_the_limit_and_other_limits_say_nothing_of_the_model() -> None:
+    assert suspicion(travel(2.0), SPRING, SLOW, 5.0) == ""
+    stale = Trip("gyro stale (limits.stale_gyro_ms)", 30.0, 20.0, "ms", 0.2, "Check the cable.")
+    assert suspicion(stale, SPRING, SLOW, 5.0) == ""
+
+
+def test_a_model_that_runs_away_predicts_nothing() -> None:
+    assert suspicion(travel(90.0), Platform(0.02, -5.0, 677.3), SLOW, 5.0) == ""
+
+
+def test_only_a_trip_during_a_set_is_explained() -> None:
+    fault = DeviceFault("gyro unplugged")
+    assert explained(fault, travel(10.0), SPRING, SLOW, 5.0) is fault
+    trip = SafetyTrip("Torque is off.")
+    assert explained(trip, travel(10.0), SPRING, (), 5.0) is trip
+    assert explained(trip, travel(10.0), None, SLOW, 5.0) is trip
+    assert str(explained(trip, travel(10.0), SPRING, SLOW, 5.0)).startswith("Torque is off. The declared model")
+
+
+@pytest.mark.parametrize("declared", [SPRING, None])
+def test_the_sequencer_adds_it_once_everything_is_closed(declared: Platform | None) -> None:
+    def fast(now_s: float) -> Exchange | None:
+        return Exchange((GyroSample(now_s, math.radians(500), True),), ()) if now_s > 0.6995 else None
+
+    rig = ScriptedRig(fast)
+    sequencer = Sequencer(
+        rig, VirtualClock(), Guard(LimitsConfig()), sample_rate_hz=1000, rest_s=0.2, declared=declared
+    )  # fmt: skip
+    campaign = sequencer.play(SLOW)
+    assert isinstance(campaign.cause, SafetyTrip)
+    assert ("The declared model predicted at most" in str(campaign.cause)) == (declared is not None)
+    assert "rate (limits.rate_deg_s): 500 deg/s at 0.199 s" in str(campaign.cause)
+    assert rig.log[2] == "torque off" and rig.log[-2:] == ["disarm", "close"]
+    assert campaign.recording.info["aborted"] == str(campaign.cause)
