@@ -44,6 +44,7 @@ FURTHER = (  # times white density, slow variance and time constant: where else 
 )  # fmt: skip
 # Of the motion, root mean square, by which a start state may be off: the smoothed motion is worst where a run begins.
 START_RATE, START_ANGLE, UNKNOWN_ANGLE = 0.1, 0.05, 1.0
+KEPT_GAINS = 4  # of a run
 TRIALS = 7  # step lengths tried before a direction is given up
 
 
@@ -107,6 +108,7 @@ class PredictionError:
         self.slowest_s = max(LONGEST_SHARE * longest, 10.0 * SHORTEST_SAMPLES * self.step_s)
         self.workers = ThreadPoolExecutor(2)
         self._most_white = MOST_TORQUE
+        self._gains: dict[int, dict[tuple[object, ...], Gains]] = {}
 
     @RUNAWAY
     def cost_at(self, fit: Fit, noise: Noise) -> float:
@@ -180,14 +182,27 @@ class PredictionError:
         lag_s = float(sum(v[0] for v in equations.sensor.values))
         rate = trace.channel == "rate"
         spans = [(a, b - 1) for a, b in s.edges]
-        gains: Gains = gains_of(
-            equations.jck, noise, trace.step_s, rate, lag_s, trace.keep, spans, self.start_variance(trace)
-        )  # fmt: skip
+        gains = self._gains_of(s, equations.jck, noise, lag_s, spans)
         predicted, state = predict_ahead(
             equations, s.grid.shaft_torque(equations), s.grid.step_s, round(trace.step_s / s.grid.step_s), spans,
             s.starts, trace.measured, trace.keep, gains, rate, bias, trace.offset_s, trace,
         )  # fmt: skip
         return Look(trace.measured - predicted, gains.variance, state, gains.gain)
+
+    def _gains_of(self, s: Shots, jck: Array, noise: Noise, lag_s: float, spans: list[tuple[int, int]]) -> Gains:
+        """A run's gains; the last few are kept, because most looks change an effect and not the linear part."""
+        trace = s.trace
+        kept = self._gains.setdefault(trace.number, {})
+        key = (*jck.tolist(), noise, lag_s, id(trace), *spans)
+        found = kept.get(key)
+        if found is None:
+            found = gains_of(
+                jck, noise, trace.step_s, trace.channel == "rate", lag_s, trace.keep, spans, self.start_variance(trace)
+            )  # fmt: skip
+            while len(kept) >= KEPT_GAINS:
+                kept.pop(next(iter(kept), None), None)
+            kept[key] = found
+        return found
 
     def start_variance(self, trace: Trace) -> tuple[float, float]:
         """Of angle and rate at the start of a stretch, read off the smoothed motion; over that of one reading."""

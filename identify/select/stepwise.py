@@ -30,7 +30,7 @@ FAINT = 0.02  # of the best score: what promises so little is not what the round
 MOST = 6  # effects that one recording is believed to show
 FEW, MANY = 8, 20  # steps of a fit that is compared, and of one that is kept
 CERTAIN = 30.0  # standard errors beyond which nobody asks whether a term is needed
-NEAR = 0.5  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
+NEAR = 0.9  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
 FAR_BEHIND = 0.2  # of what an effect explains: another that leaves more than that is no rival
 PATIENCE = 3  # effects after which the sensor's noise must be near
 AT_NOISE = 1.1  # times the noise's variance
@@ -62,6 +62,7 @@ class Stepwise:
     rivals: dict[str, dict[str, Fit]] = field(default_factory=dict)
     dropped: list[tuple[str, str]] = field(default_factory=list)
     best: Fit = None  # type: ignore[assignment]  # the model that is believed so far
+    _needed: dict[str, float] = field(default_factory=dict)  # rise of the penalised cost without an effect
 
     def __post_init__(self) -> None:
         self.best = self.base
@@ -173,9 +174,8 @@ class Stepwise:
             for other, fit in self._instead(now, rest, name).items():
                 near = fit.penalised - now.penalised < FAR_BEHIND * (rest.cost - now.cost)
                 fits[other] = self.again(fit) if near else fit
-            wide = APART * max(1.0, self.samples / max(now.count, 1))  # more samples may part them
-            best = min(f.penalised for f in fits.values())
-            close = {n: f for n, f in fits.items() if f.penalised - best < wide}
+            self._needed[name] = rest.penalised - now.penalised
+            close = self.undecided(fits)
             if len(close) > 1 and self.whole is not None:
                 close = {n: self.on_all(f) for n, f in close.items()}
             chosen, alike = decided(close)
@@ -185,6 +185,21 @@ class Stepwise:
             self.rivals.pop(name, None)
             self.rivals[chosen] = {n: fits[n] for n in alike if n != chosen}
         return now
+
+    def undecided(self, fits: Mapping[str, Fit]) -> dict[str, Fit]:
+        """Those that all samples may still find best: by as much as more samples tell."""
+        more = max(1.0, self.samples / max(next(iter(fits.values())).count, 1))
+        best = min(f.penalised for f in fits.values())
+        close = {n: f for n, f in fits.items() if f.penalised - best < APART * more}
+
+        def cannot_gain(rich: str) -> bool:  # it holds a simpler one and is no likelier: nor will it be
+            return any(
+                (close[n].cost - close[rich].cost) * more < close[rich].penalised - close[rich].cost
+                - (close[n].penalised - close[n].cost)
+                for n in effects.get(rich).nests if n in close
+            )  # fmt: skip
+
+        return {n: f for n, f in close.items() if not cannot_gain(n)}
 
     def on_all(self, fit: Fit) -> Fit:
         """The same model on all samples."""
@@ -222,6 +237,8 @@ class Stepwise:
             if name == "inertia" or kept_by or len(now.structure.terms) + len(now.structure.effects) <= 1:
                 continue
             own = [n for n in now.names if n[0] == name]
+            if self._needed.get(name, 0.0) > CERTAIN**2:
+                continue
             if len(own) == 1 and own[0][0] in TERMS and abs(now.values[own[0]]) > CERTAIN * now.std_error(own[0]):
                 continue
             start = {n: v for n, v in now.values.items() if n[0] != name}

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -63,26 +64,38 @@ class Gains:
 
 
 @jit
-def _riccati(phi, q, h, p, keep, first, last, gain, variance):  # type: ignore[no-untyped-def]
-    """Gains and innovation variances of samples first..last, for a reading of unit noise."""
-    n = len(h)
-    g = np.zeros(n)
+def _onward(phi, q, p, half):  # type: ignore[no-untyped-def]
+    """Covariance a sample later, in place: phi p phi' + q. Loops: a call to a matrix library costs more than this."""
+    n = len(q)
+    for a in range(n):
+        for b in range(n):
+            half[a, b] = 0.0
+            for c in range(n):
+                half[a, b] += phi[a, c] * p[c, b]
+    for a in range(n):
+        for b in range(a + 1):
+            total = q[a, b]
+            for c in range(n):
+                total += half[a, c] * phi[b, c]
+            p[a, b] = p[b, a] = total
+
+
+@jit
+def _riccati(phi, q, read, p, keep, first, last, gain, variance):  # type: ignore[no-untyped-def]
+    """Gains and innovation variances of samples first..last, for a reading of unit noise of one state."""
+    n = len(q)
+    g, half = np.zeros(n), np.zeros((n, n))
     calm = 0
     for i in range(first, last + 1):
         if calm < SETTLED_FOR:
-            s = 1.0
-            for a in range(n):
-                g[a] = 0.0
-                for b in range(n):
-                    g[a] += p[a, b] * h[b]
-            for a in range(n):
-                s += h[a] * g[a]
+            s = 1.0 + p[read, read]
             if not s >= 1.0:
                 s = np.inf  # the linear part ran away: nothing is predicted from here
             variance[i] = s
             if keep[i]:
                 change = 0.0
                 for a in range(n):
+                    g[a] = p[a, read]
                     gain[i, a] = g[a] / s
                     if i > first:
                         change = max(change, abs(gain[i, a] - gain[i - 1, a]) - SETTLED * abs(gain[i, a]))
@@ -92,17 +105,35 @@ def _riccati(phi, q, h, p, keep, first, last, gain, variance):  # type: ignore[n
                         p[a, b] -= g[a] * g[b] / s
             else:
                 calm = 0
-            p = phi @ p @ phi.T + q
-            for a in range(n):
-                for b in range(a):
-                    p[a, b] = p[b, a] = 0.5 * (p[a, b] + p[b, a])
+            _onward(phi, q, p, half)
         elif keep[i]:
             variance[i] = variance[i - 1]
             gain[i, :] = gain[i - 1, :]
         else:  # a sample was lost: what it would have told is missing for a while
             variance[i] = variance[i - 1]
             calm = 0
-            p = phi @ p @ phi.T + q
+            _onward(phi, q, p, half)
+
+
+@lru_cache(maxsize=64)
+def _discrete(j: float, c: float, k: float, noise: Noise, lag: float, step_s: float) -> tuple[Array, Array]:
+    """Transition and disturbance covariance of the linear part over a sample (van Loan 1978)."""
+    f = np.zeros((STATES, STATES))
+    f[0, 1] = 1.0
+    f[1, :3] = -k / j, -c / j, 1.0 / j
+    f[2, 2] = -1.0 / noise.time_constant_s
+    if lag > 0.0:
+        f[3, 1], f[3, 3] = 1.0 / lag, -1.0 / lag
+    density = np.zeros((STATES, STATES))
+    density[1, 1] = noise.white / j**2
+    density[2, 2] = 2.0 * noise.slow / noise.time_constant_s
+    n = STATES if lag > 0.0 else STATES - 1
+    big = np.zeros((2 * n, 2 * n))
+    big[:n, :n], big[:n, n:], big[n:, n:] = -f[:n, :n], density[:n, :n], f[:n, :n].T
+    van_loan = expm(big * step_s)
+    phi = np.ascontiguousarray(van_loan[n:, n:].T)
+    q = phi @ van_loan[:n, n:]
+    return phi, 0.5 * (q + q.T)
 
 
 def gains_of(
@@ -124,31 +155,17 @@ def gains_of(
     spans
         First and last sample of every stretch.
     """
-    j, c, k = jck.tolist()
     tau, lag = noise.time_constant_s, max(lag_s, 0.0)
-    f = np.zeros((STATES, STATES))
-    f[0, 1] = 1.0
-    f[1, :3] = -k / j, -c / j, 1.0 / j
-    f[2, 2] = -1.0 / tau
-    if lag > 0.0:
-        f[3, 1], f[3, 3] = 1.0 / lag, -1.0 / lag
-    density = np.zeros((STATES, STATES))
-    density[1, 1] = noise.white / j**2
-    density[2, 2] = 2.0 * noise.slow / tau
-    big = np.zeros((2 * STATES, 2 * STATES))
-    big[:STATES, :STATES], big[:STATES, STATES:], big[STATES:, STATES:] = -f, density, f.T
-    van_loan = expm(big * step_s)
-    phi = np.ascontiguousarray(van_loan[STATES:, STATES:].T)
-    q = np.ascontiguousarray(phi @ van_loan[:STATES, STATES:])
-    q = 0.5 * (q + q.T)
-    h = np.zeros(STATES)
-    h[0 if not rate else (3 if lag > 0.0 else 1)] = 1.0
+    phi, q = _discrete(*jck.tolist(), noise, lag, step_s)
+    read = 0 if not rate else (3 if lag > 0.0 else 1)
+    n = len(q)
     gain, variance = np.zeros((len(keep), STATES)), np.ones(len(keep))
     for first, last in spans:
-        p = np.zeros((STATES, STATES))
+        p = np.zeros((n, n))
         p[0, 0], p[1, 1], p[2, 2] = start_variance[0], start_variance[1], noise.slow
-        p[3, 3] = p[1, 3] = p[3, 1] = p[1, 1]
-        _riccati(phi, q, h, p, keep, first, last, gain, variance)
+        if lag > 0.0:
+            p[3, 3] = p[1, 3] = p[3, 1] = p[1, 1]
+        _riccati(phi, q, read, p, keep, first, last, gain, variance)
     slow_decay = float(np.exp(-step_s / tau))
     return Gains(gain, variance, slow_decay, float(np.exp(-step_s / lag)) if lag > 0.0 else 0.0)
 
