@@ -85,8 +85,9 @@ def identify(
     """
     say = progress or (lambda text: None)
     with threadpool_limits(1):  # small matrices: a second BLAS thread only waits
-        found = _Identifier(recording, declared, settings, say).run()
-        if found.aborted or not found.verdict.unexplained or recording.noise is not None:
+        first = _Identifier(recording, declared, settings, say)
+        found = first.run()
+        if found.aborted or recording.noise is not None or not (found.verdict.unexplained or first.more_than_noise):
             return found
         return with_noise_known(
             found, lambda colour: _Identifier(recording, declared, settings, say, colour).run(), say
@@ -109,6 +110,7 @@ class _Identifier:
         traces = [prepare(r, i, noise, full_scale=beyond) for i, r in enumerate(runs)]
         self.traces, self.left_out = runs_used(traces, recording.noise is not None, recording.axis, say)
         self.torque_free = free
+        self.more_than_noise = False  # is left by all that was found, though nothing else seemed to limit the runs
         refuse_the_idle(self.traces, free)
         if free:
             refuse_added_inertia(self.traces)
@@ -140,15 +142,23 @@ class _Identifier:
                 self.traces, self.split, self.structure, declared_values(self.declared, self.torque_free), self.start,
                 self._allowed(), self.say,
             )  # fmt: skip
-            if not search.run() and self.colour is None:
-                self.say("more is left than the sensor's noise: looking at it as a torque")
-                return self._in_torque(shapes, NEARLY_ALL)
-            fits = Fits(self.traces, self.split, len(self.structure.effects) + 1)
-            return self._concluded(search.found, fits)
+            at_noise = search.run() or self.colour is not None
+            found, fits = search.found, Fits(self.traces, self.split, len(self.structure.effects) + 1)
+            if at_noise or self._other_cause(found, fits):
+                return self._concluded(found, fits)
+            self.say("more is left than the sensor's noise: looking at it as a torque")
+            self.more_than_noise = True
+            return self._in_torque(shapes, NEARLY_ALL)
         except (Aborted, KeyboardInterrupt):
             if search is None:
                 raise
             return self._stopped(search.found)
+
+    def _other_cause(self, found: Search, fits: Fits) -> bool:
+        """Whether no effect but a line of the sensor or a run unlike the others may be what is left."""
+        after = self._after(found)
+        line = standing_line(after, self.traces) if TONE not in found.best.structure.effects else None
+        return line is not None or self._apart(found, fits, after) is not None
 
     def _decay(self, shapes: dict[str, tuple[float, ...]]) -> Identification:
         """The way for runs without torque, which are judged by how they swing on alone."""
@@ -200,7 +210,13 @@ class _Identifier:
             self.traces, self.split, self.structure, shapes, self.start, self._allowed(), unit, self.say,
             least_explained,
         )  # fmt: skip
-        return self._report(found.search, found.before, found.after, measured=found)
+        after = found.after
+        line = standing_line(after, self.traces) if self.more_than_noise and TONE in found.named else None
+        if line is not None:
+            found.search.leave_open(TONE, told(line, self.recording.axis, self.traces[0].channel), found.search.base)
+            self.say(f"not named: {TONE}; the line may come from the sensor itself")
+            found, after = found.taken_back(), found.before
+        return self._report(found.search, found.before, after, measured=found)
 
     def _allowed(self) -> list[str]:
         """Names of the effects that may be named."""

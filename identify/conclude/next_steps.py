@@ -55,9 +55,9 @@ AT_ONCE, MOVING = 3, 0.1  # first samples of a run, and the share of its largest
 
 
 def next_steps(found: Identification) -> tuple[str, ...]:
-    """One sentence a step, the most telling first; nothing where the identification was accepted."""
+    """One sentence a step, the most telling first; where the identification was accepted only what was left open."""
     if found.accepted:
-        return ()
+        return (found.verdict.tells_apart,) if found.verdict.tells_apart else ()
     if opposite_signs(found):
         return (f"{capital(SENTENCE)}, then identify again.",)
     steps = []

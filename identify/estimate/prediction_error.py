@@ -199,8 +199,8 @@ class PredictionError:
             found = gains_of(
                 jck, noise, trace.step_s, trace.channel == "rate", lag_s, trace.keep, spans, self.start_variance(trace)
             )  # fmt: skip
-            while len(kept) >= KEPT_GAINS:
-                kept.pop(next(iter(kept), None), None)
+            for old in list(kept)[: max(0, len(kept) + 1 - KEPT_GAINS)]:
+                kept.pop(old, None)
             kept[key] = found
         return found
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -56,6 +56,18 @@ class Found:
     after: Fitted
     disturbance: Disturbance
     in_torque: tuple[TorqueErrors, TorqueErrors]
+    left_before: Callable[[], Disturbance]  # what the declared model leaves
+
+    def taken_back(self) -> Found:
+        """The same with the declared model as the final one."""
+        return replace(
+            self, after=self.before, in_torque=(self.in_torque[0],) * 2, disturbance=self.left_before()
+        )  # fmt: skip
+
+    @property
+    def named(self) -> list[str]:
+        """Effects that the declared model lacked."""
+        return [e for e in self.after.structure.effects if e not in self.before.structure.effects]
 
 
 @dataclass(frozen=True)
@@ -109,7 +121,8 @@ def search_in_torque(
         say(f"nothing found up to {start.cutoff_hz:.3g} Hz: looking up to {wider:.3g} Hz")
         search, best = searched(wider)
     regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
-    if search.left(best) > (1.0 - least_explained) * search.left(base) and best.structure != structure:
+    named = best.structure.effects != structure.effects
+    if named and search.left(best) > (1.0 - least_explained) * search.left(base):
         say(f"rejected: {', '.join(best.structure.effects)}; together they still leave too much unexplained")
         best = base
     say(f"final fit with {', '.join(best.structure.effects) or 'fewer terms'}")
@@ -121,7 +134,10 @@ def search_in_torque(
         size = regression.torque_nm
         return TorqueErrors(fit.fitted_nm, fit.fitted_nm / size, fit.held_nm / size, floor, cutoff)
 
-    return Found(_told(search, structure, base, best), before, after, disturbance, (errors(base), errors(best)))
+    return Found(
+        _told(search, structure, base, best), before, after, disturbance, (errors(base), errors(best)),
+        lambda: disturbance_of(regression, base, floor, unit),
+    )  # fmt: skip
 
 
 def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> Fitted:

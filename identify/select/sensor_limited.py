@@ -7,13 +7,15 @@ left it does not: whether that is a disturbance or an effect outside the library
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
+from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.cross_validation import Judged, horizon_s
 from identify.estimate.fit import Fit
-from identify.estimate.initial_guess import Start
+from identify.estimate.initial_guess import Start, scale_of
 from identify.estimate.output_error import Estimate
 from identify.estimate.prediction_error import PredictionError
 from identify.model.parameters import Name
@@ -29,6 +31,7 @@ from rig import effects
 from rig.platform import TERMS
 
 SAMPLES = 10_000  # that the search looks at
+HIGHEST = 0.2  # of the sample rate: the low-pass for a first guess in torque cuts off no higher
 ALL = 40_000  # samples on which rivals are parted
 MORE = 1.5  # times the samples: else there is nothing more to be seen in all of them
 
@@ -63,7 +66,7 @@ class SensorLimited:
         start
             A first idea of the platform.
         """
-        few, _ = reduced(traces, split, SAMPLES)
+        few, parts = reduced(traces, split, SAMPLES)
         problem = PredictionError(few)
         guessed: dict[Name, float] = {(k,): v for k, v in zip(TERMS, start.platform, strict=True)}
         first = {**declared, **guessed}
@@ -76,7 +79,10 @@ class SensorLimited:
         if count > MORE * base.count:
             whole = PredictionError(thinned(traces, split.everything, ALL)[0])
         offered = [n for n in allowed if n not in structure.effects and _possible(n, traces)]
-        return cls(Stepwise(problem, base, offered, say, whole, count), traces, structure)
+        cutoff_hz = min(start.cutoff_hz, HIGHEST / few[0].step_s)
+        regression = TorqueRegression(few, parts, cutoff_hz, scale_of(few, start.platform, ()))
+        in_torque = partial(_in_torque, regression)
+        return cls(Stepwise(problem, base, offered, say, whole, count, in_torque), traces, structure)
 
     def run(self) -> bool:
         """Search; whether the last model predicts down to the sensor's noise."""
@@ -103,6 +109,17 @@ class SensorLimited:
         found.rival_models = {k: {n: f.platform() for n, f in v.items()} for k, v in rivals.items()}
         found.dropped = [(n, why) for n, why in s.dropped if n not in (*best.structure.terms, *best.structure.effects)]
         return found
+
+
+def _in_torque(regression: TorqueRegression, now: Fit, name: str) -> dict[Name, float] | None:
+    """Where an effect begins by least squares in torque, beside what a model has."""
+    have = [e for e in now.structure.effects if e not in effects.get(name).nests]
+    shapes = {
+        e: tuple(now.values[(e, p.name)] for p in effects.get(e).parameters if not p.linear) for e in have
+    }  # fmt: skip
+    bare = regression.solve(replace(now.structure, effects=tuple(have)), shapes)
+    found = regression.with_effect(bare, name)
+    return None if found is None else dict(found.values)
 
 
 def _status(name: str, chosen: str | None, named: Sequence[str], fit: Fit | None) -> str:

@@ -34,6 +34,7 @@ NEAR = 0.9  # of the best fall of the cost in a round: such a fit is taken to it
 FAR_BEHIND = 0.2  # of what an effect explains: another that leaves more than that is no rival
 PATIENCE = 3  # effects after which the sensor's noise must be near
 AT_NOISE = 1.1  # times the noise's variance
+OTHER_START = 1.5  # times the other: gains that far apart are both begun from
 SPECIAL = 0.5  # of the fall of a richer effect that its special case brings to be tried first
 
 
@@ -58,6 +59,7 @@ class Stepwise:
     say: Callable[[str], None] = lambda text: None
     whole: PredictionError | None = None
     samples: int = 0
+    in_torque: Callable[[Fit, str], Mapping[Name, float] | None] = lambda now, name: None
     rounds: list[Round] = field(default_factory=list)
     rivals: dict[str, dict[str, Fit]] = field(default_factory=dict)
     dropped: list[tuple[str, str]] = field(default_factory=list)
@@ -141,6 +143,11 @@ class Stepwise:
             structure = structure.minus(name)
             own = {k: v + _gain(now, name) if k[1] in linear else v for k, v in own.items()}
         fit = self.problem.fit(structure.plus(effect.name), {**start, **own}, now.noise, FEW, carry=now.shots)
+        if effect.place is Place.FRICTION:  # where it sticks depends on how large it is: from too little it stays there
+            other = self.in_torque(now, effect.name)
+            if other is not None and far_apart({**start, **own}, other, effect.name):
+                values = {**start, **own, **other}
+                fit = min(fit, self.problem.fit(structure.plus(effect.name), values, None, FEW), key=lambda f: f.cost)
         return fit if np.isfinite(fit.cost) else None
 
     def again(self, fit: Fit) -> Fit:
@@ -254,6 +261,13 @@ class Stepwise:
 def _gain(fit: Fit, name: str) -> float:
     """An effect's first gain."""
     return next((fit.values[(name, p.name)] for p in effects.get(name).parameters if p.linear and not p.per_run), 0.0)
+
+
+def far_apart(some: Mapping[Name, float], other: Mapping[Name, float], name: str) -> bool:
+    """Whether two starts of an effect differ so much in a gain that a fit from one may not come to the other."""
+    gains = [(name, p.name) for p in effects.get(name).parameters if p.linear and not p.per_run]
+    return any(max(abs(some.get(g, 0.0)), abs(other.get(g, 0.0))) > OTHER_START * min(
+        abs(some.get(g, 0.0)), abs(other.get(g, 0.0))) for g in gains)  # fmt: skip
 
 
 def disturbed(fit: Fit) -> float:

@@ -25,7 +25,6 @@ from rig.platform import Platform
 from rig.recording.journal import Journal
 from rig.recording.retiming import NO_RETIMING
 from rig.recording.run import Recording
-from rig.sequencer.declared_motion import explained
 from rig.sequencer.guarded_tick import GuardedTick
 from rig.sequencer.observer import Observer, Progress
 from rig.sequencer.probe import Probe
@@ -141,6 +140,8 @@ class Sequencer:
             cause = Aborted("Stopped by Ctrl-C: torque is off; what was recorded until then is kept.")
         except RigError as error:
             trip = self._guarded.trip  # torque is off and all is closed: there is time to look at the model
+            from rig.sequencer.declared_motion import explained  # noqa: PLC0415  # slow to load
+
             cause = explained(_with_context(error), trip, self._declared, sets[:begun], self._rest_s)
         if cause is not None and self._journal is not None:
             with contextlib.suppress(RigError):
