@@ -16,12 +16,14 @@ from identify.estimate.cross_validation import Judged
 from identify.estimate.final_fit import Fitted, covariance_of, free_run_of
 from identify.estimate.initial_guess import Start, scale_of
 from identify.estimate.output_error import Estimate
+from identify.estimate.prediction_error import PredictionError
 from identify.model.parameters import names_of
 from identify.model.structure import Structure
 from identify.results import Candidate, Disturbance
 from identify.runs.holdout import Split
 from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced
+from identify.select.likelihood_look import LikelihoodLook
 from identify.select.search_state import Search
 from identify.select.torque_search import TorqueSearch, Weighed
 from identify.signals.trace import Trace, loads_differ
@@ -105,12 +107,14 @@ def search_in_torque(
     scale = scale_of(few, start.platform, ())
     offered = [n for n in allowed if n not in structure.effects and _possible(n, traces)]
 
+    likelihood = LikelihoodLook(PredictionError(few), scale)
+
     def searched(cutoff_hz: float) -> tuple[TorqueSearch, TorqueFit]:
         regression = TorqueRegression(few, parts, cutoff_hz, scale)
         base = regression.solve(structure, shapes)
         floor = torque_noise_floor(few, base.values, cutoff_hz, [t.keep for t in few])
         acceleration = float(np.sqrt(np.mean(regression.series()[2] ** 2)))
-        search = TorqueSearch(regression, base, floor, acceleration, offered, say)
+        search = TorqueSearch(regression, base, floor, acceleration, offered, say, likelihood)
         return search, search.run()
 
     highest = HIGHEST / few[0].step_s

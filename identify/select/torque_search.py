@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 from identify.diagnose.torque_regression import TorqueFit, TorqueRegression, gains_at_zero
+from identify.select.likelihood_look import LikelihoodLook, shape_of
 from rig import effects
 from rig.effects.base import Place
 
@@ -22,6 +23,7 @@ AS_HEAVY = 0.05  # of what is left: candidates that differ by less carry the sam
 RIVAL = 0.02  # of what is left: rivals carry as much as what was taken, to that
 TOLD_APART = 10.0  # fall of the penalised cost that parts two candidates (Kass and Raftery 1995: very strong)
 INERTIA_MATTERS = 0.2  # of the torque: below, the motion hardly shows the inertia
+HEAVIEST = 4  # candidates that are fitted by prediction error
 MOST = 6  # effects that one recording is believed to show
 
 
@@ -78,13 +80,14 @@ class TorqueSearch:
     acceleration: float
     allowed: Sequence[str]
     say: Callable[[str], None] = lambda text: None
+    likelihood: LikelihoodLook | None = None
     rounds: list[tuple[Weighed, ...]] = field(default_factory=list)
 
     def run(self) -> TorqueFit:
         """Add effects as long as one carries weight, then drop what no longer does."""
         now = self.without_soaking_stiffness(self.base)
         while len(now.structure.effects) < MOST + len(self.base.structure.effects):
-            looks = self.looks(now)
+            looks = self.judged(now, self.looks(now))
             self.rounds.append(tuple(looks))
             chosen = self.choice(looks)
             if chosen is None:
@@ -115,6 +118,27 @@ class TorqueSearch:
         if old * self.acceleration < INERTIA_MATTERS * self.regression.torque_nm or new >= old:
             return 1.0
         return float((old / max(new, 1e-9 * old)) ** 2)
+
+    def judged(self, now: TorqueFit, looks: list[Weighed]) -> list[Weighed]:
+        """The same with the likelihood's word on the most promising: at its shapes, if they carry more."""
+        if self.likelihood is None:
+            return looks
+        model = self.likelihood.model(now.structure, now.values)
+        asked = self.likelihood.proposals(model, [w.effect for w in looks])
+        heavy = [w for w in looks if w.counts][:HEAVIEST]
+        starts = {**asked, **{w.effect: w.fit.values for w in heavy}}
+        found = []
+        for look in looks:
+            fit = self.likelihood.fitted(model, look.effect, starts[look.effect]) if look.effect in starts else None
+            if fit is None:
+                found.append(look)
+                continue
+            shapes = {**now.shapes, look.effect: shape_of(fit, look.effect)}
+            there = self.regression.solve(now.structure.plus(look.effect), shapes)
+            other = self.weighed(look.effect, now, there)
+            better = other if other.weight > look.weight else look
+            found.append(replace(better, evidence=model.penalised - fit.penalised))
+        return sorted(found, key=lambda w: -w.weight)
 
     def looks(self, now: TorqueFit) -> list[Weighed]:
         """All candidates on top of a model, the heaviest first."""
