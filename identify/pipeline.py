@@ -13,6 +13,7 @@ from identify.conclude.declared_values import declared_values
 from identify.conclude.error_figures import floor_of, in_torque, measure
 from identify.estimate.cross_validation import Judged
 from identify.estimate.final_fit import Fitted, by_output_error, by_regression, noise_of_all
+from identify.estimate.fit import Fit
 from identify.estimate.initial_guess import Start, first_guess
 from identify.genetic.per_set import each_set
 from identify.model.structure import Structure, shape_values
@@ -39,6 +40,7 @@ from identify.select.fitter import Fits
 from identify.select.free_decay import FreeDecay
 from identify.select.search_state import Search
 from identify.select.sensor_limited import SensorLimited
+from identify.select.torque_search import NEARLY_ALL
 from identify.signals.prepare import prepare
 from identify.signals.trace import loads_differ
 from rig import effects
@@ -49,7 +51,6 @@ from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
 TWICE_THE_NOISE = 2.0
-NEARLY_ALL = 0.9  # of what the declared model leaves: without white torque a missing effect is a function of the motion
 MUCH_CLOSER = 0.5  # times the free-run error of the other fit
 STOPPED = "the search was interrupted; missing effects are not yet determined"
 NOTHING_YET = (
@@ -148,7 +149,8 @@ class _Identifier:
                 return self._concluded(found, fits)
             self.say("more is left than the sensor's noise: looking at it as a torque")
             self.more_than_noise = True
-            return self._in_torque(shapes, NEARLY_ALL)
+            much = search.much(self.start.cutoff_hz)
+            return self._in_torque(shapes, NEARLY_ALL, (*much, search.found_as(much[0])) if much else None)
         except (Aborted, KeyboardInterrupt):
             if search is None:
                 raise
@@ -203,12 +205,15 @@ class _Identifier:
             self.say("a torque that was not recorded limits these runs, not the sensor's noise")
         return regime.disturbance_limited
 
-    def _in_torque(self, shapes: dict[str, tuple[float, ...]], least_explained: float = 0.0) -> Identification:
+    def _in_torque(
+        self, shapes: dict[str, tuple[float, ...]], least_explained: float = 0.0,
+        known: tuple[Fit, float, Search] | None = None,
+    ) -> Identification:  # fmt: skip
         """The way for measured data: what the model lacks is told by the torque that it leaves."""
         unit = UNITS[self.recording.axis]["torque"]
         found = search_in_torque(
             self.traces, self.split, self.structure, shapes, self.start, self._allowed(), unit, self.say,
-            least_explained,
+            least_explained, known,
         )  # fmt: skip
         after = found.after
         line = standing_line(after, self.traces) if self.more_than_noise and TONE in found.named else None

@@ -14,6 +14,7 @@ from identify.diagnose.torque_residual import torque_noise_floor
 from identify.estimate.by_prediction_error import by_prediction_error
 from identify.estimate.cross_validation import Judged
 from identify.estimate.final_fit import Fitted, covariance_of, free_run_of
+from identify.estimate.fit import Fit
 from identify.estimate.initial_guess import Start, scale_of
 from identify.estimate.output_error import Estimate
 from identify.estimate.prediction_error import PredictionError
@@ -23,11 +24,12 @@ from identify.results import Candidate, Disturbance
 from identify.runs.holdout import Split
 from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced
-from identify.select.likelihood_look import LikelihoodLook
+from identify.select.likelihood_look import LikelihoodLook, shape_of
 from identify.select.search_state import Search
 from identify.select.torque_search import TorqueSearch, Weighed
 from identify.signals.trace import Trace, loads_differ
 from rig import effects
+from rig.effects.base import Place
 
 HIGHEST = 0.2  # of the sample rate of what is searched: the low-pass cuts off no higher
 MUCH_LEFT = 0.05  # of the torque: where nothing explains that, a wider band is looked at
@@ -86,6 +88,7 @@ class TorqueErrors:
 def search_in_torque(
     traces: Sequence[Trace], split: Split, structure: Structure, shapes: dict[str, tuple[float, ...]], start: Start,
     allowed: Sequence[str], unit: str, say: Callable[[str], None], least_explained: float = 0.0,
+    known: tuple[Fit, float, Search] | None = None,
 ) -> Found:  # fmt: skip
     """Find what the declared model lacks, and fit both models with their disturbance.
 
@@ -102,6 +105,9 @@ def search_in_torque(
     least_explained
         Share of the power that the declared model leaves, which everything named together explains at least. Without a
         disturbance what the library lacks is always resembled by something in it.
+    known
+        A model that the search by prediction error has found, the share it explains, and that search as the report
+        tells it. It is taken where it explains enough, or where what it leaves depends on nothing.
     """
     few, parts = reduced(traces, split)
     scale = scale_of(few, start.platform, ())
@@ -109,39 +115,66 @@ def search_in_torque(
 
     likelihood = LikelihoodLook(PredictionError(few), scale)
 
-    def searched(cutoff_hz: float) -> tuple[TorqueSearch, TorqueFit]:
+    def at(cutoff_hz: float) -> TorqueSearch:
         regression = TorqueRegression(few, parts, cutoff_hz, scale)
         base = regression.solve(structure, shapes)
         floor = torque_noise_floor(few, base.values, cutoff_hz, [t.keep for t in few])
         acceleration = float(np.sqrt(np.mean(regression.series()[2] ** 2)))
-        search = TorqueSearch(regression, base, floor, acceleration, offered, say, likelihood)
-        return search, search.run()
+        return TorqueSearch(regression, base, floor, acceleration, offered, say, likelihood)
 
     highest = HIGHEST / few[0].step_s
-    search, best = searched(min(start.cutoff_hz, highest))
+    search = at(min(start.cutoff_hz, highest))
+    if known and known[1] < least_explained:
+        trial = along(search.regression, known[0])
+        known = None if disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on else known
+    best = along(search.regression, known[0]) if known else search.run()
     left = best.held_nm / search.regression.torque_nm
-    if best.structure.effects == structure.effects and left > MUCH_LEFT:
+    if known is None and best.structure.effects == structure.effects and left > MUCH_LEFT:
         wider = min(WIDER[few[0].channel] * start.cutoff_hz, highest)
         say(f"nothing found up to {start.cutoff_hz:.3g} Hz: looking up to {wider:.3g} Hz")
-        search, best = searched(wider)
+        search = at(wider)
+        best = search.run()
     regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
-    named = best.structure.effects != structure.effects
+    named = known is None and best.structure.effects != structure.effects
     if named and search.left(best) > (1.0 - least_explained) * search.left(base):
         say(f"rejected: {', '.join(best.structure.effects)}; together they still leave too much unexplained")
         best = base
-    say(f"final fit with {', '.join(best.structure.effects) or 'fewer terms'}")
+    final = known[0].structure if known else best.structure
+    say(f"final fit with {', '.join(final.effects) or 'fewer terms'}")
     before = _final(regression, base, traces, split)
-    after = before if best.structure == structure else _final(regression, best, traces, split)
+    if final == structure:
+        after = before
+    elif known:
+        after, _ = by_prediction_error(traces, final, known[0].values, split.final, split.everything)
+    else:
+        after = _final(regression, best, traces, split)
     disturbance = disturbance_of(regression, best, floor, unit)
 
     def errors(fit: TorqueFit) -> TorqueErrors:
         size = regression.torque_nm
         return TorqueErrors(fit.fitted_nm, fit.fitted_nm / size, fit.held_nm / size, floor, cutoff)
 
+    told = _told(search, structure, base, best)
+    if known:
+        told = replace(
+            known[2], base=told.base, best=replace(told.best, structure=final), contribution=told.contribution
+        )
+        told.horizon, told.floor, told.free_running = 0.0, floor, False
     return Found(
-        _told(search, structure, base, best), before, after, disturbance, (errors(base), errors(best)),
+        told, before, after, disturbance, (errors(base), errors(best)),
         lambda: disturbance_of(regression, base, floor, unit),
     )  # fmt: skip
+
+
+def along(regression: TorqueRegression, fit: Fit) -> TorqueFit:
+    """A model along the measured motion, in torque; without a lag of the sensor, which has no torque there."""
+    kept = tuple(e for e in fit.structure.effects if effects.get(e).place is not Place.SENSOR)
+    found = regression.solve(replace(fit.structure, effects=kept), {e: shape_of(fit, e) for e in kept})
+    if max(found.fitted_nm, found.held_nm) < regression.torque_nm:
+        return found
+    # Along the measured motion a drive that passes on nothing explains any torque: its effects are left out.
+    kept = tuple(e for e in kept if effects.get(e).place is not Place.DRIVE)
+    return regression.solve(replace(fit.structure, effects=kept), {e: shape_of(fit, e) for e in kept})
 
 
 def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> Fitted:

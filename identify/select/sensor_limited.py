@@ -25,14 +25,18 @@ from identify.runs.holdout import Split
 from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced, thinned
 from identify.select.search_state import Search
-from identify.select.stepwise import AT_NOISE, Stepwise, disturbed
+from identify.select.stepwise import AT_NOISE, MANY, Stepwise, disturbed
+from identify.select.torque_search import WEIGHT
 from identify.signals.trace import Trace, loads_differ
 from rig import effects
+from rig.dynamics.predictor import Noise
+from rig.effects.base import Place
 from rig.platform import TERMS
 
 SAMPLES = 10_000  # that the search looks at
 HIGHEST = 0.2  # of the sample rate: the low-pass for a first guess in torque cuts off no higher
 ALL = 40_000  # samples on which rivals are parted
+MOST_OF_IT = 0.5  # of the disturbance, explained by a model that is worth a look in torque
 MORE = 1.5  # times the samples: else there is nothing more to be seen in all of them
 
 
@@ -88,11 +92,40 @@ class SensorLimited:
         """Search; whether the last model predicts down to the sensor's noise."""
         return disturbed(self.stepwise.run()) < AT_NOISE
 
+    def much(self, cutoff_hz: float) -> tuple[Fit, float] | None:
+        """The last model where it explains most of what the first leaves, though not down to the sensor's noise.
+
+        With the share of the disturbance that it explains, up to a frequency.
+
+        Every effect of it carries weight: without it clearly more of the disturbance is left. A lag of the sensor
+        carries no torque and stays.
+        """
+        now, base, problem = self.stepwise.best, self.stepwise.base, self.stepwise.problem
+
+        def left(fit: Fit) -> float:
+            return in_band(fit.noise, cutoff_hz) * fit.variance
+
+        for name in [e for e in now.structure.effects if e not in base.structure.effects]:
+            needed = any(name in effects.get(e).lower_order for e in now.structure.effects)
+            if needed or effects.get(name).place is Place.SENSOR:
+                continue
+            start = {n: v for n, v in now.values.items() if n[0] != name}
+            without = problem.fit(now.structure.minus(name), start, None, MANY, carry=now.shots)
+            if left(now) > (1.0 - WEIGHT) * left(without):
+                now = without
+        named = now.structure.effects != base.structure.effects
+        explained = 1.0 - left(now) / left(base)
+        return (now, explained) if named and explained > MOST_OF_IT else None
+
     @property
     def found(self) -> Search:
         """What was looked at so far, as the report tells it."""
+        return self.found_as(self.stepwise.best)
+
+    def found_as(self, best: Fit) -> Search:
+        """The same with a model that has something less."""
         s = self.stepwise
-        best, base = s.best, s.base
+        base = s.base
         horizon = horizon_s(tuple(base.values.get((t,), 0.0) for t in TERMS), self.traces)  # type: ignore[arg-type]
         noise = float(np.sqrt(np.mean([t.noise**2 for t in self.traces])))
         found = Search(_judged(base), _judged(best), horizon, noise, free_running=True)
@@ -109,6 +142,12 @@ class SensorLimited:
         found.rival_models = {k: {n: f.platform() for n, f in v.items()} for k, v in rivals.items()}
         found.dropped = [(n, why) for n, why in s.dropped if n not in (*best.structure.terms, *best.structure.effects)]
         return found
+
+
+def in_band(noise: Noise, cutoff_hz: float) -> float:
+    """Variance of a disturbance below a frequency, over the variance of one reading."""
+    slow = noise.slow * 2.0 / np.pi * np.arctan(2.0 * np.pi * cutoff_hz * noise.time_constant_s)
+    return float(slow + noise.white * cutoff_hz)
 
 
 def _in_torque(regression: TorqueRegression, now: Fit, name: str) -> dict[Name, float] | None:
