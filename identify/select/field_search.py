@@ -26,6 +26,7 @@ from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced
 from identify.select.likelihood_look import LikelihoodLook, shape_of
 from identify.select.search_state import Search
+from identify.select.sensor_limited import in_band
 from identify.select.torque_search import TorqueSearch, Weighed
 from identify.signals.trace import Trace, loads_differ
 from rig import effects
@@ -149,6 +150,11 @@ def search_in_torque(
     else:
         after = _final(regression, best, traces, split)
     disturbance = disturbance_of(regression, best, floor, unit)
+    if known and any(
+        e not in best.structure.effects and effects.get(e).place is not Place.SENSOR for e in final.effects
+    ):
+        size = float(np.sqrt(in_band(known[0].noise, cutoff) * known[0].variance))
+        disturbance = Disturbance(size, unit, size / regression.torque_nm, (), {})
 
     def errors(fit: TorqueFit) -> TorqueErrors:
         size = regression.torque_nm
@@ -168,13 +174,14 @@ def search_in_torque(
 
 def along(regression: TorqueRegression, fit: Fit) -> TorqueFit:
     """A model along the measured motion, in torque; without a lag of the sensor, which has no torque there."""
-    kept = tuple(e for e in fit.structure.effects if effects.get(e).place is not Place.SENSOR)
-    found = regression.solve(replace(fit.structure, effects=kept), {e: shape_of(fit, e) for e in kept})
-    if max(found.fitted_nm, found.held_nm) < regression.torque_nm:
-        return found
-    # Along the measured motion a drive that passes on nothing explains any torque: its effects are left out.
-    kept = tuple(e for e in kept if effects.get(e).place is not Place.DRIVE)
-    return regression.solve(replace(fit.structure, effects=kept), {e: shape_of(fit, e) for e in kept})
+    seen = tuple(e for e in fit.structure.effects if effects.get(e).place is not Place.SENSOR)
+    shaft = tuple(e for e in seen if effects.get(e).place is not Place.DRIVE)
+    for kept in (seen, shaft, ()):
+        # A drive that passes on nothing explains any torque, and a play run along a noisy motion may run away.
+        found = regression.solve(replace(fit.structure, effects=kept), {e: shape_of(fit, e) for e in kept})
+        if found.held_nm < regression.torque_nm:
+            break
+    return found
 
 
 def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> Fitted:
