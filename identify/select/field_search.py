@@ -26,7 +26,7 @@ from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced
 from identify.select.likelihood_look import LikelihoodLook, shape_of
 from identify.select.search_state import Search
-from identify.select.sensor_limited import in_band
+from identify.select.sensor_limited import MOST_OF_IT, in_band
 from identify.select.torque_search import TorqueSearch, Weighed
 from identify.signals.trace import Trace, loads_differ
 from rig import effects
@@ -137,7 +137,12 @@ def search_in_torque(
         best = search.run()
     regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
     named = known is None and best.structure.effects != structure.effects
-    if named and search.left(best) > (1.0 - least_explained) * search.left(base):
+    explained = 1.0 - search.left(best) / search.left(base)
+    if (
+        named
+        and explained < least_explained
+        and (explained < MOST_OF_IT or disturbance_of(regression, best, floor, unit).depends_on)
+    ):
         say(f"rejected: {', '.join(best.structure.effects)}; together they still leave too much unexplained")
         best = base
     final = known[0].structure if known else best.structure
