@@ -39,6 +39,8 @@ def rms(values: Array) -> float:
 
 def bounded(g: Array, b: Array, low: Array) -> Array:
     """Least squares from normal equations with lower bounds: what would go below is held at its bound."""
+    if not (np.all(np.isfinite(g)) and np.all(np.isfinite(b))):
+        return np.zeros(len(b))  # an effect that ran away along a noisy motion explains nothing
     size = np.sqrt(np.maximum(np.diag(g), 1e-300))
     g, b = g / np.outer(size, size), b / size
     bound = np.where(np.isfinite(low), low * size, -np.inf)
@@ -103,4 +105,4 @@ def autoregression(r: Array, run: Array, order: int) -> Array:
             now.append(part[order:])
     p, n = np.concatenate(past), np.concatenate(now)
     g = p.T @ p + 1e-9 * float(n @ n) * np.eye(order)
-    return np.concatenate([[1.0], -np.linalg.solve(g, p.T @ n)])
+    return np.concatenate([[1.0], -np.linalg.lstsq(g, p.T @ n, rcond=1e-12)[0]])

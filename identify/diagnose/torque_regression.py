@@ -127,6 +127,22 @@ class TorqueRegression(TorqueBand):
         x = bounded(wide.T @ wide, wide.T @ torque[self._used], np.full(len(names), -np.inf))
         return dict(zip(names, x.tolist(), strict=True))
 
+    def stacked(self, structure: Structure, shapes: Shapes) -> tuple[Array, Array, list[Name]]:
+        """Columns of a structure over all runs, what is free in each run behind them, target and names; as fitted."""
+        parts = [self._columns(i, structure, shapes) for i in range(len(self.traces))]
+        names: list[Name] = list(dict.fromkeys(n for _, own, _ in parts for n in own))
+        extra = sum(a.shape[1] - len(own) for a, own, _ in parts)
+        wide, target, at = [], [], len(names)
+        for a, own, y in parts:
+            full = np.zeros((len(y), len(names) + extra))
+            full[:, [names.index(n) for n in own]] = a[:, : len(own)]
+            more = a.shape[1] - len(own)
+            full[:, at : at + more] = a[:, len(own) :]
+            at += more
+            wide.append(full)
+            target.append(y)
+        return np.concatenate(wide)[self._fitted], np.concatenate(target)[self._fitted], names
+
     def solve(self, structure: Structure, shapes: Shapes, filters: Array | None = None) -> TorqueFit:
         """One structure at given shapes; gains within their bounds.
 

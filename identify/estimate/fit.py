@@ -57,6 +57,8 @@ class Fit:
         Of one reading's noise, as the innovations show it.
     information
         Of the parameters, start states and biases eliminated, for readings of unit variance, (p, p).
+    disturbed
+        Variance of the prediction over what it were without a torque disturbance: one where the sensor alone limits it.
     """
 
     structure: Structure
@@ -69,6 +71,7 @@ class Fit:
     variance: float
     information: Array
     prediction: Prediction
+    disturbed: float
 
     @cached_property
     def values(self) -> dict[Name, float]:

@@ -83,8 +83,12 @@ def decimated(trace: Trace, factor: int) -> Trace:
         return trace
     order = REACH * factor
     weights = signal.firwin(2 * order + 1, PASSED / factor, window=("kaiser", KAISER))
-    y = np.convolve(np.pad(trace.measured, order, mode="reflect", reflect_type="odd"), weights, mode="valid")
-    measured = y[::factor]
+
+    def passed(values: Array) -> Array:
+        padded = np.pad(values, order, mode="reflect", reflect_type="odd")
+        return np.asarray(np.convolve(padded, weights, mode="valid")[::factor])
+
+    measured, less = passed(trace.measured), float(np.sqrt(np.sum(weights**2)))
     keep = _every(trace.keep, factor, len(measured))
     keep[:REACH] = keep[len(measured) - REACH :] = False  # there the filter reaches beyond the run
     stretches = [(-(-a // factor), b // factor) for a, b in trace.stretches]
@@ -94,7 +98,8 @@ def decimated(trace: Trace, factor: int) -> Trace:
         inside[a : b + 1] = True
     return replace(
         trace, measured=measured, keep=keep & inside, stretches=stretches, step_s=factor * trace.step_s,
-        noise=trace.noise * float(np.sqrt(np.sum(weights**2))), motion=None, _series={},
+        noise=less * trace.noise, beside=None if trace.beside is None else passed(trace.beside),
+        beside_noise=less * trace.beside_noise, motion=None, _series={},
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -19,20 +19,62 @@ from rig.recording.run import Array, Run
 
 LEAD_IN_S = 0.01  # at the start of a run that carry no weight
 LONGEST_FILL = 25  # missing samples that a spline may bridge
+# Coherence with the differenced encoder above which a rate was made from it (16 segments show a sixteenth by chance),
+# in bins of which at least this many hold no more than so many times the encoder's noise.
+REPEATED, FEW_BINS, MOSTLY = 0.3, 8, 2.0
 
 
-def _channel(run: Run) -> Literal["rate", "angle"]:
-    """The channel that tells more where 99 % of the motion is; a differenced encoder is no gyro."""
-    if run.rate_rad_s is None:
-        return "angle"
-    if run.angle_rad is None:
-        return "rate"
+@dataclass(frozen=True)
+class Channels:
+    """What is read of all runs alike: the channel that is predicted, and whether the other one is read beside it."""
+
+    first: Literal["rate", "angle"]
+    both: bool = False
+
+
+def channels_of(runs: Sequence[Run]) -> Channels:
+    """The channel that every run has and that tells more where the motion is; both where they are independent."""
+    if any(r.rate_rad_s is None for r in runs):
+        return Channels("angle")
+    if any(r.angle_rad is None for r in runs):
+        return Channels("rate")
+    better = float(np.mean([_rate_over_angle(r) for r in runs]))
+    coherent = [c for r in runs if (c := _noise_in_common(r)) is not None]
+    alone = any(r.rate_corner_hz for r in runs)
+    return Channels("rate" if better < 0.0 else "angle", not alone and min(coherent, default=1.0) < REPEATED)
+
+
+def _rate_over_angle(run: Run) -> float:
+    """Logarithm of the rate's noise over the angle's as a rate, where 99 % of the motion is."""
+    assert run.rate_rad_s is not None and run.angle_rad is not None
     step = float(np.median(np.diff(run.time_s)))
     ok = run.valid & np.isfinite(run.rate_rad_s) & np.isfinite(run.angle_rad)
     f, power = signal.welch(run.rate_rad_s[ok], 1.0 / step, nperseg=min(int(ok.sum()), 4096), detrend="constant")
     moving_rad_s = 2.0 * np.pi * f[np.searchsorted(np.cumsum(power), 0.99 * np.sum(power))]
     as_rate = noise_of(run.angle_rad[ok]) * moving_rad_s
-    return "rate" if noise_of(run.rate_rad_s[ok]) < as_rate else "angle"
+    return float(np.log(max(noise_of(run.rate_rad_s[ok]), 1e-300) / max(as_rate, 1e-300)))
+
+
+def _noise_in_common(run: Run) -> float | None:
+    """Coherence of the rate with the differenced encoder where the encoder's own noise is most of it.
+
+    A rate that was differenced from the encoder repeats its noise, whatever filter is between them; a gyro does not.
+    None where the motion stands above the encoder's noise everywhere.
+    """
+    assert run.rate_rad_s is not None and run.angle_rad is not None
+    ok = run.valid & np.isfinite(run.rate_rad_s) & np.isfinite(run.angle_rad)
+    step = float(np.median(np.diff(run.time_s)))
+    angle, rate = run.angle_rad[ok], run.rate_rad_s[ok]
+    differenced = np.diff(angle, prepend=angle[0]) / step
+    length = min(256, len(angle) // 16)
+    if length < 16:
+        return None
+    f, power = signal.welch(differenced, nperseg=length)
+    noise = max(noise_of(angle), rounding_of(angle) or 0.0)
+    of_noise = 2.0 * (noise * 2.0 * np.sin(np.pi * f) / step) ** 2
+    _, alike = signal.coherence(rate, differenced, nperseg=length)
+    blind = (power < MOSTLY * of_noise) & (f > 0.05) & (f < 0.48)
+    return float(np.mean(alike[blind])) if np.sum(blind) >= FEW_BINS else None
 
 
 def bias_beside(run: Run, time: Array, values: Array, good: Any) -> float:
@@ -52,9 +94,16 @@ def bias_beside(run: Run, time: Array, values: Array, good: Any) -> float:
     return upper / lower if lower > 0.0 else 0.0
 
 
+def _noise_beside(run: Run, channel: Literal["rate", "angle"], whole: Array) -> float:
+    """Standard deviation of the channel that was not chosen; an encoder's at least that of its steps."""
+    values = run.angle_rad if channel == "rate" else run.rate_rad_s
+    assert values is not None
+    return max(noise_of(whole), rounding_of(values[run.valid & np.isfinite(values)]) or 0.0)
+
+
 def prepare(
     run: Run, number: int = 0, noise: float | None = None, lead_in_s: float = LEAD_IN_S,
-    full_scale: tuple[float, float] = (-np.inf, np.inf),
+    full_scale: tuple[float, float] = (-np.inf, np.inf), channels: Channels | None = None,
 ) -> Trace:  # fmt: skip
     """Lay a run on a uniform grid and find its usable stretches.
 
@@ -68,8 +117,11 @@ def prepare(
         Samples at the start that carry no weight.
     full_scale
         The lowest and highest rate that the gyro can report: at these it may have turned faster.
+    channels
+        What is read of all runs; the best of this run alone where None.
     """
-    channel = _channel(run)
+    channels = channels or channels_of([run])
+    channel = channels.first
     values = run.rate_rad_s if channel == "rate" else run.angle_rad
     assert values is not None
     good = run.valid & np.isfinite(values) & ~lost(run)
@@ -97,13 +149,19 @@ def prepare(
         filled = np.where(torn, np.interp(grid, grid[~torn], filled[~torn]), filled)
         keep &= ~torn
     whole = filled[quiet[0] : quiet[1] + 1]
+    other = (run.angle_rad if channel == "rate" else run.rate_rad_s) if channels.both else None
+    beside = None
+    if other is not None:
+        there = good & np.isfinite(other)
+        beside = sampled(laid.beat, time, np.where(there, other, 0.0), there).values
     torque = None
     if run.torque_nm is not None and run.torque_time_s is not None:
         torque = TorqueSignal(torque_instants(run.torque_time_s, run.time_s, laid), run.torque_nm, run.torque_hold)
     trace = Trace(
         run, channel, step, filled, keep, [], torque, noise if noise is not None else noise_of(whole),
         bandwidth_of(whole, step), number, laid.beat.offset_s, float(run.time_s[0]) + grid[torn],
-        clipped, (laid.scatter_s, laid.stamps_wrong),
+        clipped, (laid.scatter_s, laid.stamps_wrong), beside=beside,
+        beside_noise=0.0 if beside is None else _noise_beside(run, channel, beside[quiet[0] : quiet[1] + 1]),
     )  # fmt: skip
     if run.min_rate_rad_s > 0.0:
         slow = np.abs(trace.fine[1][::UPSAMPLING]) <= run.min_rate_rad_s
@@ -130,7 +188,11 @@ def one_noise(traces: Sequence[Trace], known: bool) -> list[Trace]:
     for channel in ("rate", "angle"):
         found = [(t.noise, len(t.measured)) for t in traces if t.channel == channel]
         quietest[channel] = min(found, default=(0.0, 0))[0] if known else least_of(found)
-    return [replace(t, noise=quietest[t.channel]) for t in traces]
+    several = all(t.beside is not None for t in traces)
+    beside = least_of([(t.beside_noise, len(t.measured)) for t in traces]) if several else 0.0
+    return [
+        replace(t, noise=quietest[t.channel], beside=t.beside if several else None, beside_noise=beside) for t in traces
+    ]
 
 
 def above_steps(traces: Sequence[Trace]) -> list[Trace]:

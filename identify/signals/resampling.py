@@ -23,6 +23,7 @@ from rig.recording.run import Array
 EVEN = 0.02  # of a period: samples so close to the beat are on it
 SCATTER = 0.9  # of a period: stamps that scatter by more have no beat
 HOLE = 1.9  # periods between two samples beyond which one is missing
+NEAR = 1.5  # periods: instants that lie no farther from samples on both sides are read off a spline
 MOST_HOLES = 20  # times as many missing samples as there are
 MOVES = 4  # each along the motion that the one before made out
 SLOW = 0.5  # of the Nyquist frequency: motion above it is not followed when samples are moved
@@ -95,7 +96,11 @@ def beat_of(name: str, time_s: Array) -> Beat:
         )
     if np.max(np.abs(time_s / step - index)) < EVEN * min(1.0, step / 1e-9):
         return Beat(float(time_s[-1] / index[-1]), 0.0, index)
-    return _scattered(time_s, step) or Beat(step, 0.0, index)
+    beat = _scattered(time_s, step)
+    if beat is None:  # stamps of a software loop that wander: samples lie anywhere, and none is missing but in holes
+        step = float(np.mean(spacing[spacing < HOLE * step]))
+        beat = Beat(step, 0.0, np.rint(time_s / step).astype(np.int64))
+    return beat
 
 
 def _scattered(time_s: Array, step: float) -> Beat | None:
@@ -129,6 +134,8 @@ def sampled(beat: Beat, time_s: Array, values: Array, good: Any) -> Sampled:
     there = np.zeros(beat.count, dtype=bool)
     near = good & (beat.scattered | (np.abs(late_s) < 0.5 * beat.step_s))
     there[beat.index[near]] = True
+    if not beat.scattered and np.any(np.abs(late_s) > EVEN * beat.step_s):
+        there |= _beside(grid, time_s[good], NEAR * beat.step_s)
     scatter_s = float(np.sqrt(np.mean(late_s[near] ** 2))) if np.any(near) else 0.0
     splined = np.asarray(CubicSpline(time_s[good], values[good])(grid), dtype=float)
     if not beat.scattered or np.sum(near) < FEW:
@@ -142,6 +149,12 @@ def sampled(beat: Beat, time_s: Array, values: Array, good: Any) -> Sampled:
         moved[on] = values[near] - (motion(time_s[near] - beat.offset_s) - motion(beat.step_s * on))
     wrong = noise_of(even) < noise_of(moved)
     return Sampled(beat, even if wrong else moved, there, scatter_s, wrong)
+
+
+def _beside(grid: Array, time_s: Array, reach_s: float) -> Any:
+    """Instants with a sample on either side, no farther than that, (count,)."""
+    after = np.clip(np.searchsorted(time_s, grid), 1, len(time_s) - 1)
+    return (np.abs(time_s[after] - grid) < reach_s) & (np.abs(grid - time_s[after - 1]) < reach_s)
 
 
 def torque_instants(torque_time_s: Array, time_s: Array, laid: Sampled) -> Array:

@@ -63,6 +63,8 @@ class Trace:
     clipped: tuple[int, float] = (0, 0.0)  # samples left out because the gyro stood at its largest rate, and that
     scatter: tuple[float, bool] = (0.0, False)  # of the time stamps about an even beat in s; whether they are wrong
     motion: tuple[Array, Array, Array, Array, float] | None = None  # of a piece: cut out of the whole run's
+    beside: Array | None = None  # (n,): the other channel, where an encoder and a gyro read independently of each other
+    beside_noise: float = 0.0
     _series: dict[Any, Any] = field(default_factory=dict)
     _tables: dict[Channel, tuple[Array, float]] = field(default_factory=dict)  # shared by the pieces of a run
 
@@ -81,6 +83,7 @@ class Trace:
             self,
             measured=self.measured[first : last + 1],
             keep=self.keep[first : last + 1],
+            beside=None if self.beside is None else self.beside[first : last + 1],
             stretches=kept,
             offset_s=self.offset_s + first * self.step_s,
             motion=(angle[fine], rate[fine], time[fine], torque[fine], left),
@@ -177,7 +180,7 @@ class Trace:
             upsampling = int(np.clip(round(self.step_s / self.torque.shortest_s), UPSAMPLING, MAX_SUBSTEPS))
         fine = self.step_s / upsampling
         count = (n - 1) * upsampling
-        lead = int(min(LEAD_S, self.offset_s) / fine)  # a drive with memory has seen what came before a piece
+        lead = max(0, int(min(LEAD_S, self.offset_s) / fine))  # a drive with memory has seen what came before a piece
         x = self.torque.on_half_steps(start - lead * fine, fine, count + 1 + lead).copy()  # the filters work in place
         for name, values in drive:
             effect = effects.get(name)

@@ -45,6 +45,8 @@ _MODULES = {
 
 # A motor has several: each further order of the same torque is an effect of its own, which no list shows.
 _FURTHER = {f"cogging_{k}": "cogging" for k in range(2, 7)}
+# The same effect in another form, which competes with the first and goes by its name.
+_FORMS = {"sensor_lag_second_order": "sensor_lag"}
 
 
 def names() -> tuple[str, ...]:
@@ -71,6 +73,8 @@ def get(name: str) -> Effect:
         return _own(name)
     if name in _FURTHER:
         return _further(name)
+    if name in _FORMS:
+        return _form(name)
     return _channels.get(name) if name in _channels.names() else _outside.get(name)
 
 
@@ -85,14 +89,25 @@ def _further(name: str) -> Effect:
     return replace(_own(_FURTHER[name]), name=name)
 
 
+@cache
+def _form(name: str) -> Effect:
+    effect: Effect = import_module(f"rig.effects.{name}").EFFECT
+    return effect
+
+
+def forms(name: str) -> tuple[str, ...]:
+    """The other forms of an effect, which go by its name; none of most."""
+    return tuple(form for form, first in _FORMS.items() if first == name)
+
+
 def further(name: str) -> tuple[str, ...]:
     """The effects that are more of the same, in the order in which they are added; empty for most."""
     return tuple(more for more, first in _FURTHER.items() if first == name)
 
 
 def first_of(name: str) -> str:
-    """The effect that an effect is more of; itself for most."""
-    return _FURTHER.get(name, name)
+    """The effect that an effect is more of, or another form of; itself for most."""
+    return {**_FURTHER, **_FORMS}.get(name, name)
 
 
 def read_file(path: Path) -> str:
@@ -130,6 +145,6 @@ def file_of(name: str) -> Path | None:
 
 
 __all__ = [
-    "Effect", "Parameter", "Place", "Scale", "declare_channels", "file_of", "filter_kernel", "first_of",
+    "Effect", "Parameter", "Place", "Scale", "declare_channels", "file_of", "filter_kernel", "first_of", "forms",
     "further", "get", "kernel", "known", "names", "of_channel", "read_file",
 ]  # fmt: skip

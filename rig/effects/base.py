@@ -134,6 +134,7 @@ class Effect:
     states: int = 0
     filter_states: Callable[[float, tuple[float, ...]], int] | None = None
     rest_state: Callable[[float, float], tuple[float, ...]] | None = None  # of angle and rate at the start
+    lag: Callable[[tuple[float, ...]], tuple[float, float]] | None = None  # of a SENSOR: s and s^2 of its denominator
     fastest_rad_s: Callable[[tuple[float, ...]], float] | None = None  # of (J, C, K, *values): sets the step
     # Of the same: the angle over which its states follow the motion, if they follow the angle and not time.
     follows_within_rad: Callable[[tuple[float, ...]], float] | None = None

@@ -1,0 +1,337 @@
+"""The way down of a fit by prediction error: parameters, biases and noise in one step (scoring).
+
+A parameter moves the innovations. A number of the noise moves them, too, through the gains, and moves their variance,
+which tells as much about it as half a squared unit normal does (Fisher information of a variance). Both stand in one
+normal matrix, damped as Levenberg did.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from identify.estimate.fit import Fit, Prediction
+from identify.estimate.output_error import held_still, shots_for
+from identify.model.parameters import Name, bounds_of, names_of, ordered
+from identify.model.structure import Structure
+from identify.simulate.shots import RUNAWAY, Shots
+from rig import effects
+from rig.arrays import Array
+from rig.dynamics.predictor import RATE, Gains, Noise
+from rig.effects.base import Place
+
+if TYPE_CHECKING:
+    from identify.estimate.prediction_error import PredictionError
+
+STEP = 1e-6  # relative step of the differences
+NOISE_STEP = 0.02  # of a logarithm of the noise, in its differences
+FARTHEST = 4.0  # by which a logarithm of the noise may change in one step
+ENOUGH = 0.5  # fall of the cost below which a fit has arrived
+TRIALS = 7  # step lengths tried before a direction is given up
+DAMPING = 1e-4
+FURTHER = (  # times white density, slow variance and time constant: where else a noise is looked for
+    (0.01, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 10.0, 1.0), (1.0, 0.1, 0.1), (1.0, 0.03, 0.01),
+    (1.0, 1.0, 10.0),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Look:
+    """One run's innovations at a parameter vector, m readings a sample."""
+
+    innovations: Array  # (n, m)
+    variance: Array  # (n, m)
+    state: Array  # angle, rate, slow torque after each sample, (n, 3)
+    gains: Gains
+
+
+@dataclass(frozen=True)
+class Columns:
+    """One run's derivatives at a fit, of the samples that count, readings of a sample one after the other.
+
+    Attributes
+    ----------
+    columns
+        What the parameters do to the scaled innovations, (n, p).
+    bias
+        What the run's bias does, (n,); zeros where it has none.
+    scaled
+        Innovations over their standard deviation, (n,).
+    variance
+        Of the innovations, (n,).
+    """
+
+    columns: Array
+    bias: Array
+    scaled: Array
+    variance: Array
+
+
+@dataclass(frozen=True)
+class _Step:
+    """What a step is solved from: normal matrix and right side, and how each run's bias follows."""
+
+    matrix: Array
+    right: Array
+    biases: list[tuple[Array, float]]
+
+
+class Descent:
+    """From a start down to the nearest minimum of the cost.
+
+    Parameters
+    ----------
+    problem
+        The runs, and how they are predicted.
+    start
+        Values to begin from; what is missing begins at zero.
+    noise
+        To begin from; None looks for the best on a grid.
+    carry
+        Runs of an earlier fit, whose biases to begin from.
+    fixed
+        Parameters that stay at their start value.
+    """
+
+    def __init__(
+        self, problem: PredictionError, structure: Structure, start: Mapping[Name, float], noise: Noise | None,
+        carry: Sequence[Shots] | None, fixed: Sequence[Name],
+    ) -> None:  # fmt: skip
+        p = self.problem = problem
+        self.structure, self.names = structure, names_of(structure, p.runs)
+        self.x = np.array([start.get(n, 0.0) for n in self.names])
+        self.low = np.array([bounds_of(n)[0] for n in self.names])
+        self.high = np.array([bounds_of(n)[1] for n in self.names])
+        self.x = ordered(self.names, np.clip(self.x, self.low, self.high))
+        still = [*fixed, *([("inertia",)] if p.torque_free else [])]
+        self.still = held_still(self.names, p.traces, p.use, still)
+        self.scale = np.maximum(np.abs(self.x), [self._unit(n) for n in self.names])
+        self.shots = shots_for(p.traces, structure, self.names, self.x, None, p.use, None, p.coarse)
+        # Start states are not carried over: where a run begins stuck is a matter of the friction that is tried.
+        self.bias: Array = np.array([s.bias for s in (carry or self.shots)])
+        self.damping = DAMPING
+        self.weights = [s.weight for s in self.shots]
+        self.count = int(sum(w.sum() for w in self.weights)) * p.readings
+        self.kinds = self._kinds_of_noise()
+        self.noise = p.within(noise or p.on_grid(lambda q: self._cost(self._looks(self.x, p.within(q), self.bias))))
+        self.looks = self._looks(self.x, self.noise, self.bias)
+        self.cost = self._cost(self.looks)
+        self.information: Array = np.zeros((len(self.x), len(self.x)))
+        self._informed: tuple[Noise, bytes] | None = None
+
+    def _kinds_of_noise(self) -> list[str]:
+        """The numbers of the noise that this model has; without a low-pass nothing is ahead of it."""
+        out = ["white", "slow", "time_constant_s"]
+        if self.problem.gyro:
+            out.append("walk")
+            if any(effects.get(e).lag is not None for e in self.structure.effects):
+                out.append("ahead")
+        return out
+
+    def _unit(self, name: Name) -> float:
+        """What changes the torque by about itself: the scale of a parameter that is zero."""
+        p = self.problem
+        if len(name) == 1:
+            per = {"inertia": p.acceleration, "damping": p.rate_rad_s, "stiffness": p.angle_rad}[name[0]]
+            return p.torque_nm / per
+        parameter = next(q for q in effects.get(name[0]).parameters if q.name == name[1])
+        if parameter.linear:
+            return 1e-3 * p.torque_nm if parameter.unit.startswith("N") else 0.0
+        return p.step_s if parameter.unit == "s" else 1e-3
+
+    @property
+    def sticks(self) -> bool:
+        """Whether the model has dry friction."""
+        return any(effects.get(e).place is Place.FRICTION for e in self.structure.effects)
+
+    def down(self, steps: int, thorough: bool) -> int:
+        """Steps until it has arrived; how many are left. A thorough fit then looks at other noises."""
+        for left in range(steps, 0, -1):
+            if not self.step() and (left == 1 or not thorough or not self.other_noise()):
+                return left - 1
+        return 0
+
+    def step(self) -> bool:
+        """One step down; False where it has arrived, or none leads there."""
+        before = self.cost
+        return bool(np.isfinite(before)) and self._down(True) and before - self.cost > ENOUGH
+
+    def columns(self) -> list[Columns]:
+        """Derivatives of every run, where the descent stands."""
+        return [c for c, _, _ in self._all_columns(False)]
+
+    def _looks(self, x: Array, noise: Noise, bias: Array) -> list[Look]:
+        p = self.problem
+        return list(
+            p.workers.map(lambda i: p.look(self.shots[i], self.structure, self.names, x, noise, float(bias[i])),
+                          range(len(self.shots)))
+        )  # fmt: skip
+
+    @RUNAWAY
+    def _cost(self, looks: Sequence[Look]) -> float:
+        squares = sum(
+            float(np.sum(q.innovations[w] ** 2 / q.variance[w])) for q, w in zip(looks, self.weights, strict=True)
+        )
+        if not np.isfinite(squares) or squares <= 0.0:
+            return np.inf
+        log = sum(float(np.sum(np.log(q.variance[w]))) for q, w in zip(looks, self.weights, strict=True))
+        return float(self.count * np.log(squares / self.count) + log)
+
+    def _all_columns(self, of_noise: bool) -> list[tuple[Columns, Array, Array]]:
+        return list(self.problem.workers.map(lambda i: self._columns(i, of_noise), range(len(self.shots))))
+
+    @RUNAWAY
+    def _columns(self, i: int, of_noise: bool) -> tuple[Columns, Array, Array]:
+        """Derivatives of one run's scaled innovations, where the descent stands.
+
+        With what the logarithms of the noise do to them, (n, k), and what parameters and noise do to the logarithm of
+        their variance, (n, p + k).
+        """
+        p, s, base, w = self.problem, self.shots[i], self.looks[i], self.weights[i]
+        root = np.sqrt(base.variance[w])
+        scaled = base.innovations[w] / root
+
+        def change(x: Array, noise: Noise, bias: float, h: float) -> tuple[Array, Array]:
+            # What a parameter does to the gains matters to no innovation that is white, and gains cost a prediction.
+            kept = base.gains if noise is self.noise else None
+            other = p.look(s, self.structure, self.names, x, noise, bias, kept)
+            moved = (-(other.innovations[w] - base.innovations[w]) / h / root).ravel()
+            return moved, (np.log(other.variance[w] / base.variance[w]) / h).ravel()
+
+        kinds, p_ = self.kinds if of_noise else [], len(self.x)
+        columns, ones = np.zeros((scaled.size, p_)), np.zeros(scaled.size)
+        pulled, spread = np.zeros((scaled.size, len(kinds))), np.zeros((scaled.size, p_ + len(kinds)))
+        for k, name in enumerate(self.names):
+            if self.still[k] or (len(name) == 3 and int(name[2]) != s.number):
+                continue
+            h = STEP * self.scale[k] * (-1.0 if self.x[k] + STEP * self.scale[k] > self.high[k] else 1.0)
+            moved = self.x.copy()
+            moved[k] += h
+            columns[:, k], spread[:, k] = change(moved, self.noise, self.bias[i], h)
+        if s.trace.biased:
+            h = 1e-4 * p.rate_rad_s
+            ones, _ = change(self.x, self.noise, self.bias[i] + h, h)
+        for k, kind in enumerate(kinds):
+            there = replace(self.noise, **{kind: getattr(self.noise, kind) * float(np.exp(NOISE_STEP))})
+            pulled[:, k], spread[:, p_ + k] = change(self.x, there, self.bias[i], NOISE_STEP)
+        return Columns(columns, ones, scaled.ravel(), base.variance[w].ravel()), pulled, spread
+
+    def _solvable(self, of_noise: bool) -> _Step:
+        """The normal equations where the descent stands; the information of the parameters is kept."""
+        p, k = len(self.x), len(self.kinds) if of_noise else 0
+        matrix, right = np.zeros((p + k, p + k)), np.zeros(p + k)
+        information, biases, parts = np.zeros((p, p)), [], self._all_columns(of_noise)
+        squares = sum(float(c.scaled @ c.scaled) for c, _, _ in parts)
+        variance = squares / max(self.count, 1)
+        level = np.sum([v.sum(axis=0) for _, _, v in parts], axis=0) / max(self.count, 1)
+        for part, pulled, spread in parts:
+            wide, z, one = np.column_stack([part.columns, pulled]), part.scaled, part.bias
+            pivot = float(one @ one)
+            across, own = (one @ wide / pivot, float(one @ z) / pivot) if pivot > 0.0 else (np.zeros(p + k), 0.0)
+            matrix += (wide.T @ wide - pivot * np.outer(across, across)) / variance
+            right += (wide.T @ z - pivot * across * own) / variance
+            biases.append((across, own))
+            information += (part.columns.T @ part.columns - pivot * np.outer(across[:p], across[:p]))
+            apart = spread - level  # the scale of all variances is free: only what differs between samples tells
+            matrix += 0.5 * apart.T @ apart
+            right -= 0.5 * apart.T @ (1.0 - z * z / variance)
+        self.information, self._informed = information, (self.noise, self.x.tobytes())
+        return _Step(matrix, right, biases)
+
+    def _down(self, of_noise: bool) -> bool:
+        """One step of parameters, biases and, if asked for, the noise; False where none leads down."""
+        found = self._solvable(of_noise)
+        p = len(self.x)
+        if not (np.all(np.isfinite(found.matrix)) and np.all(np.isfinite(found.right))):
+            return False
+        size: Array = np.sqrt(np.maximum(np.diag(found.matrix), 1e-300))
+        free = (np.diag(found.matrix) > 0.0) & np.concatenate([~self.still, np.ones(len(size) - p, dtype=bool)])
+        scaled, right = (found.matrix / np.outer(size, size))[np.ix_(free, free)], (found.right / size)[free]
+        if float(right @ np.linalg.lstsq(scaled, right, rcond=1e-9)[0]) < 0.2 * ENOUGH:
+            return False  # what a step promises is not worth taking
+        for _ in range(TRIALS):
+            d = np.zeros(len(size))
+            d[free] = np.linalg.lstsq(scaled + self.damping * np.eye(len(right)), right, rcond=1e-14)[0]
+            d = d / size
+            x = ordered(self.names, np.clip(self.x + d[:p], self.low, self.high))
+            change = np.concatenate([x - self.x, np.clip(d[p:], -FARTHEST, FARTHEST)])
+            noise = self._with_logs(change[p:])
+            bias = self.bias + np.array([own - across @ change for across, own in found.biases])
+            looks = self._looks(x, noise, bias)
+            cost = self._cost(looks)
+            if cost < self.cost:
+                self.x, self.bias, self.looks, self.cost, self.noise = x, bias, looks, cost, noise
+                self.damping = max(self.damping / 10.0, 1e-9)
+                return True
+            self.damping = max(10.0 * self.damping, 1e-3)
+        return False
+
+    def _with_logs(self, change: Array) -> Noise:
+        values = {
+            kind: getattr(self.noise, kind) * float(np.exp(d)) for kind, d in zip(self.kinds, change, strict=False)
+        }
+        return self.problem.within(replace(self.noise, **values))
+
+    def other_noise(self) -> bool:
+        """Whether a noise that is quite another one is likelier; if so the descent goes on from there.
+
+        Beside the right one the likelihood is a quadratic in its logarithms; far off it is flat, or has a valley for
+        a disturbance that is slow and another for one that is fast.
+        """
+        before = self.cost
+        for white, slow, time in FURTHER:
+            q = self.noise
+            noise = self.problem.within(
+                replace(q, white=white * q.white, slow=slow * q.slow, time_constant_s=time * q.time_constant_s)
+            )
+            looks = self._looks(self.x, noise, self.bias)
+            cost = self._cost(looks)
+            if cost < self.cost - ENOUGH:
+                self.noise, self.looks, self.cost = noise, looks, cost
+        self.damping = DAMPING
+        return self.cost < before - ENOUGH
+
+    def _place(self) -> tuple[Noise, Array, Array, list[Look], float]:
+        return self.noise, self.x, self.bias, self.looks, self.cost
+
+    def _go(self, place: tuple[Noise, Array, Array, list[Look], float]) -> None:
+        self.noise, self.x, self.bias, self.looks, self.cost = place
+
+    def _disturbed(self) -> float:
+        """Median over the samples of the prediction's variance over that without a torque disturbance."""
+        p, quiet = self.problem, replace(self.noise, white=0.0, slow=0.0)
+        ratios = [
+            (q.variance[w] / p.variance_at(s, self.structure, self.names, self.x, quiet)[w])[:, -1]
+            for s, q, w in zip(self.shots, self.looks, self.weights, strict=True)
+        ]  # fmt: skip
+        return float(np.median(np.concatenate(ratios)))
+
+    def found(self) -> Fit:
+        """The fit where the descent stands."""
+        if self._informed != (self.noise, self.x.tobytes()):
+            self._solvable(False)
+        squares = sum(
+            float(np.sum(q.innovations[w] ** 2 / q.variance[w])) for q, w in zip(self.looks, self.weights, strict=True)
+        )
+        shots = tuple(replace_bias(s, float(b)) for s, b in zip(self.shots, self.bias, strict=True))
+        inertia = self.x[self.names.index(("inertia",))] if ("inertia",) in self.names else 1.0
+        disturbance = [
+            q.state[:, 2]
+            + (inertia + s.added) * np.sum(q.gains.gain[:, :, RATE] * q.innovations, axis=1) / s.trace.step_s
+            for q, s in zip(self.looks, self.shots, strict=True)
+        ]  # fmt: skip
+        prediction = Prediction(
+            [q.innovations[:, 0] for q in self.looks], [q.variance[:, 0] for q in self.looks], disturbance
+        )  # fmt: skip
+        return Fit(
+            self.structure, self.names, self.x, self.noise, shots, self.cost, self.count,
+            squares / max(self.count, 1), self.information, prediction, self._disturbed(),
+        )  # fmt: skip
+
+
+def replace_bias(s: Shots, bias: float) -> Shots:
+    """The same run with another bias."""
+    return Shots(s.trace, s.grid, s.first, s.starts, bias, s.weight, s.rests)
