@@ -34,14 +34,12 @@ from identify.runs.observability import why_unseen
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
 from identify.runs.usable import runs_used
 from identify.select.contribution import contributions
-from identify.select.disturbance_limited import regime_of
 from identify.select.field_search import Found, search_in_torque
 from identify.select.fitter import Fits
 from identify.select.free_decay import FreeDecay
 from identify.select.search_state import Search
 from identify.select.sensor_limited import SensorLimited
-from identify.select.torque_search import NEARLY_ALL
-from identify.signals.prepare import prepare
+from identify.signals.prepare import channels_of, prepare
 from identify.signals.trace import loads_differ
 from rig import effects
 from rig.config.identify import IdentifyConfig
@@ -108,7 +106,8 @@ class _Identifier:
             [r.rate_rad_s[r.valid & np.isfinite(r.rate_rad_s)] for r in runs if r.rate_rad_s is not None]
         )
         noise = recording.noise if colour is None else colour.level
-        traces = [prepare(r, i, noise, full_scale=beyond) for i, r in enumerate(runs)]
+        channels = channels_of(runs)
+        traces = [prepare(r, i, noise, full_scale=beyond, channels=channels) for i, r in enumerate(runs)]
         self.traces, self.left_out = runs_used(traces, recording.noise is not None, recording.axis, say)
         self.torque_free = free
         self.more_than_noise = False  # is left by all that was found, though nothing else seemed to limit the runs
@@ -130,12 +129,10 @@ class _Identifier:
     def run(self) -> Identification:
         """The whole way; where somebody stops it in the middle, what there is so far."""
         shapes = {n: shape_values(n, _plain(self.declared, n)) for n in self.structure.effects}
-        if not self.torque_free and self._disturbance_limited():
-            return self._in_torque(shapes)
-        return self._decay(shapes) if self.torque_free else self._at_the_sensor(shapes)
+        return self._decay(shapes) if self.torque_free else self._driven(shapes)
 
-    def _at_the_sensor(self, shapes: dict[str, tuple[float, ...]]) -> Identification:
-        """The way where nothing but the sensor's noise limits what is seen; in torque where that does not come true."""
+    def _driven(self, shapes: dict[str, tuple[float, ...]]) -> Identification:
+        """The way for runs with torque: by prediction error, and in torque where that leaves something to be named."""
         search: SensorLimited | None = None
         try:
             self.say("fitting the declared model")
@@ -147,10 +144,9 @@ class _Identifier:
             found, fits = search.found, Fits(self.traces, self.split, len(self.structure.effects) + 1)
             if at_noise or self._other_cause(found, fits):
                 return self._concluded(found, fits)
-            self.say("more is left than the sensor's noise: looking at it as a torque")
+            self.say("a torque that was not recorded is left beside the sensor's noise")
             self.more_than_noise = True
-            much = search.much(self.start.cutoff_hz)
-            return self._in_torque(shapes, NEARLY_ALL, (*much, search.found_as(much[0])) if much else None)
+            return self._in_torque(shapes, (search.stepwise.best, found))
         except (Aborted, KeyboardInterrupt):
             if search is None:
                 raise
@@ -195,25 +191,11 @@ class _Identifier:
             found = replace(found, verdict=replace(found.verdict, sentences=(NOTHING_YET,)))
         return replace(found, aborted=True, accepted=False, reasons=(STOPPED,))
 
-    def _disturbance_limited(self) -> bool:
-        """Whether a torque that nobody recorded, and not the sensor's noise, limits these runs."""
-        if self.colour is not None:
-            return False  # what is left was recognised as the sensor's own noise
-        self.say("looking at what limits these runs: the sensor's noise, or a torque that was not recorded")
-        regime = regime_of(self.traces, self.split, Structure(self.declared.terms), self.start)
-        if regime.disturbance_limited:
-            self.say("a torque that was not recorded limits these runs, not the sensor's noise")
-        return regime.disturbance_limited
-
-    def _in_torque(
-        self, shapes: dict[str, tuple[float, ...]], least_explained: float = 0.0,
-        known: tuple[Fit, float, Search] | None = None,
-    ) -> Identification:  # fmt: skip
+    def _in_torque(self, shapes: dict[str, tuple[float, ...]], known: tuple[Fit, Search]) -> Identification:
         """The way for measured data: what the model lacks is told by the torque that it leaves."""
         unit = UNITS[self.recording.axis]["torque"]
         found = search_in_torque(
-            self.traces, self.split, self.structure, shapes, self.start, self._allowed(), unit, self.say,
-            least_explained, known,
+            self.traces, self.split, self.structure, shapes, self.start, self._allowed(), unit, self.say, known
         )  # fmt: skip
         after = found.after
         line = standing_line(after, self.traces) if self.more_than_noise and TONE in found.named else None
@@ -224,12 +206,13 @@ class _Identifier:
         return self._report(found.search, found.before, after, measured=found)
 
     def _allowed(self) -> list[str]:
-        """Names of the effects that may be named."""
+        """Names of the effects that may be named, in all their forms."""
         asked = self.settings.candidates
-        return [
+        names = [
             n for n in (effects.known() if asked is None else asked)
             if effects.get(n).reads is None or n in self.offer.candidates
         ]  # fmt: skip
+        return [form for n in names for form in (n, *effects.forms(n))]
 
     def _doubted(self, search: Search, fits: Fits, before: Fitted, after: Fitted) -> Fitted:
         """The final fit, or another one where something else may pass for what was found."""

@@ -9,7 +9,7 @@ predictor's disturbance, so the prediction stays near the data and the scores me
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -63,6 +63,9 @@ class InnovationScores:
 
     def __init__(self, problem: PredictionError, fit: Fit, scale: Scale) -> None:
         self.problem, self.fit, self.scale = problem, fit, scale
+        # A low-pass that is tried filters no noise yet: that would change the variance, and a score compares at one.
+        filtered = any(effects.get(e).lag is not None for e in fit.structure.effects)
+        self.noise = fit.noise if filtered else problem.within(replace(fit.noise, ahead=0.0))
         parts = problem.columns_at(fit)
         self.ones = [p.bias for p in parts]
         self.base = [p.scaled for p in parts]
@@ -170,8 +173,8 @@ class InnovationScores:
             if own and s.number not in own:
                 out.append(np.zeros(len(self.base[i])))
                 continue
-            look = self.problem.look(s, structure, names, vector, fit.noise, s.bias)
-            moved = look.innovations[s.weight] / np.sqrt(look.variance[s.weight])
+            look = self.problem.look(s, structure, names, vector, self.noise, s.bias)
+            moved = (look.innovations[s.weight] / np.sqrt(look.variance[s.weight])).ravel()
             change = self.base[i] - moved
             if not np.all(np.isfinite(change)):
                 return None

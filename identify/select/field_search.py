@@ -24,9 +24,9 @@ from identify.results import Candidate, Disturbance
 from identify.runs.holdout import Split
 from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced
-from identify.select.likelihood_look import LikelihoodLook, shape_of
+from identify.select.evidence import along, in_band
+from identify.select.likelihood_look import LikelihoodLook
 from identify.select.search_state import Search
-from identify.select.sensor_limited import MOST_OF_IT, in_band
 from identify.select.torque_search import TorqueSearch, Weighed
 from identify.signals.trace import Trace, loads_differ
 from rig import effects
@@ -36,6 +36,7 @@ HIGHEST = 0.2  # of the sample rate of what is searched: the low-pass cuts off n
 MUCH_LEFT = 0.05  # of the torque: where nothing explains that, a wider band is looked at
 # Times the cut-off at which the sensor's noise is ten times as much torque: an angle is differentiated twice.
 WIDER = {"angle": 10.0**0.4, "rate": 10.0 ** (2.0 / 3.0)}
+CLEARLY_LESS = 0.75  # times the power that prediction error's model leaves on held-out samples
 NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
 PERCENT = 100.0
 
@@ -88,8 +89,7 @@ class TorqueErrors:
 
 def search_in_torque(
     traces: Sequence[Trace], split: Split, structure: Structure, shapes: dict[str, tuple[float, ...]], start: Start,
-    allowed: Sequence[str], unit: str, say: Callable[[str], None], least_explained: float = 0.0,
-    known: tuple[Fit, float, Search] | None = None,
+    allowed: Sequence[str], unit: str, say: Callable[[str], None], known: tuple[Fit, Search],
 ) -> Found:  # fmt: skip
     """Find what the declared model lacks, and fit both models with their disturbance.
 
@@ -103,12 +103,9 @@ def search_in_torque(
         Names of the effects that may be named.
     unit
         Of the torque.
-    least_explained
-        Share of the power that the declared model leaves, which everything named together explains at least. Without a
-        disturbance what the library lacks is always resembled by something in it.
     known
-        A model that the search by prediction error has found, the share it explains, and that search as the report
-        tells it. It is taken where it explains enough, or where what it leaves depends on nothing.
+        The model that the search by prediction error has found, and that search as the report tells it. It stands
+        where what it leaves depends on nothing, or where the search in torque leaves as much on held-out samples.
     """
     few, parts = reduced(traces, split)
     scale = scale_of(few, start.platform, ())
@@ -125,40 +122,37 @@ def search_in_torque(
 
     highest = HIGHEST / few[0].step_s
     search = at(min(start.cutoff_hz, highest))
-    if known and known[1] < least_explained:
-        trial = along(search.regression, known[0])
-        known = None if disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on else known
-    best = along(search.regression, known[0]) if known else search.run()
+    trial = along(search.regression, known[0])
+    by_likelihood: tuple[Fit, Search] | None = known
+    best = trial
+    if disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on:
+        say("what is left depends on something: looking at it as a torque")
+        best = search.run()
+        if search.left(best) > CLEARLY_LESS * search.left(trial):
+            best = trial
+        else:
+            by_likelihood = None
     left = best.held_nm / search.regression.torque_nm
-    if known is None and best.structure.effects == structure.effects and left > MUCH_LEFT:
+    if by_likelihood is None and best.structure.effects == structure.effects and left > MUCH_LEFT:
         wider = min(WIDER[few[0].channel] * start.cutoff_hz, highest)
         say(f"nothing found up to {start.cutoff_hz:.3g} Hz: looking up to {wider:.3g} Hz")
         search = at(wider)
         best = search.run()
     regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
-    named = known is None and best.structure.effects != structure.effects
-    explained = 1.0 - search.left(best) / search.left(base)
-    if (
-        named
-        and explained < least_explained
-        and (explained < MOST_OF_IT or disturbance_of(regression, best, floor, unit).depends_on)
-    ):
-        say(f"rejected: {', '.join(best.structure.effects)}; together they still leave too much unexplained")
-        best = base
-    final = known[0].structure if known else best.structure
+    final = by_likelihood[0].structure if by_likelihood else best.structure
     say(f"final fit with {', '.join(final.effects) or 'fewer terms'}")
     before = _final(regression, base, traces, split)
     if final == structure:
         after = before
-    elif known:
-        after, _ = by_prediction_error(traces, final, known[0].values, split.final, split.everything)
+    elif by_likelihood:
+        after, _ = by_prediction_error(traces, final, by_likelihood[0].values, split.final, split.everything)
     else:
         after = _final(regression, best, traces, split)
     disturbance = disturbance_of(regression, best, floor, unit)
-    if known and any(
+    if by_likelihood and any(
         e not in best.structure.effects and effects.get(e).place is not Place.SENSOR for e in final.effects
     ):
-        size = float(np.sqrt(in_band(known[0].noise, cutoff) * known[0].variance))
+        size = float(np.sqrt(in_band(by_likelihood[0].noise, cutoff) * by_likelihood[0].variance))
         disturbance = Disturbance(size, unit, size / regression.torque_nm, (), {})
 
     def errors(fit: TorqueFit) -> TorqueErrors:
@@ -166,27 +160,15 @@ def search_in_torque(
         return TorqueErrors(fit.fitted_nm, fit.fitted_nm / size, fit.held_nm / size, floor, cutoff)
 
     told = _told(search, structure, base, best)
-    if known:
+    if by_likelihood:
         told = replace(
-            known[2], base=told.base, best=replace(told.best, structure=final), contribution=told.contribution
+            by_likelihood[1], base=told.base, best=replace(told.best, structure=final), contribution=told.contribution
         )
         told.horizon, told.floor, told.free_running = 0.0, floor, False
     return Found(
         told, before, after, disturbance, (errors(base), errors(best)),
         lambda: disturbance_of(regression, base, floor, unit),
     )  # fmt: skip
-
-
-def along(regression: TorqueRegression, fit: Fit) -> TorqueFit:
-    """A model along the measured motion, in torque; without a lag of the sensor, which has no torque there."""
-    seen = tuple(e for e in fit.structure.effects if effects.get(e).place is not Place.SENSOR)
-    shaft = tuple(e for e in seen if effects.get(e).place is not Place.DRIVE)
-    for kept in (seen, shaft, ()):
-        # A drive that passes on nothing explains any torque, and a play run along a noisy motion may run away.
-        found = regression.solve(replace(fit.structure, effects=kept), {e: shape_of(fit, e) for e in kept})
-        if found.held_nm < regression.torque_nm:
-            break
-    return found
 
 
 def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> Fitted:

@@ -7,12 +7,12 @@ left it does not: whether that is a disturbance or an effect outside the library
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 
 import numpy as np
 
 from identify.diagnose.torque_regression import TorqueRegression
+from identify.diagnose.torque_residual import torque_noise_floor
 from identify.estimate.cross_validation import Judged, horizon_s
 from identify.estimate.fit import Fit
 from identify.estimate.initial_guess import Start, scale_of
@@ -24,19 +24,16 @@ from identify.results import Candidate
 from identify.runs.holdout import Split
 from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced, thinned
+from identify.select.evidence import Weigher, disturbed
 from identify.select.search_state import Search
-from identify.select.stepwise import AT_NOISE, MANY, Stepwise, disturbed
-from identify.select.torque_search import WEIGHT
+from identify.select.stepwise import AT_NOISE, Stepwise
 from identify.signals.trace import Trace, loads_differ
 from rig import effects
-from rig.dynamics.predictor import Noise
-from rig.effects.base import Place
 from rig.platform import TERMS
 
 SAMPLES = 10_000  # that the search looks at
 HIGHEST = 0.2  # of the sample rate: the low-pass for a first guess in torque cuts off no higher
 ALL = 40_000  # samples on which rivals are parted
-MOST_OF_IT = 0.5  # of the disturbance, explained by a model that is worth a look in torque
 MORE = 1.5  # times the samples: else there is nothing more to be seen in all of them
 
 
@@ -85,37 +82,13 @@ class SensorLimited:
         offered = [n for n in allowed if n not in structure.effects and _possible(n, traces)]
         cutoff_hz = min(start.cutoff_hz, HIGHEST / few[0].step_s)
         regression = TorqueRegression(few, parts, cutoff_hz, scale_of(few, start.platform, ()))
-        in_torque = partial(_in_torque, regression)
-        return cls(Stepwise(problem, base, offered, say, whole, count, in_torque), traces, structure)
+        floor = torque_noise_floor(few, base.values, cutoff_hz, [t.keep for t in few])
+        weigher = Weigher(problem, regression, floor)
+        return cls(Stepwise(problem, base, offered, weigher, say, whole, count), traces, structure)
 
     def run(self) -> bool:
         """Search; whether the last model predicts down to the sensor's noise."""
         return disturbed(self.stepwise.run()) < AT_NOISE
-
-    def much(self, cutoff_hz: float) -> tuple[Fit, float] | None:
-        """The last model where it explains most of what the first leaves, though not down to the sensor's noise.
-
-        With the share of the disturbance that it explains, up to a frequency.
-
-        Every effect of it carries weight: without it clearly more of the disturbance is left. A lag of the sensor
-        carries no torque and stays.
-        """
-        now, base, problem = self.stepwise.best, self.stepwise.base, self.stepwise.problem
-
-        def left(fit: Fit) -> float:
-            return in_band(fit.noise, cutoff_hz) * fit.variance
-
-        for name in [e for e in now.structure.effects if e not in base.structure.effects]:
-            needed = any(name in effects.get(e).lower_order for e in now.structure.effects)
-            if needed or effects.get(name).place is Place.SENSOR:
-                continue
-            start = {n: v for n, v in now.values.items() if n[0] != name}
-            without = problem.fit(now.structure.minus(name), start, None, MANY, carry=now.shots)
-            if left(now) > (1.0 - WEIGHT) * left(without):
-                now = without
-        named = now.structure.effects != base.structure.effects
-        explained = 1.0 - left(now) / left(base)
-        return (now, explained) if named and explained > MOST_OF_IT else None
 
     @property
     def found(self) -> Search:
@@ -132,8 +105,9 @@ class SensorLimited:
         named = [e for e in best.structure.effects if e not in base.structure.effects]
         for r in s.rounds:
             for score in r.scores:
-                fit = r.tried.get(score.effect)
-                bic = (fit.penalised - r.now.penalised) if fit is not None else -score.gain
+                seen = r.tried.get(score.effect)
+                fit = seen.fit if seen is not None else None
+                bic = -seen.support if seen is not None else -score.gain
                 found.candidates.append(
                     Candidate(score.effect, r.number, bic, None, _status(score.effect, r.chosen, named, fit))
                 )
@@ -142,23 +116,6 @@ class SensorLimited:
         found.rival_models = {k: {n: f.platform() for n, f in v.items()} for k, v in rivals.items()}
         found.dropped = [(n, why) for n, why in s.dropped if n not in (*best.structure.terms, *best.structure.effects)]
         return found
-
-
-def in_band(noise: Noise, cutoff_hz: float) -> float:
-    """Variance of a disturbance below a frequency, over the variance of one reading."""
-    slow = noise.slow * 2.0 / np.pi * np.arctan(2.0 * np.pi * cutoff_hz * noise.time_constant_s)
-    return float(slow + noise.white * cutoff_hz)
-
-
-def _in_torque(regression: TorqueRegression, now: Fit, name: str) -> dict[Name, float] | None:
-    """Where an effect begins by least squares in torque, beside what a model has."""
-    have = [e for e in now.structure.effects if e not in effects.get(name).nests]
-    shapes = {
-        e: tuple(now.values[(e, p.name)] for p in effects.get(e).parameters if not p.linear) for e in have
-    }  # fmt: skip
-    bare = regression.solve(replace(now.structure, effects=tuple(have)), shapes)
-    found = regression.with_effect(bare, name)
-    return None if found is None else dict(found.values)
 
 
 def _status(name: str, chosen: str | None, named: Sequence[str], fit: Fit | None) -> str:

@@ -1,8 +1,9 @@
-"""The search: effects added one at a time to a model fitted by prediction error, each asked again beside the others.
+"""The search: effects added one at a time to a model fitted by prediction error, each judged again beside the others.
 
 Every model has its own disturbance. While an effect is missing its torque counts as disturbance and the prediction
 leans on the measurements; as effects are found the disturbance shrinks, down to the sensor's noise where all is found.
-So one likelihood judges all models, from the first that lacks everything to the last.
+So one likelihood judges all models, of simulated rigs and of real ones, from the first that lacks everything to the
+last. What it says is scaled by how far it can be believed, and a name takes weight besides (``evidence``).
 """
 
 from __future__ import annotations
@@ -17,73 +18,92 @@ from identify.estimate.initial_guess import scale_of
 from identify.estimate.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.propose.innovation_score import InnovationScores, Score
+from identify.propose.torque_looks import TorqueLook, torque_looks
 from identify.runs.measured_channels import simplicity
+from identify.select.evidence import Evidence, Weigher, disturbed
 from identify.signals.spectral_lines import foreign_lines_hz, ringing_hz, rings_hz
 from rig import effects
 from rig.effects.base import Place, Scale
 from rig.platform import TERMS
 
-TRIED = 4  # candidates of a round that are fitted
-HOPE = 20.0  # fall of the cost, beyond the penalty, that no chance among all candidates and shapes makes
-APART = 10.0  # fall of the penalised cost that parts two models (Kass and Raftery 1995: very strong)
-FAINT = 0.02  # of the best score: what promises so little is not what the round is about
+# What decides a name. All in units of the cost (minus twice the log-likelihood) or as shares.
+HOPE = 20.0  # support that no chance among all candidates and shapes makes
+APART = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
+WEIGHT = 0.20  # share of the disturbance that an effect takes away to be named: below, it is true but small
+AS_HEAVY = 0.05  # of the disturbance: a special case that carries as much, to that, is preferred to the richer effect
+SPECIAL = 0.5  # of the support of a richer effect, with which its special case is preferred
+AT_NOISE = 1.1  # times the sensor's variance: a model that predicts as closely leaves no disturbance
 MOST = 6  # effects that one recording is believed to show
-FEW, MANY = 8, 20  # steps of a fit that is compared, and of one that is kept
+# What only costs time.
+TRIED = 4  # candidates of a round, by their scores, that are fitted
+HEAVIEST = 3  # candidates by their weight in torque that are fitted beside those
+FAINT = 0.02  # of the best score: what promises so little is not what the round is about
+FEW, MANY = 14, 25  # steps of a fit that is compared, and of one that is kept
 CERTAIN = 30.0  # standard errors beyond which nobody asks whether a term is needed
 NEAR = 0.9  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
 FAR_BEHIND = 0.2  # of what an effect explains: another that leaves more than that is no rival
-PATIENCE = 3  # effects after which the sensor's noise must be near
-AT_NOISE = 1.1  # times the noise's variance
+COMPARABLE = 0.3  # of what an effect explains, that the score of another promises: with less it is no rival
 OTHER_START = 1.5  # times the other: gains that far apart are both begun from
-SPECIAL = 0.5  # of the fall of a richer effect that its special case brings to be tried first
 
 
 @dataclass(frozen=True)
 class Round:
-    """What was tried in one round: every candidate's score, the fits, and which was taken."""
+    """What was tried in one round: every candidate's score, the evidence of those fitted, and which was taken."""
 
     number: int
     now: Fit
     scores: tuple[Score, ...]
-    tried: Mapping[str, Fit]
+    tried: Mapping[str, Evidence]
     chosen: str | None
 
 
 @dataclass
 class Stepwise:
-    """The search over structures on one problem."""
+    """The search over structures on one problem.
+
+    Attributes
+    ----------
+    base
+        The declared model, fitted.
+    allowed
+        Names of the effects that may be named.
+    weigher
+        Weighs models against each other.
+    whole, samples
+        The likelihood on more of the recording, and how many samples the recording has: for models that lie close.
+    best
+        The model that is believed so far.
+    """
 
     problem: PredictionError
     base: Fit
     allowed: Sequence[str]
+    weigher: Weigher
     say: Callable[[str], None] = lambda text: None
     whole: PredictionError | None = None
     samples: int = 0
-    in_torque: Callable[[Fit, str], Mapping[Name, float] | None] = lambda now, name: None
     rounds: list[Round] = field(default_factory=list)
     rivals: dict[str, dict[str, Fit]] = field(default_factory=dict)
     dropped: list[tuple[str, str]] = field(default_factory=list)
-    best: Fit = None  # type: ignore[assignment]  # the model that is believed so far
-    _needed: dict[str, float] = field(default_factory=dict)  # rise of the penalised cost without an effect
+    best: Fit = None  # type: ignore[assignment]
+    _needed: dict[str, float] = field(default_factory=dict)  # support of an effect beside all others
 
     def __post_init__(self) -> None:
         self.best = self.base
 
     def run(self) -> Fit:
-        """Add effects as long as one is worth it; ask each again beside the others; drop what is needless."""
+        """Add effects as long as one is worth it; judge each again beside the others; drop what is needless."""
         for number in range(1, MOST + 1):
             now = self.best
-            if len(self._added(now)) >= PATIENCE and disturbed(now) > AT_NOISE:
-                break  # more than that resemble anything
             scores, tried = self.tried(now)
-            chosen = self.choice(now, tried)
+            chosen = self.choice(tried)
             self.rounds.append(Round(number, now, tuple(scores), tried, chosen))
             if chosen is None:
                 break
             new = tried[chosen]
-            self.say(f"added {chosen}: log-likelihood +{0.5 * (now.cost - new.cost):.4g}")
-            self.best = self.pruned(new, [e for e in self._added(new) if e != chosen])
-        self.best = self.asked_again(self.best)
+            self.say(f"added {chosen}: log-likelihood +{0.5 * new.gain:.3g}, {100.0 * new.weight:.0f} % of the disturbance")
+            self.best = self.pruned(new.fit, [e for e in self._added(new.fit) if e != chosen])
+        self.best = self.judged_again(self.best)
         self.best = self.pruned(self.best, [*self.best.structure.terms, *self._added(self.best)])
         return self.best
 
@@ -100,25 +120,34 @@ class Stepwise:
         return replace(scale, rings_hz=rings_hz(traces, left, natural_hz))
 
     def names(self, now: Fit) -> list[str]:
-        """What may be added, or put in the place of a special case."""
+        """What may be added, or put in the place of a special case; of an effect that is there, one more of the same."""
         have = now.structure.effects
-        return [n for n in self.allowed if n not in have]
+        more = [m for n in have for m in effects.further(effects.first_of(n)) if m not in have][:1]
+        return [n for n in (*self.allowed, *more) if n not in have]
 
-    def tried(self, now: Fit) -> tuple[list[Score], dict[str, Fit]]:
-        """All candidates' scores, and fits of the most promising."""
-        looks = InnovationScores(self.problem, now, self.scale(now)).all(self.names(now))
-        scores = [v[0] for v in looks]
-        tried: dict[str, Fit] = {}
-        for group in self.shortlist(now, looks):
-            best = None
-            for s in group[:1]:
-                fit = self.fitted(now, s)
-                if fit is not None and (best is None or fit.cost < best.cost):
-                    best = fit
-            if best is not None:
-                tried[group[0].effect] = best
-        most = max((now.cost - f.cost for f in tried.values()), default=0.0)
-        return scores, {n: self.again(f) if now.cost - f.cost > NEAR * most else f for n, f in tried.items()}
+    def tried(self, now: Fit) -> tuple[list[Score], dict[str, Evidence]]:
+        """All candidates' scores, and the evidence for the most promising, fitted."""
+        names = self.names(now)
+        looks = InnovationScores(self.problem, now, self.scale(now)).all(names)
+        heavy = self.heaviest(now, names)
+        short = self.shortlist(now, looks)
+        starts: dict[str, list[Mapping[Name, float]]] = {v[0].effect: [v[0].start] for v in short}
+        for look in heavy:
+            starts.setdefault(look.effect, []).append(look.start)
+        fits = {n: f for n, s in starts.items() if (f := self.fitted(now, n, s)) is not None}
+        most = max((now.cost - f.cost for f in fits.values()), default=0.0)
+        fits = {n: self.further(f) if now.cost - f.cost > NEAR * most else f for n, f in fits.items()}
+        return [v[0] for v in looks], {n: self.weigher.evidence(n, now, f) for n, f in fits.items()}
+
+    def heaviest(self, now: Fit, names: Sequence[str]) -> list[TorqueLook]:
+        """Candidates that carry much of the disturbance along the measured motion."""
+        there = self.weigher.in_torque(now)
+        left = self.weigher.left(there)
+        nested = {s for e in now.structure.effects for s in effects.get(e).nests}
+        held = [n for n in names if n not in nested and not set(effects.get(n).nests) & set(there.structure.effects)]
+        looks = torque_looks(self.weigher.regression, there, held, HEAVIEST)
+        floor = self.weigher.floor_nm**2
+        return [w for w in looks if 1.0 - max(w.left_nm**2 - floor, 0.0) / left > WEIGHT]
 
     def shortlist(self, now: Fit, looks: Sequence[list[Score]]) -> list[list[Score]]:
         """The largest gains beyond their penalty, with their special cases and what comes first by order."""
@@ -132,60 +161,67 @@ class Stepwise:
         wanted = {n for v in short for n in (*effects.get(v[0].effect).nests, *effects.get(v[0].effect).lower_order)}
         return short + [v for v in worth if v[0].effect in wanted and v not in short]
 
-    def fitted(self, now: Fit, score: Score) -> Fit | None:
-        """A candidate fitted on top of a model, in the place of what it contains."""
-        effect = effects.get(score.effect)
+    def fitted(self, now: Fit, name: str, starts: Sequence[Mapping[Name, float]]) -> Fit | None:
+        """A candidate fitted on top of a model, in the place of what it contains: the best from all starts."""
+        effect = effects.get(name)
         held = [e for e in self._added(now) if e in effect.nests]
-        structure, start = now.structure, {k: v for k, v in now.values.items() if k[0] not in held}
-        own = dict(score.start)
+        structure, rest = now.structure, {k: v for k, v in now.values.items() if k[0] not in held}
         linear = {p.name for p in effect.parameters if p.linear}
-        for name in held:
-            structure = structure.minus(name)
-            own = {k: v + _gain(now, name) if k[1] in linear else v for k, v in own.items()}
-        fit = self.problem.fit(structure.plus(effect.name), {**start, **own}, now.noise, FEW, carry=now.shots)
-        if effect.place is Place.FRICTION:  # where it sticks depends on how large it is: from too little it stays there
-            other = self.in_torque(now, effect.name)
-            if other is not None and far_apart({**start, **own}, other, effect.name):
-                values = {**start, **own, **other}
-                fit = min(fit, self.problem.fit(structure.plus(effect.name), values, None, FEW), key=lambda f: f.cost)
-        return fit if np.isfinite(fit.cost) else None
+        for special in held:
+            structure = structure.minus(special)
+        fits: list[Fit] = []
+        for start in starts:
+            own = {k: v for k, v in start.items() if k[0] == name}
+            if len(start) > len(own):  # in torque: the rest begins there, too, and the disturbance is looked for anew
+                if not fits or far_apart(own, fits[0].values, name):
+                    fits.append(self.problem.fit(structure.plus(name), {**rest, **start}, None, FEW, thorough=False))
+                continue
+            for special in held:
+                own = {k: v + _gain(now, special) if k[1] in linear else v for k, v in own.items()}
+            fits.append(self.problem.fit(structure.plus(name), {**rest, **own}, now.noise, FEW, carry=now.shots, thorough=False))
+        best = min(fits, key=lambda f: f.cost)
+        return best if np.isfinite(best.cost) else None
 
-    def again(self, fit: Fit) -> Fit:
+    def further(self, fit: Fit) -> Fit:
         """The same with more steps."""
         more = self.problem.fit(fit.structure, fit.values, fit.noise, MANY, carry=fit.shots)
         return more if more.cost < fit.cost else fit
 
-    def choice(self, now: Fit, tried: Mapping[str, Fit]) -> str | None:
-        """The likeliest candidate, or the simplest of those that are as likely; None where none is worth it."""
-        good = {n: f for n, f in tried.items() if now.penalised - f.penalised > HOPE}
+    def choice(self, tried: Mapping[str, Evidence]) -> str | None:
+        """The candidate that is best supported, or the simplest of those that are as likely; None where none counts."""
+        good = {n: e for n, e in tried.items() if e.support > HOPE and e.weight > WEIGHT}
         if not good:
             return None
-        best = min(good, key=lambda n: good[n].penalised)
-        nested = [n for n in effects.get(best).nests if n in good]
-        nested = [n for n in nested if now.cost - good[n].cost > SPECIAL * (now.cost - good[best].cost)]
-        if nested:
-            best = min(nested, key=lambda n: good[n].cost)
-        alike = [n for n in good if good[n].penalised - good[best].penalised < APART]
-        best = min(alike, key=lambda n: (*plainness(n), good[n].penalised))
-        lower = [n for n in effects.get(best).lower_order if n in good]
-        return lower[0] if lower else best
+        best = max(good.values(), key=lambda e: e.support)
+        special = [
+            n for n in effects.get(best.effect).nests
+            if n in good
+            and (good[n].support > SPECIAL * best.support or good[n].weight > best.weight - AS_HEAVY)
+        ]  # fmt: skip
+        if special:
+            best = max((good[n] for n in special), key=lambda e: e.support)
+        alike = [n for n, e in good.items() if e is best or e.behind(best) < APART]
+        chosen = min(alike, key=lambda n: (*plainness(n), -good[n].support))
+        lower = [n for n in effects.get(chosen).lower_order if n in good]
+        return lower[0] if lower else chosen
 
-    def asked_again(self, now: Fit) -> Fit:
+    def judged_again(self, now: Fit) -> Fit:
         """Every named effect against all others in its place, beside the finished rest."""
         for name in self._added(now):
             if name not in now.structure.effects:
                 continue
             bare = {k: v for k, v in now.values.items() if k[0] != name}
-            rest = self.problem.fit(now.structure.minus(name), bare, None, MANY, carry=now.shots)
+            rest = self.problem.fit(now.structure.minus(name), bare, now.noise, MANY, carry=now.shots)
             fits: dict[str, Fit] = {name: now}
             for other, fit in self._instead(now, rest, name).items():
                 near = fit.penalised - now.penalised < FAR_BEHIND * (rest.cost - now.cost)
-                fits[other] = self.again(fit) if near else fit
-            self._needed[name] = rest.penalised - now.penalised
+                fits[other] = self.further(fit) if near else fit
+            evidence = self.weigher.evidence(name, rest, now)
+            self._needed[name] = evidence.support
             close = self.undecided(fits)
             if len(close) > 1 and self.whole is not None:
                 close = {n: self.on_all(f) for n, f in close.items()}
-            chosen, alike = decided(close)
+            chosen, alike = decided(close, evidence.inflation)
             if chosen != name:
                 self.say(f"replaced {name} by {chosen}: it fits better beside the other effects")
                 now = fits[chosen]
@@ -224,12 +260,13 @@ class Stepwise:
                 continue
             structure = replace(now.structure, effects=tuple(other if e == name else e for e in now.structure.effects))
             own: dict[Name, float] = {(other, p.name): _gain(now, name) for p in parameters}
-            fits[other] = self.problem.fit(structure, {**rest_values, **own}, now.noise, FEW, carry=now.shots)
+            fits[other] = self.problem.fit(structure, {**rest_values, **own}, now.noise, FEW, carry=now.shots, thorough=False)
+        explained = rest.cost - now.cost
         for group in self.shortlist(rest, looks):
             other = group[0].effect
-            if other == name:
+            if other == name or group[0].gain < COMPARABLE * explained:
                 continue
-            found = self.fitted(rest, group[0])
+            found = self.fitted(rest, other, [group[0].start])
             if found is not None and (other not in fits or found.cost < fits[other].cost):
                 fits[other] = found
         return {n: f for n, f in fits.items() if np.isfinite(f.cost)}
@@ -244,18 +281,36 @@ class Stepwise:
             if name == "inertia" or kept_by or len(now.structure.terms) + len(now.structure.effects) <= 1:
                 continue
             own = [n for n in now.names if n[0] == name]
-            if self._needed.get(name, 0.0) > CERTAIN**2:
-                continue
-            if len(own) == 1 and own[0][0] in TERMS and abs(now.values[own[0]]) > CERTAIN * now.std_error(own[0]):
+            term = len(own) == 1 and own[0][0] in TERMS
+            if not self._asked(now, name, own):
                 continue
             start = {n: v for n, v in now.values.items() if n[0] != name}
-            without = self.problem.fit(now.structure.minus(name), start, now.noise, FEW, carry=now.shots)
-            if without.penalised - now.penalised > APART:
+            without = self.problem.fit(now.structure.minus(name), start, now.noise, FEW, carry=now.shots, thorough=False)
+            evidence = self.weigher.evidence(name, without, now)
+            soaks = name == "stiffness" and self._may_soak(now)
+            light = evidence.weight < WEIGHT and (name not in TERMS or soaks)
+            if evidence.support > APART and not light:
                 continue
-            self.dropped.append((name, f"log-likelihood {0.5 * (now.cost - without.cost):.3g} lower without it"))
+            why = f"log-likelihood {0.5 * evidence.gain:.3g} lower without it"
+            if term and light:
+                why = "it carries no torque that the others do not"
+            self.dropped.append((name, why))
             self.say(f"dropped {name}")
             now = without
         return now
+
+    def _may_soak(self, now: Fit) -> bool:
+        """Whether the spring is so weak that it may only soak up what is constant over a run, or pushes."""
+        pull = now.values.get(("stiffness",), 0.0) * self.problem.angle_rad
+        return disturbed(now) > AT_NOISE and pull < WEIGHT * self.problem.torque_nm
+
+    def _asked(self, now: Fit, name: str, own: Sequence[Name]) -> bool:
+        """Whether it is in doubt that a term or an effect is needed."""
+        if name == "stiffness" and self._may_soak(now):
+            return True
+        if name in TERMS:
+            return abs(now.values[own[0]]) < CERTAIN * now.std_error(own[0])
+        return self._needed.get(name, 0.0) < CERTAIN**2
 
 
 def _gain(fit: Fit, name: str) -> float:
@@ -264,22 +319,18 @@ def _gain(fit: Fit, name: str) -> float:
 
 
 def far_apart(some: Mapping[Name, float], other: Mapping[Name, float], name: str) -> bool:
-    """Whether two starts of an effect differ so much in a gain that a fit from one may not come to the other."""
-    gains = [(name, p.name) for p in effects.get(name).parameters if p.linear and not p.per_run]
-    return any(max(abs(some.get(g, 0.0)), abs(other.get(g, 0.0))) > OTHER_START * min(
-        abs(some.get(g, 0.0)), abs(other.get(g, 0.0))) for g in gains)  # fmt: skip
+    """Whether two starts of an effect differ so much that a fit from one may not come to the other."""
+    numbers = [(name, p.name) for p in effects.get(name).parameters if not p.per_run]
+    return any(
+        max(abs(some.get(g, 0.0)), abs(other.get(g, 0.0))) > OTHER_START * min(abs(some.get(g, 0.0)), abs(other.get(g, 0.0)))
+        for g in numbers
+    )  # fmt: skip
 
 
-def disturbed(fit: Fit) -> float:
-    """By how much more than the sensor's noise the prediction errs: one where no torque disturbs."""
-    kept = [v[s.weight] for v, s in zip(fit.prediction.variance, fit.shots, strict=True)]
-    return float(np.median(np.concatenate(kept)))
-
-
-def decided(fits: Mapping[str, Fit]) -> tuple[str, list[str]]:
+def decided(fits: Mapping[str, Fit], inflation: float = 1.0) -> tuple[str, list[str]]:
     """The simplest of the likeliest, and all that are as likely."""
     best = min(f.penalised for f in fits.values())
-    alike = [n for n in fits if fits[n].penalised - best < APART]
+    alike = [n for n in fits if fits[n].penalised - best < APART * inflation]
     return min(alike, key=lambda n: (*plainness(n), fits[n].penalised)), alike
 
 
@@ -287,8 +338,3 @@ def plainness(name: str) -> tuple[int, int, bool]:
     """What goes first among candidates that do as well: no channel, fewer parameters, the drive before the sensor."""
     effect = effects.get(name)
     return simplicity(name), len(effect.parameters), effect.place is Place.SENSOR
-
-
-def start_of(platform: tuple[float, float, float], terms: Sequence[str]) -> dict[Name, float]:
-    """Values of J, C, K to begin from."""
-    return {(k,): v for k, v in zip(TERMS, platform, strict=True) if k in terms}

@@ -1,0 +1,193 @@
+"""What speaks for one model against another: how much likelier it is, and how much of what is left it carries.
+
+The likelihood takes the torque disturbance for a sum of a white and a slow part. A real one is coloured otherwise,
+repeats with the motion, differs between runs; a fall of the cost then means less than it says. How much less shows in
+the scores of the parameters in question: over blocks of the record they scatter by more than the likelihood takes them
+to. The fall of the cost is divided by that ratio (the scaled likelihood ratio of Satorra and Bentler 1994; the
+sandwich of White 1982), which is one where the likelihood is right.
+
+On a real record everything is significant, so a name takes weight, too: a share of the disturbance that goes with it,
+on samples not fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from scipy.stats import chi2
+
+from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
+from identify.estimate.fit import Fit
+from identify.estimate.prediction_error import Columns, PredictionError
+from identify.model.parameters import Name
+from rig import effects
+from rig.arrays import Array
+from rig.dynamics.predictor import Noise
+from rig.effects.base import Place
+from rig.platform import TERMS
+
+BLOCKS = 30  # of all runs together, over which scores scatter: their ratio is then known to a quarter
+CHANCE = 0.95  # quantile of a ratio of variances: what chance alone reaches is no sign of a wrong likelihood
+FEWEST_RUNS = 4  # whose scores show whether runs differ
+ALONE = 1e-3  # of a parameter's influence, that the others leave: of less only rounding is seen
+EVIDENT = 0.1  # of the sensor's variance, that a disturbance adds to the prediction error: a smaller one weighs nothing
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """One model against another that has less.
+
+    Attributes
+    ----------
+    gain
+        Fall of the cost, minus twice the logarithm of the likelihood.
+    inflation
+        Variance of the scores over what the likelihood takes it for, one at least.
+    price
+        Penalty for the parameters that were added (Schwarz 1978).
+    weight
+        Share of the disturbance's power that goes with the model; one for an effect in the sensor, which is no torque.
+    """
+
+    effect: str
+    fit: Fit
+    gain: float
+    inflation: float
+    price: float
+    weight: float
+
+    @property
+    def support(self) -> float:
+        """Fall of the cost as far as it can be believed, parameters paid for."""
+        return self.gain / self.inflation - self.price
+
+    def behind(self, other: Evidence) -> float:
+        """By how much another model on the same samples is likelier, as far as that can be believed."""
+        apart = abs(self.fit.penalised - other.fit.penalised) / max(self.inflation, other.inflation)
+        return min(apart, abs(other.support - self.support))
+
+
+class Weigher:
+    """Weighs models of one recording against each other.
+
+    Parameters
+    ----------
+    problem
+        The runs that are searched, and their likelihood.
+    regression
+        The same in torque.
+    floor_nm
+        What the sensor's noise alone leaves there, root mean square.
+    """
+
+    def __init__(self, problem: PredictionError, regression: TorqueRegression, floor_nm: float) -> None:
+        self.problem, self.regression, self.floor_nm = problem, regression, floor_nm
+
+    def evidence(self, effect: str, now: Fit, new: Fit) -> Evidence:
+        """A model with one effect or term more against the one without it."""
+        added = [n for n in new.names if n not in now.names]
+        return Evidence(
+            effect, new, now.cost - new.cost, inflation(self.problem.columns_at(new), new, added),
+            (new.penalised - new.cost) - (now.penalised - now.cost),
+            1.0 if effect not in TERMS and effects.get(effect).place is Place.SENSOR else self.weight(now, new),
+        )  # fmt: skip
+
+    def weight(self, now: Fit, new: Fit) -> float:
+        """Share of the disturbance that goes: of its power in the band of the motion, or of its white part.
+
+        The power in the band is what the residual in torque has on held-out samples, and what the likelihood takes the
+        disturbance for. The first knows no model of it but sees the sensor's noise as well, the second the reverse.
+        """
+        shares = [1.0 - self.left(self.in_torque(new)) / self.left(self.in_torque(now))]
+        if disturbed(now) > 1.0 + EVIDENT:
+            cutoff_hz = self.regression.cutoff_hz
+            shares.append(1.0 - in_band(new.noise, cutoff_hz) * new.variance / (in_band(now.noise, cutoff_hz) * now.variance))
+            shares.append(1.0 - new.noise.white * new.variance / (now.noise.white * now.variance))
+        return float(max(shares))
+
+    def left(self, fit: TorqueFit) -> float:
+        """Power of the held-out residual in torque, the sensor's part taken off."""
+        return max(fit.held_nm**2 - self.floor_nm**2, 1e-4 * self.floor_nm**2)
+
+    def in_torque(self, fit: Fit) -> TorqueFit:
+        """A model along the measured motion, its gains fitted there."""
+        return along(self.regression, fit)
+
+
+def in_band(noise: Noise, cutoff_hz: float) -> float:
+    """Variance of a disturbance below a frequency, over the variance of one reading."""
+    slow = noise.slow * 2.0 / np.pi * np.arctan(2.0 * np.pi * cutoff_hz * noise.time_constant_s)
+    return float(slow + noise.white * cutoff_hz)
+
+
+def along(regression: TorqueRegression, fit: Fit) -> TorqueFit:
+    """A model along the measured motion, in torque; without a lag of the sensor, which has no torque there."""
+    seen = tuple(e for e in fit.structure.effects if effects.get(e).place is not Place.SENSOR)
+    shaft = tuple(e for e in seen if effects.get(e).place is not Place.DRIVE)
+    for kept in (seen, shaft, ()):
+        # A drive that passes on nothing explains any torque, and a play run along a noisy motion may run away.
+        found = regression.solve(replace(fit.structure, effects=kept), {e: shape_of(fit, e) for e in kept})
+        if found.held_nm < regression.torque_nm:
+            break
+    return found
+
+
+def shape_of(fit: Fit, name: str) -> tuple[float, ...]:
+    """The shapes of an effect as a fit has them."""
+    return tuple(fit.values[(name, p.name)] for p in effects.get(name).parameters if not p.linear)
+
+
+def disturbed(fit: Fit) -> float:
+    """By how much more than the sensor's noise the prediction errs: one where no torque disturbs."""
+    return fit.disturbed
+
+
+def inflation(parts: Sequence[Columns], fit: Fit, names: Sequence[Name]) -> float:
+    """Variance of the scores of some parameters over what the likelihood takes it for, one at least.
+
+    The other parameters and the runs' biases are projected out. Blocks of the record show what is coloured or comes in
+    bursts; whole runs, where there are several, show what differs between them.
+    """
+    columns, scaled = zip(*(_without_bias(p) for p in parts), strict=True)
+    information = np.sum([x.T @ x for x in columns], axis=0)
+    mine = [fit.names.index(n) for n in names if information[(i := fit.names.index(n)), i] > 0.0]
+    others = [i for i in range(len(fit.names)) if i not in mine and information[i, i] > 0.0]
+    if not mine or not np.all(np.isfinite(information)):
+        return 1.0
+    across = information[np.ix_(others, mine)]
+    taken = np.linalg.pinv(information[np.ix_(others, others)], rcond=1e-12, hermitian=True) @ across
+    own = [x[:, mine] - x[:, others] @ taken for x in columns]
+    size = np.sqrt(np.sum([np.sum(x * x, axis=0) for x in own], axis=0))
+    known = size > ALONE * np.sqrt(np.diag(information)[mine])
+    own = [x[:, known] / size[known] for x in own]
+    expected = np.linalg.pinv(np.sum([x.T @ x for x in own], axis=0) * fit.variance, rcond=ALONE, hermitian=True)
+
+    def ratio(scores: Sequence[Array]) -> float:
+        s = np.array(scores)
+        return float(np.trace(expected @ (s.T @ s))) / max(int(np.sum(known)), 1) / _by_chance(len(s))
+
+    each = max(1, round(BLOCKS / len(parts)))
+    blocks = [
+        x[rows].T @ z[rows] for x, z in zip(own, scaled, strict=True) for rows in np.array_split(np.arange(len(z)), each)
+    ]  # fmt: skip
+    found = [1.0, ratio(blocks)]
+    if len(parts) >= FEWEST_RUNS:
+        found.append(ratio([x.T @ z for x, z in zip(own, scaled, strict=True)]))
+    return max(x for x in found if np.isfinite(x))
+
+
+def _without_bias(part: Columns) -> tuple[Array, Array]:
+    one = part.bias
+    power = float(one @ one)
+    if power <= 0.0:
+        return part.columns, part.scaled
+    return part.columns - np.outer(one, one @ part.columns) / power, part.scaled - one * float(one @ part.scaled) / power
+
+
+@lru_cache(maxsize=32)
+def _by_chance(count: int) -> float:
+    """What a mean of so many squared unit normals reaches by chance."""
+    return float(chi2.ppf(CHANCE, count)) / count
