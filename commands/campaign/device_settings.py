@@ -99,8 +99,8 @@ def _port_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     if isinstance(gyro, str) and isinstance(channel, str) and is_same_port(gyro, channel.partition("@")[0]):
         yield (
             CAN_CHANNEL,
-            f"{channel} is the port that {'.'.join(map(str, GYRO_PORT))} names as well ({gyro}): gyroscope and "
-            "CAN adapter need a port each; `rig devices` lists what is plugged in",
+            f"{channel} is also the port of the gyroscope ({'.'.join(map(str, GYRO_PORT))}: {gyro}): give the CAN "
+            "adapter its own port; `rig devices` lists all ports",
         )
 
 
@@ -130,7 +130,7 @@ def _without_emulator(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
         path: KeyPath = ("bench", name, "device")
         device = _at(data, path)
         if isinstance(device, str) and device in drivers and device not in emulators:
-            yield path, f"{device!r} has no emulator; emulated are {', '.join(emulators)}"
+            yield path, f"{device!r} has no emulator: choose one of {', '.join(emulators)}"
 
 
 def _at(data: Any, path: KeyPath) -> Any:

@@ -22,8 +22,8 @@ from rig.interface import Statement, Torque
 from rig.platform import Platform
 
 NOBODY_AGREED = (  # the same whether it was asked, could not be, or is a replay: results are compared
-    "it is not played: identify.follow_up is ask, and nobody agreed (without a terminal nobody can be asked); "
-    "set identify.follow_up: auto to play it without asking (real torque also needs --yes)"
+    "it was not played: identify.follow_up is ask, and the question was not answered with yes (it needs a terminal). "
+    "To play it without the question, set identify.follow_up: auto (real torque also needs --yes)"
 )
 QUESTION = "Play this follow-up now? Type yes to play it: "
 NEXT_SEED = 1_000_003  # a simulated gyro must not repeat its noise
@@ -71,12 +71,12 @@ def _refusal(context: CommandContext, loaded: LoadedConfig) -> str:
     """Why no follow-up is played, before anything is asked; empty where one may be."""
     config = loaded.config
     if config.identify.follow_up == "never":
-        return "it is not played: identify.follow_up is never"
+        return "it was not played: identify.follow_up is never"
     backend = backend_name(config, context.options.dry_run, context.options.emulate)
     replayed = backend == "bench" and config.bench is not None and config.bench.replay is not None
     if config.identify.follow_up == "ask" and (replayed or not _somebody_there()):
         return NOBODY_AGREED
-    return "it is not played: a replayed capture holds no further data" if replayed else ""
+    return "it was not played: a replayed capture holds no further data" if replayed else ""
 
 
 def _somebody_there() -> bool:

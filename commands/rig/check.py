@@ -52,7 +52,7 @@ Check = Callable[[CheckSubject], list[str]]
 def configuration(subject: CheckSubject) -> list[str]:
     """That the file is sound: it would not have been loaded otherwise."""
     config = subject.loaded.config
-    return [f"configuration {plain(str(subject.loaded.path))}: sound (backend {config.backend})"]
+    return [f"configuration {plain(str(subject.loaded.path))}: valid (backend {config.backend})"]
 
 
 def forecast(subject: CheckSubject) -> list[str]:

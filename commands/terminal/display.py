@@ -21,7 +21,7 @@ from rig.sequencer.recorder import SetStatistics
 BAR_WIDTH = 24  # characters
 MOST_WAITING = 50  # lines; a terminal that takes none loses bars, not memory
 LAST_WORDS_S = 1.0  # how long a slow terminal is waited for at the end
-LOST = "Stopped because its terminal is gone"
+LOST = "Stopped because the terminal was closed"
 
 
 def plain(text: str) -> str:

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from types import FrameType
 
 # By name: not every system has all of them.
-SIGNALS = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "the loss of its terminal", "SIGBREAK": "Ctrl-Break"}
+SIGNALS = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "the loss of the terminal", "SIGBREAK": "Ctrl-Break"}
 STOPPED = 130
 
 _exit_code: int | None = None  # the exit code, once it is known

@@ -15,7 +15,7 @@ from rig.errors import Aborted
 
 STOPPING = "Stopping: torque to zero, then saving. Ctrl-C again cuts the torque at once."
 AGAIN_S = 0.02  # until the signal strikes again: the callback has returned by then
-SAVING = "Stopping as soon as what is being saved is saved."
+SAVING = "Stopping after the current file is saved."
 
 
 def _strike() -> None:

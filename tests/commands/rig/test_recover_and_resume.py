@@ -212,7 +212,7 @@ def test_what_cannot_be_resumed_is_said(tmp_path: Path) -> None:
     recorded.write_text("backend: recorded\nrecorded: {runs: [{file: a.csv}]}\n")
     for line, said in (
         ((config, "--resume", tmp_path / "absent"), "is not a folder"),
-        ((config, "--resume", tmp_path), "play the campaign anew"),
+        ((config, "--resume", tmp_path), "play the campaign again"),
         ((recorded, "--resume", tmp_path), "nothing to resume"),
     ):
         done = command(identify_run, *line, "--out", tmp_path / "out")

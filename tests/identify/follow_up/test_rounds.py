@@ -92,7 +92,7 @@ def test_a_plan_and_what_has_none_are_said_in_words() -> None:
             Unparted("actuator_lag", "sensor_lag", "measure the current"),
             Unparted("backlash", "cogging", "no excitation"),
         ),
-        note="it is not played: nobody can be asked",
+        note="it was not played: identify.follow_up is never",
     )
     said = lines(follow_up)
     assert said[0].startswith("follow_up.yaml (12 s): a slow sine")
