@@ -47,8 +47,8 @@ def lag_for_damping(platform: Platform, inertia_std_error: float, traces: Sequen
         return ""
     unit = "N s/m" if axis == "linear" else "N m s/rad"
     return (
-        "Sets this slow cannot separate damping from a delay or lag of the drive or the gyro: each "
-        f"{1e3 * LATE_S:g} ms of it that nobody declared is {number(stiffness * LATE_S, 2)} {unit} of the "
-        f"{number(platform.damping_nm_s_rad, 3)} that C is here. A set near the resonance at {number(natural_hz, 2)} "
-        "Hz, or one that starts abruptly, separates them."
+        "These sets are too slow to separate damping from a delay or lag of the drive or the gyro: each undeclared "
+        f"{1000.0 * LATE_S:g} ms adds {number(stiffness * LATE_S, 2)} {unit} to the identified C of "
+        f"{number(platform.damping_nm_s_rad, 3)} {unit}. Add a set near the resonance at {number(natural_hz, 2)} Hz, "
+        "or one that starts abruptly (soft_start_s: 0)."
     )

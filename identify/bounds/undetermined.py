@@ -27,7 +27,7 @@ def undetermined(fitted: Fitted, runs: Set[int], alone: bool) -> dict[Name, str]
         tied = _tied_to_nothing(fitted, i, alone) if term else ""
         wide = term and (not np.isfinite(error) or error > WIDE * abs(value))
         if tied:
-            out[name] = f"only a combination with {tied} is determined"
+            out[name] = f"only its combination with {tied} is determined; add a set at another frequency"
         elif not fitted.determined[i] or wide:
             out[name] = _why(value, error, fitted.determined[i])
     return out

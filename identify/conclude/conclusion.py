@@ -145,8 +145,9 @@ def _at_the_sensor(case: Case, measured: Measured, floor: NoiseFloor) -> Disturb
 
 
 def _about_damping(case: Case, after: Fitted, final: ModelResult) -> tuple[str, ...]:
+    """What C may be instead; nothing where C is not reported."""
     name = ("inertia",)
-    if final.platform is None or name not in after.names:
+    if final.platform is None or name not in after.names or "damping" not in final.parameters:
         return ()
     fitted = [t for t in case.traces if t.number in _runs_fitted(case)]
     told = lag_for_damping(final.platform, after.std_error(name), fitted, case.recording.axis)

@@ -11,6 +11,7 @@ from identify.wording import (
     SYMBOLS,
     capital,
     half_interval,
+    how_to_separate,
     joined,
     left_over,
     number,
@@ -18,7 +19,6 @@ from identify.wording import (
     plain,
     readable,
     title,
-    told_apart,
     unit,
     value_of,
     without,
@@ -129,7 +129,7 @@ def _named(found: Identification, name: str) -> str:
     if rivals:
         separate = effects.get(name).separated_by
         text += f" These data cannot exclude {' or '.join(plain(r) for r in rivals)}"
-        text += f"; {told_apart(separate)}." if separate else "."
+        text += f"; {how_to_separate(separate)}." if separate else "."
     return text
 
 

@@ -21,9 +21,8 @@ from identify.wording import (
     bent_percent,
     declared_number,
     errors_in_turn,
-    not_reported,
+    not_said_yet,
     number,
-    pairs,
     percent,
     plain,
     printable,
@@ -66,8 +65,7 @@ def summary(
 
 
 def _whole(identification: Identification, info: Mapping[str, Any]) -> Group:
-    final, verdict = identification.final, identification.verdict
-    floor = identification.noise_floor
+    final, verdict, floor = identification.final, identification.verdict, identification.noise_floor
     note = printable(sentence(identification.holdout_note))
     parts: list[RenderableType] = [
         *_listed("Verdict", verdict.sentences, bullet=""),
@@ -77,9 +75,8 @@ def _whole(identification: Identification, info: Mapping[str, Any]) -> Group:
         _errors(identification),
         Padding(Text(f"The noise floor is {floor.source}. {note}"), (0, 0, 0, 2)),
         *_listed("Torque delay", delay_lines(identification, info), bullet=""),
-        *_listed("Dropped: not supported by the data", not_reported(final.dropped)),
-        *_listed("Not determined by these data", not_reported(final.not_determined)),
-        *_listed("Cannot be distinguished on these data", pairs(verdict.confusable_with)),
+        *_listed("Dropped: not supported by the data", not_said_yet(final.dropped, identification)),
+        *_listed("Not determined by these data", not_said_yet(final.not_determined, identification)),
         *_listed("Follow-up", follow_up_lines(identification.follow_up) if identification.follow_up else ()),
     ]
     if identification.per_set:
@@ -96,7 +93,7 @@ def _listed(heading: str, lines: Sequence[str], bullet: str = "- ") -> list[Rend
 
 def _outcome(identification: Identification) -> list[RenderableType]:
     if identification.aborted:
-        head = Text("ABORTED: this is what the samples recorded until then say.", style="bold red")
+        head = Text("ABORTED: these results use only the samples recorded before the stop.", style="bold red")
     elif identification.accepted:
         head = Text("ACCEPTED", style="bold green")
     else:

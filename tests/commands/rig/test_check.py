@@ -106,4 +106,4 @@ def test_a_free_decay_without_torque_promises_ratios_only(tmp_path: Path) -> Non
     (tmp_path / "decay.csv").write_text(f"time_s,angle_rad\n{rows}\n")
     done = command(app, "check", write_config(tmp_path, "backend: recorded\nrecorded: {runs: [{file: decay.csv}]}\n"))
     assert done.exit_code == 0, done.output
-    assert "without torque only ratios can be determined; expected C/J" in done.stdout
+    assert "a decay without torque determines only ratios; expected C/J" in done.stdout

@@ -42,7 +42,7 @@ def test_the_sets_are_recovered_from_the_capture_alone_and_can_be_identified(onl
     assert all(f"{run.name}: {len(run.time_s)} samples" in done.stdout for run in runs)
     assert (only_raw / "raw" / "wire.cap").read_bytes() == capture
     loaded = load_config(only_raw / "recovered.yaml")
-    assert "The declared model is not in it" in loaded.text
+    assert "The declared model was lost" in loaded.text
     assert len(read_recording(loaded).runs) == 2
 
 

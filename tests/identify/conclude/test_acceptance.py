@@ -33,6 +33,6 @@ def test_each_limit_is_named_where_it_is_passed(left: Disturbance, words: str) -
 def test_within_all_limits_it_is_accepted_and_told_in_a_sentence() -> None:
     left = Disturbance(0.1, "N*m", 0.1, (RATE,), {"inertia": 1.0, "damping": 5.0})
     assert too_much_left(left, AcceptConfig(), "rotary") == []
-    assert "3.0 % on the rate" in left_over(left, "rotary")
-    assert "3.0 % on the speed" in left_over(left, "linear")
+    assert "3.0 % depends on the rate" in left_over(left, "rotary")
+    assert "3.0 % depends on the speed" in left_over(left, "linear")
     assert "changes J by 1.0 % and C by 5.0 %" in left_over(left, "rotary")
