@@ -70,8 +70,8 @@ def plan_drive(
         missing.append(cia402.TARGET_TORQUE)
     if missing:
         raise ConfigError(
-            f"this drive cannot be commanded by torque: its object dictionary lacks {_names(missing)}: take a drive "
-            "with a torque mode, or the file that belongs to it (bench.amplifier.settings.eds)"
+            f"this drive cannot be commanded by torque: its object dictionary lacks {_names(missing)}: use a drive "
+            "with a torque mode, or give the EDS file of this drive (bench.amplifier.settings.eds)"
         )
     has = {i: i in dictionary for i in (cia402.MAX_TORQUE, cia402.RATED_TORQUE, cia402.ACTUAL_TORQUE)}
     mode, mode_note = _choose_mode(dictionary, wish, supported_modes)

@@ -106,7 +106,7 @@ class Odrive(Amplifier):
         self._beat = None
         timeout_s = self.settings.state_timeout_ms * 1e-3
         if not link.wait(timeout_s, self._is_closed, lambda: self._feed(link, zero)):
-            raise DeviceFault(f"{self.label} does not close its loop: {self._how_it_is()}")
+            raise DeviceFault(f"{self.label} does not enter closed-loop control: {self._how_it_is()}")
 
     @staticmethod
     def _feed(link: CanLink, zero: CanFrame) -> None:
@@ -122,7 +122,7 @@ class Odrive(Amplifier):
         if not tripped:
             link.send(self.off_frames())
             raise DeviceFault(
-                f"{self.label} keeps running without a sign of life from this computer: refused. Switch its "
+                f"{self.label} keeps running although this computer stopped sending. It is refused: switch its "
                 "watchdog on (odrivetool: axis0.config.enable_watchdog = True, watchdog_timeout = "
                 f"{self.config.watchdog_ms * 1e-3:g}, save_configuration())"
             )

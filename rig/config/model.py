@@ -36,7 +36,7 @@ class ModelConfig(Section):
         if len(set(terms)) != len(terms):
             raise ValueError("a term is listed twice: name each of inertia, damping, stiffness once")
         if "inertia" not in terms:
-            raise ValueError("inertia has to stay: without it there is no motion to simulate; leave out others")
+            raise ValueError("inertia is required: without it no motion can be simulated; leave out other terms")
         return terms
 
     @property

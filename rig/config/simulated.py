@@ -91,7 +91,7 @@ class SimulatedConfig(Section):
     def _stays_put(self) -> Self:
         for key in ("damping_nm_s_rad", "stiffness_nm_rad"):
             if getattr(self.platform, key) < 0:
-                raise ValueError(f"platform.{key} is negative: such a platform runs away by itself")
+                raise ValueError(f"platform.{key} is negative: such a platform is unstable; give 0 or more")
         inertia = self.platform.inertia_kg_m2
         resonance_hz = math.sqrt(self.platform.stiffness_nm_rad / inertia) / (2 * math.pi)
         decay_hz = self.platform.damping_nm_s_rad / inertia / (2 * math.pi)

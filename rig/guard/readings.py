@@ -37,7 +37,7 @@ class DriveCurrent(Reading):
     """The motor's current."""
 
     channel, key, unit = "drive_current_a", "drive_current_a", "A"
-    what, cure = "current of the drive", "Lower torque_nm, or check the torque constant that is declared."
+    what, cure = "current of the drive", "Lower torque_nm, or check the declared torque constant."
 
 
 class EncoderTravel(Check):
@@ -78,7 +78,7 @@ class EncoderTravel(Check):
             return None
         return self._trip(
             "no angle from the encoder", 1e3 * silent_s, 1e3 * LONGEST_WITHOUT_S, "ms", now_s,
-            "Its readings are not numbers: check its cable and supply.",
+            "The encoder delivers no numbers: check its cable and supply.",
         )  # fmt: skip
 
 

@@ -67,7 +67,7 @@ def _expanded(folder: Path, file: str) -> Path:
     try:
         return folder / Path(file).expanduser()
     except RuntimeError as error:
-        raise RecordingError(f"{file}: ~ means no home folder here ({error}): give the whole path") from error
+        raise RecordingError(f"{file}: the home folder (~) is unknown ({error}): give the absolute path") from error
 
 
 def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> list[Run]:
@@ -206,8 +206,8 @@ def _leaks(runs: Sequence[Run], sources: Sequence[Path]) -> list[str]:
             start, end = max(one.time_s[0], other.time_s[0]), min(one.time_s[-1], other.time_s[-1])
             if start < end:
                 wrong.append(
-                    f"{sources[i]}: {start:g} to {end:g} s is both use: fit and use: holdout: "
-                    "set from_s and to_s so that the stretches do not overlap"
+                    f"{sources[i]}: {start:g} to {end:g} s has both use: fit and use: holdout: set from_s and to_s so "
+                    "that the two do not overlap"
                 )
     return wrong
 

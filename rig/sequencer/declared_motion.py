@@ -57,7 +57,7 @@ def suspicion(trip: Trip, declared: Platform, sets: Sequence[PlannedSet], rest_s
     }
     larger = {words: float(getattr(_peaks(p, sets, rest_s), quantity)) for words, p in others.items() if p != declared}
     suspects = [w for w in sorted(larger, key=lambda w: -larger[w]) if larger[w] > LARGER * predicted]
-    what = " or ".join(suspects[:NAMED]) or "the declared model may lack something"
+    what = " or ".join(suspects[:NAMED]) or "the declared model may lack an effect"
     return f"The declared model predicted at most {predicted:.3g} {trip.unit} in this set: {what}."
 
 

@@ -93,7 +93,7 @@ CASES = {
         "a list",
     ),
     "term twice": (RUNS + "model: {terms: [inertia, inertia]}", ":5: model.terms", "twice", "once"),
-    "no inertia term": (RUNS + "model: {terms: [damping]}", ":5: model.terms", "inertia has to stay", "leave out"),
+    "no inertia term": (RUNS + "model: {terms: [damping]}", ":5: model.terms", "inertia is required", "leave out"),
     "unknown effect": (
         RUNS + "model:\n  effects:\n    coulomb_frictoin: {level_nm: 1}",
         ":7: model.effects.coulomb_frictoin",
@@ -131,7 +131,7 @@ CASES = {
         "at least 0",
     ),
     "window backwards": (RUNS + "      from_s: 3\n      to_s: 2", ":4: recorded.runs.0", "to_s = 2", "later than"),
-    "nothing to fit": (RUNS + "      use: holdout", "recorded", "nothing is left to fit", "mark one use: fit"),
+    "nothing to fit": (RUNS + "      use: holdout", "recorded", "there is nothing to fit", "set use: fit"),
     "zero scale": (RUNS + "  scale: {torque: 0}", ":5: recorded.scale.torque", "erases", "factor to SI"),
     "column used twice": (
         RUNS + "  columns: {rate: a, angle: a}",

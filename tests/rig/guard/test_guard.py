@@ -151,7 +151,7 @@ def test_a_gyro_that_is_stale_on_a_late_machine_points_at_the_machine_first() ->
     assert on_time is not None and late is not None
     assert on_time.limit == late.limit and late.limit.startswith("gyro stale")
     assert on_time.what_to_do.startswith("No valid gyro sample arrived: check the cable and supply")
-    assert late.what_to_do.startswith("This machine does not keep up: it was 12.0 ms late")
+    assert late.what_to_do.startswith("This computer is too slow: it was 12.0 ms late")
 
 
 def test_lateness_before_the_last_valid_sample_does_not_count_against_the_machine() -> None:

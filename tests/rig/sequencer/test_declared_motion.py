@@ -24,7 +24,7 @@ FREE = Platform(0.5, 0.1, 0.0, terms=("inertia", "damping"))
 
 
 def travel(allowed_deg: float) -> Trip:
-    return Trip("travel (limits.travel_deg; 0.1 deg of it is what the gyro may have drifted)", allowed_deg, allowed_deg,
+    return Trip("travel (limits.travel_deg; 0.1 deg of it is possible drift of the gyro)", allowed_deg, allowed_deg,
                 "deg", 0.2, "Lower torque_nm.")  # fmt: skip
 
 
