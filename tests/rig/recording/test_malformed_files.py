@@ -221,7 +221,7 @@ def test_a_device_is_refused(tmp_path: Path) -> None:
 def test_a_home_that_does_not_exist_is_said(tmp_path: Path) -> None:
     message = refusal(tmp_path, "~no-such-user-here/run.csv")
     assert "the home folder (~) is unknown" in message
-    assert "give the whole path" in message
+    assert "give the absolute path" in message
 
 
 def test_all_wrong_files_are_said_at_once(tmp_path: Path) -> None:
