@@ -15,7 +15,7 @@ from drivers.capture.wire_capture import (
     export,
     read_capture,
 )
-from rig.recording.steady import whole
+from rig.recording.tail_file import whole
 
 
 class CaptureSummary(NamedTuple):

@@ -12,11 +12,11 @@ from identify.bounds.undetermined import of_another_run, open_phases, undetermin
 from identify.conclude.acceptance import grown, too_much_left
 from identify.conclude.declared_values import declared_values, kept_as_declared
 from identify.conclude.error_figures import Measured
+from identify.conclude.max_error import with_max_error
 from identify.conclude.next_steps import opposite_signs, unexplained_reason
 from identify.conclude.verdict import sentences_of
 from identify.diagnose.diagnosis import with_diagnosis
 from identify.estimate.final_fit import Fitted, noise_of_all
-from identify.genetic.per_set import KEYS
 from identify.model.parameters import Name, platform_of
 from identify.model.structure import Structure
 from identify.results import (
@@ -112,7 +112,7 @@ def conclude(
         for g in searched if after.sensor_limited and not g.accepted
     ]  # fmt: skip
     reasons += [f"{x.name} is not determined: {x.reason}" for x in final.not_determined]
-    reference, per_set = _against_reference(case, per_set)
+    reference, per_set = with_max_error(per_set, case.settings.reference)
     material = measured is None and unexplained
     if measured is not None:
         reasons += too_much_left(measured, case.settings.accept, case.recording.axis)
@@ -249,27 +249,6 @@ def _to_build_on(case: Case, fitted: Fitted, model: ModelResult) -> ModelResult:
         for name, told in zip(lost, model.not_determined, strict=True)
     )
     return replace(model, not_determined=missing, platform=_platform(case, fitted, values))
-
-
-def _against_reference(
-    case: Case, per_set: tuple[SetResult, ...]
-) -> tuple[dict[str, float] | None, tuple[SetResult, ...]]:
-    """Max_Error of Eq. 15 over the sets, and each set's own."""
-    known = case.settings.reference
-    if known is None:
-        return None, per_set
-    out: dict[str, float] = {}
-    sets = []
-    for one in per_set:
-        parameters = dict(one.parameters)
-        for term, key in KEYS.items():
-            reference = getattr(known, key)
-            if reference and term in parameters:
-                error = 100.0 * abs(parameters[term].value - reference) / reference
-                parameters[term] = replace(parameters[term], max_error_percent=error)
-                out[term] = max(out.get(term, 0.0), error)
-        sets.append(replace(one, parameters=parameters))
-    return out, tuple(sets)
 
 
 def _series(case: Case, before: Measured, after: Measured) -> tuple[RunTraces, ...]:

@@ -16,7 +16,7 @@ from rig.config.limits import LimitsConfig
 from rig.errors import PreflightRefusal
 from rig.excitation import PlannedSet, planned
 from rig.platform import Platform
-from rig.preflight.forecast import Peaks, SetForecast, SetSequence, has_no_restoring_spring, largest_factor
+from rig.preflight.simulated_sets import Peaks, SetForecast, SetSequence, has_no_restoring_spring, largest_factor
 
 SMALLEST_REPORTED_DEG = 0.005  # half of the last digit shown
 LIMIT_KEYS = ("limits.travel_deg", "limits.rate_deg_s", "limits.torque_nm")

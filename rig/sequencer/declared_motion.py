@@ -10,7 +10,7 @@ from rig.errors import RigError, SafetyTrip
 from rig.excitation import PlannedSet
 from rig.guard import Trip
 from rig.platform import Platform
-from rig.preflight.forecast import Peaks, SetForecast, SetSequence, has_no_restoring_spring
+from rig.preflight.simulated_sets import Peaks, SetForecast, SetSequence, has_no_restoring_spring
 
 CLEARLY = 0.8  # of the limit: a prediction above it is within what a declared model is good for
 FACTOR = 2.0  # by which each declared number is changed, to see which of them makes the motion larger
