@@ -163,7 +163,7 @@ def off_by(ratio: float) -> str:
     return f"{percent(abs(off)).lstrip('+')} too {'high' if off > 0 else 'low'}"
 
 
-def errors_in_turn(identification: Identification) -> dict[str, Errors]:
+def errors_by_model(identification: Identification) -> dict[str, Errors]:
     """What each model in turn leaves, all on the same samples, by what a table calls it.
 
     The declared one, the one from before a follow-up where one was played, the final one.
@@ -177,7 +177,7 @@ def errors_in_turn(identification: Identification) -> dict[str, Errors]:
     return out | ({"final model": identification.after.error} if identification.after else {})
 
 
-def bent_percent(identification: Identification) -> dict[str, float]:
+def bias_percent(identification: Identification) -> dict[str, float]:
     """How far the declared model reads each of its parameters from where the final model has it, in percent."""
     if identification.after is None:
         return {}
@@ -212,7 +212,7 @@ def not_reported(several: Sequence[NotReported]) -> list[str]:
     return [capital(f"{plain(item.name.replace('.', ', '))}: {item.reason}") for item in several]
 
 
-def left_over(left: Disturbance, axis: str) -> str:
+def residual_torque_sentence(left: Disturbance, axis: str) -> str:
     """What is left after the final model, in one sentence: how large a torque, and what it goes with."""
     torque = "force" if axis == "linear" else "torque"
     size = f"{number(left.torque_rms, 2)} {unit(left.unit)} rms ({number(100.0 * left.relative, 2)} % of the {torque})"

@@ -50,7 +50,7 @@ def _refused(
     given = bench.get(name)
     if not isinstance(given, dict):
         return
-    config, is_whole = _as_far_as_sound(given, section)
+    config, is_whole = _valid_part(given, section)
     if config is None:
         return
     try:
@@ -71,7 +71,7 @@ def _bus_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     from drivers.transport.can_link import bus_faults
 
     given = _at(data, CAN)
-    config, is_whole = _as_far_as_sound(given, CanConfig) if isinstance(given, dict) else (None, False)
+    config, is_whole = _valid_part(given, CanConfig) if isinstance(given, dict) else (None, False)
     if config is not None and is_whole:
         for key, text in bus_faults(config):
             yield (*CAN, *key.split(".")), text
@@ -139,7 +139,7 @@ def _at(data: Any, path: KeyPath) -> Any:
     return data
 
 
-def _as_far_as_sound(given: Mapping[str, Any], section: type[BaseModel]) -> tuple[Any, bool]:
+def _valid_part(given: Mapping[str, Any], section: type[BaseModel]) -> tuple[Any, bool]:
     """The section without keys that it has not and values that it refuses, and whether there were none of the latter.
 
     None where nothing sound is left.

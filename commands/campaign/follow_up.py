@@ -21,7 +21,7 @@ from rig.errors import UsageError
 from rig.interface import Statement, Torque
 from rig.platform import Platform
 
-NOBODY_AGREED = (  # the same whether it was asked, could not be, or is a replay: results are compared
+NOT_CONFIRMED = (  # the same whether it was asked, could not be, or is a replay: results are compared
     "it was not played: identify.follow_up is ask, and the question was not answered with yes (it needs a terminal). "
     "To play it without the question, set identify.follow_up: auto (real torque also needs --yes)"
 )
@@ -74,12 +74,12 @@ def _refusal(context: CommandContext, loaded: LoadedConfig) -> str:
         return "it was not played: identify.follow_up is never"
     backend = backend_name(config, context.options.dry_run, context.options.emulate)
     replayed = backend == "bench" and config.bench is not None and config.bench.replay is not None
-    if config.identify.follow_up == "ask" and (replayed or not _somebody_there()):
-        return NOBODY_AGREED
+    if config.identify.follow_up == "ask" and (replayed or not _on_terminal()):
+        return NOT_CONFIRMED
     return "it was not played: a replayed capture holds no further data" if replayed else ""
 
 
-def _somebody_there() -> bool:
+def _on_terminal() -> bool:
     return sys.stdin is not None and sys.stdin.isatty()
 
 
@@ -97,7 +97,7 @@ def _consent(mode: str) -> Callable[[Statement, bool, bool, Callable[[str], str]
         except EOFError:
             answer = ""
         if answer.strip().lower() not in ("yes", "y"):
-            raise UsageError(NOBODY_AGREED)
+            raise UsageError(NOT_CONFIRMED)
 
     return ask_each_time
 

@@ -68,7 +68,7 @@ def play_campaign(context: CommandContext, loaded: LoadedConfig, folder: Results
     if backend == RECORDED:
         raise UsageError("--resume: recordings are read, not played: there is nothing to resume.")
     before = read_unfinished(context.options.resume)
-    refuse_what_differs(before, loaded, backend)
+    refuse_differences(before, loaded, backend)
     summary = f"Resuming {plain(str(before.folder))}: {len(before.done)} of {len(before.planned)} set(s) are finished"
     names = tuple(f"earlier_{number}.journal" for number in range(1, len(before.journals) + 1))
     earlier = PlayedCampaign(Recording(before.runs), before.done, None, names)
@@ -120,7 +120,7 @@ def _whole(contents: JournalContents) -> Iterator[Run]:
             yield run_from_journal(source)
 
 
-def refuse_what_differs(before: UnfinishedCampaign, loaded: LoadedConfig, backend: str) -> None:
+def refuse_differences(before: UnfinishedCampaign, loaded: LoadedConfig, backend: str) -> None:
     """Raise UsageError that names every key by which the sets would not belong together."""
     was = before.header.get("played_on")
     if was != backend:

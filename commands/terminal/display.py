@@ -20,7 +20,7 @@ from rig.sequencer.recorder import SetStatistics
 
 BAR_WIDTH = 24  # characters
 MOST_WAITING = 50  # lines; a terminal that takes none loses bars, not memory
-LAST_WORDS_S = 1.0  # how long a slow terminal is waited for at the end
+DRAIN_TIMEOUT_S = 1.0  # how long a slow terminal is waited for at the end
 LOST = "Stopped because the terminal was closed"
 
 
@@ -77,7 +77,7 @@ class Terminal:
         finally:
             self._end_line()
             self._lines.put(None)
-            thread.join(LAST_WORDS_S)
+            thread.join(DRAIN_TIMEOUT_S)
 
     def _write(self) -> None:
         lost = False
@@ -132,7 +132,7 @@ class Terminal:
         self.clear_line()
         written = threading.Event()
         self._lines.put(written)
-        written.wait(LAST_WORDS_S)
+        written.wait(DRAIN_TIMEOUT_S)
 
 
 class SetBars(Observer):

@@ -108,8 +108,8 @@ def of_set(information: Information, others: Sequence[Information] = ()) -> str:
         )
         return f"{i.name}: below the noise: {motion} ({expected(i)}); {cure}"
     if not weak(i):
-        return f"{i.name}: expected {expected(i)}{_about_zeros(i)}"
-    return f"{of_weak_set(i, others)} (expected {expected(i)}){_about_zeros(i)}"
+        return f"{i.name}: expected {expected(i)}{_detection_limits(i)}"
+    return f"{of_weak_set(i, others)} (expected {expected(i)}){_detection_limits(i)}"
 
 
 def of_weak_set(information: Information, others: Sequence[Information] = ()) -> str:
@@ -123,7 +123,7 @@ def of_weak_set(information: Information, others: Sequence[Information] = ()) ->
     return sentence + (f"; add a set for {' and '.join(rest)}" if rest else "")
 
 
-def _about_zeros(information: Information) -> str:
+def _detection_limits(information: Information) -> str:
     bounds = ""
     for k, name in enumerate(information.names):
         if information.values[k] == 0.0 and name in {("damping",), ("stiffness",)}:
@@ -156,7 +156,7 @@ def of_campaign(each: Sequence[Information]) -> str:
             f"all sets together: expected {expected(total)}. Without torque, J, C and K themselves stay unknown: "
             "record the torque, or repeat the decay with a known added inertia"
         )
-    line = f"all sets together: expected {expected(total)}{_about_zeros(total)}; {_figures(total)}"
+    line = f"all sets together: expected {expected(total)}{_detection_limits(total)}; {_figures(total)}"
     missing = weak(total)
     if missing:
         line += f"; NOT determined: {' and '.join(label(n) for n in missing)}. {cure(total)}"

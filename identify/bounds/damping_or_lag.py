@@ -18,8 +18,10 @@ from rig.platform import Platform
 SLOW = 0.5  # of the natural frequency: faster sets tell one from the other
 LAGS = ("torque_delay", "actuator_lag", "sensor_lag")
 LATE_S = 1e-3  # the example in the sentence
-FIRM = 1e-4  # relative standard error of the inertia: what tells that so well tells damping from a delay as well
-WORTH_SAYING = 0.02  # relative standard error of C beside an unknown delay
+WELL_KNOWN_INERTIA = (
+    1e-4  # relative standard error of the inertia: what tells that so well tells damping from a delay as well
+)
+MIN_RELATIVE_ERROR = 0.02  # relative standard error of C beside an unknown delay
 
 
 def lag_for_damping(platform: Platform, inertia_std_error: float, traces: Sequence[Trace], axis: str) -> str:
@@ -39,11 +41,13 @@ def lag_for_damping(platform: Platform, inertia_std_error: float, traces: Sequen
     if not asked or not (inertia > 0.0 and stiffness > 0.0) or any(t.torque is None for t in traces):
         return ""
     natural_hz = float(np.sqrt(stiffness / inertia)) / (2.0 * np.pi)
-    if inertia_std_error < FIRM * inertia or not all(highest_torque_hz(t) < SLOW * natural_hz for t in traces):
+    if inertia_std_error < WELL_KNOWN_INERTIA * inertia or not all(
+        highest_torque_hz(t) < SLOW * natural_hz for t in traces
+    ):
         return ""
     with np.errstate(all="ignore"):
         late = together([information_of(t, with_delay(platform), len(traces)) for t in traces])
-    if not late.relative(("damping",)) > WORTH_SAYING:
+    if not late.relative(("damping",)) > MIN_RELATIVE_ERROR:
         return ""
     unit = "N s/m" if axis == "linear" else "N m s/rad"
     return (

@@ -24,7 +24,7 @@ def undetermined(fitted: Fitted, runs: Set[int], alone: bool) -> dict[Name, str]
         if of_another_run(name, runs):
             continue
         value, error, term = fitted.values[name], fitted.std_error(name), len(name) == 1
-        tied = _tied_to_nothing(fitted, i, alone) if term else ""
+        tied = _undetermined_partner(fitted, i, alone) if term else ""
         wide = term and (not np.isfinite(error) or error > WIDE * abs(value))
         if tied:
             out[name] = f"only its combination with {tied} is determined; add a set at another frequency"
@@ -66,7 +66,7 @@ def _why(value: float, error: float, determined: bool) -> str:
     )
 
 
-def _tied_to_nothing(fitted: Fitted, i: int, alone: bool) -> str:
+def _undetermined_partner(fitted: Fitted, i: int, alone: bool) -> str:
     """A term that the data do not determine and that drags this one along; empty where there is none.
 
     In a single run (``alone``) inertia and stiffness are one number at each frequency.

@@ -13,11 +13,11 @@ from identify.wording import (
     half_interval,
     how_to_separate,
     joined,
-    left_over,
     number,
     off_by,
     plain,
     readable,
+    residual_torque_sentence,
     title,
     unit,
     value_of,
@@ -42,7 +42,7 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
             + (why or _nothing_named(found))
         )  # fmt: skip
     out += [found.verdict.left_open] if found.verdict.left_open else []
-    out += _bent(found)
+    out += _parameter_bias(found)
     if found.torque_scale is not None and "torque_scale" not in found.verdict.effects:
         scale = found.torque_scale
         off = abs(scale.value - 1.0) > 1.96 * scale.std_error
@@ -51,10 +51,10 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
             f"{number(1.96 * scale.std_error, 2)} times the recorded one"
             + ("; J, C and K are larger or smaller by the same factor." if off else ": the torque scale is right.")
         )
-    out += _known_badly(found)
+    out += _poorly_determined(found)
     out += _unseen_scale(found)
     if found.disturbance is not None and _decided_in_torque(found):
-        out.append(left_over(found.disturbance, found.axis))
+        out.append(residual_torque_sentence(found.disturbance, found.axis))
     elif found.verdict.unexplained:
         out.append(
             f"{number(100.0 * found.verdict.unexplained_fraction, 2)} % of the residual above the noise floor is "
@@ -105,7 +105,7 @@ def _unseen_scale(found: Identification) -> list[str]:
     ]
 
 
-def _known_badly(found: Identification) -> list[str]:
+def _poorly_determined(found: Identification) -> list[str]:
     """J, C and K that are given and yet say little, with what would tell more."""
     given = found.final.parameters
     wide = [name for name, p in given.items() if p.value and p.std_error > WELL_KNOWN * abs(p.value)]
@@ -133,7 +133,7 @@ def _named(found: Identification, name: str) -> str:
     return text
 
 
-def _bent(found: Identification) -> list[str]:
+def _parameter_bias(found: Identification) -> list[str]:
     """What the change of the model did to each parameter, in one sentence that names the change."""
     if found.after is None or (found.verdict.unexplained and not found.verdict.effects):
         return []  # of two wrong models neither says what the other did

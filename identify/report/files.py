@@ -28,7 +28,7 @@ from identify.results import (
     Verdict,
     follow_up_file_name,
 )
-from identify.wording import bent_percent
+from identify.wording import bias_percent
 from rig.config.model import model_yaml
 from rig.platform import Platform
 from rig.recording.hdf5 import write_recording_h5
@@ -63,7 +63,7 @@ def result_json(identification: Identification) -> dict[str, Any]:
         "max_error_percent": identification.max_error_percent,
         "dropped": _listed(final.dropped),
         "not_determined": _listed(final.not_determined),
-        "bent_percent": bent_percent(identification),
+        "bias_percent": bias_percent(identification),
         "genetic": _genetic(identification.joint) if identification.joint else None,
         "holdout": identification.holdout_note,
         "follow_up": _follow_up(identification) if identification.follow_up else None,

@@ -18,9 +18,9 @@ from identify.follow_up.wording import lines as follow_up_lines
 from identify.results import Identification, ParameterEstimate
 from identify.wording import (
     SYMBOLS,
-    bent_percent,
+    bias_percent,
     declared_number,
-    errors_in_turn,
+    errors_by_model,
     not_said_yet,
     number,
     percent,
@@ -118,7 +118,7 @@ def _table(heading: str, columns: Sequence[str], words: Sequence[int] = (0,)) ->
 
 
 def _parameters(identification: Identification) -> Table:
-    before, after, bent = identification.before, identification.after, bent_percent(identification)
+    before, after, bent = identification.before, identification.after, bias_percent(identification)
     names = list(dict.fromkeys([*before.parameters, *(after.parameters if after else ())]))
     given = ["declared"] if identification.declared else []
     head = ["", *given, "declared model", *(["off by", "final model"] if after else []), "unit"]
@@ -147,7 +147,7 @@ def _estimate(estimate: ParameterEstimate | None) -> str:
 
 
 def _errors(identification: Identification) -> Table:
-    models = errors_in_turn(identification)
+    models = errors_by_model(identification)
     floor = identification.noise_floor
     linear = identification.axis == "linear"
     angle = bool(identification.traces) and identification.traces[0].channel == "angle"

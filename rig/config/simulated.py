@@ -88,7 +88,7 @@ class SimulatedConfig(Section):
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
 
     @model_validator(mode="after")
-    def _stays_put(self) -> Self:
+    def _is_stable(self) -> Self:
         for key in ("damping_nm_s_rad", "stiffness_nm_rad"):
             if getattr(self.platform, key) < 0:
                 raise ValueError(f"platform.{key} is negative: such a platform is unstable; give 0 or more")

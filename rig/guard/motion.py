@@ -89,13 +89,13 @@ class Jump(Check):
         for time_s, rate, valid in tick.gyro:
             if not valid or (self._last is not None and time_s <= self._last[0]):
                 continue
-            trip = self._bend(time_s, rate, step_nm)
+            trip = self._check_acceleration(time_s, rate, step_nm)
             self._older, self._last = self._last, (time_s, rate)
             if trip is not None:
                 return trip
         return None
 
-    def _bend(self, time_s: float, rate: float, step_nm: float) -> Trip | None:
+    def _check_acceleration(self, time_s: float, rate: float, step_nm: float) -> Trip | None:
         """The acceleration before and after the middle sample differ by what a change of torque makes, no more."""
         if self._older is None or self._last is None or time_s - self._older[0] > LONGEST_GAP_S:
             return None

@@ -58,7 +58,7 @@ class EncoderTravel(Check):
         if angle_rad is None:
             return None
         if not math.isfinite(angle_rad):
-            return self._unheard(tick.now_s)
+            return self._check_silence(tick.now_s)
         self._heard_s = tick.now_s
         if self._rest_rad is None:
             self._rest_rad = angle_rad
@@ -70,7 +70,7 @@ class EncoderTravel(Check):
             "Lower torque_nm or excitation.margin; the declared model may be too stiff.",
         )  # fmt: skip
 
-    def _unheard(self, now_s: float) -> Trip | None:
+    def _check_silence(self, now_s: float) -> Trip | None:
         if self._heard_s is None:
             self._heard_s = now_s
         silent_s = now_s - self._heard_s

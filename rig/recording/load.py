@@ -56,11 +56,11 @@ def read_recording(loaded: LoadedConfig) -> Recording:
         runs += found
         sources += [path] * len(found)
     if not wrong:
-        wrong += _leaks(runs, sources)
+        wrong += _fitted_and_held_out(runs, sources)
     if wrong:
         raise RecordingError("\n".join(dict.fromkeys(wrong)))
     info = {"backend": "recorded", "files": [str(path) for path in sources], "config_text": loaded.text}
-    return Recording(_named_apart(runs), axis=section.axis, noise=section.noise, info=info)
+    return Recording(_with_unique_names(runs), axis=section.axis, noise=section.noise, info=info)
 
 
 def _expanded(folder: Path, file: str) -> Path:
@@ -196,7 +196,7 @@ def _window(run: Run, entry: RecordedRun, path: Path) -> Run:
     )
 
 
-def _leaks(runs: Sequence[Run], sources: Sequence[Path]) -> list[str]:
+def _fitted_and_held_out(runs: Sequence[Run], sources: Sequence[Path]) -> list[str]:
     """Stretches of one file that are both fitted and held out: their error would prove nothing."""
     wrong: list[str] = []
     for i, one in enumerate(runs):
@@ -212,7 +212,7 @@ def _leaks(runs: Sequence[Run], sources: Sequence[Path]) -> list[str]:
     return wrong
 
 
-def _named_apart(runs: Sequence[Run]) -> tuple[Run, ...]:
+def _with_unique_names(runs: Sequence[Run]) -> tuple[Run, ...]:
     """Runs with names of their own, so that a table of them can be read; what steers a terminal is no part of them."""
     runs = [dataclasses.replace(run, name=printable(run.name)) for run in runs]
     names = [run.name for run in runs]

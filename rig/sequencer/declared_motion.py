@@ -36,11 +36,11 @@ def explained(
     """
     if not isinstance(error, SafetyTrip) or trip is None or declared is None or not sets:
         return error
-    sentence = suspicion(trip, declared, sets, rest_s)
+    sentence = suspected_parameter(trip, declared, sets, rest_s)
     return SafetyTrip(f"{error} {sentence}") if sentence else error
 
 
-def suspicion(trip: Trip, declared: Platform, sets: Sequence[PlannedSet], rest_s: float) -> str:
+def suspected_parameter(trip: Trip, declared: Platform, sets: Sequence[PlannedSet], rest_s: float) -> str:
     """Which declared number may be wrong, in a sentence; empty where the prediction is near the limit, too."""
     quantity = next((n for n in ("travel_deg", "rate_deg_s") if f"limits.{n}" in trip.limit), None)
     if quantity is None:

@@ -32,7 +32,7 @@ from identify.report.page.tables import (
 from identify.results import Identification
 from identify.wording import (
     SYMBOLS,
-    bent_percent,
+    bias_percent,
     half_interval,
     half_of,
     not_said_yet,
@@ -114,7 +114,7 @@ def _titled(heading: str, lines: Sequence[Piece]) -> Markup:
 
 
 def _tiles(identification: Identification) -> Markup:
-    bent, tiles = bent_percent(identification), []
+    bent, tiles = bias_percent(identification), []
     for name, found in identification.final.parameters.items():
         half = half_interval(found)
         before = f"without the missing effects: {percent(bent[name])}" if name in bent else ""
@@ -142,7 +142,7 @@ def _errors(identification: Identification, gallery: Gallery) -> Markup:
         gallery.place(shape_figure(identification)),
         error_table(identification),
         paragraph(sentence(identification.holdout_note), class_="note"),
-        *_where_it_lives(identification),
+        *_residual_contents(identification),
         *figures,
     )
 
@@ -155,7 +155,7 @@ def _at_the_noise_floor(identification: Identification) -> list[Markup]:
     return [paragraph("The residual is at the noise floor: nothing significant is unexplained.")]
 
 
-def _where_it_lives(identification: Identification) -> list[Markup]:
+def _residual_contents(identification: Identification) -> list[Markup]:
     """What the residual holds in words, before and after, so that one sees what went away."""
     found = {"declared model": identification.residual_before, "final model": identification.residual_after}
     return [

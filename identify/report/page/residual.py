@@ -21,7 +21,7 @@ from identify.report.page.figure import (
     once_in_legend,
     points,
 )
-from identify.report.page.motion import left_over
+from identify.report.page.motion import motion_error
 from identify.report.page.quantities import QUANTITIES, axis
 from identify.report.page.thinning import binned_mean, cloud, line
 from identify.results import Identification, RunTraces
@@ -74,7 +74,7 @@ def residual_of(trace: RunTraces, which: Which, torque: bool, lowpass_hz: float 
     if torque:
         found = trace.torque_residual_before if which == "before" else trace.torque_residual_after
         return np.where(trace.keep * settled(trace, lowpass_hz) > 0.0, np.asarray(found), np.nan)
-    return left_over(trace, trace.simulated_before if which == "before" else trace.simulated_after)
+    return motion_error(trace, trace.simulated_before if which == "before" else trace.simulated_after)
 
 
 def _titled(identification: Identification) -> tuple[str, bool]:

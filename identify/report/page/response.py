@@ -9,7 +9,7 @@ import numpy as np
 
 from identify.frequency.measured_response import measured_response
 from identify.frequency.model_response import Size, linear_response
-from identify.frequency.spectra import TRUSTED, VAGUE, Complex, Record, Response, decibel
+from identify.frequency.spectra import LARGEST_GAIN_ERROR, TRUSTED, Complex, Record, Response, decibel
 from identify.report.page.figure import (
     AFTER,
     BEFORE,
@@ -266,7 +266,8 @@ def _caption(sets: Sequence[SetResponse], left_out: Sequence[str]) -> str:
     pale = sum(int(np.sum(~s.measured.trusted)) for s in sets)
     caption += "Off by: difference between simulation and measurement, relative to the larger of the two. "
     caption += (
-        f"Dotted: coherence {TRUSTED:g}. Pale crosses: coherence below it, or a standard error above {100 * VAGUE:g} %"
+        f"Dotted: coherence {TRUSTED:g}. Pale crosses: coherence below it, or a standard error above "
+        f"{100 * LARGEST_GAIN_ERROR:g} %"
     )
     return caption + (
         f" ({pale} of {sum(len(s.measured.frequency_hz) for s in sets)} points)." if pale else " (none here)."

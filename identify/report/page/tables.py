@@ -10,10 +10,10 @@ from identify.report.page.quantities import QUANTITIES
 from identify.results import Candidate, Identification, ModelResult, ParameterEstimate
 from identify.wording import (
     SYMBOLS,
-    bent_percent,
+    bias_percent,
     capital,
     declared_number,
-    errors_in_turn,
+    errors_by_model,
     frequency,
     half_of,
     interval_of,
@@ -36,7 +36,7 @@ SCREENED = "screened out"
 def parameter_table(identification: Identification) -> Markup:
     """Before and after with intervals, and how far the declared model bends each parameter."""
     before, after = identification.before, identification.after
-    bent = bent_percent(identification)
+    bent = bias_percent(identification)
     names = list(dict.fromkeys([*before.parameters, *(after.parameters if after else ())]))
     given = ["declared"] if identification.declared else []
     rows: list[list[Piece]] = []
@@ -106,7 +106,7 @@ def error_table(identification: Identification) -> Markup:
         (f"{q.torque} residual over {q.torque}", "residual_torque_relative", "%", None),
         ("the same, held-out samples", "holdout_torque_relative", "%", None),
     ]
-    models = errors_in_turn(identification)
+    models = errors_by_model(identification)
     rows: list[list[Piece]] = []
     for words, key, its_unit, least in kinds:
         values = [getattr(error, key) for error in models.values()]
