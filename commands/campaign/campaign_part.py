@@ -1,4 +1,4 @@
-"""What came of a campaign, and a part of one: shared by playing, following up and resuming."""
+"""The outcome of a campaign or of a part of one: shared by playing, follow-up and resuming."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What only the drivers know to be wrong in a `bench` section, so that it is told with everything else in the file."""
+"""Faults in a `bench` section that only the drivers can recognise, reported with all other faults of the file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Playing on: a follow-up in the results folder of the campaign that asked for it, with pre-flight and consent anew."""
+"""Plays a follow-up into the results folder of its campaign, with its own pre-flight and consent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Resuming: the sets that a campaign did not finish are played into a new folder, which gets the finished ones too."""
+"""`--resume`: plays the sets that a campaign did not finish into a new folder, together with the finished ones."""
 
 from __future__ import annotations
 

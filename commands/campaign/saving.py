@@ -1,4 +1,4 @@
-"""After the last tick: what the journals and the sequencer have becomes recording.h5."""
+"""After the last tick: journals and the log of the sequencer become recording.h5."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Identify what was recorded, write the results folder, and print the summary."""
+"""Identifies a recording, writes the results folder and prints the summary."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`rig check`: everything that can be known to be wrong before a campaign, said at once with its cure.
+"""`rig check`: everything that can be known to be wrong before a campaign, each with its cure.
 
 Each check is one function from what is known to lines for the operator; one that fails raises, and the others
 still speak. A further check is a function and a place in ``CHECKS``.

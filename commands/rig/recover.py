@@ -1,4 +1,4 @@
-"""`rig recover`: what a kill or a power cut left of a results folder, mended, said, and made ready to identify from."""
+"""`rig recover`: repairs a results folder after a kill or a power cut, so that it can be identified from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the operator sees while a campaign runs, on stderr.
+"""The display on stderr while a campaign plays.
 
 Nothing here may hold up a tick: a terminal that is stopped (Ctrl-S) or slow blocks whoever writes to it. So a
 thread writes, and the loop only hands over short lines. A terminal that is gone is a reason to stop.

@@ -1,4 +1,4 @@
-"""Signals from the first moment of a command to its last: before anything else listens, and after.
+"""Signals before the command has set up its own handling, and after it has ended.
 
 Nothing heavy may be imported here: this comes before all that is slow to import.
 """

@@ -1,4 +1,4 @@
-"""The one place that turns what went wrong into a message and an exit code."""
+"""The one place that turns an exception into a message and an exit code."""
 
 from __future__ import annotations
 

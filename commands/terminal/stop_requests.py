@@ -1,4 +1,4 @@
-"""Signals become requests to stop: the first ends the campaign in order, a second Ctrl-C cuts the torque at once."""
+"""What Ctrl-C and other signals do: the first ends the campaign in order, a second cuts the torque at once."""
 
 from __future__ import annotations
 

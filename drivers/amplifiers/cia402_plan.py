@@ -1,4 +1,4 @@
-"""What a CiA 402 drive can do, read from its object dictionary, before anything is sent to it.
+"""The abilities of a CiA 402 drive (modes, limits, optional objects), read from its object dictionary.
 
 Makers leave objects out (the EPOS4 has no 0x6072 and no 0x6075) and differ in what a torque of 1000 means.
 The plan says which mode is used, what is missing and what takes its place; or refuses.

@@ -1,4 +1,4 @@
-"""What a CiA 402 drive is told before it may be enabled: scale, watchdog, PDO maps, mode."""
+"""Setup of a CiA 402 drive before it may be enabled: scale, watchdog (heartbeat consumer), PDO maps, mode."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a raw capture holds, and what of it is lost."""
+"""Summary of a raw capture: what it holds and how much is lost."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Replay: a raw capture in the place of the devices, through the same drivers, to the same samples.
+"""Replay: a raw capture in place of the devices, through the same drivers, to the same samples.
 
 ``ReplayRig`` is a Rig and ``ReplayClock`` a clock: a sequencer that plays the same sets on them does, tick by
 tick, what it did on the bench.

@@ -1,4 +1,4 @@
-"""The CAN side of an amplifier: frames out in one go, frames in without a thread, one sentence when it fails.
+"""The CAN side of an amplifier: sends and receives frames without a thread, and reports bus faults.
 
 python-can reads through a background thread (``Notifier``) that dies of its first error; a control loop
 that polls sees every error where it happens and needs no lock. While somebody waits here, ``idle`` is

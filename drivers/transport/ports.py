@@ -1,4 +1,4 @@
-"""Byte ports: non-blocking bulk reads and writes, and one sentence when the other end is gone.
+"""Byte ports: non-blocking bulk reads and writes, with one message if the other end disappears.
 
 Drivers talk to the ``BytePort`` protocol, so that a replay or a test can stand in for a serial line.
 """

@@ -1,4 +1,4 @@
-"""After the fit: what each run, and all together, could tell at the model that was found, beside what came out.
+"""After the fit: the Cramer-Rao bound of each run and of all together, compared with the standard error reached.
 
 The bound is that of `rig check` (see ``identifiability``), now at the identified values and on the samples that were
 really recorded. Where the standard error that was reached lies at the bound, only a better sensor or more torque

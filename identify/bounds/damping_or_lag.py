@@ -1,4 +1,4 @@
-"""Whether damping may be no more than a delay or a lag that nobody declared: far below the resonance one is the other.
+"""Whether the sets can separate damping from an undeclared delay or lag: far below the resonance they cannot.
 
 A torque that comes late by a short time t lags by w t, and so does the motion of a damped spring whose C is K t.
 """

@@ -1,4 +1,4 @@
-"""Before the rig moves, or a recording is fitted: what it can determine, line by line, for `rig check`."""
+"""Before playing or fitting: what each run can determine, one line each, for `rig check`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When a model is accepted: what is left and goes with something must be immaterial, and no error may grow unsaid."""
+"""When a model is accepted: the residual torque that depends on something must be small; larger errors are noted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From fits to what is told: parameters with units and intervals, what is not determined, verdict, acceptance."""
+"""From the final fits to the result: parameters with intervals, undetermined parameters, verdict, acceptance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What to run next after a campaign that was not accepted: for the summary, the report and result.json alike."""
+"""What to run next after a campaign that was not accepted, for summary, report and result.json."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fitted numbers against those that somebody declared: factors that a wrong unit or a wrong sign would make.
+"""Fitted values compared with declared ones: factors that a wrong unit or a wrong sign would make.
 
 A wrong scale of torque or rate multiplies J, C and K alike. A wrong unit of time multiplies K/J by its square. One
 number that is off beside others that agree is a matter of the declared number itself. Anything else is silence: a

@@ -1,4 +1,4 @@
-"""Noise in the recorded torque: the model is shaken by it, the platform was not."""
+"""Noise in the recorded torque: it excites the model but did not excite the platform."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a residual holds, in sentences for the person at the bench."""
+"""Sentences on what a residual consists of."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The guard: looks at every tick before and after its exchange, and says when to stop.
+"""The guard: checks every limit before and after the exchange of each tick, and trips.
 
 A pure state machine: no clock, no device. Each limit is one small check, so that a new one is a class and
 a line in ``CHECKS``. The first broken limit is the verdict; taking the torque off is the sequencer's.

@@ -1,4 +1,4 @@
-"""Is the motion one that the torque could have made? Checks that need little of the declared model.
+"""Implausible motion: jumps, returned work and standstill that no torque explains, almost without the declared model.
 
 What is declared may be wrong by a factor of two in inertia and stiffness, and may lack any friction, play or delay;
 a lightly damped resonance is no fault. So nothing here compares with a predicted rate. Held on to is only what holds

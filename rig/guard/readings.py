@@ -1,4 +1,4 @@
-"""Limits on what only some rigs report: temperature and current of the drive, the angle of an encoder."""
+"""Limits on readings that only some rigs have: temperature and current of the drive, angle of an encoder."""
 
 from __future__ import annotations
 

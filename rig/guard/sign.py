@@ -1,4 +1,4 @@
-"""Does the motion follow the torque, or the torque turned round?
+"""Reversed sign: whether the measured rate or the reversed one explains the torque.
 
 A sign that turns in the middle of a set, well below resonance, leaves rate and travel within their limits, and the work
 that it fakes is less than what an undeclared delay may fake. What it cannot fake is the platform: through one low-pass

@@ -1,4 +1,4 @@
-"""Do angle, rate and time agree about what a second and a radian are?"""
+"""Whether angle, rate and time agree: units, signs, swapped columns."""
 
 from __future__ import annotations
 

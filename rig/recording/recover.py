@@ -1,4 +1,4 @@
-"""Mending what a kill or a power cut left of a results folder; nothing that stands there is changed.
+"""Recovery of a results folder after a kill or a power cut; existing files are not changed.
 
 The journals have everything that was written; recording.h5 is made of them at the end of a campaign, and is made
 here where it is absent, damaged or has less.

@@ -1,4 +1,4 @@
-"""What a trip on travel or rate says of the declared model, where that stayed clear of the limit."""
+"""After a trip on travel or rate: which declared parameter may be wrong, if the prediction stayed within the limit."""
 
 from __future__ import annotations
 

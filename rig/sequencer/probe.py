@@ -1,4 +1,4 @@
-"""The probe: small pulses after arming, before any full torque, and what their answer says.
+"""The probe: small pulses after arming, before any full torque, to check sign and scale of torque and rate.
 
 Half a sine each, one way and the other, doubled until the platform answers clearly. From each answer follow all
 inertias that fit nearly as well as the best (``rig.sequencer.pulse_inertia``). They have to lie within a factor of the
