@@ -8,7 +8,7 @@ import numpy as np
 
 from identify.bounds.identifiability import DELAY, Information, together
 from identify.model.parameters import Name
-from identify.wording import SYMBOLS, number, plain
+from identify.wording import SYMBOLS, joined, number, plain
 from rig import effects
 from rig.platform import TERMS
 
@@ -29,7 +29,7 @@ def undetermined(name: str, missing: Sequence[str], partner: str | None = None) 
     beside = f"fit it with {partner}" if partner else "fit it together with a set at another frequency"
     if {"inertia", "stiffness"} <= set(missing):
         return f"{name} alone cannot separate inertia from stiffness: keep the start transient or {beside}"
-    return f"{name} alone does not determine {' and '.join(missing)}: keep the start transient or {beside}"
+    return f"{name} alone does not determine {joined(missing)}: keep the start transient or {beside}"
 
 
 def label(name: Name, torque_free: bool = False) -> str:
@@ -41,12 +41,12 @@ def label(name: Name, torque_free: bool = False) -> str:
 
 
 def expected(information: Information) -> str:
-    """Expected standard errors: "J +-0.0024 %, C +-0.023 %, K +-0.0024 %"."""
+    """Expected standard errors: "J +-0.0024 %, C +-0.023 %, K +-0.0024 %"; one above the value determines nothing."""
     each = []
     for name in information.names:
         value, error = abs(information.values[information.names.index(name)]), information.std_error(name)
         words = label(name, information.torque_free)
-        if not np.isfinite(error):
+        if not np.isfinite(error) or 0.0 < value < error:
             each.append(f"{words} not determined")
         elif value == 0.0:
             each.append(f"{words} +-{_amount(error, _unit(name))} (declared as 0)")
@@ -120,7 +120,7 @@ def of_weak_set(information: Information, others: Sequence[Information] = ()) ->
         return f"{information.name} alone does not determine every effect"
     sentence = undetermined(information.name, terms, _partner(information, missing, others))
     rest = [label(n) for n in missing if n[0] not in TERMS]
-    return sentence + (f"; add a set for {' and '.join(rest)}" if rest else "")
+    return sentence + (f"; add a set for {joined(rest)}" if rest else "")
 
 
 def _detection_limits(information: Information) -> str:
@@ -159,7 +159,7 @@ def of_campaign(each: Sequence[Information]) -> str:
     line = f"all sets together: expected {expected(total)}{_detection_limits(total)}; {_figures(total)}"
     missing = weak(total)
     if missing:
-        line += f"; NOT determined: {' and '.join(label(n) for n in missing)}. {cure(total)}"
+        line += f"; NOT determined: {joined([label(n) for n in missing])}. {cure(total)}"
     return line
 
 
@@ -187,11 +187,13 @@ def cure(total: Information) -> str:
 
 def of_delay(each: Sequence[Information]) -> str:
     """Whether a torque delay, which every record may hold, can be separated from damping; ``each`` with the delay."""
-    total = together(each)
-    if total.torque_free or DELAY_NAME not in total.names or ("damping",) not in total.names:
+    total, damping = together(each), ("damping",)
+    if total.torque_free or DELAY_NAME not in total.names or damping not in total.names:
         return ""
+    if damping in weak(total.without(DELAY_NAME)):
+        return ""  # that damping is not determined has been said
     error = total.std_error(DELAY_NAME)
-    bent = total.relative(("damping",))
+    bent = total.relative(damping)
     if below_noise(total):
         return ""
     if not np.isfinite(error) or bent > WELL_KNOWN:

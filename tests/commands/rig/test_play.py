@@ -85,7 +85,7 @@ def test_a_refused_campaign_leaves_no_folder_behind(tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = command(app, "play", write_config(tmp_path), "--set", "limits.torque_nm=10", "--out", out)
     assert done.exit_code == 2
-    assert "At most 10.000 N m is allowed" in done.stderr
+    assert "At most 10.00 N m is allowed" in done.stderr
     assert not out.exists()
 
 
