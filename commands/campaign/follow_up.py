@@ -22,8 +22,8 @@ from rig.interface import Statement, Torque
 from rig.platform import Platform
 
 NOT_CONFIRMED = (  # the same whether it was asked, could not be, or is a replay: results are compared
-    "it was not played: identify.follow_up is ask, and the question was not answered with yes (it needs a terminal). "
-    "To play it without the question, set identify.follow_up: auto (real torque also needs --yes)"
+    "it was not played: identify.follow_up is ask, and the question was not answered with yes (without a terminal "
+    "it is not asked). To play it without the question, set identify.follow_up: auto (real torque also needs --yes)"
 )
 QUESTION = "Play this follow-up now? Type yes to play it: "
 NEXT_SEED = 1_000_003  # a simulated gyro must not repeat its noise

@@ -157,7 +157,7 @@ def test_a_gyro_that_is_stale_on_a_late_machine_points_at_the_machine_first() ->
 def test_lateness_before_the_last_valid_sample_does_not_count_against_the_machine() -> None:
     trip = first_trip(Guard(LIMITS), falls_silent(0.02, lambda t: t < 0.0005))
     assert trip is not None and trip.limit.startswith("gyro stale")
-    assert "This machine" not in trip.what_to_do
+    assert "This computer" not in trip.what_to_do
 
 
 def test_a_gyro_that_sends_only_invalid_samples_is_stale_too() -> None:
