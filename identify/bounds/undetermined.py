@@ -8,6 +8,7 @@ import numpy as np
 
 from identify.estimate.final_fit import Fitted
 from identify.model.parameters import Name
+from identify.wording import number
 
 TIED = 0.95  # correlation beyond which two parameters are one
 OPEN_RAD = 0.5  # standard error of a phase beyond which it is open
@@ -62,7 +63,8 @@ def _why(value: float, error: float, determined: bool) -> str:
     if not determined:
         return "these runs hold no information on it; add a set at another frequency or keep the start transient"
     return (
-        f"its standard error {error:.3g} is more than half of its value {value:.3g}; use more torque or a longer record"
+        f"its standard error {number(error, 2)} is more than half of its value {number(value, 2)}; use more torque or "
+        "a longer record"
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from identify.bounds.damping_or_lag import lag_for_damping
 from identify.bounds.undetermined import of_another_run, open_phases, undetermined
-from identify.conclude.acceptance import grown, too_much_left
+from identify.conclude.acceptance import grown, of_reported, too_much_left
 from identify.conclude.declared_values import declared_values, kept_as_declared
 from identify.conclude.error_figures import Measured
 from identify.conclude.max_error import with_max_error
@@ -115,7 +115,7 @@ def conclude(
     reference, per_set = with_max_error(per_set, case.settings.reference)
     material = measured is None and unexplained
     if measured is not None:
-        reasons += too_much_left(measured, case.settings.accept, case.recording.axis)
+        reasons += too_much_left(of_reported(measured, final), case.settings.accept, case.recording.axis)
     found = Identification(
         accepted=not reasons and not material, reasons=(), axis=case.recording.axis, before=result_before,
         verdict=verdict, after=result_after, noise_floor=floor, per_set=per_set, joint=joint,
@@ -129,7 +129,8 @@ def conclude(
     if opposite_signs(found):
         reasons.insert(0, SENTENCE)
     found = replace(found, accepted=not reasons, reasons=tuple(reasons))
-    said = (*sentences_of(found), *_about_damping(case, after, final))
+    of_damping = _about_damping(case, after, final)
+    said = (*sentences_of(found, damping_said=bool(of_damping)), *of_damping)
     return with_diagnosis(replace(found, verdict=replace(verdict, sentences=said)))
 
 
