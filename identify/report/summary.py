@@ -158,14 +158,16 @@ def _errors(identification: Identification) -> Table:
         (f"held-out {channel}, free run", "holdout_rate_rms", floor.holdout_rate_rms, channel_unit),
         ("held-out fit", "holdout_fit_percent", None, "%"),
         (f"{torque} residual", "residual_rms_torque", floor.residual_rms_torque, torque_unit),
-        (f"{torque} residual / {torque}, held out", "holdout_torque_relative", None, ""),
+        (f"{torque} residual / {torque}, held out", "holdout_torque_relative", None, "%"),
     ]
     head = ["", *models, "noise floor", "unit"]
     table = _table("Error", head, words=(0, len(head) - 1))
     for words, key, least, its_unit in kinds:
         values = [getattr(error, key) for error in models.values()]
         if any(value is not None for value in values):
-            table.add_row(words, *[number(value) for value in values], number(least), its_unit)
+            times = 100.0 if key.endswith("_relative") else 1.0
+            shown = [number(None if value is None else times * value) for value in values]
+            table.add_row(words, *shown, number(least), its_unit)
     return table
 
 

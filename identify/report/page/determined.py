@@ -1,8 +1,8 @@
-"""What the data could determine beside what came out, set by set and together."""
+"""The Cramer-Rao bound compared with the standard error reached, set by set and together."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -13,8 +13,11 @@ from identify.wording import SYMBOLS, capital, number
 RATIOS = {"damping": "damping_over_inertia", "stiffness": "stiffness_over_inertia"}
 
 
-def determined_table(comparisons: Sequence[BoundComparison]) -> Markup:
-    """Rank, condition, bound and standard error of each parameter, and what follows; nothing without entries."""
+def determined_table(comparisons: Sequence[BoundComparison], remarked: Collection[str] = ()) -> Markup:
+    """Rank, condition, bound and standard error of each parameter, and what follows; nothing without entries.
+
+    ``remarked`` are the sets of which the table of the sets says already what they do not determine.
+    """
     if not comparisons:
         return Markup("")
     names = list(dict.fromkeys(n for one in comparisons for n in one.expected))
@@ -26,7 +29,7 @@ def determined_table(comparisons: Sequence[BoundComparison]) -> Markup:
     for one in comparisons:
         row: list[Piece] = [one.name, f"{one.rank} of {one.parameters}", _condition(one.condition)]
         row += [_pair(one.expected.get(n), one.achieved.get(n)) for n in names]
-        rows.append([*row, capital(one.sentence)])
+        rows.append([*row, "" if one.name in remarked else capital(one.sentence)])
     caption = (
         "One standard error, in percent of the value. Bound: the Cramer-Rao bound for the sensor's noise, the "
         "recorded samples and the identified values (initial state and bias unknown; for a single set, effects "

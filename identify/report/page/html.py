@@ -175,7 +175,8 @@ def _candidates(identification: Identification) -> Markup:
 
 
 def _sets(identification: Identification, recording: Recording, gallery: Gallery) -> Markup:
-    determined = determined_table(compare_with_bound(identification, recording))
+    remarked = {one.name for one in identification.per_set if one.advice}
+    determined = determined_table(compare_with_bound(identification, recording), remarked)
     if not identification.per_set and identification.joint is None:
         return section("sets", "What the data could determine", determined) if determined.html else determined
     return section(

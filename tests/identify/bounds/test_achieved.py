@@ -83,6 +83,13 @@ def test_the_table_shows_bound_and_reached_and_the_words() -> None:
     assert determined_table(()).html == ""
 
 
+def test_a_set_with_a_remark_of_its_own_is_not_discussed_again() -> None:
+    (first, *others) = compare_with_bound(FOUND, RECORDING)
+    first = replace(first, sentence="the first alone does not determine damping")
+    assert "The first alone" in determined_table((first, *others)).html
+    assert "The first alone" not in determined_table((first, *others), {first.name}).html
+
+
 def test_without_a_model_that_can_be_simulated_nothing_is_said() -> None:
     assert FOUND.after is not None
     assert compare_with_bound(replace(FOUND, after=replace(FOUND.after, platform=None)), RECORDING) == ()
