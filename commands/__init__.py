@@ -1,1 +1,1 @@
-"""The commands: the top floor, which only wires the rest together."""
+"""The commands: the top layer, which connects the other packages."""

@@ -1,4 +1,4 @@
-"""What devices say in a run of a day: the first and the last of it are kept, the rest is counted."""
+"""A log of bounded length: the first and the last messages are kept, the others counted."""
 
 from __future__ import annotations
 

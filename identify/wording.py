@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from identify.results import Disturbance, Errors, Identification, NotReported, ParameterEstimate
@@ -163,7 +163,7 @@ def off_by(ratio: float) -> str:
     return f"{percent(abs(off)).lstrip('+')} too {'high' if off > 0 else 'low'}"
 
 
-def errors_in_turn(identification: Identification) -> dict[str, Errors]:
+def errors_by_model(identification: Identification) -> dict[str, Errors]:
     """What each model in turn leaves, all on the same samples, by what a table calls it.
 
     The declared one, the one from before a follow-up where one was played, the final one.
@@ -177,7 +177,7 @@ def errors_in_turn(identification: Identification) -> dict[str, Errors]:
     return out | ({"final model": identification.after.error} if identification.after else {})
 
 
-def bent_percent(identification: Identification) -> dict[str, float]:
+def bias_percent(identification: Identification) -> dict[str, float]:
     """How far the declared model reads each of its parameters from where the final model has it, in percent."""
     if identification.after is None:
         return {}
@@ -201,13 +201,10 @@ def frequency(value: float | None) -> str:
     return "-" if value is None else f"{value:g} Hz"
 
 
-def pairs(several: Mapping[str, Sequence[str]]) -> list[str]:
-    """What a name can be confused with, one sentence each; names without a rival are left out."""
-    return [
-        capital(f"{' or '.join(plain(r) for r in rivals)} explains these data about as well as {plain(name)}.")
-        for name, rivals in several.items()
-        if rivals
-    ]
+def not_said_yet(several: Sequence[NotReported], found: Identification) -> list[str]:
+    """Parameters that stand in no table, with the reason, where neither the verdict nor the reasons say it already."""
+    said = (*found.verdict.sentences, *found.reasons)
+    return not_reported([item for item in several if not any(item.reason in sentence for sentence in said)])
 
 
 def not_reported(several: Sequence[NotReported]) -> list[str]:
@@ -215,19 +212,21 @@ def not_reported(several: Sequence[NotReported]) -> list[str]:
     return [capital(f"{plain(item.name.replace('.', ', '))}: {item.reason}") for item in several]
 
 
-def left_over(left: Disturbance, axis: str) -> str:
+def residual_torque_sentence(left: Disturbance, axis: str) -> str:
     """What is left after the final model, in one sentence: how large a torque, and what it goes with."""
     torque = "force" if axis == "linear" else "torque"
     size = f"{number(left.torque_rms, 2)} {unit(left.unit)} rms ({number(100.0 * left.relative, 2)} % of the {torque})"
     if not left.depends_on:
         return (
-            f"The final model leaves a {torque} of {size}. It depends on nothing that was tried: it is noise, and the "
-            "intervals include it."
+            f"The final model leaves a residual {torque} of {size}. It depends on no quantity that was tested, so it "
+            "counts as noise and is included in the intervals."
         )
-    each = joined([f"{number(100.0 * d.relative, 2)} % on the {depends_on(d.on, axis)}" for d in left.depends_on])
+    each = joined(
+        [f"{number(100.0 * d.relative, 2)} % depends on the {depends_on(d.on, axis)}" for d in left.depends_on]
+    )
     moved = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in left.moves_percent.items()])
-    told = f" Fitting that part as well changes {moved}." if moved else ""
-    return f"The final model leaves a {torque} of {size}. Part of it depends on something: {each}.{told}"
+    change = f" Fitting this part too changes {moved}." if moved else ""
+    return f"The final model leaves a residual {torque} of {size}. Of the {torque}, {each}.{change}"
 
 
 def depends_on(quantity: str, axis: str) -> str:
@@ -243,7 +242,7 @@ def without(times: float) -> str:
     return f"Without it, even after refitting, the error on held-out data is {number(times, 3)} times larger."
 
 
-def told_apart(how: str) -> str:
+def how_to_separate(how: str) -> str:
     """What separates an effect from its rivals, as part of a sentence: "what tells it from a delay: ..."."""
     return f"to distinguish it {how}" if how.startswith("from ") else f"to separate them: {how}"
 

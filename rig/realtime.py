@@ -1,4 +1,4 @@
-"""Real-time priority for the calling thread, with a plain statement of what was got and what was not."""
+"""Real-time priority and locked memory for the calling thread, and what of it was granted."""
 
 from __future__ import annotations
 

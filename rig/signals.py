@@ -1,4 +1,4 @@
-"""How a signal runs between its samples, and what a run may be used for."""
+"""How a torque is held between samples, and what a run may be used for."""
 
 from __future__ import annotations
 

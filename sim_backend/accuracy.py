@@ -1,4 +1,4 @@
-"""How exact the simulated motion is: the rig as it plays, against the same rig on far finer steps."""
+"""Accuracy of the simulated motion: the rig as it plays, compared with the same rig on much finer steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands between a commanded torque and the shaft of the simulated platform, one class a kind.
+"""Amplifier models between the commanded torque and the shaft of the simulated platform, one class each.
 
 An amplifier advances the plant under the torque it makes and reports that torque: instantaneous samples
 of a smooth torque where it is ideal, values that held from their time stamp on where it is not.

@@ -82,7 +82,7 @@ class Plant:
             raise ConfigError(
                 f"simulated.platform: its fastest motion, {e.fastest_rad_s() / (2 * np.pi):.3g} Hz, takes "
                 f"{needed:.3g} fine steps a tick, at most {MOST_PARTS} are simulated: raise the inertia, lower the "
-                "stiffness, the damping or the sharpest of its effects, or tick faster"
+                "stiffness, the damping or the steepest of its effects, or raise excitation.sample_rate_hz"
             )
         # A power of two, so that grids that halve each other nest and a held torque changes on all of them.
         self.parts = 1 << max(0, int(np.ceil(np.log2(needed) - 1e-9))) if needed > 1.0 else 1

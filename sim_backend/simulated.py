@@ -164,7 +164,7 @@ def _common_rate_hz(tick_hz: float, gyro_hz: float) -> float:
     )
     if common > HIGHEST_COMMON_RATE_HZ:
         raise ConfigError(
-            f"simulated.gyro.sample_rate_hz = {gyro_hz:g} and excitation.sample_rate_hz = {tick_hz:g} have no "
-            f"common multiple up to {HIGHEST_COMMON_RATE_HZ} Hz: choose rates that divide each other"
+            f"simulated.gyro.sample_rate_hz = {gyro_hz:g} and excitation.sample_rate_hz = {tick_hz:g} have no common "
+            f"multiple up to {HIGHEST_COMMON_RATE_HZ} Hz: choose rates of which one is a multiple of the other"
         )
     return float(common)

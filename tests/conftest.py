@@ -40,7 +40,7 @@ WITH_DEADLINES = (
     "rig/recording/test_journal",
     "rig/recording/test_memory",
     "rig/recording/test_readers",
-    "rig/recording/test_steady",
+    "rig/recording/test_tail_file",
     "rig/sequencer/test_warm_up",
     "rig/test_realtime",
     "sim_backend/emulators",

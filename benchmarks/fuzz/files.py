@@ -24,7 +24,7 @@ from drivers.codecs import stim300
 from drivers.codecs.lawicel import CanFrame
 from rig.recording import Journal, Recording, Run
 from rig.recording.hdf5 import write_recording_h5
-from rig.recording.steady import record, tail_of
+from rig.recording.tail_file import record, tail_of
 
 ROOT = Path(__file__).resolve().parents[2]
 Maker = Callable[[Path], None]

@@ -1,1 +1,1 @@
-"""What plays a campaign from the command line, shared by both programs."""
+"""Playing a campaign from the command line, shared by `rig play` and `identify-run`."""

@@ -1,4 +1,4 @@
-"""Before anything moves: what is about to happen, said loudly."""
+"""The announcement before anything moves: kind of torque, limits, sets, expected time, results folder."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ def emulated(loaded: LoadedConfig, raw_folder: Path) -> Iterator[Stage]:
     config = loaded.config
     _require_channels(config)
     if _bench_section(config).replay is not None:
-        raise UsageError("--emulate and bench.replay exclude each other: a replay uses no devices.")
+        raise UsageError("--emulate and bench.replay exclude each other: a replay uses no devices. Leave one out.")
     require_emulators()
     from sim_backend.emulators.launch import on_emulated_ports, started
 
@@ -89,7 +89,9 @@ BACKENDS: Mapping[str, Backend] = {SIMULATED: simulated, "bench": bench, EMULATE
 def backend_name(config: Config, dry_run: bool, emulate: bool) -> str:
     """The backend that was asked for. Raises UsageError for two at once."""
     if dry_run and emulate:
-        raise UsageError("--dry-run and --emulate exclude each other: the first simulates, the second emulates.")
+        raise UsageError(
+            "--dry-run and --emulate exclude each other: the first simulates, the second emulates. Leave one out."
+        )
     if dry_run:
         return SIMULATED
     return EMULATED if emulate else config.backend

@@ -1,4 +1,4 @@
-"""What came of a campaign, and a part of one: shared by playing, following up and resuming."""
+"""The outcome of a campaign or of a part of one: shared by playing, follow-up and resuming."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from commands.campaign.consent import ask_consent
 from commands.campaign.results_folder import JOURNAL_FILE, RAW_FOLDER
 from rig.interface import Statement
 from rig.recording.run import Recording
-from rig.recording.steady import tail_of
+from rig.recording.tail_file import tail_of
 
 
 @dataclass(frozen=True)

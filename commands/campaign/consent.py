@@ -31,12 +31,12 @@ def ask_consent(statement: Statement, yes: bool, is_terminal: bool, ask: Callabl
         return
     if not is_terminal:
         raise UsageError(
-            "this campaign applies REAL torque, and without a terminal nobody can be asked. Give --yes if the "
-            "machine is clear, or try --dry-run or --emulate first. Nothing was moved."
+            "this campaign applies REAL torque and must be confirmed, but there is no terminal to ask on. Add --yes "
+            "if the machine is clear, or try --dry-run or --emulate first. Nothing was moved."
         )
     try:
         answer = ask(QUESTION)
     except EOFError:
         answer = ""
     if answer.strip().lower() not in ("yes", "y"):
-        raise UsageError("not started: the answer was not yes. Nothing was moved.")
+        raise UsageError("not started: the question was not answered with yes. Nothing was moved.")

@@ -1,4 +1,4 @@
-"""What every command that plays or identifies has at hand: the options, the terminal, the stop requests, the folder."""
+"""What every playing or identifying command needs: options, terminal, stop requests, results folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What only the drivers know to be wrong in a `bench` section, so that it is told with everything else in the file."""
+"""Faults in a `bench` section that only the drivers can recognise, reported with all other faults of the file."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _refused(
     given = bench.get(name)
     if not isinstance(given, dict):
         return
-    config, is_whole = _as_far_as_sound(given, section)
+    config, is_whole = _valid_part(given, section)
     if config is None:
         return
     try:
@@ -71,7 +71,7 @@ def _bus_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     from drivers.transport.can_link import bus_faults
 
     given = _at(data, CAN)
-    config, is_whole = _as_far_as_sound(given, CanConfig) if isinstance(given, dict) else (None, False)
+    config, is_whole = _valid_part(given, CanConfig) if isinstance(given, dict) else (None, False)
     if config is not None and is_whole:
         for key, text in bus_faults(config):
             yield (*CAN, *key.split(".")), text
@@ -99,8 +99,8 @@ def _port_faults(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     if isinstance(gyro, str) and isinstance(channel, str) and is_same_port(gyro, channel.partition("@")[0]):
         yield (
             CAN_CHANNEL,
-            f"{channel} is the port that {'.'.join(map(str, GYRO_PORT))} names as well ({gyro}): gyroscope and "
-            "CAN adapter need a port each; `rig devices` lists what is plugged in",
+            f"{channel} is also the port of the gyroscope ({'.'.join(map(str, GYRO_PORT))}: {gyro}): give the CAN "
+            "adapter its own port; `rig devices` lists all ports",
         )
 
 
@@ -130,7 +130,7 @@ def _without_emulator(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
         path: KeyPath = ("bench", name, "device")
         device = _at(data, path)
         if isinstance(device, str) and device in drivers and device not in emulators:
-            yield path, f"{device!r} has no emulator; emulated are {', '.join(emulators)}"
+            yield path, f"{device!r} has no emulator: choose one of {', '.join(emulators)}"
 
 
 def _at(data: Any, path: KeyPath) -> Any:
@@ -139,7 +139,7 @@ def _at(data: Any, path: KeyPath) -> Any:
     return data
 
 
-def _as_far_as_sound(given: Mapping[str, Any], section: type[BaseModel]) -> tuple[Any, bool]:
+def _valid_part(given: Mapping[str, Any], section: type[BaseModel]) -> tuple[Any, bool]:
     """The section without keys that it has not and values that it refuses, and whether there were none of the latter.
 
     None where nothing sound is left.

@@ -1,4 +1,4 @@
-"""Room on the disk, looked at before anything moves: a campaign that fills it ends there, and its time is lost."""
+"""Free disk space, checked before anything moves."""
 
 from __future__ import annotations
 

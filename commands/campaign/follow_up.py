@@ -1,4 +1,4 @@
-"""Playing on: a follow-up in the results folder of the campaign that asked for it, with pre-flight and consent anew."""
+"""Plays a follow-up into the results folder of its campaign, with its own pre-flight and consent."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from rig.errors import UsageError
 from rig.interface import Statement, Torque
 from rig.platform import Platform
 
-NOBODY_AGREED = (  # the same whether it was asked, could not be, or is a replay: results are compared
-    "it is not played: identify.follow_up is ask, and nobody agreed (without a terminal nobody can be asked); "
-    "set identify.follow_up: auto to play it without asking (real torque also needs --yes)"
+NOT_CONFIRMED = (  # the same whether it was asked, could not be, or is a replay: results are compared
+    "it was not played: identify.follow_up is ask, and the question was not answered with yes (without a terminal "
+    "it is not asked). To play it without the question, set identify.follow_up: auto (real torque also needs --yes)"
 )
 QUESTION = "Play this follow-up now? Type yes to play it: "
 NEXT_SEED = 1_000_003  # a simulated gyro must not repeat its noise
@@ -71,15 +71,15 @@ def _refusal(context: CommandContext, loaded: LoadedConfig) -> str:
     """Why no follow-up is played, before anything is asked; empty where one may be."""
     config = loaded.config
     if config.identify.follow_up == "never":
-        return "it is not played: identify.follow_up is never"
+        return "it was not played: identify.follow_up is never"
     backend = backend_name(config, context.options.dry_run, context.options.emulate)
     replayed = backend == "bench" and config.bench is not None and config.bench.replay is not None
-    if config.identify.follow_up == "ask" and (replayed or not _somebody_there()):
-        return NOBODY_AGREED
-    return "it is not played: a replayed capture holds no further data" if replayed else ""
+    if config.identify.follow_up == "ask" and (replayed or not _on_terminal()):
+        return NOT_CONFIRMED
+    return "it was not played: a replayed capture holds no further data" if replayed else ""
 
 
-def _somebody_there() -> bool:
+def _on_terminal() -> bool:
     return sys.stdin is not None and sys.stdin.isatty()
 
 
@@ -97,7 +97,7 @@ def _consent(mode: str) -> Callable[[Statement, bool, bool, Callable[[str], str]
         except EOFError:
             answer = ""
         if answer.strip().lower() not in ("yes", "y"):
-            raise UsageError(NOBODY_AGREED)
+            raise UsageError(NOT_CONFIRMED)
 
     return ask_each_time
 

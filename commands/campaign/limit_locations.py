@@ -1,4 +1,4 @@
-"""Where in the configuration the limits stand that a campaign would break."""
+"""The places (file, line) of the limits that a campaign would break."""
 
 from __future__ import annotations
 

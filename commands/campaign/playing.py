@@ -68,7 +68,7 @@ def play(
     backend = backend_name(config, options.dry_run, options.emulate)
     if backend not in BACKENDS:
         raise UsageError(
-            f"backend: {backend} has nothing to play: give --dry-run, or a `simulated` or `bench` backend."
+            f"backend: {backend} reads recordings and plays nothing: add --dry-run, or set backend: simulated or bench."
         )
     if backend == EMULATED:
         context.terminal.show("Starting the emulated devices ...")
@@ -115,7 +115,7 @@ def _ask(question: str) -> str:
     try:
         answer = sys.stdin.readline()
     except OSError:
-        raise Aborted("the terminal is gone; nothing was played.") from None
+        raise Aborted("the terminal was closed; nothing was played.") from None
     if not answer:
         raise EOFError
     return answer

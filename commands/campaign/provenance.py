@@ -1,4 +1,4 @@
-"""What a recording has to say about its origin, so that it can be understood years later."""
+"""The origin of a recording: versions, system, configuration."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The results folder: named early, made late, never overwritten."""
+"""The results folder: named before playing, created after the pre-flight, never overwritten."""
 
 from __future__ import annotations
 

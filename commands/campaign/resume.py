@@ -1,4 +1,4 @@
-"""Resuming: the sets that a campaign did not finish are played into a new folder, which gets the finished ones too."""
+"""`--resume`: plays the sets that a campaign did not finish into a new folder, together with the finished ones."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def play_campaign(context: CommandContext, loaded: LoadedConfig, folder: Results
     if backend == RECORDED:
         raise UsageError("--resume: recordings are read, not played: there is nothing to resume.")
     before = read_unfinished(context.options.resume)
-    refuse_what_differs(before, loaded, backend)
+    refuse_differences(before, loaded, backend)
     summary = f"Resuming {plain(str(before.folder))}: {len(before.done)} of {len(before.planned)} set(s) are finished"
     names = tuple(f"earlier_{number}.journal" for number in range(1, len(before.journals) + 1))
     earlier = PlayedCampaign(Recording(before.runs), before.done, None, names)
@@ -97,13 +97,14 @@ def read_unfinished(folder: Path) -> UnfinishedCampaign:
         raise RecordingError(f"--resume {folder}: is not a folder: give the results folder of the campaign to resume")
     journals = campaign_journals(folder)
     if not journals:
-        raise RecordingError(f"--resume {folder}: holds no {JOURNAL_FILE}: play the campaign anew, without --resume")
+        raise RecordingError(f"--resume {folder}: holds no {JOURNAL_FILE}: play the campaign again without --resume")
     contents = [read_journal(path) for path in journals]
     header = contents[-1].header
     planned, config = header.get("planned_in_all", header.get("planned")), header.get("config")
     if not isinstance(planned, list) or not isinstance(config, dict):
         raise RecordingError(
-            f"--resume {folder}: its journal does not say what was planned (an earlier version wrote it): play anew"
+            f"--resume {folder}: its journal was written by an earlier version and does not list the planned "
+            "sets: play the campaign again without --resume"
         )
     runs = {run.name: run for part in contents for run in _whole(part)}
     return UnfinishedCampaign(
@@ -119,7 +120,7 @@ def _whole(contents: JournalContents) -> Iterator[Run]:
             yield run_from_journal(source)
 
 
-def refuse_what_differs(before: UnfinishedCampaign, loaded: LoadedConfig, backend: str) -> None:
+def refuse_differences(before: UnfinishedCampaign, loaded: LoadedConfig, backend: str) -> None:
     """Raise UsageError that names every key by which the sets would not belong together."""
     was = before.header.get("played_on")
     if was != backend:
@@ -133,9 +134,9 @@ def refuse_what_differs(before: UnfinishedCampaign, loaded: LoadedConfig, backen
     wrong = [line for section in sections for line in _differences(then.get(section), now.get(section), (section,))]
     if wrong:
         raise UsageError(
-            f"--resume {before.folder}: the sets would not belong together, because these keys differ:\n"
+            f"--resume {before.folder}: old and new sets could not be fitted together, because these keys differ:\n"
             + "\n".join(f"  {line}" for line in wrong)
-            + "\nSet them back, or play the whole campaign anew."
+            + "\nRestore these values, or play the whole campaign again."
         )
 
 
@@ -147,7 +148,7 @@ def _differences(then: Any, now: Any, path: Sequence[str]) -> Iterator[str]:
         for name in now:
             if name in then:  # a key that the earlier version did not know has its default
                 yield from _differences(then[name], now[name], (*path, name))
-        yield from (f"{key}.{name}: was {_short(then[name])}, is gone" for name in then if name not in now)
+        yield from (f"{key}.{name}: was {_short(then[name])}, is no longer set" for name in then if name not in now)
     elif isinstance(then, list) and isinstance(now, list) and len(then) == len(now):
         for i, (one, other) in enumerate(zip(then, now, strict=True)):
             yield from _differences(one, other, (*path, str(i)))

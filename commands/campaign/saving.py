@@ -1,4 +1,4 @@
-"""After the last tick: what the journals and the sequencer have becomes recording.h5."""
+"""After the last tick: journals and the log of the sequencer become recording.h5."""
 
 from __future__ import annotations
 
@@ -55,12 +55,17 @@ def save(
 def describe_location(played: PlayedCampaign, folder: Path) -> str:
     """Where the samples of a campaign are, or that there are none and what its folder has instead."""
     if played.recording.runs:
-        return f"What was recorded is in {folder}"
+        return f"The recording is in {folder}"
     if not played.read_back:
-        return f"The recording could not be read back; what reached the disk is in {folder}: try `rig recover` on it"
+        return (
+            f"The recording could not be read back. The data on disk are in {folder}: recover them with `rig recover`"
+        )
     wire = any(path.stat().st_size for path in folder.glob("raw/**/*.*") if path.name in WIRE_LOGS)
     kept = "the raw capture of the wire, and the journal" if wire else "the journal"
-    return f"Nothing was recorded, since it ended before the first sample of a set; {folder} has {kept}, which says why"
+    return (
+        f"Nothing was recorded: the campaign ended before the first sample of a set. {folder} holds {kept}, which "
+        "shows why"
+    )
 
 
 def _write(path: Path, recording: Recording, contents: JournalContents | None, anew: bool) -> None:
@@ -73,7 +78,7 @@ def _write(path: Path, recording: Recording, contents: JournalContents | None, a
     try:
         new.replace(path / RECORDING_FILE)
     except OSError as error:
-        raise JournalError(f"cannot write {path / RECORDING_FILE}: {error.strerror}; {new} has everything") from error
+        raise JournalError(f"cannot write {path / RECORDING_FILE}: {error.strerror}; all data are in {new}") from error
 
 
 def _read_back(context: CommandContext, path: Path) -> JournalContents | None:

@@ -104,9 +104,7 @@ def _run_played(context: CommandContext, loaded: LoadedConfig, folder: ResultsFo
         try:
             found = identified(context, loaded, played.recording)
         except (Aborted, KeyboardInterrupt):
-            context.terminal.show_always(
-                f"Stopped before anything was identified. What was recorded is in {folder.path}"
-            )
+            context.terminal.show_always(f"Stopped before anything was identified. The recording is in {folder.path}")
             raise
         except UsageError as error:  # the campaign was played, so this is no matter of usage any more
             context.say_error(error)

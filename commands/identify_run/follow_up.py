@@ -1,4 +1,4 @@
-"""Plan a follow-up where a name has a rival, play it, and identify again from all the data."""
+"""Plans a follow-up if effects cannot be distinguished, plays it, and identifies again from all data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Identify what was recorded, write the results folder, and print the summary."""
+"""Identifies a recording, writes the results folder and prints the summary."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def conclude_aborted(
     whole = played.complete_runs
     if not whole.runs:
         where = describe_location(played, folder.path)
-        context.terminal.show_always(f"No set was complete, so nothing is identified. {where}")
+        context.terminal.show_always(f"No set was completed, so nothing was identified. {where}")
         return
     context.terminal.show(f"Identifying from the {len(whole.runs)} complete set(s); the results are marked aborted.")
     found = dataclasses.replace(identified(context, loaded, whole), aborted=True)

@@ -1,4 +1,4 @@
-"""`rig check`: everything that can be known to be wrong before a campaign, said at once with its cure.
+"""`rig check`: everything that can be known to be wrong before a campaign, each with its cure.
 
 Each check is one function from what is known to lines for the operator; one that fails raises, and the others
 still speak. A further check is a function and a place in ``CHECKS``.
@@ -52,7 +52,7 @@ Check = Callable[[CheckSubject], list[str]]
 def configuration(subject: CheckSubject) -> list[str]:
     """That the file is sound: it would not have been loaded otherwise."""
     config = subject.loaded.config
-    return [f"configuration {plain(str(subject.loaded.path))}: sound (backend {config.backend})"]
+    return [f"configuration {plain(str(subject.loaded.path))}: valid (backend {config.backend})"]
 
 
 def forecast(subject: CheckSubject) -> list[str]:

@@ -1,4 +1,4 @@
-"""`rig devices`: what is plugged into this machine."""
+"""`rig devices`: serial ports and CAN adapters of this machine."""
 
 from __future__ import annotations
 

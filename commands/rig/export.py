@@ -55,7 +55,7 @@ def _can_logs(home: Path, wanted: str, folder: Path) -> Iterator[str]:
     for capture in captures:
         part = capture.parent.name if capture.parent != home / "raw" else "can"
         target = folder / f"{part}.{wanted}"
-        yield f"{target}: {write_can_log(capture, target)} frames of {capture}, times count from the first"
+        yield f"{target}: {write_can_log(capture, target)} frames of {capture}; the first frame is at time 0"
 
 
 def _runs(source: Path, wanted: str, folder: Path) -> Iterator[str]:
@@ -64,7 +64,7 @@ def _runs(source: Path, wanted: str, folder: Path) -> Iterator[str]:
 
     runs = [content for content in read_file(source) if isinstance(content, Run)]
     if not runs:
-        raise RecordingError(f"{source}: was not written by this program and is a table already")
+        raise RecordingError(f"{source}: is not a recording of this program but a table already: use it as it is")
     _made(folder)
     write = writers.writer_of(wanted)
     entries: list[dict[str, Any]] = []
@@ -75,8 +75,10 @@ def _runs(source: Path, wanted: str, folder: Path) -> Iterator[str]:
         yield f"{folder / name}: {len(run.time_s)} samples"
     section = {"torque_hold": runs[0].torque_hold, "runs": entries}
     text = yaml.safe_dump({"backend": "recorded", "recorded": section}, sort_keys=False, default_flow_style=None)
-    (folder / CONFIG_FILE).write_text(f"# Reads what was exported here.\n{text}", encoding="utf-8")
-    yield f"{folder / CONFIG_FILE}: reads them"
+    (folder / CONFIG_FILE).write_text(
+        f"# Reads the recording that was exported to this folder.\n{text}", encoding="utf-8"
+    )
+    yield f"{folder / CONFIG_FILE}: the configuration that reads them"
 
 
 def _entry(run: Run, name: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""`rig recover`: what a kill or a power cut left of a results folder, mended, said, and made ready to identify from."""
+"""`rig recover`: repairs a results folder after a kill or a power cut, so that it can be identified from."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def recover_folder(folder: Path) -> int:
     for line in recovery.lines:
         sys.stdout.write(plain(line) + "\n")
     if not (folder / RESULT_FILE).exists():
-        sys.stdout.write(f"{RESULT_FILE}: absent: the campaign ended before it was identified\n")
+        sys.stdout.write(f"{RESULT_FILE}: missing: the campaign ended before the identification\n")
     if not recovery.is_new:
         sys.stdout.write(f"Nothing to recover: {plain(str(recovery.export))} is complete.\n")
         return OK
@@ -75,14 +75,14 @@ def _out_of_captures(folder: Path, without: RecordingError) -> Recovery:
     paths = _capture_files(folder)
     if not paths:
         raise without
-    recordings, lines = [], ["no journal with a sample: the raw capture is played through the drivers"]
+    recordings, lines = [], ["no journal holds a sample: the raw capture is decoded by the drivers instead"]
     for path in paths:
         name = path.relative_to(folder)
         try:
             if summary_of(path).ticks:
                 recordings.append(recording_from_capture(path))
             else:
-                lines.append(f"{name}: ends before anything was played")
+                lines.append(f"{name}: ends before the first set")
         except Aborted:
             raise
         except RigError as error:
@@ -97,7 +97,7 @@ def _out_of_captures(folder: Path, without: RecordingError) -> Recovery:
     there = (folder / RECORDING_FILE).exists()
     path = free_name(folder, RECOVERED_FILE if there else RECORDING_FILE)
     write_recording_h5(path, recording)
-    lines.append(f"{path.name}: written, {len(runs)} run(s); the names of the sets are lost with the journal")
+    lines.append(f"{path.name}: written, {len(runs)} run(s); the names of the sets were in the journal and are lost")
     return Recovery(tuple(lines), recording, path, is_new=True)
 
 
@@ -113,15 +113,17 @@ def _write_config(folder: Path, export: Path, info: Mapping[str, Any]) -> Path:
     content: dict[str, Any] = {"backend": "recorded", "recorded": {"runs": [{"file": export.name}]}}
     config = info.get("config")
     model = config.get("model") if isinstance(config, dict) else None
-    head = "# What was recovered here, and the model that was declared.\n"
+    head = "# Reads the recovered recording; the model is the declared one.\n"
     if isinstance(model, dict):
         content["model"] = dict(model)
         if content["model"].pop("effects_from", None):
             # A recording comes from anywhere; a file of effects is code, and only a person may name that.
             content["model"].pop("effects", None)
-            head += "# It had effects of its own: name their file under model.effects_from again if you trust it.\n"
+            head += (
+                "# The campaign read effects from a file. If you trust that file, name it under model.effects_from.\n"
+            )
     else:
-        head = "# What was recovered here. The declared model is not in it: add it as model: before you identify.\n"
+        head = "# Reads the recovered recording. The declared model was lost: add it as model: before you identify.\n"
     text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
     path = free_name(folder, CONFIG_FILE)
     path.write_text(head + text, encoding="utf-8")

@@ -1,1 +1,1 @@
-"""Between a command and whoever sits at the terminal: options, signals, display, exit codes."""
+"""The terminal: options, signals, display, exit codes."""

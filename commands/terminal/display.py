@@ -1,4 +1,4 @@
-"""What the operator sees while a campaign runs, on stderr.
+"""The display on stderr while a campaign plays.
 
 Nothing here may hold up a tick: a terminal that is stopped (Ctrl-S) or slow blocks whoever writes to it. So a
 thread writes, and the loop only hands over short lines. A terminal that is gone is a reason to stop.
@@ -20,8 +20,8 @@ from rig.sequencer.recorder import SetStatistics
 
 BAR_WIDTH = 24  # characters
 MOST_WAITING = 50  # lines; a terminal that takes none loses bars, not memory
-LAST_WORDS_S = 1.0  # how long a slow terminal is waited for at the end
-LOST = "Stopped because its terminal is gone"
+DRAIN_TIMEOUT_S = 1.0  # how long a slow terminal is waited for at the end
+LOST = "Stopped because the terminal was closed"
 
 
 def plain(text: str) -> str:
@@ -77,7 +77,7 @@ class Terminal:
         finally:
             self._end_line()
             self._lines.put(None)
-            thread.join(LAST_WORDS_S)
+            thread.join(DRAIN_TIMEOUT_S)
 
     def _write(self) -> None:
         lost = False
@@ -132,7 +132,7 @@ class Terminal:
         self.clear_line()
         written = threading.Event()
         self._lines.put(written)
-        written.wait(LAST_WORDS_S)
+        written.wait(DRAIN_TIMEOUT_S)
 
 
 class SetBars(Observer):

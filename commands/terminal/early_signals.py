@@ -1,4 +1,4 @@
-"""Signals from the first moment of a command to its last: before anything else listens, and after.
+"""Signals before the command has set up its own handling, and after it has ended.
 
 Nothing heavy may be imported here: this comes before all that is slow to import.
 """
@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from types import FrameType
 
 # By name: not every system has all of them.
-SIGNALS = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "the loss of its terminal", "SIGBREAK": "Ctrl-Break"}
+SIGNALS = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "the loss of the terminal", "SIGBREAK": "Ctrl-Break"}
 STOPPED = 130
 
 _exit_code: int | None = None  # the exit code, once it is known

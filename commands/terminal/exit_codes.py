@@ -1,4 +1,4 @@
-"""The one place that turns what went wrong into a message and an exit code."""
+"""The one place that turns an exception into a message and an exit code."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def message_of(error: BaseException, folder: Path | None) -> str:
     at = f" in {Path(where[-1].filename).name}, line {where[-1].lineno}" if where else ""
     text = " ".join(str(error).split())[:300]
     kept = _keep_traceback(error, folder)
-    return f"Internal error: {type(error).__name__}: {text}{at}. This is a fault of the program.{kept}"
+    return f"Internal error: {type(error).__name__}: {text}{at}. This is a bug in isp-rig.{kept}"
 
 
 def _keep_traceback(error: BaseException, folder: Path | None) -> str:

@@ -27,7 +27,7 @@ Overrides = Annotated[
 ]
 Seed = Annotated[int | None, typer.Option(metavar="N", min=0, max=2**32 - 1, help="Seed of simulation and search.")]
 Quiet = Annotated[
-    bool, typer.Option("--quiet", help="Print only errors and warnings: REAL torque, code that is run, low disk space.")
+    bool, typer.Option("--quiet", help="Print only errors and warnings (REAL torque, code from files, low disk space).")
 ]
 
 
@@ -42,7 +42,7 @@ def new_app(help_text: str) -> typer.Typer:
 
 
 def show_version(wanted: bool) -> None:
-    """Print the version and leave."""
+    """Print the version and exit."""
     if wanted:
         from commands.terminal.version import version
 
@@ -51,5 +51,5 @@ def show_version(wanted: bool) -> None:
 
 
 Version = Annotated[
-    bool, typer.Option("--version", callback=show_version, is_eager=True, help="Print the version and leave.")
+    bool, typer.Option("--version", callback=show_version, is_eager=True, help="Print the version and exit.")
 ]

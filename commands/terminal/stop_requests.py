@@ -1,4 +1,4 @@
-"""Signals become requests to stop: the first ends the campaign in order, a second Ctrl-C cuts the torque at once."""
+"""What Ctrl-C and other signals do: the first ends the campaign in order, a second cuts the torque at once."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rig.errors import Aborted
 
 STOPPING = "Stopping: torque to zero, then saving. Ctrl-C again cuts the torque at once."
 AGAIN_S = 0.02  # until the signal strikes again: the callback has returned by then
-SAVING = "Stopping as soon as what is being saved is saved."
+SAVING = "Stopping after the current file is saved."
 
 
 def _strike() -> None:

@@ -1,4 +1,4 @@
-"""Which version of this program, and of what it stands on, is installed."""
+"""The versions of this program and of the packages it uses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every amplifier driver gives to the bench."""
+"""The interface of every amplifier driver."""
 
 from __future__ import annotations
 

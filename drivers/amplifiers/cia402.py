@@ -1,4 +1,4 @@
-"""CiA 402 servo drives over CANopen: torque by PDO, watchdog by heartbeat, faults in words.
+"""CiA 402 servo drives over CANopen: torque by PDO, watchdog fed by heartbeat, faults in words.
 
     every tick      RPDO {controlword, target torque}, SYNC; every quarter of the watchdog time a heartbeat
     from the drive  TPDO {statusword, actual torque, time} on SYNC, heartbeat, EMCY

@@ -1,4 +1,4 @@
-"""What a CiA 402 drive can do, read from its object dictionary, before anything is sent to it.
+"""The abilities of a CiA 402 drive (modes, limits, optional objects), read from its object dictionary.
 
 Makers leave objects out (the EPOS4 has no 0x6072 and no 0x6075) and differ in what a torque of 1000 means.
 The plan says which mode is used, what is missing and what takes its place; or refuses.
@@ -70,8 +70,8 @@ def plan_drive(
         missing.append(cia402.TARGET_TORQUE)
     if missing:
         raise ConfigError(
-            f"this drive cannot be commanded by torque: its object dictionary lacks {_names(missing)}: take a drive "
-            "with a torque mode, or the file that belongs to it (bench.amplifier.settings.eds)"
+            f"this drive cannot be commanded by torque: its object dictionary lacks {_names(missing)}: use a drive "
+            "with a torque mode, or give the EDS file of this drive (bench.amplifier.settings.eds)"
         )
     has = {i: i in dictionary for i in (cia402.MAX_TORQUE, cia402.RATED_TORQUE, cia402.ACTUAL_TORQUE)}
     mode, mode_note = _choose_mode(dictionary, wish, supported_modes)

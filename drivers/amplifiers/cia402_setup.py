@@ -1,4 +1,4 @@
-"""What a CiA 402 drive is told before it may be enabled: scale, watchdog, PDO maps, mode."""
+"""Setup of a CiA 402 drive before it may be enabled: scale, watchdog (heartbeat consumer), PDO maps, mode."""
 
 from __future__ import annotations
 
@@ -151,13 +151,16 @@ class Cia402Setup:
         objects.write(cia402.HEARTBEAT_CONSUMER, 1, wanted, 4)
         if objects.read(cia402.HEARTBEAT_CONSUMER, 1) != wanted:
             raise DeviceFault(
-                f"{self._label} did not keep its heartbeat consumer (0x1016:01): it would keep driving if this "
-                "computer fails. Refused; use a drive or firmware that has one."
+                f"{self._label} did not accept the heartbeat consumer (0x1016:01), so it would keep driving if this "
+                "computer fails. It is refused: use a drive or firmware that has a heartbeat consumer."
             )
         if objects.read_if_there(cia402.ABORT_CONNECTION_OPTION) is not None:
             objects.write(cia402.ABORT_CONNECTION_OPTION, 0, s.on_lost_host, 2)
             if objects.read(cia402.ABORT_CONNECTION_OPTION, signed=True) == 0:
-                raise DeviceFault(f"{self._label}: 0x6007 stays 0, so a lost computer would change nothing: refused")
+                raise DeviceFault(
+                    f"{self._label}: 0x6007 (reaction to a lost connection) stays 0, so the drive would keep "
+                    "driving if this computer fails. It is refused: use another drive or firmware."
+                )
         else:
             self._leave_operational_when_lost(objects)
 
@@ -171,7 +174,10 @@ class Cia402Setup:
             raise DeviceFault(
                 f"{self._label} has no 0x6007 and "
                 + ("no 0x1029" if behaviour is None else "its 0x1029:01 stays 1 (no change)")
-                + ": nothing makes it cut the torque if this computer fails. Refused; use another drive or firmware."
+                + (
+                    ", so it would not cut the torque if this computer fails. It is refused: use another drive or "
+                    "firmware."
+                )
             )
 
     def _map(self, objects: RemoteObjects, plan: DrivePlan) -> bool:

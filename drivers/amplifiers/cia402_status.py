@@ -1,4 +1,4 @@
-"""What a CiA 402 drive says of itself: state, NMT state, heartbeat, emergencies; and whether that is well."""
+"""Status of a CiA 402 drive: state, NMT state, its heartbeat, emergencies, and whether they are in order."""
 
 from __future__ import annotations
 

@@ -169,8 +169,8 @@ class Moteus(Amplifier):
         if not heard or self.mode != MODE_TIMEOUT:
             link.send(self.off_frames())
             raise DeviceFault(
-                f"{self.label} keeps running without a sign of life from this computer (mode {self.mode}, "
-                f"{MODE_TIMEOUT} expected): refused. Its firmware has to keep the watchdog of the position command "
+                f"{self.label} keeps running although this computer stopped sending (mode {self.mode}, {MODE_TIMEOUT} "
+                "expected). It is refused: use a firmware that supports the watchdog of the position command "
                 "(register 0x027)."
             )
 

@@ -106,7 +106,7 @@ class Odrive(Amplifier):
         self._beat = None
         timeout_s = self.settings.state_timeout_ms * 1e-3
         if not link.wait(timeout_s, self._is_closed, lambda: self._feed(link, zero)):
-            raise DeviceFault(f"{self.label} does not close its loop: {self._how_it_is()}")
+            raise DeviceFault(f"{self.label} does not enter closed-loop control: {self._describe_state()}")
 
     @staticmethod
     def _feed(link: CanLink, zero: CanFrame) -> None:
@@ -122,7 +122,7 @@ class Odrive(Amplifier):
         if not tripped:
             link.send(self.off_frames())
             raise DeviceFault(
-                f"{self.label} keeps running without a sign of life from this computer: refused. Switch its "
+                f"{self.label} keeps running although this computer stopped sending. It is refused: switch its "
                 "watchdog on (odrivetool: axis0.config.enable_watchdog = True, watchdog_timeout = "
                 f"{self.config.watchdog_ms * 1e-3:g}, save_configuration())"
             )
@@ -150,7 +150,7 @@ class Odrive(Amplifier):
         elif command == Command.GET_IQ and len(heard.frame.data) == 8:
             self._current_a = wire.decode(command, heard.frame.data)[1]
 
-    def _how_it_is(self) -> str:
+    def _describe_state(self) -> str:
         if self._beat is None:
             return "no heartbeat"
         state = wire.AXIS_STATES.get(self._beat.axis_state, f"state {self._beat.axis_state}")
@@ -161,7 +161,7 @@ class Odrive(Amplifier):
         if not self._armed or self._beat is None:
             return
         if self._beat.axis_error or self._beat.axis_state != wire.AXIS_CLOSED_LOOP:
-            raise DeviceFault(f"{self.label} left closed loop: {self._how_it_is()}")
+            raise DeviceFault(f"{self.label} left closed loop: {self._describe_state()}")
         if self._beat_at_s is not None and now_s - self._beat_at_s > 3 * HEARTBEAT_S:
             raise DeviceFault(f"{self.label} is silent: no heartbeat for {(now_s - self._beat_at_s) * 1e3:.0f} ms")
 
@@ -183,5 +183,5 @@ class Odrive(Amplifier):
         )
         if not off:
             raise DeviceFault(
-                f"{self.label} does not confirm that it is idle ({self._how_it_is()}): PRESS THE EMERGENCY STOP"
+                f"{self.label} does not confirm that it is idle ({self._describe_state()}): PRESS THE EMERGENCY STOP"
             )

@@ -1,4 +1,4 @@
-"""When a torque that a drive reports was on the shaft: the drive's own time stamps on the host's clock.
+"""Time of the torque that a drive reports: the drive's time stamps on the host's clock.
 
 What comes back is heard late, so the fastest answers alone put every stamp late by the shortest way back. The
 shortest way there and back is known, how it divides is not: all of it is taken off, so that a torque is never

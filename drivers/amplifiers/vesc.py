@@ -75,9 +75,9 @@ class Vesc(Amplifier):
         self.settings = read_settings(VescSettings, config.settings, "bench.amplifier.settings")
         if not self.settings.timeout_is_set:
             raise ConfigError(
-                "bench.amplifier.settings.timeout_is_set: set the VESC's timeout to "
-                f"{config.watchdog_ms} ms in VESC Tool (App Settings), then say true here; without it the motor "
-                "goes on for a second after this computer has died"
+                f"bench.amplifier.settings.timeout_is_set: set the VESC's timeout to {config.watchdog_ms} ms in VESC "
+                "Tool (App Settings), then set this key to true; without it the motor keeps running for a second "
+                "after this computer fails"
             )
         self.label = f"VESC, id {config.node}"
         self._current_id = SET_CURRENT << 8 | config.node
@@ -117,7 +117,7 @@ class Vesc(Amplifier):
             raise DeviceFault(
                 f"{self.label} sends no status: switch on CAN status 1 in VESC Tool, check id and bit rate"
             )
-        return [f"peak {self.peak_torque_nm:.4g} N m as declared, time-out set by hand"]
+        return [f"peak {self.peak_torque_nm:.4g} N m as declared, time-out set in VESC Tool"]
 
     def arm(self, link: CanLink) -> None:
         """There is no enable: zero current from now on."""

@@ -1,4 +1,4 @@
-"""What a rig is by its gyroscope and its drive, whether they are played live or from a capture."""
+"""The properties of a rig that follow from its gyroscope and its drive, live or replayed from a capture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The two devices of a bench on their ports: contacted, listened to, let go of."""
+"""The two devices of a bench on their ports: opened, contacted, read, closed."""
 
 from __future__ import annotations
 

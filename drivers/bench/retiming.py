@@ -1,4 +1,4 @@
-"""Sets of a campaign stamped anew: what the clocks of a bench know once nothing is played any more."""
+"""Corrected time stamps of the sets of a bench, after the campaign."""
 
 from __future__ import annotations
 

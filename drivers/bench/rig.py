@@ -191,7 +191,8 @@ class BenchRig(DeviceRig):
         except DeviceFault as fault:
             raise DeviceFault(
                 f"the drive could not be shown to be off: {fault} Its own watchdog cuts the torque "
-                f"{self._config.amplifier.watchdog_ms} ms after the last frame; check before you go near."
+                f"{self._config.amplifier.watchdog_ms} ms after the last frame. Check the drive before you approach "
+                "the machine."
             ) from None
 
     def close(self) -> None:
@@ -232,7 +233,7 @@ class BenchRig(DeviceRig):
         """What is known of the devices so far. Raises DeviceFault before the bench was open."""
         devices = self._devices
         if devices is None or devices.line is None:
-            raise DeviceFault("a bench that was never open has nothing to report")
+            raise DeviceFault("the bench was never opened and has nothing to report")
         return BenchReport(
             devices.line.report(),
             tuple(devices.notes),

@@ -1,4 +1,4 @@
-"""What a raw capture holds, and what of it is lost."""
+"""Summary of a raw capture: what it holds and how much is lost."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from drivers.capture.wire_capture import (
     export,
     read_capture,
 )
-from rig.recording.steady import whole
+from rig.recording.tail_file import whole
 
 
 class CaptureSummary(NamedTuple):

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 from drivers.codecs.lawicel import CanFrame
 from rig.errors import Aborted, RecordingError
 from rig.recording.flushing import SYNC_EVERY_S, WRITE_EVERY_S, Repeating, sync_folder
-from rig.recording.steady import SteadyFile, whole
+from rig.recording.tail_file import TailedFile, whole
 
 MAGIC = b"ISPRAW1\n"
 FILE_NAME = "wire.cap"
@@ -85,7 +85,7 @@ class Capture:
         self.path = folder / FILE_NAME
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._file = SteadyFile(self.path)
+            self._file = TailedFile(self.path)
         except OSError as problem:
             raise Aborted(f"cannot write the raw capture {self.path}: {problem.strerror}") from None
         # A deque because appending and taking are each done at once, whichever thread is at it.

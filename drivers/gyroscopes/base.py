@@ -22,7 +22,7 @@ from rig.interface import GyroSample, LowPass
 
 AXES = "xyz"
 BITS_PER_BYTE = 10  # start, eight data bits, stop
-CATCHES_UP_S = 0.03  # a kernel that was busy hands out what it kept back within this time
+LONGEST_BURST_S = 0.03  # a kernel that was busy hands out what it kept back within this time
 MESSAGES_KEPT = 5  # first and last messages of a device
 MOST_LOST_MARKED = 20_000  # ten seconds at 2 kHz: more is a new start, not a gap
 
@@ -253,7 +253,7 @@ class Gyroscope(ABC):
         """Counters of one read as running numbers.
 
         A counter that wraps after 128 ms cannot tell a gap from none; how late its datagrams seem to be
-        shows how many turns are missing. What only was held up somewhere catches up within ``CATCHES_UP_S``.
+        shows how many turns are missing. What only was held up somewhere catches up within ``LONGEST_BURST_S``.
         """
         step, modulus = self.counts_per_sample, self.count_modulus
         previous, unwrapped, gap_at = self._count, [], 0
@@ -278,7 +278,7 @@ class Gyroscope(ABC):
             self._late_since_s = math.inf
             return unwrapped
         self._late_since_s = min(self._late_since_s, last_taken_at_s)
-        if last_taken_at_s - self._late_since_s < CATCHES_UP_S:
+        if last_taken_at_s - self._late_since_s < LONGEST_BURST_S:
             return unwrapped
         self._late_since_s = math.inf
         return [value + turns * modulus if k >= gap_at else value for k, value in enumerate(unwrapped)]

@@ -141,10 +141,11 @@ class GyroLine:
         shares = (mean_hz / wanted_hz - 1.0, median_hz / wanted_hz - 1.0)
         if min(map(abs, shares)) <= RATE_TOLERANCE:
             return ""
-        where = f"; by its counter {lost} were lost on the way" if lost else ""
+        where = f"; its counter shows that {lost} were lost in transmission" if lost else ""
         return (
-            f"{mean_hz:.0f} samples/s instead of {wanted_hz:g}{where}: set bench.gyroscope.sample_rate_hz to what the "
-            "device is set to; if that is right, the line or the adapter loses the rest (baud rate, buffers, cable)"
+            f"{mean_hz:.0f} samples/s instead of {wanted_hz:g}{where}: set bench.gyroscope.sample_rate_hz to the rate "
+            "that the device is set to; if it is right already, the line or the adapter loses samples: check baud "
+            "rate, buffers and cable"
         )
 
     def problems(self, listened_s: float) -> list[str]:
@@ -174,9 +175,9 @@ class GyroLine:
             found.append(f"{where}: no valid sample ({counts.last_reason or 'no reason given'})")
         elif len(rates) >= LEAST_FOR_NOISE and min(rates) == max(rates):
             found.append(
-                f"{where}: all of {len(rates)} samples read exactly {math.degrees(rates[0]):.6g} deg/s: a "
-                f"working sensor shows noise. Is {gyro.config.axis} an axis that it measures (bench.gyroscope.axis), "
-                "or has it hung?"
+                f"{where}: all of {len(rates)} samples read exactly {math.degrees(rates[0]):.6g} deg/s: a working "
+                f"sensor shows noise. Check that the sensor measures axis {gyro.config.axis} (bench.gyroscope.axis), "
+                "or restart it."
             )
         return found
 

@@ -1,4 +1,4 @@
-"""Replay: a raw capture in the place of the devices."""
+"""Replay: a raw capture in place of the devices."""
 
 from drivers.replay.rig import ReplayRig
 

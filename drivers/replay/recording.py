@@ -1,4 +1,4 @@
-"""A recording out of a raw capture alone: what the drivers make of its bytes, cut at the marks of its sets.
+"""A recording made from a raw capture alone: its bytes decoded by the drivers, cut at the marks of the sets.
 
 Nobody has to know the configuration of then: the capture holds that of the devices, and the torque that was asked for
 at every tick. What the plan said of a set (its name, its frequency) is not in it.

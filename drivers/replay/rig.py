@@ -1,4 +1,4 @@
-"""Replay: a raw capture in the place of the devices, through the same drivers, to the same samples.
+"""Replay: a raw capture in place of the devices, through the same drivers, to the same samples.
 
 ``ReplayRig`` is a Rig and ``ReplayClock`` a clock: a sequencer that plays the same sets on them does, tick by
 tick, what it did on the bench.
@@ -211,7 +211,7 @@ class ReplayRig(DeviceRig):
         if abs(asked_nm - played_nm) > SAME_TORQUE_NM:
             raise RecordingError(
                 f"{self._path} holds another campaign: {played_nm:.6g} N m were played where this configuration asks "
-                f"for {asked_nm:.6g} N m. Replay it with the model, limits and excitation that it was played with."
+                f"for {asked_nm:.6g} N m. Replay it with the model, limits and excitation of that campaign."
             )
 
     def begin_set(self, torque: TorqueOfTime, start_s: float) -> None:

@@ -1,4 +1,4 @@
-"""Time stamps in hindsight: what was recorded is stamped anew by a line that also knows what came afterwards.
+"""Time stamps corrected after the campaign, by a line that is also fitted to later readings.
 
 While a campaign plays, a device's clock is mapped to the host's by a fit that learns and therefore moves, by tens of
 microseconds in the first minute and whenever the ways get slower or faster. The clocks themselves are straight

@@ -1,4 +1,4 @@
-"""Time at the source: a device's sample counter turned into seconds of the host's clock.
+"""A device's sample counter mapped to seconds of the host's clock, while a campaign plays.
 
 A datagram is read some time after its sample was taken, never before. Per quarter of a second the
 datagram that came through fastest says where the device's clock stands; a straight line through those

@@ -1,4 +1,4 @@
-"""The CAN side of an amplifier: frames out in one go, frames in without a thread, one sentence when it fails.
+"""The CAN side of an amplifier: sends and receives frames without a thread, and reports bus faults.
 
 python-can reads through a background thread (``Notifier``) that dies of its first error; a control loop
 that polls sees every error where it happens and needs no lock. While somebody waits here, ``idle`` is
@@ -192,9 +192,9 @@ def bus_faults(config: CanConfig) -> Iterator[tuple[str, str]]:
             near = get_close_matches(config.interface, known, 1)
             hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
             yield "interface", f"python-can has no interface {config.interface!r}; {hint}"
-        yield from _harm(config)
+        yield from _unsafe_options(config)
         return
-    yield from _harm(config)
+    yield from _unsafe_options(config)
     if config.bitrate not in BIT_RATE_CODES:
         allowed = ", ".join(str(rate) for rate in sorted(BIT_RATE_CODES))
         yield "bitrate", f"{config.bitrate} is not one of a Lawicel adapter's: {allowed}"
@@ -203,7 +203,7 @@ def bus_faults(config: CanConfig) -> Iterator[tuple[str, str]]:
             yield f"options.{key}", f"unknown key; {OWN_INTERFACE} knows {', '.join(OWN_OPTIONS)}"
 
 
-def _harm(config: CanConfig) -> Iterator[tuple[str, str]]:
+def _unsafe_options(config: CanConfig) -> Iterator[tuple[str, str]]:
     """What would let python-can write files, reach other machines or run code: the key, and why it is refused."""
     if config.interface in NETWORK_INTERFACES:
         yield "interface", f"{config.interface} is not allowed: it reaches other machines; name an adapter of this one"
@@ -231,7 +231,7 @@ def open_bus(config: CanConfig) -> can.BusABC:
             "bench.amplifier.can.channel is empty: name the adapter's port (`rig devices` lists them) "
             "or run with --emulate"
         )
-    for key, fault in _harm(config):
+    for key, fault in _unsafe_options(config):
         raise ConfigError(f"bench.amplifier.can.{key}: {fault}")
     options: dict[str, Any] = {"bitrate": config.bitrate, **config.options}
     try:

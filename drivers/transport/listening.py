@@ -1,4 +1,4 @@
-"""A port with an ear of its own: a thread takes bytes in and stamps them as they arrive.
+"""A port read by a thread of its own, which stamps bytes as they arrive.
 
 Reading a serial port makes the kernel wait for its own worker thread, which on a busy machine gets its turn
 milliseconds later. A control loop that reads would wait with it and miss its deadline; here only the

@@ -1,4 +1,4 @@
-"""Byte ports: non-blocking bulk reads and writes, and one sentence when the other end is gone.
+"""Byte ports: non-blocking bulk reads and writes, with one message if the other end disappears.
 
 Drivers talk to the ``BytePort`` protocol, so that a replay or a test can stand in for a serial line.
 """
@@ -212,10 +212,11 @@ def _cannot_open(path: str, baud: int, problem: Exception) -> str:
 
     code = getattr(problem, "errno", None)
     cure = {
-        errno.ENOENT: "Is it plugged in?",
-        errno.EACCES: "You may not open it: add yourself to the group that owns it (often `dialout`).",
-        errno.EBUSY: "Another program holds it: close that first.",
-        errno.EAGAIN: "Another program holds it: close that first.",
+        errno.ENOENT: "Check that it is plugged in.",
+        errno.EACCES: "This user may not open it: add the user to the group that owns it (often `dialout`).",
+        errno.EBUSY: "Another program has it open: close that program first.",
+        errno.EAGAIN: "Another program has it open: close that program first.",
     }.get(code or 0, "")
     there = ", ".join(sorted(port.device for port in list_ports.comports())) or "none"
-    return f"cannot open {path} at {baud} baud: {problem}. {cure} Serial ports present: {there}."
+    why = os.strerror(code) if code else str(problem)
+    return f"cannot open {path} at {baud} baud: {why}. {cure} Serial ports present: {there}."

@@ -24,8 +24,8 @@ from drivers.transport.ports import BytePort, SerialPort
 from rig.errors import DeviceFault
 
 LATE_S = 0.06  # an answer to a frame that takes longer: what is sent does not reach the bus in time
-TALKS_S = 1.0  # what was on its way may take so long
-QUIET_S = 0.05  # an adapter that has said nothing for so long has said all
+LONGEST_FLUSH_S = 1.0  # for frames that were on their way when the channel was closed
+QUIET_S = 0.05  # of silence, after which an adapter has sent everything
 
 
 class SlcanBulkBus(can.BusABC):
@@ -90,14 +90,14 @@ class SlcanBulkBus(can.BusABC):
         # Ends whatever half a command an earlier program left behind, and closes the channel if it is open;
         # the answers to that mean nothing and are waited out.
         self._port.write(b"\r\r\rC\r")
-        talks_until_s = time.monotonic() + TALKS_S
+        talks_until_s = time.monotonic() + LONGEST_FLUSH_S
         while self._port.wait_readable(QUIET_S):
             self._port.read()
             if time.monotonic() > talks_until_s:
                 raise DeviceFault(
-                    f"{self._port.name} keeps sending, {TALKS_S:g} s after the command to close its channel; allowed "
-                    f"is a pause of {1e3 * QUIET_S:g} ms. It is not a Lawicel adapter, or its baud rate "
-                    "differs. Are the ports of gyroscope and adapter swapped (bench.amplifier.can.channel)?"
+                    f"{self._port.name} is still sending {LONGEST_FLUSH_S:g} s after the command to close its channel: "
+                    "it is not a Lawicel adapter, or its baud rate differs. Check whether the ports of gyroscope and "
+                    "adapter are swapped (bench.amplifier.can.channel)."
                 )
         self._ask(lawicel.BIT_RATE_CODES[bitrate])
         self._ask("Z1" if timestamps else "Z0", may_refuse=not timestamps)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 USB_SERIAL = Path("/sys/bus/usb-serial/devices")
-BRISK_MS = 1  # ms, the least that an FTDI latency timer can be set to
+LOWEST_LATENCY_MS = 1  # ms, the least that an FTDI latency timer can be set to
 
 
 def usb_latency_ms(port: str, root: Path = USB_SERIAL) -> int | None:
@@ -21,5 +21,9 @@ def describe_usb_latency(port: str, root: Path = USB_SERIAL) -> str:
     held_ms = usb_latency_ms(port, root)
     if held_ms is None:
         return ""
-    slow = ": bytes arrive in bunches; the driver asks for 1 ms when it opens the port" if held_ms > BRISK_MS else ""
+    slow = (
+        ": bytes arrive in bunches; the driver asks for 1 ms when it opens the port"
+        if held_ms > LOWEST_LATENCY_MS
+        else ""
+    )
     return f"latency timer {held_ms} ms{slow}"

@@ -1,4 +1,4 @@
-"""After the fit: what each run, and all together, could tell at the model that was found, beside what came out.
+"""After the fit: the Cramer-Rao bound of each run and of all together, compared with the standard error reached.
 
 The bound is that of `rig check` (see ``identifiability``), now at the identified values and on the samples that were
 really recorded. Where the standard error that was reached lies at the bound, only a better sensor or more torque
@@ -29,7 +29,7 @@ TOTAL = "all sets together"
 
 
 @dataclass(frozen=True)
-class Told:
+class BoundComparison:
     """What a run, or all together, could tell of J, C, K and what it did tell.
 
     Attributes
@@ -53,7 +53,7 @@ class Told:
     sentence: str
 
 
-def hindsight(found: Identification, recording: Recording) -> tuple[Told, ...]:
+def compare_with_bound(found: Identification, recording: Recording) -> tuple[BoundComparison, ...]:
     """One entry a run, in the order played, and one for all together; nothing where no usable model came out.
 
     A run alone is looked at with the effects of the final model known, as each was fitted for itself.
@@ -68,9 +68,9 @@ def hindsight(found: Identification, recording: Recording) -> tuple[Told, ...]:
         return ()
     alone = [_terms_only(i) for i in each]
     sets = {one.name: one for one in found.per_set}
-    out = [_told(i, dict(sets[i.name].parameters), alone, False) for i in alone if i.name in sets and i.names]
+    out = [_compare(i, dict(sets[i.name].parameters), alone, False) for i in alone if i.name in sets and i.names]
     fitted = [i for i, t in zip(each, traces, strict=True) if t.run.use != "holdout"] or each
-    whole = _told(together(fitted), _as_terms(found.final.parameters), [], True)
+    whole = _compare(together(fitted), _as_terms(found.final.parameters), [], True)
     return (*out, whole)
 
 
@@ -94,15 +94,15 @@ def _as_terms(parameters: Mapping[str, ParameterEstimate]) -> dict[str, Paramete
     return {name.removesuffix("_over_inertia"): estimate for name, estimate in parameters.items()}
 
 
-def _told(
+def _compare(
     information: Information, reached: Mapping[str, ParameterEstimate], others: Sequence[Information], whole: bool
-) -> Told:
+) -> BoundComparison:
     names: list[Name] = [n for n in information.names if n[0] in TERMS]
     expected = {n[0]: information.relative(n) for n in names}
     achieved = {n: abs(p.std_error / p.value) for n, p in reached.items() if n in expected and p.value != 0.0}
     i = information
     sentence = _sentence(i, expected, achieved, others, whole)
-    return Told(TOTAL if whole else i.name, i.rank, len(i.names), i.condition, expected, achieved, sentence)
+    return BoundComparison(TOTAL if whole else i.name, i.rank, len(i.names), i.condition, expected, achieved, sentence)
 
 
 def _sentence(
@@ -115,18 +115,21 @@ def _sentence(
         return advice.cure(information) if whole else advice.of_weak_set(information, others)
     lost = [symbols[n] for n in expected if n not in achieved]
     if lost:
-        return f"{joined(lost)} could be determined here, but the unexplained residual hides it: find its cause first"
+        return (
+            f"the data would determine {joined(lost)} but for the unexplained residual: find the cause of the "
+            "residual first"
+        )
     far = {n: achieved[n] / expected[n] for n in achieved if expected[n] > 0.0 and achieved[n] > FAR * expected[n]}
     narrow = [n for n in achieved if achieved[n] < NARROW * expected[n]]
     if not far and narrow:
-        told = joined([f"{symbols[n]} {_percent(expected[n])}" for n in narrow])
-        return f"the interval is narrower than the sensor allows: use {told} as the standard error"
+        bounds = joined([f"{symbols[n]} {_percent(expected[n])}" for n in narrow])
+        return f"the interval is narrower than the sensor's noise allows: use {bounds} as the standard error"
     if not far:
-        return "at the sensor's limit: only more torque, more time or a quieter sensor would improve it"
+        return "limited by the sensor's noise: to improve it, use more torque, a longer record or a quieter sensor"
     worst = max(far, key=lambda n: far[n])
     return (
-        f"the sensor allows {symbols[worst]} to within {_percent(expected[worst])}, the fit reaches "
-        f"{_percent(achieved[worst])}: the limit is the unexplained residual, not the sensor"
+        f"limited by the unexplained residual: {symbols[worst]} has a standard error of {_percent(achieved[worst])}, "
+        f"the sensor's noise would allow {_percent(expected[worst])}"
     )
 
 

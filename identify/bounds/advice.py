@@ -8,20 +8,20 @@ import numpy as np
 
 from identify.bounds.identifiability import DELAY, Information, together
 from identify.model.parameters import Name
-from identify.wording import SYMBOLS, number, plain
+from identify.wording import SYMBOLS, joined, number, plain
 from rig import effects
 from rig.platform import TERMS
 
 WELL_KNOWN = 0.05  # relative standard error up to which a parameter counts as determined
 AIM = 0.01  # relative standard error that advice on the torque aims at
-SEPARATE = 200.0  # amplification of the model's errors beyond which inertia and stiffness are not told apart
-DETECTABLE = 1.96  # standard errors: what is smaller cannot be told from none
+SEPARATE = 200.0  # amplification of the model's errors beyond which inertia and stiffness cannot be separated
+DETECTABLE = 1.96  # standard errors: a smaller value cannot be distinguished from 0
 DELAY_NAME: Name = (DELAY, "delay")
 _RATIOS = {("damping",): "C/J", ("stiffness",): "K/J"}
 
 
 def undetermined(name: str, missing: Sequence[str], partner: str | None = None) -> str:
-    """Advice on a run that alone does not tell some terms; ``partner`` is a run that it should be fitted with.
+    """Advice on a run that alone does not determine some terms; ``partner`` is a run that it should be fitted with.
 
     >>> undetermined("0.5 Hz", ["inertia", "stiffness"], "6 Hz")
     '0.5 Hz alone cannot separate inertia from stiffness: keep the start transient or fit it with 6 Hz'
@@ -29,7 +29,7 @@ def undetermined(name: str, missing: Sequence[str], partner: str | None = None) 
     beside = f"fit it with {partner}" if partner else "fit it together with a set at another frequency"
     if {"inertia", "stiffness"} <= set(missing):
         return f"{name} alone cannot separate inertia from stiffness: keep the start transient or {beside}"
-    return f"{name} alone does not determine {' and '.join(missing)}: keep the start transient or {beside}"
+    return f"{name} alone does not determine {joined(missing)}: keep the start transient or {beside}"
 
 
 def label(name: Name, torque_free: bool = False) -> str:
@@ -41,18 +41,23 @@ def label(name: Name, torque_free: bool = False) -> str:
 
 
 def expected(information: Information) -> str:
-    """Expected standard errors: "J 0.0024 %, C 0.023 %, K 0.0024 %"."""
-    told = []
+    """Expected standard errors: "J +-0.0024 %, C +-0.023 %, K +-0.0024 %"; one above the value determines nothing."""
+    each = []
     for name in information.names:
         value, error = abs(information.values[information.names.index(name)]), information.std_error(name)
         words = label(name, information.torque_free)
-        if not np.isfinite(error):
-            told.append(f"{words} not determined")
+        if not np.isfinite(error) or 0.0 < value < error:
+            each.append(f"{words} not determined")
         elif value == 0.0:
-            told.append(f"{words} +-{number(error, 2)} {_unit(name)} (declared as 0)")
+            each.append(f"{words} +-{_amount(error, _unit(name))} (declared as 0)")
         else:
-            told.append(f"{words} +-{number(100.0 * error / value, 2)} %")
-    return ", ".join(told)
+            each.append(f"{words} +-{number(100.0 * error / value, 2)} %")
+    return ", ".join(each)
+
+
+def _amount(value: float, unit: str) -> str:
+    """Two digits and the unit; times in microseconds."""
+    return f"{number(1e6 * value, 2)} us" if unit == "s" else f"{number(value, 2)} {unit}"
 
 
 def _unit(name: Name) -> str:
@@ -91,20 +96,20 @@ def of_set(information: Information, others: Sequence[Information] = ()) -> str:
     """One sentence on one set; ``others`` are the sets that it could be fitted with."""
     i = information
     if i.torque_free:
-        ratios = f"without torque only ratios can be determined; expected {expected(i)}"
+        ratios = f"a decay without torque determines only ratios; expected {expected(i)}"
         return f"{i.name}: {ratios}. Record the torque to get J, C and K"
     if below_noise(i):
         worst = max(i.relative(n) for k, n in enumerate(i.names) if i.values[k] != 0.0)
-        told = f"the motion is {number(i.loudness, 2)} times the sensor's noise: too small to determine anything"
+        motion = f"the motion is {number(i.loudness, 2)} times the sensor's noise: too small to determine anything"
         cure = (
             f"about {number(worst / AIM, 2)} times the torque would give {100 * AIM:g} %"
             if worst < 1e6
             else "raise the torque"
         )
-        return f"{i.name}: below the noise: {told} ({expected(i)}); {cure}"
+        return f"{i.name}: below the noise: {motion} ({expected(i)}); {cure}"
     if not weak(i):
-        return f"{i.name}: expected {expected(i)}{_about_zeros(i)}"
-    return f"{of_weak_set(i, others)} (expected {expected(i)}){_about_zeros(i)}"
+        return f"{i.name}: expected {expected(i)}{_detection_limits(i)}"
+    return f"{of_weak_set(i, others)} (expected {expected(i)}){_detection_limits(i)}"
 
 
 def of_weak_set(information: Information, others: Sequence[Information] = ()) -> str:
@@ -113,20 +118,20 @@ def of_weak_set(information: Information, others: Sequence[Information] = ()) ->
     terms = [n[0] for n in missing if n[0] in TERMS]
     if not terms:
         return f"{information.name} alone does not determine every effect"
-    told = undetermined(information.name, terms, _partner(information, missing, others))
+    sentence = undetermined(information.name, terms, _partner(information, missing, others))
     rest = [label(n) for n in missing if n[0] not in TERMS]
-    return told + (f"; {' and '.join(rest)} need another set" if rest else "")
+    return sentence + (f"; add a set for {joined(rest)}" if rest else "")
 
 
-def _about_zeros(information: Information) -> str:
-    told = ""
+def _detection_limits(information: Information) -> str:
+    bounds = ""
     for k, name in enumerate(information.names):
         if information.values[k] == 0.0 and name in {("damping",), ("stiffness",)}:
             least = DETECTABLE * information.std_error(name)
             if np.isfinite(least):
                 bound = f"{number(least, 2)} {_unit(name)}"
-                told += f"; {name[0]} is declared as 0: below {bound} it cannot be distinguished from zero"
-    return told
+                bounds += f"; {name[0]} is declared as 0; a value below {bound} cannot be distinguished from 0"
+    return bounds
 
 
 def _partner(information: Information, missing: Sequence[Name], others: Sequence[Information]) -> str | None:
@@ -148,26 +153,26 @@ def of_campaign(each: Sequence[Information]) -> str:
     total = together(each)
     if total.torque_free:
         return (
-            f"all sets together: expected {expected(total)}. Without torque J, C and K themselves stay unknown "
-            "(record it, or repeat the decay with a known inertia mounted)"
+            f"all sets together: expected {expected(total)}. Without torque, J, C and K themselves stay unknown: "
+            "record the torque, or repeat the decay with a known added inertia"
         )
-    told = f"all sets together: expected {expected(total)}{_about_zeros(total)}; {_figures(total)}"
+    line = f"all sets together: expected {expected(total)}{_detection_limits(total)}; {_figures(total)}"
     missing = weak(total)
     if missing:
-        told += f"; NOT determined: {' and '.join(label(n) for n in missing)}. {cure(total)}"
-    return told
+        line += f"; NOT determined: {joined([label(n) for n in missing])}. {cure(total)}"
+    return line
 
 
 def _figures(total: Information) -> str:
     """Rank, condition and the strongest correlation."""
     p = len(total.names)
-    told = f"rank {total.rank} of {p}, condition {number(total.condition, 2)}"
+    figures = f"rank {total.rank} of {p}, condition {number(total.condition, 2)}"
     if p < 2:
-        return told
+        return figures
     size = np.abs(total.correlation - np.eye(p))
     i, k = np.unravel_index(int(np.argmax(size)), size.shape)
     names = f"{label(total.names[min(i, k)])} and {label(total.names[max(i, k)])}"
-    return f"{told}, strongest correlation {number(float(total.correlation[i, k]), 3)} ({names})"
+    return f"{figures}, strongest correlation {number(float(total.correlation[i, k]), 3)} ({names})"
 
 
 def cure(total: Information) -> str:
@@ -181,12 +186,14 @@ def cure(total: Information) -> str:
 
 
 def of_delay(each: Sequence[Information]) -> str:
-    """Whether a torque delay, which every record may hold, can be told from damping; ``each`` with the delay."""
-    total = together(each)
-    if total.torque_free or DELAY_NAME not in total.names or ("damping",) not in total.names:
+    """Whether a torque delay, which every record may hold, can be separated from damping; ``each`` with the delay."""
+    total, damping = together(each), ("damping",)
+    if total.torque_free or DELAY_NAME not in total.names or damping not in total.names:
         return ""
+    if damping in weak(total.without(DELAY_NAME)):
+        return ""  # that damping is not determined has been said
     error = total.std_error(DELAY_NAME)
-    bent = total.relative(("damping",))
+    bent = total.relative(damping)
     if below_noise(total):
         return ""
     if not np.isfinite(error) or bent > WELL_KNOWN:

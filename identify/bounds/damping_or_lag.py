@@ -1,4 +1,4 @@
-"""Whether damping may be no more than a delay or a lag that nobody declared: far below the resonance one is the other.
+"""Whether the sets can separate damping from an undeclared delay or lag: far below the resonance they cannot.
 
 A torque that comes late by a short time t lags by w t, and so does the motion of a damped spring whose C is K t.
 """
@@ -18,8 +18,10 @@ from rig.platform import Platform
 SLOW = 0.5  # of the natural frequency: faster sets tell one from the other
 LAGS = ("torque_delay", "actuator_lag", "sensor_lag")
 LATE_S = 1e-3  # the example in the sentence
-FIRM = 1e-4  # relative standard error of the inertia: what tells that so well tells damping from a delay as well
-WORTH_SAYING = 0.02  # relative standard error of C beside an unknown delay
+WELL_KNOWN_INERTIA = (
+    1e-4  # relative standard error of the inertia: what tells that so well tells damping from a delay as well
+)
+MIN_RELATIVE_ERROR = 0.02  # relative standard error of C beside an unknown delay
 
 
 def lag_for_damping(platform: Platform, inertia_std_error: float, traces: Sequence[Trace], axis: str) -> str:
@@ -39,16 +41,18 @@ def lag_for_damping(platform: Platform, inertia_std_error: float, traces: Sequen
     if not asked or not (inertia > 0.0 and stiffness > 0.0) or any(t.torque is None for t in traces):
         return ""
     natural_hz = float(np.sqrt(stiffness / inertia)) / (2.0 * np.pi)
-    if inertia_std_error < FIRM * inertia or not all(highest_torque_hz(t) < SLOW * natural_hz for t in traces):
+    if inertia_std_error < WELL_KNOWN_INERTIA * inertia or not all(
+        highest_torque_hz(t) < SLOW * natural_hz for t in traces
+    ):
         return ""
     with np.errstate(all="ignore"):
         late = together([information_of(t, with_delay(platform), len(traces)) for t in traces])
-    if not late.relative(("damping",)) > WORTH_SAYING:
+    if not late.relative(("damping",)) > MIN_RELATIVE_ERROR:
         return ""
     unit = "N s/m" if axis == "linear" else "N m s/rad"
     return (
-        "Sets this slow cannot separate damping from a delay or lag of the drive or the gyro: each "
-        f"{1e3 * LATE_S:g} ms of it that nobody declared is {number(stiffness * LATE_S, 2)} {unit} of the "
-        f"{number(platform.damping_nm_s_rad, 3)} that C is here. A set near the resonance at {number(natural_hz, 2)} "
-        "Hz, or one that starts abruptly, separates them."
+        "These sets are too slow to separate damping from a delay or lag of the drive or the gyro: each undeclared "
+        f"{1e3 * LATE_S:g} ms adds {number(stiffness * LATE_S, 2)} {unit} to the identified C of "
+        f"{number(platform.damping_nm_s_rad, 3)} {unit}. Add a set near the resonance at {number(natural_hz, 2)} Hz, "
+        "or one that starts abruptly (soft_start_s: 0)."
     )

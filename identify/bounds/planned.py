@@ -1,4 +1,4 @@
-"""Before the rig moves, or a recording is fitted: what it can determine, line by line, for `rig check`."""
+"""Before playing or fitting: what each run can determine, one line each, for `rig check`."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ def of_planned_campaign(
         return []
     noise = noise_rad_s or ASSUMED_NOISE_RAD_S
     late = of_planned(with_delay(platform), sets, sample_rate_hz, noise)
-    told = "" if noise_rad_s else " (assumed: not declared)"
+    assumed = "" if noise_rad_s else " (assumed: not declared)"
     basis = (
-        f"for the declared values (one standard error), gyro noise {math.degrees(noise):.3g} deg/s a sample{told}, "
+        f"one standard error at the declared values; gyro noise {math.degrees(noise):.3g} deg/s per sample{assumed} at "
         f"{sample_rate_hz:g} Hz"
     )
     return [basis, *_lines(late, advice.DELAY_NAME[0] in platform.effects)]
@@ -68,7 +68,12 @@ def of_recorded_campaign(recording: Recording, declared: Platform) -> list[str]:
     structure = Structure(declared.terms)
     found = _quick(traces, structure)
     if found is None:
-        return ["the declared terms do not fit these runs closely enough for a prediction; identify-run will tell"]
+        return [
+            (
+                "the declared model fits these runs too poorly for a prediction: run identify-run to see what they "
+                "determine"
+            )
+        ]
     platform = Platform(*found, terms=declared.terms)
     late = [information_of(t, with_delay(platform) if t.torque is not None else platform, len(traces)) for t in traces]
     if any(i.torque_free for i in late) and not all(i.torque_free for i in late):

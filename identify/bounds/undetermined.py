@@ -8,6 +8,7 @@ import numpy as np
 
 from identify.estimate.final_fit import Fitted
 from identify.model.parameters import Name
+from identify.wording import number
 
 TIED = 0.95  # correlation beyond which two parameters are one
 OPEN_RAD = 0.5  # standard error of a phase beyond which it is open
@@ -24,10 +25,10 @@ def undetermined(fitted: Fitted, runs: Set[int], alone: bool) -> dict[Name, str]
         if of_another_run(name, runs):
             continue
         value, error, term = fitted.values[name], fitted.std_error(name), len(name) == 1
-        tied = _tied_to_nothing(fitted, i, alone) if term else ""
+        tied = _undetermined_partner(fitted, i, alone) if term else ""
         wide = term and (not np.isfinite(error) or error > WIDE * abs(value))
         if tied:
-            out[name] = f"only a combination with {tied} is determined"
+            out[name] = f"only its combination with {tied} is determined; add a set at another frequency"
         elif not fitted.determined[i] or wide:
             out[name] = _why(value, error, fitted.determined[i])
     return out
@@ -62,11 +63,12 @@ def _why(value: float, error: float, determined: bool) -> str:
     if not determined:
         return "these runs hold no information on it; add a set at another frequency or keep the start transient"
     return (
-        f"its standard error {error:.3g} is more than half of its value {value:.3g}; use more torque or a longer record"
+        f"its standard error {number(error, 2)} is more than half of its value {number(value, 2)}; use more torque or "
+        "a longer record"
     )
 
 
-def _tied_to_nothing(fitted: Fitted, i: int, alone: bool) -> str:
+def _undetermined_partner(fitted: Fitted, i: int, alone: bool) -> str:
     """A term that the data do not determine and that drags this one along; empty where there is none.
 
     In a single run (``alone``) inertia and stiffness are one number at each frequency.

@@ -1,6 +1,8 @@
-"""When a model is accepted: what is left and goes with something must be immaterial, and no error may grow unsaid."""
+"""When a model is accepted: the residual torque that depends on something must be small; larger errors are noted."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 from identify.results import Disturbance, ModelResult
 from identify.wording import SYMBOLS, depends_on, joined, number
@@ -10,8 +12,13 @@ from rig.platform import TERMS
 GROWN = 1.02  # times the declared model's error: less is chance
 
 
+def of_reported(left: Disturbance, model: ModelResult) -> Disturbance:
+    """Without what it does to parameters that are not reported."""
+    return replace(left, moves_percent={k: v for k, v in left.moves_percent.items() if k in model.parameters})
+
+
 def too_much_left(left: Disturbance, accept: AcceptConfig, axis: str) -> list[str]:
-    """Why what is left is material, one sentence a limit; nothing where it is immaterial."""
+    """Why the residual torque is material, one sentence a limit; nothing where it is immaterial."""
     if not left.depends_on:
         return []
     torque = "force" if axis == "linear" else "torque"
@@ -19,14 +26,15 @@ def too_much_left(left: Disturbance, accept: AcceptConfig, axis: str) -> list[st
     out = []
     if left.material_percent > accept.torque_percent:
         out.append(
-            f"the {torque} that is left and depends on the {on} is {number(left.material_percent, 2)} % of the "
-            f"{torque}; {number(accept.torque_percent, 2)} % is allowed (identify.accept.torque_percent)"
+            f"the part of the residual {torque} that depends on the {on} is "
+            f"{number(left.material_percent, 2)} % of the {torque}; {number(accept.torque_percent, 2)} % is allowed "
+            "(identify.accept.torque_percent)"
         )
     for name in TERMS:
         moved, most = left.moves_percent.get(name, 0.0), getattr(accept, f"{name}_percent")
         if moved > most:
             out.append(
-                f"fitting the {torque} that is left and depends on the {on} changes {SYMBOLS[name]} by "
+                f"fitting the part of the residual {torque} that depends on the {on} changes {SYMBOLS[name]} by "
                 f"{number(moved, 2)} %; "
                 f"{number(most, 2)} % is allowed (identify.accept.{name}_percent)"
             )

@@ -1,4 +1,4 @@
-"""From fits to what is told: parameters with units and intervals, what is not determined, verdict, acceptance."""
+"""From the final fits to the result: parameters with intervals, undetermined parameters, verdict, acceptance."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 
 from identify.bounds.damping_or_lag import lag_for_damping
 from identify.bounds.undetermined import of_another_run, open_phases, undetermined
-from identify.conclude.acceptance import grown, too_much_left
+from identify.conclude.acceptance import grown, of_reported, too_much_left
 from identify.conclude.declared_values import declared_values, kept_as_declared
 from identify.conclude.error_figures import Measured
+from identify.conclude.max_error import with_max_error
 from identify.conclude.next_steps import opposite_signs, unexplained_reason
 from identify.conclude.verdict import sentences_of
 from identify.diagnose.diagnosis import with_diagnosis
 from identify.estimate.final_fit import Fitted, noise_of_all
-from identify.genetic.per_set import KEYS
 from identify.model.parameters import Name, platform_of
 from identify.model.structure import Structure
 from identify.results import (
@@ -112,10 +112,10 @@ def conclude(
         for g in searched if after.sensor_limited and not g.accepted
     ]  # fmt: skip
     reasons += [f"{x.name} is not determined: {x.reason}" for x in final.not_determined]
-    reference, per_set = _against_reference(case, per_set)
+    reference, per_set = with_max_error(per_set, case.settings.reference)
     material = measured is None and unexplained
     if measured is not None:
-        reasons += too_much_left(measured, case.settings.accept, case.recording.axis)
+        reasons += too_much_left(of_reported(measured, final), case.settings.accept, case.recording.axis)
     found = Identification(
         accepted=not reasons and not material, reasons=(), axis=case.recording.axis, before=result_before,
         verdict=verdict, after=result_after, noise_floor=floor, per_set=per_set, joint=joint,
@@ -129,7 +129,8 @@ def conclude(
     if opposite_signs(found):
         reasons.insert(0, SENTENCE)
     found = replace(found, accepted=not reasons, reasons=tuple(reasons))
-    said = (*sentences_of(found), *_about_damping(case, after, final))
+    of_damping = _about_damping(case, after, final)
+    said = (*sentences_of(found, damping_said=bool(of_damping)), *of_damping)
     return with_diagnosis(replace(found, verdict=replace(verdict, sentences=said)))
 
 
@@ -145,8 +146,9 @@ def _at_the_sensor(case: Case, measured: Measured, floor: NoiseFloor) -> Disturb
 
 
 def _about_damping(case: Case, after: Fitted, final: ModelResult) -> tuple[str, ...]:
+    """What C may be instead; nothing where C is not reported."""
     name = ("inertia",)
-    if final.platform is None or name not in after.names:
+    if final.platform is None or name not in after.names or "damping" not in final.parameters:
         return ()
     fitted = [t for t in case.traces if t.number in _runs_fitted(case)]
     told = lag_for_damping(final.platform, after.std_error(name), fitted, case.recording.axis)
@@ -248,27 +250,6 @@ def _to_build_on(case: Case, fitted: Fitted, model: ModelResult) -> ModelResult:
         for name, told in zip(lost, model.not_determined, strict=True)
     )
     return replace(model, not_determined=missing, platform=_platform(case, fitted, values))
-
-
-def _against_reference(
-    case: Case, per_set: tuple[SetResult, ...]
-) -> tuple[dict[str, float] | None, tuple[SetResult, ...]]:
-    """Max_Error of Eq. 15 over the sets, and each set's own."""
-    known = case.settings.reference
-    if known is None:
-        return None, per_set
-    out: dict[str, float] = {}
-    sets = []
-    for one in per_set:
-        parameters = dict(one.parameters)
-        for term, key in KEYS.items():
-            reference = getattr(known, key)
-            if reference and term in parameters:
-                error = 100.0 * abs(parameters[term].value - reference) / reference
-                parameters[term] = replace(parameters[term], max_error_percent=error)
-                out[term] = max(out.get(term, 0.0), error)
-        sets.append(replace(one, parameters=parameters))
-    return out, tuple(sets)
 
 
 def _series(case: Case, before: Measured, after: Measured) -> tuple[RunTraces, ...]:

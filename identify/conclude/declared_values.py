@@ -1,4 +1,4 @@
-"""What stands in the model where the data say nothing: the declared number, if the model replays the runs with it.
+"""Values of undetermined parameters in the model: the declared ones, if the model reproduces the runs with them.
 
 A single steady sine tells K - J w^2, and neither J nor K. The declared pair may contradict that, and the pair at
 which a fit happens to stop means nothing. So each number that is not determined goes back to its declared value and

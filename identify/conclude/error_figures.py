@@ -1,4 +1,4 @@
-"""The figures that stand before and after: errors in torque and in free run, and the floor below them."""
+"""The errors before and after: torque residual, free run, and their noise floor."""
 
 from __future__ import annotations
 

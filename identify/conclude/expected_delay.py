@@ -1,4 +1,4 @@
-"""The torque delay that was fitted beside the one that whoever recorded the data expects."""
+"""The fitted torque delay compared with the one that the drivers expect."""
 
 from __future__ import annotations
 

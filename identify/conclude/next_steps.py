@@ -1,4 +1,4 @@
-"""What to run next after a campaign that was not accepted: for the summary, the report and result.json alike."""
+"""What to run next after a campaign that was not accepted, for summary, report and result.json."""
 
 from __future__ import annotations
 
@@ -13,45 +13,61 @@ from identify.results import GeneticRun, Identification, RunTraces, follow_up_fi
 from identify.runs.sign_convention import SENTENCE, signs
 from identify.wording import capital, joined, number, percent, plain
 
-TELLING = 0.1  # share of the residual's power from which it is said to go with something
+MIN_SHARE = 0.1  # share of the residual's power from which it is said to depend on a quantity
 USUAL_CUTOFF_HZ = 50.0
 RUN = {
-    "rate": "Friction and damping show at other speeds: add a slow ramp_hold_release set, and repeat one set at a "
-    "quarter and at half of its torque (repeat_scales: [0.5, 0.25]).",
-    "angle": "Spring, gap, cogging or gravity show along the travel: add a slow ramp_hold_release set over the whole "
-    "travel, and repeat one set at half of its torque; where gravity may act, once more with the base turned.",
-    "torque": "The drive shows at other torques: repeat the sets at half of their torque (repeat_scales: [0.5]), and "
-    "record the measured current instead of the command where the drive reports one.",
-    "time": "Something drifts: play the first set once more at the end, after a warm-up of ten minutes, and look at "
-    "temperature and clamping.",
+    "rate": (
+        "To separate friction from damping, vary the speed: add a slow ramp_hold_release set, and repeat one set at a "
+        "quarter and at half of its torque (repeat_scales: [0.5, 0.25])."
+    ),
+    "angle": (
+        "To separate spring, backlash, cogging and gravity, vary the travel: add a slow ramp_hold_release set over "
+        "the whole travel, and repeat one set at half of its torque; if gravity may act, repeat it with the base "
+        "turned."
+    ),
+    "torque": (
+        "To find an effect of the drive, vary the torque: repeat the sets at half of their torque (repeat_scales: "
+        "[0.5]), and if the drive reports the measured current, record it instead of the command."
+    ),
+    "time": (
+        "The platform or a sensor drifts: warm up for ten minutes, play the first set again at the end, and check "
+        "temperature and clamping."
+    ),
 }
-RELEASED_RUN = {  # the same without a motor
-    "rate": "Friction and drag show at other speeds: release the platform from a larger and from a smaller angle, and "
-    "record each until it rests.",
-    "angle": "Spring, gap or gravity show along the travel: release the platform from both ends of its travel, record "
-    "each until it rests; where gravity may act, once more with the base turned.",
-    "time": "Something drifts: repeat the first release at the end, after ten minutes, and look at temperature and "
-    "clamping.",
+DECAY_RUN = {  # the same without a motor
+    "rate": (
+        "To separate friction from drag, vary the speed: release the platform from a larger and from a smaller angle, "
+        "and record each decay until the platform rests."
+    ),
+    "angle": (
+        "To separate spring, backlash and gravity, vary the travel: release the platform from both ends of its travel "
+        "and record each decay until it rests; if gravity may act, repeat it with the base turned."
+    ),
+    "time": (
+        "The platform or a sensor drifts: repeat the first release after ten minutes, and check temperature and "
+        "clamping."
+    ),
 }
 LINEAR = {"rate": "speed", "angle": "position", "torque": "force"}
-OTHERWISE = (
-    "The residual depends on none of rate, angle, torque and time: its spectrum and the frequency response show at "
-    "which frequencies it is large. Add a multisine (0.5 Hz to beyond the resonance) if none was played, and one run "
-    "with zero torque and the drive enabled."
+INDEPENDENT = (
+    "The residual does not depend on rate, angle, torque or time. Look in its spectrum and in the frequency response "
+    "at which frequencies it is large. If no multisine was played, add one (0.5 Hz to beyond the resonance); also "
+    "record one run with zero torque and the drive enabled."
 )
 
 
-RELEASED = (
-    "The residual depends on neither rate nor angle nor time: release the platform from other angles, record each "
-    "until it rests, and play a campaign with torque: a decay shows only ratios, and few causes."
+INDEPENDENT_DECAY = (
+    "The residual does not depend on rate, angle or time: release the platform from other angles, record each decay "
+    "until it rests, and play a campaign with torque: a decay determines only ratios and separates few causes."
 )
 COLOURED = (
-    "The noise floor is estimated from the fastest changes alone. If the sensor's noise is slower (coloured), the "
-    "residual may be that noise: record the sensor at rest with the drive off, and give the rms of the noise as "
-    "recorded.noise."
+    "The noise floor is estimated from the highest frequencies only. If the sensor's noise is larger at low "
+    "frequencies (coloured), the residual may be that noise: record the sensor at rest with the drive off, and set "
+    "recorded.noise to its rms."
 )
+REPEAT = "Play the campaign again and compare the results; `rig check` predicts what each set can determine."
 NEAR_FLOOR = 4.0  # times the noise floor
-AT_ONCE, MOVING = 3, 0.1  # first samples of a run, and the share of its largest rate that they may have
+FIRST_SAMPLES, MOVING = 3, 0.1  # first samples of a run, and the share of its largest rate that they may have
 
 
 def next_steps(found: Identification) -> tuple[str, ...]:
@@ -74,11 +90,10 @@ def next_steps(found: Identification) -> tuple[str, ...]:
     if follow_up is not None and follow_up.plan is not None:
         file = follow_up_file_name(len(follow_up.rounds))
         stopped = "Tripped on" in follow_up.note  # as it stands the guard would stop it again
-        steps.append(f"Lower torque_nm in {file} before you play it again" if stopped else f"Play {file}")
-        steps[-1] += f": {follow_up.plan.why}"
+        steps.append(f"Lower torque_nm in {file} before you play it again." if stopped else f"Play {file}.")
     if found.aborted:
-        steps.append("The campaign was aborted: run it again to its end.")
-    return tuple(steps) or ("Run the campaign once more and compare: `rig check` says what each set can determine.",)
+        steps.append("The campaign was aborted: play it again in full.")
+    return tuple(steps) or (REPEAT,)
 
 
 def opposite_signs(found: Identification) -> bool:
@@ -100,11 +115,11 @@ def unexplained_reason(ratio: float, found: Identification) -> str:
     elif error.holdout_fit_percent is not None and math.isfinite(error.holdout_fit_percent):
         share = f"{percent(100.0 - error.holdout_fit_percent).lstrip('+')} of the motion"
     size = f"{number(ratio, 3)} times the sensor's noise"
-    told = f"{share} ({size})" if share else size
-    acts = "none of the effects tried describes it"
+    amount = f"{share} ({size})" if share else size
+    acts = "no effect that was tried describes it"
     if found.verdict.left_open:
-        acts = "the verdict leaves open what part of it is"
-    return f"the model leaves {told} unexplained: {acts}"
+        acts = "the cause of a part of it is not determined (see the verdict)"
+    return f"the model leaves {amount} unexplained: {acts}"
 
 
 def torque_free(found: Identification) -> bool:
@@ -130,9 +145,9 @@ def _to_explain(found: Identification) -> list[str]:
     left = found.residual_before if found.after is None else found.residual_after
     if left is not None and left.moments:
         places = joined([f"in {m.run} from {m.from_s:.2f} to {m.to_s:.2f} s" for m in left.moments])
-        return [f"Most of the residual lies {places}. Leave that out with from_s or to_s, or record it again."]
-    noisy = torque_noise.told(found)
-    return [noisy] if noisy else [*_by_what_it_goes_with(found), *_coloured(found)]
+        return [f"Most of the residual lies {places}. Exclude it with from_s or to_s, or record the run again."]
+    noisy = torque_noise.describe(found)
+    return [noisy] if noisy else [*_by_dependence(found), *_coloured(found)]
 
 
 def _coloured(found: Identification) -> list[str]:
@@ -142,23 +157,26 @@ def _coloured(found: Identification) -> list[str]:
     return [COLOURED] if near and floor.source == "estimated" else []
 
 
-def _by_what_it_goes_with(found: Identification) -> list[str]:
+def _by_dependence(found: Identification) -> list[str]:
     shares = dependence(found.traces, found.final.error.lowpass_hz or USUAL_CUTOFF_HZ)
     name, share = next(iter(shares.items()), ("", 0.0))
     late = _begun_in_motion(found.traces)
     if late:
-        late = [f"{capital(joined(late))} {'begins' if len(late) == 1 else 'begin'} in motion: effects with memory "
-                "(creep, hysteresis, a second mode) cannot be found there, because their start state is known only at "
-                "rest. Start every recording before the torque."]  # fmt: skip
+        starts = "starts" if len(late) == 1 else "start"
+        late = [
+            f"{capital(joined(late))} {starts} in motion. Effects with memory (creep, hysteresis, a second mode) "
+            "cannot be identified there, because their initial state is known only at rest. Start every recording "
+            "before the torque."
+        ]
     free = torque_free(found)
-    if share < TELLING:
-        return [*late, RELEASED if free else OTHERWISE]
-    run = RELEASED_RUN[name] if free else RUN[name]
-    told = f"{number(100.0 * share, 2)} % of the residual's power depends on the {name}. {run}"
+    if share < MIN_SHARE:
+        return [*late, INDEPENDENT_DECAY if free else INDEPENDENT]
+    run = DECAY_RUN[name] if free else RUN[name]
+    advice = f"{number(100.0 * share, 2)} % of the residual's power depends on the {name}. {run}"
     if found.axis == "linear":
         for rotary, linear in LINEAR.items():
-            told = told.replace(f" {rotary}", f" {linear}")
-    return [*late, told]
+            advice = advice.replace(f" {rotary}", f" {linear}")
+    return [*late, advice]
 
 
 def _begun_in_motion(traces: Sequence[RunTraces]) -> list[str]:
@@ -166,7 +184,7 @@ def _begun_in_motion(traces: Sequence[RunTraces]) -> list[str]:
     return [
         t.name for t in traces
         if t.torque_nm is not None
-        and float(np.median(np.abs(t.rate_rad_s[:AT_ONCE]))) > MOVING * float(np.max(np.abs(t.rate_rad_s)))
+        and float(np.median(np.abs(t.rate_rad_s[:FIRST_SAMPLES]))) > MOVING * float(np.max(np.abs(t.rate_rad_s)))
     ]  # fmt: skip
 
 
@@ -175,7 +193,7 @@ def _to_reach(runs: Sequence[GeneticRun]) -> str:
     if hopeless:
         return (
             f"{capital(joined(hopeless))}: even the closed-form optimum stays above J_dec, so more generations do not "
-            "help; look at the residual of these sets first, and record them once more."
+            "help: look at the residual of these sets, then record them again."
         )
     return (
         f"{capital(joined([r.name for r in runs]))}: the closed-form optimum lies below J_dec, but the search did not "

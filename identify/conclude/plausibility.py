@@ -1,4 +1,4 @@
-"""Fitted numbers against those that somebody declared: factors that a wrong unit or a wrong sign would make.
+"""Fitted values compared with declared ones: factors that a wrong unit or a wrong sign would make.
 
 A wrong scale of torque or rate multiplies J, C and K alike. A wrong unit of time multiplies K/J by its square. One
 number that is off beside others that agree is a matter of the declared number itself. Anything else is silence: a
@@ -35,27 +35,30 @@ class Cause:
 # Of torque over rate, which J, C and K share.
 OF_RATE = (
     Cause(1.0 / DEGREES, "the rate were in deg/s and read as rad/s"),
-    Cause(DEGREES, "the rate were in rad/s and converted from deg/s all the same"),
+    Cause(DEGREES, "the rate were already in rad/s but converted from deg/s"),
     Cause(TURN, "the rate were in turns per second and read as rad/s"),
-    Cause(1.0 / TURN, "the rate were in rad/s and converted from turns per second all the same"),
+    Cause(1.0 / TURN, "the rate were already in rad/s but converted from turns per second"),
     Cause(1.0 / RPM, "the rate were in rpm and read as rad/s, or the torque in kgf m and read as N m"),
-    Cause(RPM, "the rate were in rad/s and converted from rpm, or the torque in N m and converted from kgf m"),
+    Cause(
+        RPM,
+        "the rate were in rad/s but converted from rpm, or the torque in N m but converted from kgf m",
+    ),
     Cause(THOUSAND, "the torque were in mN m and read as N m"),
     Cause(1.0 / THOUSAND, "the rate were in mrad/s and read as rad/s"),
 )
 OF_ANGLE = (
     Cause(1.0 / DEGREES, "the angle were in degrees and read as rad"),
-    Cause(DEGREES, "the angle were in rad and converted from degrees all the same"),
+    Cause(DEGREES, "the angle were already in rad but converted from degrees"),
     Cause(TURN, "the angle were in turns and read as rad"),
-    Cause(1.0 / TURN, "the angle were in rad and converted from turns all the same"),
+    Cause(1.0 / TURN, "the angle were already in rad but converted from turns"),
     Cause(1.0 / GRAVITY, "the torque were in kgf m and read as N m"),
-    Cause(GRAVITY, "the torque were in N m and converted from kgf m all the same"),
+    Cause(GRAVITY, "the torque were already in N m but converted from kgf m"),
     Cause(THOUSAND, "the torque were in mN m and read as N m"),
     Cause(1.0 / THOUSAND, "the angle were in mrad and read as rad"),
 )
 OF_POSITION = (
     Cause(1.0 / GRAVITY, "the force were in kgf and read as N"),
-    Cause(GRAVITY, "the force were in N and converted from kgf all the same"),
+    Cause(GRAVITY, "the force were already in N but converted from kgf"),
     Cause(THOUSAND, "the force were in mN and read as N"),
     Cause(1.0 / THOUSAND, "the motion were in mm and read as m"),
 )
@@ -64,13 +67,13 @@ OF_ONE = {
     "inertia": (
         Cause(1e-3, "it were in g m^2"), Cause(1e-4, "it were in kg cm^2"), Cause(1e-6, "it were in kg mm^2"),
         Cause(1e-7, "it were in g cm^2"), Cause(GRAVITY, "it were in kgf m s^2"),
-        Cause(1.0 / FREQUENCY, "it came from K and a frequency in Hz taken for rad/s"),
+        Cause(1.0 / FREQUENCY, "it were calculated from K with a frequency in Hz instead of rad/s"),
     ),
     "damping": (Cause(DEGREES, "it were per deg/s"), Cause(RPM, "it were per rpm")),
     "stiffness": (
         Cause(DEGREES, "it were per degree"), Cause(TURN, "it were per turn"), Cause(1e-3, "it were in mN m/rad"),
         Cause(GRAVITY, "it were in kgf m/rad"),
-        Cause(FREQUENCY, "it came from J and a frequency in Hz taken for rad/s"),
+        Cause(FREQUENCY, "it were calculated from J with a frequency in Hz instead of rad/s"),
     ),
 }  # fmt: skip
 OF_ONE_LINEAR = {
@@ -78,17 +81,17 @@ OF_ONE_LINEAR = {
     "damping": (),
     "stiffness": (
         Cause(THOUSAND, "it were in N/mm"), Cause(GRAVITY, "it were in kgf/m"),
-        Cause(FREQUENCY, "it came from the mass and a frequency in Hz taken for rad/s"),
+        Cause(FREQUENCY, "it were calculated from the mass with a frequency in Hz instead of rad/s"),
     ),
 }  # fmt: skip
 OF_TIME = (
     Cause(THOUSAND, "the time were in ms and read as s"),
-    Cause(1e-3, "the time were in s and converted from ms"),
+    Cause(1e-3, "the time were already in s but converted from ms"),
 )
 OF_SQUARED_FREQUENCY = (
-    Cause(FREQUENCY, "it came from a frequency in Hz taken for rad/s"),
+    Cause(FREQUENCY, "it were calculated with a frequency in Hz instead of rad/s"),
     Cause(1e-6, "the time were in ms and read as s"),
-    Cause(1e6, "the time were in s and converted from ms all the same"),
+    Cause(1e6, "the time were already in s but converted from ms"),
 )
 
 
@@ -147,7 +150,7 @@ def _alike(jck: Mapping[str, float], causes: tuple[Cause, ...]) -> tuple[Implaus
     for cause in causes if len(deciding) > 1 else ():
         if all(_is(jck[n], cause.factor) for n in deciding):
             names = tuple(n for n in jck if _is(jck[n], cause.factor))
-            return (_told(names, jck, f"as if {cause.words}: check that unit, then the declared numbers"),)
+            return (_implausible(names, jck, f"as if {cause.words}: check this unit, then the declared values"),)
     return ()
 
 
@@ -156,7 +159,9 @@ def _only_one(jck: Mapping[str, float], causes: tuple[Cause, ...]) -> tuple[Impl
     name, ratio = next(iter(jck.items()))
     for cause in causes if len(jck) == 1 and name != "damping" else ():
         if max(cause.factor, 1.0 / cause.factor) in (DEGREES, THOUSAND) and _is(ratio, cause.factor):
-            return (_told((name,), jck, f"as if {cause.words}: check that unit and the one of the declared number"),)
+            return (
+                _implausible((name,), jck, f"as if {cause.words}: check this unit and the unit of the declared value"),
+            )
     return ()
 
 
@@ -170,7 +175,7 @@ def _in_time(jck: Mapping[str, float], channel: Channel) -> tuple[Implausible, .
         if _is(jck["inertia"], j) and _is(jck["stiffness"], k):
             words = f"as if {cause.words}: check recorded.scale.time"
             ratio = {"stiffness_over_inertia": jck["stiffness"] / jck["inertia"]}
-            return (_told(("stiffness_over_inertia",), ratio, words),)
+            return (_implausible(("stiffness_over_inertia",), ratio, words),)
     return ()
 
 
@@ -182,10 +187,10 @@ def _single(jck: Mapping[str, float], causes: Mapping[str, tuple[Cause, ...]]) -
         beside = f"while {joined([SYMBOLS[n] for n in agree])} {'agrees' if len(agree) == 1 else 'agree'}"
         for cause in causes[name]:
             if _is(ratio, cause.factor):
-                words = f"{beside}, as if {cause.words}: check the declared number"
-                out.append(_told((name,), jck, words))
+                words = f"{beside}, as if {cause.words}: check the declared value"
+                out.append(_implausible((name,), jck, words))
         if _is(ratio, -1.0):
-            out.append(_told((name,), jck, f"{beside}: check the sign of the declared number"))
+            out.append(_implausible((name,), jck, f"{beside}: check the sign of the declared value"))
     return out
 
 
@@ -193,16 +198,18 @@ def _without_torque(ratios: Mapping[str, float]) -> tuple[Implausible, ...]:
     name = "stiffness_over_inertia"
     for cause in OF_SQUARED_FREQUENCY if name in ratios else ():
         if _is(ratios[name], cause.factor):
-            return (_told((name,), ratios, f"as if {cause.words}: check the unit of time and the declared numbers"),)
+            return (
+                _implausible((name,), ratios, f"as if {cause.words}: check the unit of time and the declared values"),
+            )
     return ()
 
 
-def _told(names: tuple[str, ...], ratios: Mapping[str, float], words: str) -> Implausible:
+def _implausible(names: tuple[str, ...], ratios: Mapping[str, float], words: str) -> Implausible:
     """With the factor that was found: the geometric mean where several numbers share it."""
     factor = math.prod(abs(ratios[n]) for n in names) ** (1.0 / len(names)) * math.copysign(1.0, ratios[names[0]])
-    verb, numbers = ("is", "number") if len(names) == 1 else ("are", "numbers")
+    verb, values = ("is", "value") if len(names) == 1 else ("are", "values")
     symbols = joined([SYMBOLS[n] for n in names])
-    return Implausible(names, factor, f"{symbols} {verb} {_times(factor)} the declared {numbers}, {words}.")
+    return Implausible(names, factor, f"{symbols} {verb} {_times(factor)} the declared {values}, {words}.")
 
 
 def _times(factor: float) -> str:

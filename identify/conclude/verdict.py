@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from identify.bounds.advice import WELL_KNOWN
+from identify.conclude.acceptance import of_reported
 from identify.conclude.next_steps import opposite_signs, to_determine, torque_free
 from identify.results import Identification
 from identify.runs.measured_channels import REFUSED
@@ -11,14 +12,14 @@ from identify.wording import (
     SYMBOLS,
     capital,
     half_interval,
+    how_to_separate,
     joined,
-    left_over,
     number,
     off_by,
     plain,
     readable,
+    residual_torque_sentence,
     title,
-    told_apart,
     unit,
     value_of,
     without,
@@ -30,8 +31,11 @@ SHOWN = 4  # numbers of an effect in a sentence
 SHOWN_PERCENT = 0.05  # a change below that is not worth a sentence
 
 
-def sentences_of(found: Identification) -> tuple[str, ...]:
-    """One finding a sentence, the most important first."""
+def sentences_of(found: Identification, damping_said: bool = False) -> tuple[str, ...]:
+    """One finding a sentence, the most important first.
+
+    ``damping_said``: another sentence says already why the damping is uncertain.
+    """
     out: list[str] = [f"{capital(SENTENCE)}."] if not found.accepted and opposite_signs(found) else []
     for name in found.verdict.effects:
         out.append(_named(found, name))
@@ -42,7 +46,7 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
             + (why or _nothing_named(found))
         )  # fmt: skip
     out += [found.verdict.left_open] if found.verdict.left_open else []
-    out += _bent(found)
+    out += _parameter_bias(found)
     if found.torque_scale is not None and "torque_scale" not in found.verdict.effects:
         scale = found.torque_scale
         off = abs(scale.value - 1.0) > 1.96 * scale.std_error
@@ -51,10 +55,10 @@ def sentences_of(found: Identification) -> tuple[str, ...]:
             f"{number(1.96 * scale.std_error, 2)} times the recorded one"
             + ("; J, C and K are larger or smaller by the same factor." if off else ": the torque scale is right.")
         )
-    out += _known_badly(found)
+    out += _poorly_determined(found, damping_said)
     out += _unseen_scale(found)
     if found.disturbance is not None and _decided_in_torque(found):
-        out.append(left_over(found.disturbance, found.axis))
+        out.append(residual_torque_sentence(of_reported(found.disturbance, found.final), found.axis))
     elif found.verdict.unexplained:
         out.append(
             f"{number(100.0 * found.verdict.unexplained_fraction, 2)} % of the residual above the noise floor is "
@@ -105,10 +109,11 @@ def _unseen_scale(found: Identification) -> list[str]:
     ]
 
 
-def _known_badly(found: Identification) -> list[str]:
+def _poorly_determined(found: Identification, damping_said: bool) -> list[str]:
     """J, C and K that are given and yet say little, with what would tell more."""
     given = found.final.parameters
     wide = [name for name, p in given.items() if p.value and p.std_error > WELL_KNOWN * abs(p.value)]
+    wide = [name for name in wide if not (damping_said and name == "damping")]
     if not wide or not found.accepted:
         return []  # what else is wrong comes first
     each = [
@@ -129,11 +134,11 @@ def _named(found: Identification, name: str) -> str:
     if rivals:
         separate = effects.get(name).separated_by
         text += f" These data cannot exclude {' or '.join(plain(r) for r in rivals)}"
-        text += f"; {told_apart(separate)}." if separate else "."
+        text += f"; {how_to_separate(separate)}." if separate else "."
     return text
 
 
-def _bent(found: Identification) -> list[str]:
+def _parameter_bias(found: Identification) -> list[str]:
     """What the change of the model did to each parameter, in one sentence that names the change."""
     if found.after is None or (found.verdict.unexplained and not found.verdict.effects):
         return []  # of two wrong models neither says what the other did

@@ -1,4 +1,4 @@
-"""Where a model's residual lives: harmonics of the excitation, free lines, direction of motion, memory, moments.
+"""What a residual consists of: harmonics of the excitation, free lines, direction of motion, memory, moments.
 
 Every figure is a power of the residual. The same is asked of draws of the sensor's noise, sent through the same
 differentiator, low-pass and drift removal: what these show is what chance shows.

@@ -1,4 +1,4 @@
-"""What is left after the final model, told as a torque: how large, what it goes with, and what that does to J, C and K.
+"""The residual as a torque: its size, what it depends on, and how far that changes J, C and K.
 
 Every rig has a disturbance: current ripple, the floor, a cable. The part that goes with nothing is noise and is in the
 intervals. The part that goes with angle, rate, direction, torque, time or history is something the model lacks; a

@@ -1,4 +1,4 @@
-"""Noise in the recorded torque: the model is shaken by it, the platform was not."""
+"""Noise in the recorded torque: it excites the model but did not excite the platform."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from identify.signals.noise import noise_of
 from identify.wording import number
 
 ENOUGH = 0.5  # of what is left, that it has to make
-TOLD = (
+SENTENCE = (
     "The recorded {torque} contains noise of {noise} {unit} rms a sample; {passed} {unit} of it lies below {cutoff:g} "
     "Hz, where the residual is {left} {unit}. Record the commanded {torque} instead, or measure it with less noise: "
     "smaller effects are hidden by it."
 )
 
 
-def told(found: Identification) -> str:
+def describe(found: Identification) -> str:
     """One sentence on it and what to do, where it makes most of the torque residual; else empty."""
     error = found.final.error
     left, cutoff = error.residual_rms_torque, error.lowpass_hz
@@ -30,7 +30,7 @@ def told(found: Identification) -> str:
     if not below > ENOUGH * left:
         return ""
     linear = found.axis == "linear"
-    return TOLD.format(
+    return SENTENCE.format(
         torque="force" if linear else "torque", unit="N" if linear else "N m", noise=number(whole, 3),
         passed=number(below, 3), left=number(left, 3), cutoff=cutoff,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What a residual holds, in sentences for the person at the bench."""
+"""Sentences on what a residual consists of."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from identify.results import FreeLine, Harmonics, Moment, ResidualDiagnosis, Sha
 from identify.wording import joined, number, unit
 
 WORTH, WORTH_OF_PAST = 0.02, 0.1  # shares of the residual's power below which nothing is said
-AT_THE_NOISE = 1.3  # times the noise floor
+NOISE_LEVEL = 1.3  # times the noise floor
 TWIN = {"angle": "position", "rate": "speed", "torque": "force"}  # on a linear axis
 LINEAR = (
     "a residual at the excitation frequency alone has a linear cause: "
@@ -31,8 +31,8 @@ def diagnosis_sentences(found: ResidualDiagnosis, axis: str) -> tuple[str, ...]:
     return tuple(_on(axis, text) for text in said if text)
 
 
-def told(share: Share | None, worth: float = WORTH) -> bool:
-    """Whether a share is more than chance, and worth a word."""
+def is_significant(share: Share | None, worth: float = WORTH) -> bool:
+    """Whether a share is more than chance shows, and large enough to report."""
     return share is not None and share.share > share.by_chance and share.share >= worth
 
 
@@ -40,26 +40,27 @@ def _level(found: ResidualDiagnosis, more: bool) -> str:
     over, what = found.over_floor, "The torque residual" if found.quantity == "torque" else "The error in free run"
     if over is None:
         return ""
-    if not more and over < AT_THE_NOISE:
+    if not more and over < NOISE_LEVEL:
         return f"{what} is at the level of the sensor's noise ({number(over, 3)} times) and shows no structure."
     looked_for = "harmonics, free lines, direction or memory" if found.direction is not None else "free lines"
     rest = "" if more else f"; it shows no {looked_for}"
-    return f"{what} is {number(over, 3)} times as large as the sensor's noise alone would make it{rest}."
+    return f"{what} is {number(over, 3)} times the level of the sensor's noise{rest}."
 
 
 def _harmonics(found: Harmonics | None) -> list[str]:
-    if found is None or not told(found.repeats):
+    if found is None or not is_significant(found.repeats):
         return []
     begin = f"{_percent(found.repeats.share)} of it repeats with the excitation"
     if found.own is None or found.odd is None or found.even is None:
         return [
-            f"{begin}. The excitation has odd and even multiples itself, so those of the platform cannot be told apart."
+            f"{begin}. The excitation itself contains odd and even harmonics, so harmonics made by the platform "
+            "cannot be separated from them."
         ]
     parts, why = [], []
-    if told(found.own):
-        parts.append(f"{_percent(found.own.share)} at the played frequency")
+    if is_significant(found.own):
+        parts.append(f"{_percent(found.own.share)} at the excitation frequency")
     for share, parity, rest, meaning in ((found.odd, "odd", 1, ODD), (found.even, "even", 0, EVEN)):
-        if told(share):
+        if is_significant(share):
             orders = [f"{_nth(k)} {_percent(v)}" for k, v in found.orders.items() if k % 2 == rest and k > 1][:3]
             parts.append(
                 f"{_percent(share.share)} in {parity} harmonics" + (f" ({', '.join(orders)})" if orders else "")
@@ -73,13 +74,13 @@ def _harmonics(found: Harmonics | None) -> list[str]:
 def _line(line: FreeLine, found: ResidualDiagnosis) -> str:
     runs = f", in {line.runs} runs" if line.runs > 1 else ""
     return (
-        f"A line at {number(line.frequency_hz, 4)} Hz, not locked to the excitation of any set: "
-        f"{number(line.size, 2)} {unit(found.unit)}{runs}. Look for a machine that turns or vibrates at that frequency."
+        f"A spectral line at {number(line.frequency_hz, 4)} Hz ({number(line.size, 2)} {unit(found.unit)}{runs}) is "
+        "not a harmonic of any excitation. Look for a machine that rotates or vibrates at that frequency."
     )
 
 
 def _direction(share: Share | None) -> list[str]:
-    if share is None or not told(share):
+    if share is None or not is_significant(share):
         return []
     return [
         f"{_percent(share.share)} of it changes sign with the direction of motion at the same angle: friction or "
@@ -88,7 +89,7 @@ def _direction(share: Share | None) -> list[str]:
 
 
 def _memory(share: Share | None) -> list[str]:
-    if share is None or not told(share, WORTH_OF_PAST):
+    if share is None or not is_significant(share, WORTH_OF_PAST):
         return []
     return [
         f"{_percent(share.share)} of it depends on the past and not on the present angle, rate and torque: "
@@ -102,8 +103,8 @@ def _moments(found: Sequence[Moment]) -> list[str]:
     places = [f"{m.run} from {m.from_s:.2f} to {m.to_s:.2f} s ({_percent(m.share)})" for m in found]
     share = _percent(sum(m.share for m in found))
     return [
-        f"{share} of it lies in {joined(places)}: something happened only then (a touch, a slip, the start "
-        "of a run). Leave it out with from_s or to_s, or record the run again."
+        f"{share} of it lies in {joined(places)}: probably a single event (a touch, a slip, the start of a run). "
+        "Exclude it with from_s or to_s, or record the run again."
     ]
 
 

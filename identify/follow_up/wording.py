@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import yaml
 
-from identify.results import FollowUp, FollowUpPlan, Parting, Unparted, follow_up_file_name
+from identify.results import FollowUp, FollowUpPlan, Parting, follow_up_file_name
 from identify.wording import capital, joined, plain
 
 if TYPE_CHECKING:
@@ -27,11 +27,6 @@ def why_of(partings: Sequence[Parting], sets: Sequence[Candidate]) -> str:
 def size(parting: Parting) -> str:
     """An expected separation, to two digits: it is no more exact than the models."""
     return f"{float(f'{parting.separation:.2g}'):,.0f}" if parting.separation < PLENTY else f"over {PLENTY:,.0f}"
-
-
-def unparted_sentence(one: Unparted) -> str:
-    """Why a pair has no plan."""
-    return capital(f"{plain(one.effect)} and {plain(one.rival)}: {one.reason}.")
 
 
 def verdict_sentences(follow_up: FollowUp, told: Collection[str] = ()) -> list[str]:
@@ -55,7 +50,7 @@ def _lower(sentence: str) -> str:
 
 
 def lines(follow_up: FollowUp) -> list[str]:
-    """Everything about the follow-up, one sentence each."""
+    """What was played and where the plan is, one sentence each; the verdict says what the plan is for."""
     out = []
     for n, one in enumerate(follow_up.rounds, 1):
         head = "Played" if len(follow_up.rounds) == 1 else f"Played, {n}"
@@ -63,13 +58,11 @@ def lines(follow_up: FollowUp) -> list[str]:
         out += [f"{capital(plain(a))} and {plain(b)} can be distinguished now." for a, b in one.separated]
         out += [f"{capital(plain(a))} and {plain(b)} still cannot be distinguished." for a, b in one.open]
     if follow_up.plan is not None:
-        out.append(
-            f"{follow_up_file_name(len(follow_up.rounds))} ({follow_up.plan.duration_s:.0f} s): "
-            f"{_lower(follow_up.plan.why)}"
-        )
+        file = follow_up_file_name(len(follow_up.rounds))
+        out.append(f"{file} ({follow_up.plan.duration_s:.0f} s) holds the excitation that the verdict describes.")
     if follow_up.note:
         out.append(capital(follow_up.note))
-    return out + [unparted_sentence(one) for one in follow_up.unparted]
+    return out
 
 
 def follow_up_yaml(plan: FollowUpPlan) -> str:

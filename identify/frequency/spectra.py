@@ -16,7 +16,7 @@ from rig.recording.run import Array
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 TRUSTED = 0.8  # coherence below which a line is drawn pale
-VAGUE = 0.25  # relative error of the gain (2 dB) above which it is drawn pale as well
+LARGEST_GAIN_ERROR = 0.25  # relative error of the gain (2 dB) above which it is drawn pale as well
 EXCITED = 1e-4  # of the strongest line's power (-40 dB): what lies below is not excited
 MOST = 240  # lines of one response
 SPARSE = 0.5  # share of the bins of a band below which its lines stand apart
@@ -75,8 +75,8 @@ class Response:
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
-        """Lines whose coherence reaches ``TRUSTED`` and whose error stays below ``VAGUE``, shape (m,)."""
-        return np.asarray((self.coherence >= TRUSTED) & (self.relative_error <= VAGUE))
+        """Lines whose coherence reaches ``TRUSTED`` and whose error stays below ``LARGEST_GAIN_ERROR``, shape (m,)."""
+        return np.asarray((self.coherence >= TRUSTED) & (self.relative_error <= LARGEST_GAIN_ERROR))
 
 
 def decibel(response: Complex) -> Array:

@@ -1,1 +1,1 @@
-"""What the user gets: the summary on the terminal, the files of the results folder, the page."""
+"""The results for the user: terminal summary, files of the results folder, report page."""

@@ -28,7 +28,7 @@ from identify.results import (
     Verdict,
     follow_up_file_name,
 )
-from identify.wording import bent_percent
+from identify.wording import bias_percent
 from rig.config.model import model_yaml
 from rig.platform import Platform
 from rig.recording.hdf5 import write_recording_h5
@@ -63,7 +63,7 @@ def result_json(identification: Identification) -> dict[str, Any]:
         "max_error_percent": identification.max_error_percent,
         "dropped": _listed(final.dropped),
         "not_determined": _listed(final.not_determined),
-        "bent_percent": bent_percent(identification),
+        "bias_percent": bias_percent(identification),
         "genetic": _genetic(identification.joint) if identification.joint else None,
         "holdout": identification.holdout_note,
         "follow_up": _follow_up(identification) if identification.follow_up else None,
@@ -210,9 +210,11 @@ def model_text(identification: Identification, declared: Platform, inertia_decla
         "`simulated.platform:` for a twin of the rig.",
     ]
     if not identification.accepted:
-        lines.append("NOT ACCEPTED: see result.json and report.html before you build on it.")
+        lines.append("NOT ACCEPTED: read report.html before you use this model.")
     if identification.axis == "linear":
-        lines.append("Linear axis: kg, N s/m and N/m stand where the keys say kg m^2, N m s/rad and N m/rad.")
+        lines.append(
+            "Linear axis: the values are in kg, N s/m and N/m although the keys say kg m^2, N m s/rad and N m/rad."
+        )
     if identification.torque_free:
         lines += _scale_lines(declared, inertia_declared)
     lines += [f"Dropped: {item.name}: {item.reason}" for item in final.dropped]
@@ -226,13 +228,15 @@ def _scale_lines(declared: Platform, inertia_declared: bool) -> list[str]:
     if inertia_declared:
         return [
             "No torque was recorded, so only ratios to the inertia are known: the declared inertia sets the scale.",
-            f"All other values are right only as far as the declared inertia of {declared.inertia_kg_m2:g} is.",
+            f"All other values are in proportion to the declared inertia of {declared.inertia_kg_m2:g} kg m^2 and "
+            "share its error.",
         ]
     return [
         "ONLY RATIOS TO THE INERTIA ARE KNOWN: no torque was recorded and no inertia declared (model.inertia_kg_m2).",
-        "All values below are per unit of inertia. They replay the decay but do not say what a torque would move:",
-        "`backend: bench` refuses it. Declare the inertia and identify again, or multiply by it all in N m (N m s/rad,",
-        "...), set inertia_kg_m2 to it and take inertia_unknown out.",
+        "All values below are per unit of inertia. They reproduce the decay but not the response to a torque:",
+        "`backend: bench` refuses this model. Declare the inertia and identify again; or multiply all values in N "
+        "m (N m s/rad,",
+        "...) by the inertia, set inertia_kg_m2 to it and remove inertia_unknown.",
     ]
 
 
@@ -240,7 +244,10 @@ def _standing(item: NotReported) -> str:
     """What the number of a parameter is that the data do not determine."""
     if item.as_declared:
         return "Not determined, kept as declared"
-    return "Not determined, NOT as declared: fitted, valid only with the other values and for motion like in these runs"
+    return (
+        "Not determined, NOT as declared: a fitted value, valid only together with the other values and for similar "
+        "motion"
+    )
 
 
 def write_results(

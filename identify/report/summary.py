@@ -18,12 +18,11 @@ from identify.follow_up.wording import lines as follow_up_lines
 from identify.results import Identification, ParameterEstimate
 from identify.wording import (
     SYMBOLS,
-    bent_percent,
+    bias_percent,
     declared_number,
-    errors_in_turn,
-    not_reported,
+    errors_by_model,
+    not_said_yet,
     number,
-    pairs,
     percent,
     plain,
     printable,
@@ -66,8 +65,7 @@ def summary(
 
 
 def _whole(identification: Identification, info: Mapping[str, Any]) -> Group:
-    final, verdict = identification.final, identification.verdict
-    floor = identification.noise_floor
+    final, verdict, floor = identification.final, identification.verdict, identification.noise_floor
     note = printable(sentence(identification.holdout_note))
     parts: list[RenderableType] = [
         *_listed("Verdict", verdict.sentences, bullet=""),
@@ -77,9 +75,8 @@ def _whole(identification: Identification, info: Mapping[str, Any]) -> Group:
         _errors(identification),
         Padding(Text(f"The noise floor is {floor.source}. {note}"), (0, 0, 0, 2)),
         *_listed("Torque delay", delay_lines(identification, info), bullet=""),
-        *_listed("Dropped: not supported by the data", not_reported(final.dropped)),
-        *_listed("Not determined by these data", not_reported(final.not_determined)),
-        *_listed("Cannot be distinguished on these data", pairs(verdict.confusable_with)),
+        *_listed("Dropped: not supported by the data", not_said_yet(final.dropped, identification)),
+        *_listed("Not determined by these data", not_said_yet(final.not_determined, identification)),
         *_listed("Follow-up", follow_up_lines(identification.follow_up) if identification.follow_up else ()),
     ]
     if identification.per_set:
@@ -96,7 +93,7 @@ def _listed(heading: str, lines: Sequence[str], bullet: str = "- ") -> list[Rend
 
 def _outcome(identification: Identification) -> list[RenderableType]:
     if identification.aborted:
-        head = Text("ABORTED: this is what the samples recorded until then say.", style="bold red")
+        head = Text("ABORTED: these results use only the samples recorded before the stop.", style="bold red")
     elif identification.accepted:
         head = Text("ACCEPTED", style="bold green")
     else:
@@ -121,7 +118,7 @@ def _table(heading: str, columns: Sequence[str], words: Sequence[int] = (0,)) ->
 
 
 def _parameters(identification: Identification) -> Table:
-    before, after, bent = identification.before, identification.after, bent_percent(identification)
+    before, after, bent = identification.before, identification.after, bias_percent(identification)
     names = list(dict.fromkeys([*before.parameters, *(after.parameters if after else ())]))
     given = ["declared"] if identification.declared else []
     head = ["", *given, "declared model", *(["off by", "final model"] if after else []), "unit"]
@@ -150,7 +147,7 @@ def _estimate(estimate: ParameterEstimate | None) -> str:
 
 
 def _errors(identification: Identification) -> Table:
-    models = errors_in_turn(identification)
+    models = errors_by_model(identification)
     floor = identification.noise_floor
     linear = identification.axis == "linear"
     angle = bool(identification.traces) and identification.traces[0].channel == "angle"
@@ -161,14 +158,16 @@ def _errors(identification: Identification) -> Table:
         (f"held-out {channel}, free run", "holdout_rate_rms", floor.holdout_rate_rms, channel_unit),
         ("held-out fit", "holdout_fit_percent", None, "%"),
         (f"{torque} residual", "residual_rms_torque", floor.residual_rms_torque, torque_unit),
-        (f"{torque} residual / {torque}, held out", "holdout_torque_relative", None, ""),
+        (f"{torque} residual / {torque}, held out", "holdout_torque_relative", None, "%"),
     ]
     head = ["", *models, "noise floor", "unit"]
     table = _table("Error", head, words=(0, len(head) - 1))
     for words, key, least, its_unit in kinds:
         values = [getattr(error, key) for error in models.values()]
         if any(value is not None for value in values):
-            table.add_row(words, *[number(value) for value in values], number(least), its_unit)
+            times = 100.0 if key.endswith("_relative") else 1.0
+            shown = [number(None if value is None else times * value) for value in values]
+            table.add_row(words, *shown, number(least), its_unit)
     return table
 
 

@@ -70,9 +70,9 @@ class AmplifierConfig(Section):
 
 
 class RealTimeConfig(Section):
-    """How hard to hold the tick. ``priority: 0`` asks for none; what was got is said and recorded.
+    """Real-time scheduling of the loop. ``priority: 0`` requests none; what was granted is reported and recorded.
 
-    ``spin_us`` before each deadline are spent looking at the clock instead of asleep.
+    ``spin_us`` before each deadline are spent polling the clock instead of sleeping.
     """
 
     priority: Annotated[int, Field(ge=0, le=90)] = 50
@@ -83,8 +83,8 @@ class RealTimeConfig(Section):
 class ProbeConfig(Section):
     """The small pulses between arming and the first set (docs/safety.md).
 
-    ``play: false`` leaves them out. ``torque_nm`` is the most that a pulse may have; where left out, three tenths
-    of the largest torque of the campaign. ``inertia_factor``: the declared inertia may be wrong by so much either way.
+    ``play: false`` omits them. ``torque_nm``: largest torque of a pulse; if absent, 0.3 times the largest torque of
+    the campaign. ``inertia_factor``: factor by which the declared inertia may be wrong, up or down.
     """
 
     play: bool = True
@@ -93,9 +93,9 @@ class ProbeConfig(Section):
 
 
 class InjectedFault(Section):
-    """A fault that takes hold of the emulated devices ``after_s`` the drive was enabled, for ``lasts_s``.
+    """A fault of the emulated devices: it begins ``after_s`` after the drive is enabled and lasts ``lasts_s``.
 
-    ``value`` is what the fault is about, where it is about a number; docs/devices/emulators.md lists them.
+    ``value`` is the number that some faults need; docs/devices/emulators.md lists them.
     """
 
     fault: Annotated[str, Field(min_length=1, max_length=80)]
@@ -105,7 +105,7 @@ class InjectedFault(Section):
 
 
 class EmulatorConfig(Section):
-    """The devices that `rig emulate` and `--emulate` put in the place of the real ones.
+    """The devices that `rig emulate` and `--emulate` use in place of the real ones.
 
     The platform, its undeclared effects and the gyro's noise are those of the `simulated` section.
     ``gyro_drift_ppm``, ``drive_drift_ppm``: their clocks against the host's. ``rated_torque_nm`` and
@@ -132,7 +132,7 @@ class BenchConfig(Section):
     ``settle_s`` is how long the gyro's clock is compared with the host's before anything moves. ``probe``: small
     pulses after arming.
     ``raw_capture`` keeps every byte and frame with its time in `raw/` of the results folder. ``replay``
-    names such a folder (relative to this yaml): it is played through the same drivers, no device is touched.
+    names such a folder (relative to this yaml): it is played through the same drivers; no device is contacted.
     """
 
     gyroscope: GyroscopeConfig = GyroscopeConfig()

@@ -22,7 +22,7 @@ class GeneticConfig(Section):
     elitism: bool = True
     shrinking_mutation: bool = True
     restarts: Annotated[int, Field(ge=0, le=1000)] = 5  # repeats at most while J >= J_dec (Eq. 14, Fig. 5)
-    search_factor: Annotated[float, Field(gt=1, le=1e6)] = 10.0  # range either way around the declared value
+    search_factor: Annotated[float, Field(gt=1, le=1e6)] = 10.0  # range above and below the declared value
     objective: Literal["white", "plain"] = "white"  # e(k) of Eq. 12 in rate units, or plain equation error
 
 
@@ -35,10 +35,10 @@ class ReferenceConfig(Section):
 
 
 class AcceptConfig(Section):
-    """How much may be left that depends on something, for a model to be accepted."""
+    """Limits of acceptance for the residual torque that depends on something."""
 
     torque_percent: Annotated[float, Field(gt=0, le=100)] = 5.0  # of the torque
-    inertia_percent: Positive = 2.0  # by which it may move J, C and K
+    inertia_percent: Positive = 2.0  # by which fitting it may change J, C and K
     damping_percent: Positive = 10.0
     stiffness_percent: Positive = 2.0
 

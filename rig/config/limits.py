@@ -10,13 +10,13 @@ from rig.config.base import Positive, Section
 
 
 class LimitsConfig(Section):
-    """Travel, rate and torque either way from rest, and how long the guard puts up with silence.
+    """Travel, rate and torque in both directions from rest, and time-outs; the guard trips beyond each of them.
 
-    ``stale_gyro_ms``: no valid sample for so long. ``frozen_gyro_ms``: bit-identical samples for so long
-    (null switches it off, for a simulated gyro without noise). ``missed_ticks``: so many in a row.
-    ``stall_ms``: a single tick later than this, be it a stalled process or a clock that jumped.
-    ``motion_check``: whether the motion is held against the torque (jumps, a wrong sign, nothing that moves).
-    ``standstill_torque_nm``: the torque may change by so much without any motion; where left out, 1.3 times the
+    ``stale_gyro_ms``: longest time without a valid sample. ``frozen_gyro_ms``: longest time with bit-identical
+    samples (null switches it off, for a simulated gyro without noise). ``missed_ticks``: number in a row.
+    ``stall_ms``: largest lateness of a single tick (a stalled process or a clock that jumped).
+    ``motion_check``: whether the motion is compared with the torque (jumps, a wrong sign, no motion).
+    ``standstill_torque_nm``: largest change of torque without any motion; if absent, 1.3 times the
     set's largest torque, but not less than 0.2 nor more than 0.4 of ``torque_nm``.
     ``drive_temperature_c``, ``drive_current_a``: of drives that report them.
     """

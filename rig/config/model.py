@@ -24,7 +24,7 @@ class ModelConfig(Section):
     damping_nm_s_rad: float = 0.045
     stiffness_nm_rad: float = 677.3
     terms: tuple[Term, ...] = TERMS  # type: ignore[assignment]
-    inertia_unknown: bool = False  # all numbers are per unit of an inertia that nobody gave: of a decay without torque
+    inertia_unknown: bool = False  # all values are per unit of inertia: of a decay without torque
     effects_from: tuple[Annotated[str, Field(min_length=1, max_length=4096)], ...] = ()  # files with effects of yours
     # What its effects read besides angle, rate and torque; stands before them, who are checked against it.
     channels: Annotated[Mapping[str, ModelChannel], AfterValidator(check_channels)] = Field(default_factory=dict)
@@ -36,7 +36,7 @@ class ModelConfig(Section):
         if len(set(terms)) != len(terms):
             raise ValueError("a term is listed twice: name each of inertia, damping, stiffness once")
         if "inertia" not in terms:
-            raise ValueError("inertia has to stay: without it there is no motion to simulate; leave out others")
+            raise ValueError("inertia is required: without it no motion can be simulated; leave out other terms")
         return terms
 
     @property

@@ -54,7 +54,7 @@ class ChannelColumn(ChannelConfig):
     @classmethod
     def _not_zero(cls, factor: float) -> float:
         if factor == 0:
-            raise ValueError("a factor of 0 erases the column: give the factor to the channel's unit")
+            raise ValueError("a factor of 0 erases the column: give the factor that converts to the channel's unit")
         return factor
 
 
@@ -93,7 +93,10 @@ class Scale(Section):
     @classmethod
     def _not_zero(cls, factor: float) -> float:
         if factor == 0:
-            raise ValueError("a factor of 0 erases the column: give the factor to SI units, e.g. 0.0174533")
+            raise ValueError(
+                "a factor of 0 erases the column: give the factor that converts to SI units, e.g. 0.0174533 from "
+                "degrees"
+            )
         return factor
 
 
@@ -120,7 +123,7 @@ class RecordedConfig(Section):
     @model_validator(mode="after")
     def _something_to_fit(self) -> Self:
         if all(run.use == "holdout" for run in self.runs):
-            raise ValueError("every run says use: holdout, so nothing is left to fit: mark one use: fit")
+            raise ValueError("all runs have use: holdout, so there is nothing to fit: set use: fit for at least one")
         return self
 
     def min_rate_of(self, run: RecordedRun) -> float:

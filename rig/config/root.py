@@ -41,7 +41,7 @@ class Config(Section):
     @classmethod
     def _name_fits_a_folder(cls, name: str) -> str:
         if not name.isprintable() or _NOT_IN_A_NAME.search(name) or name != name.strip(" ."):
-            raise ValueError("becomes part of a folder's name: use letters, digits, spaces, - _ . inside it")
+            raise ValueError("is used as the name of a folder: use letters, digits, spaces, - _ . inside it")
         return name
 
     @field_validator("model")
@@ -49,9 +49,9 @@ class Config(Section):
     def _torque_needs_an_inertia(cls, model: ModelConfig, info: ValidationInfo) -> ModelConfig:
         if model.inertia_unknown and info.data.get("backend") == "bench":
             raise ValueError(
-                "inertia_unknown is true: its numbers are per unit of an inertia that nobody gave, so what a torque "
-                "would move cannot be predicted; multiply damping, stiffness and all that is in N m (N m s/rad, "
-                "...) by the platform's inertia, set inertia_kg_m2 to it and take inertia_unknown out"
+                "inertia_unknown is true: the values of this model are per unit of inertia, so the motion under a "
+                "torque cannot be predicted. Multiply all values in N m (N m s/rad, ...), damping and stiffness "
+                "included, by the platform's inertia, set inertia_kg_m2 to it and remove inertia_unknown"
             )
         return model
 

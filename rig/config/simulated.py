@@ -88,10 +88,10 @@ class SimulatedConfig(Section):
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
 
     @model_validator(mode="after")
-    def _stays_put(self) -> Self:
+    def _is_stable(self) -> Self:
         for key in ("damping_nm_s_rad", "stiffness_nm_rad"):
             if getattr(self.platform, key) < 0:
-                raise ValueError(f"platform.{key} is negative: such a platform runs away by itself")
+                raise ValueError(f"platform.{key} is negative: such a platform is unstable; give 0 or more")
         inertia = self.platform.inertia_kg_m2
         resonance_hz = math.sqrt(self.platform.stiffness_nm_rad / inertia) / (2 * math.pi)
         decay_hz = self.platform.damping_nm_s_rad / inertia / (2 * math.pi)

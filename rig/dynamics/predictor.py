@@ -1,4 +1,4 @@
-"""The motion one sample ahead: simulated, and corrected at every sample by what was measured there (compiled).
+"""One-step prediction of the motion: simulated, and corrected at every sample (Kalman filter, compiled).
 
 A torque that nobody recorded (current ripple, the floor, a cable) sets a simulated platform off for good. A Kalman
 filter in innovations form takes it up: the nonlinear simulator predicts each sample from the one before, the

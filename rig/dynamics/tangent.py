@@ -1,4 +1,4 @@
-"""A motion's neighbourhood to first order: what a small torque, or another start, adds to it.
+"""Linearised motion: the first-order change by a small torque or another initial state.
 
 Around a motion that runs smoothly the equation of motion is linear with coefficients that follow the motion. One pass
 over it reads them off; from then on every small change costs a product of small matrices a step, not a simulation.

@@ -1,4 +1,4 @@
-"""The torque between its samples: what happens there biases J, C and K by more than the sensor's noise."""
+"""The torque between its samples (held or band-limited)."""
 
 from __future__ import annotations
 

@@ -101,7 +101,7 @@ def read_file(path: Path, known: Collection[str]) -> str:
     if held and all(f.text == text for f in held):
         return text
     if held:
-        raise ConfigError(f"{path} has changed since it was read: start the program anew")
+        raise ConfigError(f"{path} has changed since it was read: start the program again")
     for effect in _effects_in(path):
         taken = effect.name in known or effect.name in installed() or effect.name in _FILES
         fault = f"the name {effect.name!r} is taken: give it another" if taken else ""
@@ -124,7 +124,7 @@ def _effects_in(path: Path) -> list[Effect]:
         raise ConfigError(f"{path}{_line_in(error, path)}: {_said(error)}") from error
     found = list(getattr(module, "EFFECTS", ())) or [getattr(module, "EFFECT", None)]
     if found == [None]:
-        raise ConfigError(f"{path} holds no effect: give it a line `EFFECT = Effect(...)`, or `EFFECTS = (..., ...)`")
+        raise ConfigError(f"{path} defines no effect: add a line `EFFECT = Effect(...)`, or `EFFECTS = (..., ...)`")
     for effect in found:
         fault = _fault(effect)
         if fault:
@@ -145,7 +145,7 @@ def _fault(effect: Any) -> str:
     if not given or len(set(given)) < len(given):
         return "needs at least one parameter, and every parameter a name of its own"
     if searched:
-        return f"parameter {searched[0]} is not linear, so it is searched for: give it `start=`, where to begin"
+        return f"parameter {searched[0]} is not linear, so the fit needs an initial value: give it `start=`"
     if getattr(effect.kernel, "_sig", None) != wanted:
         return f"its kernel has to be decorated with @{'filter_kernel' if filters else 'kernel'} of rig.effects"
     return ""

@@ -1,4 +1,4 @@
-"""Up to which travel the torque of gravity cannot be told from that of a polynomial spring."""
+"""The travel up to which the torque of gravity cannot be separated from a polynomial spring."""
 
 from __future__ import annotations
 

@@ -30,8 +30,8 @@ EFFECT = Effect(
     equation="T = sine * sin(th) + cosine * cos(th)",
     source="m g r sin(th + phase), expanded",
     meaning="The load is not balanced: gravity turns its centre of mass towards the lowest point.",
-    sign="Resisting, like K th: sine > 0 if the load hangs down at th = 0. Within a small travel sine cannot be told "
-    "from K.",
+    sign="Resisting, like K th: sine > 0 if the load hangs down at th = 0. Within a small travel sine cannot be "
+    "separated from K.",
     parameters=(
         Parameter("sine", "N*m", "m g r cos(phase)", linear=True, low=-float("inf"), suffix="nm"),
         Parameter("cosine", "N*m", "m g r sin(phase)", linear=True, low=-float("inf"), suffix="nm"),

@@ -1,4 +1,4 @@
-"""What a guard sees of a tick, what it says when a limit is broken, and what every single check is."""
+"""The interface of the guard: what it sees of a tick, a trip, and a single check."""
 
 from __future__ import annotations
 

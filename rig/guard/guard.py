@@ -1,4 +1,4 @@
-"""The guard: looks at every tick before and after its exchange, and says when to stop.
+"""The guard: checks every limit before and after the exchange of each tick, and trips.
 
 A pure state machine: no clock, no device. Each limit is one small check, so that a new one is a class and
 a line in ``CHECKS``. The first broken limit is the verdict; taking the torque off is the sequencer's.
@@ -39,7 +39,7 @@ class MissedTicks(Check):
             return None
         return self._trip(
             "missed ticks in a row (limits.missed_ticks)", self._in_a_row, self._limits.missed_ticks, "ticks",
-            tick.now_s, "This machine does not keep up: lower excitation.sample_rate_hz or free the processor.",
+            tick.now_s, "This computer is too slow: lower excitation.sample_rate_hz, or stop other programs.",
         )  # fmt: skip
 
 
@@ -68,10 +68,13 @@ class StaleGyro(Check):
 
     def _advice(self, period_s: float) -> str:
         if self._late_s <= period_s:
-            return "No valid gyro sample arrived: check the cable and supply, and whether the rate left the full scale."
+            return (
+                "No valid gyro sample arrived: check the cable and supply, and whether the rate exceeded the full "
+                "scale."
+            )
         return (
-            f"This machine does not keep up: it was {self._late_s * 1e3:.1f} ms late since the last valid sample. "
-            "Free the processor; if it recurs on a machine that keeps up, check the gyro's cable and supply."
+            f"This computer is too slow: it was {self._late_s * 1e3:.1f} ms late since the last valid sample. Stop "
+            "other programs; if it happens again without delays, check the gyro's cable and supply."
         )
 
 
@@ -173,11 +176,11 @@ class Travel(Check):
         if travel_deg <= self._limits.travel_deg:
             return None
         return self._trip(
-            f"travel (limits.travel_deg; {bound_deg:.2g} deg of it is what the gyro may have drifted)",
+            f"travel (limits.travel_deg; {bound_deg:.2g} deg of it is possible drift of the gyro)",
             travel_deg, self._limits.travel_deg, "deg", time_s,
-            "Lower torque_nm or excitation.margin; the declared model may be too stiff. Travel counts from where the "
-            "campaign began: without a spring every set begins where the one before left the platform, and what "
-            "the gyro may have drifted is large where the rest was too short for it to stop (excitation.rest_s).",
+            "Lower torque_nm or excitation.margin; the declared model may be too stiff. Travel is measured from the "
+            "start of the campaign: without a spring, each set starts where the previous one ended. If the gyro drift "
+            "is large, the platform may not have come to rest: lengthen excitation.rest_s.",
         )  # fmt: skip
 
 
@@ -191,7 +194,7 @@ class MeasuredTorque(Check):
             if not abs(torque_nm) <= allowed * MEASURED_TORQUE_EXCESS:
                 return self._trip(
                     "applied torque (limits.torque_nm)", abs(torque_nm), allowed, "N m", time_s,
-                    "The drive applied more than it was asked for: check its torque units and rated torque.",
+                    "The drive applied more torque than commanded: check its torque units and rated torque.",
                 )  # fmt: skip
         return None
 
@@ -239,7 +242,8 @@ class Guard:
             return Trip(
                 "stall or clock jump (limits.stall_ms)", late_s * 1e3, self._stall_s * 1e3, "ms late",
                 now_s - self._start_s,
-                "The campaign does not resume after a stall. Find what stopped this program, then start again.",
+                "The campaign does not resume after a stall. Find the cause (system load, standby, clock "
+                "adjustment), then start again.",
             )  # fmt: skip
         if abs(torque_nm) <= self._torque_nm:
             return None

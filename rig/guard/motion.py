@@ -1,4 +1,4 @@
-"""Is the motion one that the torque could have made? Checks that need little of the declared model.
+"""Implausible motion: jumps, returned work and standstill that no torque explains, almost without the declared model.
 
 What is declared may be wrong by a factor of two in inertia and stiffness, and may lack any friction, play or delay;
 a lightly damped resonance is no fault. So nothing here compares with a predicted rate. Held on to is only what holds
@@ -89,13 +89,13 @@ class Jump(Check):
         for time_s, rate, valid in tick.gyro:
             if not valid or (self._last is not None and time_s <= self._last[0]):
                 continue
-            trip = self._bend(time_s, rate, step_nm)
+            trip = self._check_acceleration(time_s, rate, step_nm)
             self._older, self._last = self._last, (time_s, rate)
             if trip is not None:
                 return trip
         return None
 
-    def _bend(self, time_s: float, rate: float, step_nm: float) -> Trip | None:
+    def _check_acceleration(self, time_s: float, rate: float, step_nm: float) -> Trip | None:
         """The acceleration before and after the middle sample differ by what a change of torque makes, no more."""
         if self._older is None or self._last is None or time_s - self._older[0] > LONGEST_GAP_S:
             return None
@@ -111,8 +111,8 @@ class Jump(Check):
         jump, most = (math.degrees(x * second_s) for x in (abs(after - before), allowed))
         return self._trip(
             "implausible jump of the rate (limits.motion_check)", jump, most, "deg/s", time_s,
-            "No torque does that from one sample to the next: check the gyro, its cable and supply, and for an impact "
-            "on an end stop.",
+            "The torque cannot change the rate so fast: check the gyro, its cable and supply, and the end stops for "
+            "an impact.",
         )  # fmt: skip
 
 
@@ -176,7 +176,8 @@ class WrongSign(Check):
         if missing <= allowed:
             return None
         return self._trip(
-            "torque and rate have opposite signs: the platform returned work that was not put in (limits.motion_check)",
+            "torque and rate have opposite signs: the platform returned more work than was put in "
+            "(limits.motion_check)",
             missing, allowed, "J", time_s,
             "Check bench.amplifier.invert and bench.gyroscope.invert, and the coupling of gyro and motor to the shaft.",
         )  # fmt: skip
@@ -224,8 +225,10 @@ class Standstill(Check):
             return None
         return self._trip(
             "torque changed while nothing moved (limits.standstill_torque_nm)", self._high - self._low, allowed, "N m",
-            time_s, "Is a brake on, the platform stuck, or the gyro off its shaft? Where friction is that large, raise "
-            "the limit.",
+            time_s, (
+                "Check for an applied brake, a stuck platform, or a gyro that is loose on its shaft. If friction is "
+                "really that large, raise the limit."
+            ),
         )  # fmt: skip
 
     def _allowed_nm(self) -> float:

@@ -1,4 +1,4 @@
-"""Limits on what only some rigs report: temperature and current of the drive, the angle of an encoder."""
+"""Limits on readings that only some rigs have: temperature and current of the drive, angle of an encoder."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class DriveCurrent(Reading):
     """The motor's current."""
 
     channel, key, unit = "drive_current_a", "drive_current_a", "A"
-    what, cure = "current of the drive", "Lower torque_nm, or check the torque constant that is declared."
+    what, cure = "current of the drive", "Lower torque_nm, or check the declared torque constant."
 
 
 class EncoderTravel(Check):
@@ -58,7 +58,7 @@ class EncoderTravel(Check):
         if angle_rad is None:
             return None
         if not math.isfinite(angle_rad):
-            return self._unheard(tick.now_s)
+            return self._check_silence(tick.now_s)
         self._heard_s = tick.now_s
         if self._rest_rad is None:
             self._rest_rad = angle_rad
@@ -70,7 +70,7 @@ class EncoderTravel(Check):
             "Lower torque_nm or excitation.margin; the declared model may be too stiff.",
         )  # fmt: skip
 
-    def _unheard(self, now_s: float) -> Trip | None:
+    def _check_silence(self, now_s: float) -> Trip | None:
         if self._heard_s is None:
             self._heard_s = now_s
         silent_s = now_s - self._heard_s
@@ -78,7 +78,7 @@ class EncoderTravel(Check):
             return None
         return self._trip(
             "no angle from the encoder", 1e3 * silent_s, 1e3 * LONGEST_WITHOUT_S, "ms", now_s,
-            "Its readings are not numbers: check its cable and supply.",
+            "The encoder delivers no numbers: check its cable and supply.",
         )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Does the motion follow the torque, or the torque turned round?
+"""Reversed sign: whether the measured rate or the reversed one explains the torque.
 
 A sign that turns in the middle of a set, well below resonance, leaves rate and travel within their limits, and the work
 that it fakes is less than what an undeclared delay may fake. What it cannot fake is the platform: through one low-pass
@@ -151,10 +151,10 @@ class ReversedSign(Check):
         if self._count < BLOCKS_IN_A_ROW:
             return None
         return self._trip(
-            "torque and rate have opposite signs: only a platform of reversed sign explains the torque "
-            "(limits.motion_check)", 1e2 * upright, 1e2 * allowed, "% left unexplained", time_s,
-            "Did a connector come loose or a setting change? Check bench.amplifier.invert and bench.gyroscope.invert. "
-            "If both are right, model.inertia_kg_m2 and model.stiffness_nm_rad are far off.",
+            "torque and rate have opposite signs: only the reversed rate explains the torque (limits.motion_check)",
+            1e2 * upright, 1e2 * allowed, "% left unexplained", time_s,
+            "Check the connectors, bench.amplifier.invert and bench.gyroscope.invert. If they are right, correct "
+            "model.inertia_kg_m2 and model.stiffness_nm_rad.",
         )  # fmt: skip
 
     def _remember(self, time_s: float) -> None:

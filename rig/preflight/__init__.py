@@ -1,6 +1,5 @@
 """Pre-flight: what every set would do to the declared platform, before anything moves."""
 
-from rig.preflight.forecast import Peaks
 from rig.preflight.prediction import (
     Prediction,
     allowed_peaks,
@@ -11,6 +10,7 @@ from rig.preflight.prediction import (
     predict,
     predict_all,
 )
+from rig.preflight.simulated_sets import Peaks
 
 __all__ = [
     "Peaks",

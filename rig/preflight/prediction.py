@@ -16,7 +16,7 @@ from rig.config.limits import LimitsConfig
 from rig.errors import PreflightRefusal
 from rig.excitation import PlannedSet, planned
 from rig.platform import Platform
-from rig.preflight.forecast import Peaks, SetForecast, SetSequence, has_no_restoring_spring, largest_factor
+from rig.preflight.simulated_sets import Peaks, SetForecast, SetSequence, has_no_restoring_spring, largest_factor
 
 SMALLEST_REPORTED_DEG = 0.005  # half of the last digit shown
 LIMIT_KEYS = ("limits.travel_deg", "limits.rate_deg_s", "limits.torque_nm")
@@ -70,21 +70,21 @@ class Prediction:
         """One line for the operator."""
         motion = self._describe_motion()
         if self.passes:
-            return f"{motion}: within the limits"
+            return f"{motion}, within the limits"
         most = f"At most {self._allowed_torque} is allowed" if self.scale > 0 else "No torque is small enough"
         if not self.broken:
-            return f"{motion}: within the limits alone, but not after the sets before it. {most}"
-        return f"{motion}: exceeds {self._describe_broken()}. {most}"
+            return f"{motion}, within the limits for the set alone but not after the sets before it. {most}"
+        return f"{motion}. This exceeds {self._describe_broken()}. {most}"
 
     def describe_as_played(self) -> str:
         """The same line of a set that is played with the torque that is allowed."""
         if self.passes or self.scale <= 0:
             return self.describe()
         broken = [name for (name, _), key in zip(_UNITS, self.keys, strict=True) if key in self.broken]
-        limits = f"the {' and '.join(broken)} limit{'s' if len(broken) > 1 else ''}" if broken else "the limits"
-        reason = f"exceeds {self._describe_broken()}" if broken else "too far after the sets before it"
+        limits = f"the {_joined(broken)} limit{'s' if len(broken) > 1 else ''}" if broken else "the limits"
+        reason = f"This exceeds {self._describe_broken()}" if broken else "This is too much after the sets before it"
         return (
-            f"{self._describe_motion()}: {reason}. Reduced to {self._allowed_torque} ({100 * self.scale:.1f} %) "
+            f"{self._describe_motion()}. {reason}. Reduced to {self._allowed_torque} ({100 * self.scale:.1f} %) "
             f"to stay within {limits}."
         )
 
@@ -94,8 +94,8 @@ class Prediction:
 
     def _describe_motion(self) -> str:
         text = (
-            f"{self.planned.name}: {self.peaks.torque_nm:.1f} N m would travel {self.peaks.travel_deg:.2f} deg "
-            f"at up to {self.peaks.rate_deg_s:.0f} deg/s"
+            f"{self.planned.name}: {self.peaks.torque_nm:.1f} N m would move the platform by "
+            f"{self.peaks.travel_deg:.2f} deg at up to {self.peaks.rate_deg_s:.0f} deg/s"
         )
         if abs(self.starts_deg) >= SMALLEST_REPORTED_DEG:
             text += f", starting {self.starts_deg:.2f} deg from the start of the campaign"
@@ -104,19 +104,24 @@ class Prediction:
     def _describe_broken(self) -> str:
         units = zip(_UNITS, self.allowed, self.keys, strict=True)
         broken = [
-            f"the {name} limit of {limit:g} {unit} ({key}{'' if key in LIMIT_KEYS else ', the full scale of the gyro'})"
+            f"the {name} limit of {limit:g} {unit} ({key}{'' if key in LIMIT_KEYS else ', full scale of the gyro'})"
             for (name, unit), limit, key in units
             if key in self.broken
         ]
-        return " and ".join(broken)
+        return _joined(broken)
 
 
 _UNITS = (("travel", "deg"), ("rate", "deg/s"), ("torque", "N m"))
 
 
+def _joined(words: Sequence[str]) -> str:
+    """ "a", "a and b", "a, b and c"."""
+    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
+
+
 def _rounded_down(value: float) -> str:
-    """Five figures that do not exceed the value: what is printed must itself pass."""
-    digits = max(0, 4 - math.floor(math.log10(value)))
+    """Four digits that do not exceed the value: the printed torque must itself pass."""
+    digits = max(0, 3 - math.floor(math.log10(value)))
     return f"{math.floor(value * 10**digits) / 10**digits:.{digits}f}"
 
 
@@ -266,7 +271,7 @@ def model_hint(platform: Platform) -> str:
         )
     if platform.stiffness_nm_rad == 0:
         return (
-            "The declared model has no stiffness, so a torque that starts as a sine leaves the platform "
-            "drifting. Lower the torque, shorten duration_s, or declare model.stiffness_nm_rad if there is one."
+            "The declared model has no stiffness, so a sine torque leaves the platform drifting. "
+            "Lower the torque, shorten duration_s, or declare model.stiffness_nm_rad if the platform has a spring."
         )
     return ""

@@ -1,4 +1,4 @@
-"""Do angle, rate and time agree about what a second and a radian are?"""
+"""Whether angle, rate and time agree: units, signs, swapped columns."""
 
 from __future__ import annotations
 
@@ -131,5 +131,5 @@ def check_time_unit(run: Run, path: Path) -> None:
     raise RecordingError(
         f"{path}: samples are {step:g} s apart (median), too coarse to follow a platform: the time looks like "
         f"{unit}: set recorded.scale.time: {factor:.9f}".rstrip("0")
-        + "; if it is in seconds, say so with recorded.scale.time: 1"
+        + "; if it is in seconds, set recorded.scale.time: 1"
     )

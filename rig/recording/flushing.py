@@ -1,4 +1,4 @@
-"""Work that is done again and again beside a control loop, which must never wait for a disk."""
+"""Periodic writing and syncing to disk, in threads of their own: the control loop must never wait for a disk."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 WRITE_EVERY_S = 0.025
 SYNC_EVERY_S = 0.04
-"""What a kill costs is what waits to be written; what a power cut costs is what waits to be synced as well."""
+"""A kill loses what is not yet written; a power cut loses what is not yet synced as well."""
 
 
 class Repeating:

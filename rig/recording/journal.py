@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 from rig.errors import Aborted
 from rig.recording.flushing import SYNC_EVERY_S, WRITE_EVERY_S, Repeating, sync_folder
-from rig.recording.steady import SteadyFile
+from rig.recording.tail_file import TailedFile
 
 MARKER = b"ISPJ"
 FRAME_HEAD = struct.Struct("<4sB3xII")
@@ -62,7 +62,7 @@ class Journal:
     it, a thread writes and forces the data to the disk, and the control loop never waits for either.
     """
 
-    def __init__(self, file: SteadyFile, flush_interval_s: float, clock: Callable[[], float]) -> None:
+    def __init__(self, file: TailedFile, flush_interval_s: float, clock: Callable[[], float]) -> None:
         self.path = file.path
         self._file = file
         self._interval_s = flush_interval_s
@@ -94,7 +94,7 @@ class Journal:
         """
         path = Path(path)
         try:
-            file = SteadyFile(path)
+            file = TailedFile(path)
         except OSError as error:
             raise JournalError(f"cannot start journal {path}: {error.strerror}; choose another --out") from error
         journal = cls(file, flush_interval_s, clock)

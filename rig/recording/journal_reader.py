@@ -35,7 +35,7 @@ from rig.recording.journal import (
 from rig.recording.retiming import BEGUN_S, NO_RETIMING, Retiming, retimed, retiming_from_event
 from rig.recording.rows import increasing, on_samples
 from rig.recording.run import Recording, Run, printable
-from rig.recording.steady import opened
+from rig.recording.tail_file import opened
 
 RUN_META = (
     "torque_hold", "use", "min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "rate_corner_hz", "rate_delay_s",

@@ -56,18 +56,18 @@ def read_recording(loaded: LoadedConfig) -> Recording:
         runs += found
         sources += [path] * len(found)
     if not wrong:
-        wrong += _leaks(runs, sources)
+        wrong += _fitted_and_held_out(runs, sources)
     if wrong:
         raise RecordingError("\n".join(dict.fromkeys(wrong)))
     info = {"backend": "recorded", "files": [str(path) for path in sources], "config_text": loaded.text}
-    return Recording(_named_apart(runs), axis=section.axis, noise=section.noise, info=info)
+    return Recording(_with_unique_names(runs), axis=section.axis, noise=section.noise, info=info)
 
 
 def _expanded(folder: Path, file: str) -> Path:
     try:
         return folder / Path(file).expanduser()
     except RuntimeError as error:
-        raise RecordingError(f"{file}: ~ means no home folder here ({error}): give the whole path") from error
+        raise RecordingError(f"{file}: the home folder (~) is unknown ({error}): give the absolute path") from error
 
 
 def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> list[Run]:
@@ -196,7 +196,7 @@ def _window(run: Run, entry: RecordedRun, path: Path) -> Run:
     )
 
 
-def _leaks(runs: Sequence[Run], sources: Sequence[Path]) -> list[str]:
+def _fitted_and_held_out(runs: Sequence[Run], sources: Sequence[Path]) -> list[str]:
     """Stretches of one file that are both fitted and held out: their error would prove nothing."""
     wrong: list[str] = []
     for i, one in enumerate(runs):
@@ -206,13 +206,13 @@ def _leaks(runs: Sequence[Run], sources: Sequence[Path]) -> list[str]:
             start, end = max(one.time_s[0], other.time_s[0]), min(one.time_s[-1], other.time_s[-1])
             if start < end:
                 wrong.append(
-                    f"{sources[i]}: {start:g} to {end:g} s is both use: fit and use: holdout: "
-                    "set from_s and to_s so that the stretches do not overlap"
+                    f"{sources[i]}: {start:g} to {end:g} s has both use: fit and use: holdout: set from_s and to_s so "
+                    "that the two do not overlap"
                 )
     return wrong
 
 
-def _named_apart(runs: Sequence[Run]) -> tuple[Run, ...]:
+def _with_unique_names(runs: Sequence[Run]) -> tuple[Run, ...]:
     """Runs with names of their own, so that a table of them can be read; what steers a terminal is no part of them."""
     runs = [dataclasses.replace(run, name=printable(run.name)) for run in runs]
     names = [run.name for run in runs]

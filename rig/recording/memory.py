@@ -1,4 +1,4 @@
-"""A limit on what a library may take that believes whatever a file says of its own size."""
+"""A memory limit around a library that trusts the sizes stated in a file."""
 
 from __future__ import annotations
 

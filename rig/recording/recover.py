@@ -1,4 +1,4 @@
-"""Mending what a kill or a power cut left of a results folder; nothing that stands there is changed.
+"""Recovery of a results folder after a kill or a power cut; existing files are not changed.
 
 The journals have everything that was written; recording.h5 is made of them at the end of a campaign, and is made
 here where it is absent, damaged or has less.
@@ -81,8 +81,8 @@ def _account(contents: JournalContents) -> str:
     notes = [] if contents.closed else [f"the program was killed: up to {UNWRITTEN_S:g} s before that were not written"]
     if contents.gaps:
         notes.append(
-            f"{contents.gaps} damaged stretch(es), {contents.stray_rows} row(s) behind them belong to no known run and "
-            "are left out"
+            f"{contents.gaps} damaged part(s); {contents.stray_rows} row(s) after them belong to no known run and are "
+            "left out"
         )
     if contents.unread_bytes:
         notes.append(f"{contents.unread_bytes} byte(s) lost: cut or damaged")
@@ -114,7 +114,8 @@ def _recording_of(contents: JournalContents, lines: list[str]) -> Recording:
             found = recording_from_journal(single).runs
         except (KeyError, TypeError, ValueError, IndexError) as error:
             lines.append(
-                f"  {source.name}: lost: its frames are intact but not in the format of this version ({error!r})"
+                f"  {source.name}: not recovered: its frames are intact but not in the format of this version "
+                f"({error!r})"
             )
             continue
         for run in found:
@@ -139,7 +140,7 @@ def _state_of_export(path: Path, expected: Recording) -> tuple[str, Recording | 
     here, wanted = _samples(found), _samples(expected)
     if here < wanted:
         return f"has {here} samples where the journals have {wanted}", None
-    return f"whole, {len(found.runs)} run(s), {here} samples", found
+    return f"complete, {len(found.runs)} run(s), {here} samples", found
 
 
 def _samples(recording: Recording) -> int:

@@ -42,7 +42,7 @@ def free_name(folder: Path, name: str) -> Path:
     for candidate in (path, *numbered):
         if not candidate.exists() and not candidate.is_symlink():
             return candidate
-    raise RecordingError(f"{path}: too many of them exist already: move some away")
+    raise RecordingError(f"{path}: too many numbered copies exist already: move some to another folder")
 
 
 def joined(parts: Sequence[JournalContents]) -> JournalContents | None:

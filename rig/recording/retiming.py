@@ -1,4 +1,4 @@
-"""Time stamps that were bettered afterwards: how they stand in a journal, and how they are applied.
+"""Corrected time stamps: how they are stored in a journal and applied.
 
 While it plays, a sample is stamped by what is known of the device's clock until then. When the campaign is over the
 rig may know better; then one event a set holds the points of a piecewise straight map from the recorded times to the

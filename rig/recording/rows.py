@@ -1,4 +1,4 @@
-"""Rows as they were measured, made fit for a Run: in order of time, slow channels on the samples' grid."""
+"""Measured rows made into a Run: sorted by time, slow channels on the grid of the samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a trip on travel or rate says of the declared model, where that stayed clear of the limit."""
+"""After a trip on travel or rate: which declared parameter may be wrong, if the prediction stayed within the limit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rig.errors import RigError, SafetyTrip
 from rig.excitation import PlannedSet
 from rig.guard import Trip
 from rig.platform import Platform
-from rig.preflight.forecast import Peaks, SetForecast, SetSequence, has_no_restoring_spring
+from rig.preflight.simulated_sets import Peaks, SetForecast, SetSequence, has_no_restoring_spring
 
 CLEARLY = 0.8  # of the limit: a prediction above it is within what a declared model is good for
 FACTOR = 2.0  # by which each declared number is changed, to see which of them makes the motion larger
@@ -36,11 +36,11 @@ def explained(
     """
     if not isinstance(error, SafetyTrip) or trip is None or declared is None or not sets:
         return error
-    sentence = suspicion(trip, declared, sets, rest_s)
+    sentence = suspected_parameter(trip, declared, sets, rest_s)
     return SafetyTrip(f"{error} {sentence}") if sentence else error
 
 
-def suspicion(trip: Trip, declared: Platform, sets: Sequence[PlannedSet], rest_s: float) -> str:
+def suspected_parameter(trip: Trip, declared: Platform, sets: Sequence[PlannedSet], rest_s: float) -> str:
     """Which declared number may be wrong, in a sentence; empty where the prediction is near the limit, too."""
     quantity = next((n for n in ("travel_deg", "rate_deg_s") if f"limits.{n}" in trip.limit), None)
     if quantity is None:
@@ -57,7 +57,7 @@ def suspicion(trip: Trip, declared: Platform, sets: Sequence[PlannedSet], rest_s
     }
     larger = {words: float(getattr(_peaks(p, sets, rest_s), quantity)) for words, p in others.items() if p != declared}
     suspects = [w for w in sorted(larger, key=lambda w: -larger[w]) if larger[w] > LARGER * predicted]
-    what = " or ".join(suspects[:NAMED]) or "the declared model may lack something"
+    what = " or ".join(suspects[:NAMED]) or "the declared model may lack an effect"
     return f"The declared model predicted at most {predicted:.3g} {trip.unit} in this set: {what}."
 
 

@@ -1,4 +1,4 @@
-"""One tick of the loop: permission, exchange with the devices, record, verdict; the torque off before all else."""
+"""One tick of the loop: check, exchange with the devices, record, check again; a fault takes the torque off first."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How late the ticks of a set were, counted in classes: the memory of a minute serves for a day."""
+"""Lateness of the ticks of a set, counted in classes, so that memory stays bounded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who is told how a campaign goes."""
+"""The interface for observers of a campaign (progress, display)."""
 
 from __future__ import annotations
 

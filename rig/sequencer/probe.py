@@ -1,4 +1,4 @@
-"""The probe: small pulses after arming, before any full torque, and what their answer says.
+"""The probe: small pulses after arming, before any full torque, to check sign and scale of torque and rate.
 
 Half a sine each, one way and the other, doubled until the platform answers clearly. From each answer follow all
 inertias that fit nearly as well as the best (``rig.sequencer.pulse_inertia``). They have to lie within a factor of the
@@ -163,14 +163,14 @@ class Probe:
         peak_deg_s = math.degrees(last.peak_rad_s)
         if last.inertia is None:
             raise SafetyTrip(
-                f"Torque is off. The probe found no clear answer: {asked} gave {peak_deg_s:.2g} deg/s at most. "
-                "Is a brake on, the platform stuck, the motor not connected, the gyro off its shaft? Where friction "
-                "holds it, raise bench.probe.torque_nm. Nothing was played."
+                f"Torque is off. The probe found no clear answer: {asked} gave {peak_deg_s:.2g} deg/s at most. Check "
+                "for an applied brake, a stuck platform, a disconnected motor, or a gyro that is loose on its shaft. "
+                "If friction holds the platform, raise bench.probe.torque_nm. Nothing was played."
             )
         found, low, high = last.inertia
         if high < 0.0:
             raise SafetyTrip(
-                f"Torque is off. The probe found torque and rate with opposite signs: {asked} answered like an "
+                f"Torque is off. The probe found torque and rate with opposite signs: {asked} gave the response of an "
                 f"inertia of {found:.3g} kg m2. Change one of bench.amplifier.invert and bench.gyroscope.invert. "
                 "Nothing was played."
             )

@@ -1,4 +1,4 @@
-"""The inertia that a pulse of torque shows, with friction, spring and delay unknown.
+"""The inertia estimated from the response to a pulse, with friction, spring and delay unknown.
 
 From rest, and while the motion lasts,
 

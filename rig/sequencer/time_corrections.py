@@ -1,4 +1,4 @@
-"""After the last tick: what a rig knows better by then of the times of its samples, put into the journal."""
+"""After the last tick: the corrected time stamps of the rig, written to the journal."""
 
 from __future__ import annotations
 

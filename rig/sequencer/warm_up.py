@@ -1,4 +1,4 @@
-"""What the loop calls, called once before any torque is possible.
+"""Calls every function of the loop once before torque is possible, so that none is loaded or compiled later.
 
 The first call of a numeric routine loads code from disk and allocates: with locked memory the first matrix product
 alone pages in 32 MB, which took 15 ms on one machine and 110 ms on another. In the loop that is a stall, and a stall

@@ -1,4 +1,4 @@
-"""A Lawicel CAN adapter: the line protocol between the serial side and whatever hangs on its bus."""
+"""A Lawicel CAN adapter: the line protocol between its serial side and its bus."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def _make_gyro(config: Config) -> AnyGyro:
     assert config.bench is not None
     gyro, truth = config.bench.gyroscope, config.simulated.gyro
     if gyro.device not in GYROS:
-        raise ConfigError(f"bench.gyroscope.device: {gyro.device!r} has no emulator; emulated are {', '.join(GYROS)}")
+        raise ConfigError(f"bench.gyroscope.device: {gyro.device!r} has no emulator: choose one of {', '.join(GYROS)}")
     return GYROS[gyro.device](
         GyroSettings(
             sample_rate_hz=gyro.sample_rate_hz or DEFAULT_RATE_HZ,
@@ -79,7 +79,7 @@ def _make_drive(config: Config) -> EmulatedDrive:
     assert config.bench is not None
     device = config.bench.amplifier.device
     if device not in DRIVES:
-        raise ConfigError(f"bench.amplifier.device: {device!r} has no emulator; emulated are {', '.join(DRIVES)}")
+        raise ConfigError(f"bench.amplifier.device: {device!r} has no emulator: choose one of {', '.join(DRIVES)}")
     return DRIVES[device](config)
 
 

@@ -1,4 +1,4 @@
-"""What every emulated drive gives to the emulator: frames out, torque on the shaft, events."""
+"""The interface of every emulated drive: frames out, torque on the shaft, events."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What reached the emulators while the machine kept them from running, put back to when it was sent.
+"""Frames that arrived while the machine paused the emulators, moved back to the time they were sent.
 
 A drive does not stop because a computer is busy; a process that emulates one does. Were the frames that waited
 meanwhile all taken at the moment of waking up, the shaft would stand under an old torque and then get many new

@@ -101,7 +101,7 @@ def _listening(process: subprocess.Popen[bytes], config: Config) -> Emulators:
             break
     process.kill()
     said = process.stderr.read().decode(errors="replace").strip()
-    raise DeviceFault(f"the emulators did not start: {said[-2000:] or 'they said nothing'}")
+    raise DeviceFault(f"the emulators did not start: {said[-2000:] or 'no message was received'}")
 
 
 def _on_sockets(config: Config) -> Config:

@@ -58,7 +58,7 @@ def test_the_gyros_full_scale_is_a_limit_too() -> None:
 def test_a_refusal_for_the_gyros_full_scale_says_that_it_is_the_gyros() -> None:
     with pytest.raises(PreflightRefusal) as refused:
         plan(PAPER, ExcitationConfig(), WIDE, math.radians(100), "simulated.gyro.full_scale_deg_s")
-    assert "rate limit of 100 deg/s (simulated.gyro.full_scale_deg_s, the full scale of the gyro)" in str(refused.value)
+    assert "rate limit of 100 deg/s (simulated.gyro.full_scale_deg_s, full scale of the gyro)" in str(refused.value)
     assert refused.value.keys == ("limits.travel_deg", "simulated.gyro.full_scale_deg_s")
 
 
@@ -67,7 +67,10 @@ def test_a_refusal_lists_every_set_with_its_travel_and_the_torque_that_passes() 
         plan(PAPER, ExcitationConfig(), LimitsConfig())
     text = str(refused.value)
     assert text.startswith("5 of 5 sets would break a limit; nothing was moved.")
-    for line in ("0.5 Hz: 300.0 N m would travel 25.63 deg", "9 Hz: 150.0 N m would travel 18.11 deg"):
+    for line in (
+        "0.5 Hz: 300.0 N m would move the platform by 25.63 deg",
+        "9 Hz: 150.0 N m would move the platform by 18.11 deg",
+    ):
         assert line in text
     for passes in ("117.0", "115.6", "108.6", "67.1", "42.0"):
         assert passes in text
@@ -136,7 +139,7 @@ def test_the_torques_said_to_pass_pass_together(effects: dict[str, dict[str, flo
     loose = Platform(0.5, 0.0, 0.0, effects, ("inertia",))
     sentences = [p.describe() for p in predict_all(loose, walking(4), WIDE)]
     assert "not after the sets before it" in sentences[0]
-    assert "from the start of the campaign: exceeds the travel limit" in sentences[3]
+    assert "from the start of the campaign. This exceeds the travel limit" in sentences[3]
     said = [float(re.search(r"At most ([0-9.]+) N m is allowed$", text)[1]) for text in sentences]  # type: ignore[index]
     sets = [{"torque_nm": a, "frequency_hz": 1, "duration_s": 3} for a in said]
     played = plan(loose, ExcitationConfig.model_validate({"sets": sets, "rest_s": 2}), WIDE)

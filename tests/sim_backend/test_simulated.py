@@ -128,7 +128,7 @@ def test_a_gyro_may_sample_at_a_rate_of_its_own() -> None:
 
 
 def test_rates_without_a_common_grid_are_refused_with_the_cure() -> None:
-    with pytest.raises(ConfigError, match="choose rates that divide each other"):
+    with pytest.raises(ConfigError, match="choose rates of which one is a multiple"):
         SimulatedRig(config(gyro={"sample_rate_hz": 999.7}), 1000.0)
 
 

@@ -141,6 +141,6 @@ def test_emulators_that_cannot_start_say_why(config):
 
     gyroscope = config.bench.gyroscope.model_copy(update={"device": "kvh1750"})
     bench = config.bench.model_copy(update={"gyroscope": gyroscope})
-    refused = pytest.raises(DeviceFault, match="'kvh1750' has no emulator; emulated are stim300, vectornav")
+    refused = pytest.raises(DeviceFault, match="'kvh1750' has no emulator: choose one of stim300, vectornav")
     with refused, started(config.model_copy(update={"bench": bench})):
         pass

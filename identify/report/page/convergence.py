@@ -46,8 +46,10 @@ def convergence_figure(identification: Identification) -> Figure | None:
         layout["shapes"].append(level(first.closed_form_objective / first.j_dec, color="#8a919b", dash="dot"))
     return Figure(
         label="Genetic algorithm: objective against generation, with J_dec and the closed-form optimum",
-        caption=f"Best individual of each generation, before any polish. Dashed green: J_dec; a run passes below it. "
-        f"Dotted grey: closed-form optimum of {first.name}.",
+        caption=(
+            "Best individual of each generation, without local refinement. Dashed green: J_dec; a run below it is "
+            f"accepted. Dotted grey: closed-form optimum of {first.name}."
+        ),
         traces=once_in_legend(drawn),
         layout=layout,
         height=330,

@@ -1,40 +1,43 @@
-"""What the data could determine beside what came out, set by set and together."""
+"""The Cramer-Rao bound compared with the standard error reached, set by set and together."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from identify.bounds.achieved import Told
+from identify.bounds.achieved import BoundComparison
 from identify.report.page.markup import Markup, Piece, element, join, table
 from identify.wording import SYMBOLS, capital, number
 
 RATIOS = {"damping": "damping_over_inertia", "stiffness": "stiffness_over_inertia"}
 
 
-def determined_table(told: Sequence[Told]) -> Markup:
-    """Rank, condition, bound and standard error of each parameter, and what follows; nothing without entries."""
-    if not told:
+def determined_table(comparisons: Sequence[BoundComparison], remarked: Collection[str] = ()) -> Markup:
+    """Rank, condition, bound and standard error of each parameter, and what follows; nothing without entries.
+
+    ``remarked`` are the sets of which the table of the sets says already what they do not determine.
+    """
+    if not comparisons:
         return Markup("")
-    names = list(dict.fromkeys(n for one in told for n in one.expected))
+    names = list(dict.fromkeys(n for one in comparisons for n in one.expected))
     ratios = "inertia" not in names
     symbols = [SYMBOLS[RATIOS[n]] if ratios else SYMBOLS[n] for n in names]
     head: list[Piece] = ["set", "rank", "condition"]
     head += [join([symbol, element("small", " bound / reached (%)")]) for symbol in symbols]
     rows: list[list[Piece]] = []
-    for one in told:
+    for one in comparisons:
         row: list[Piece] = [one.name, f"{one.rank} of {one.parameters}", _condition(one.condition)]
         row += [_pair(one.expected.get(n), one.achieved.get(n)) for n in names]
-        rows.append([*row, capital(one.sentence)])
+        rows.append([*row, "" if one.name in remarked else capital(one.sentence)])
     caption = (
-        "One standard error, in percent of the value. Bound: the least that the sensor's noise allows on the samples "
-        "recorded, at the values found (Cramer-Rao, start state and bias unknown; a set alone with the effects known). "
-        "Reached: as reported. Rank: combinations of parameters that show at all. Condition: 1 is best; in the "
-        "hundreds, small errors of the model move one parameter at the cost of another."
+        "One standard error, in percent of the value. Bound: the Cramer-Rao bound for the sensor's noise, the "
+        "recorded samples and the identified values (initial state and bias unknown; for a single set, effects "
+        "known). Reached: the reported standard error. Rank: number of parameter combinations that the data "
+        "determine. Condition: 1 is best; above 100, a small error of the model shifts one parameter against another."
     )
-    made = table([*head, "what it says"], rows, caption, words=(len(head),))
-    return join([element("h3", "What the data could determine, and what came out"), made])
+    made = table([*head, "conclusion"], rows, caption, words=(len(head),))
+    return join([element("h3", "Cramer-Rao bound and standard error reached"), made])
 
 
 def _condition(value: float) -> str:

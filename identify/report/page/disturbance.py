@@ -19,7 +19,7 @@ def disturbance_table(identification: Identification) -> Markup:
     left, q = identification.disturbance, QUANTITIES[identification.axis]
     if left is None:
         return Markup("")
-    rows: list[list[Piece]] = [["all of it", number(left.torque_rms, 2), number(100.0 * left.relative, 2), ""]]
+    rows: list[list[Piece]] = [["total", number(left.torque_rms, 2), number(100.0 * left.relative, 2), ""]]
     rows += [
         [
             f"depends on the {depends_on(d.on, identification.axis)}", number(d.torque_rms, 2),
@@ -30,8 +30,8 @@ def disturbance_table(identification: Identification) -> Markup:
     return table(
         ["", f"rms ({q.torque_unit})", f"% of the {q.torque}", "false-alarm rate"],
         rows,
-        f"The {q.torque} that is left after the final model, without the sensor's noise. What depends on something is "
-        "missing from the model; the rest is noise and is included in the intervals.",
+        f"The residual {q.torque} of the final model, without the sensor's noise. A part that depends on a quantity "
+        "is missing from the model; the rest is noise and is included in the intervals.",
     )
 
 
@@ -53,10 +53,12 @@ def shape_figure(identification: Identification) -> Figure | None:
     names = ", ".join(depends_on(d.on, identification.axis) for d in shown)
     columns = min(2, len(panels))
     return Figure(
-        label=f"Shape of the {q.torque} that is left against {names}",
-        heading="Shape of what the model lacks",
-        caption=f"The free-form term (a spline) of the {q.torque} that is left, fitted beside the final model, without "
-        "the constant and the straight line, which the model's own terms take up.",
+        label=f"Residual {q.torque} against {names}: fitted shape",
+        heading="Shape of the missing effect",
+        caption=(
+            f"A free-form term (spline) of the residual {q.torque}, fitted together with the final model. Its "
+            "constant and linear parts are omitted, because the model's own terms contain them."
+        ),
         traces=drawn,
         layout=grid(panels, columns=columns, gap=0.12) | {"showlegend": False},
         height=110 + 210 * -(-len(panels) // columns),

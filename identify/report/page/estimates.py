@@ -49,7 +49,7 @@ def estimates_figure(identification: Identification) -> Figure | None:
     layout["shapes"] = [level(0.5, MEASURED, p, dash="dot") for p in range(1, len(panels) + 1)]
     return Figure(
         label="Parameters of every set with their 95 % intervals, in percent of the final value",
-        caption="95 % intervals. What lies far outside is written at the edge instead of drawn.",
+        caption="95 % intervals. Values far outside the axis are written at its edge.",
         traces=drawn,
         layout=layout,
         height=110 + 34 * len(rows),

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from identify.bounds.achieved import hindsight
+from identify.bounds.achieved import compare_with_bound
 from identify.conclude.expected_delay import delay_lines
 from identify.conclude.next_steps import next_steps
 from identify.diagnose.wording import diagnosis_sentences
@@ -32,15 +32,10 @@ from identify.report.page.tables import (
 from identify.results import Identification
 from identify.wording import (
     SYMBOLS,
-    bent_percent,
-    capital,
+    bias_percent,
     half_interval,
     half_of,
-    joined,
-    left_over,
-    not_reported,
-    number,
-    pairs,
+    not_said_yet,
     percent,
     plain,
     sentence,
@@ -75,7 +70,7 @@ def report_html(identification: Identification, recording: Recording, name: str)
 
 def _header(identification: Identification, name: str) -> Markup:
     if identification.aborted:
-        badge, state = "ABORTED: based on what was recorded until then", "bad"
+        badge, state = "ABORTED: based on the samples recorded before the stop", "bad"
     else:
         badge, state = ("ACCEPTED", "good") if identification.accepted else ("NOT ACCEPTED", "bad")
     return element(
@@ -92,13 +87,12 @@ def _verdict(identification: Identification, recording: Recording, gallery: Gall
     reasons = [
         element(
             "div",
-            element("h3", "Why not, and what to run next"),
+            element("h3", "Why it was not accepted"),
             bullets(identification.reasons),
             *([element("h3", "Next"), bullets(steps)] if steps else []),
             class_="next",
         )
     ]
-    missing = not_reported(final.dropped), not_reported(final.not_determined)
     return section(
         "verdict",
         "What was found",
@@ -107,8 +101,8 @@ def _verdict(identification: Identification, recording: Recording, gallery: Gall
         _tiles(identification),
         parameter_table(identification),
         _titled("Torque delay", delay_lines(identification, recording.info)),
-        _titled("Dropped: not supported by the data", missing[0]),
-        _titled("Not determined by these data", missing[1]),
+        _titled("Dropped: not supported by the data", not_said_yet(final.dropped, identification)),
+        _titled("Not determined by these data", not_said_yet(final.not_determined, identification)),
         gallery.place(estimates_figure(identification)),
         effect_cards(identification),
         correlation_table(final.correlation),
@@ -120,7 +114,7 @@ def _titled(heading: str, lines: Sequence[Piece]) -> Markup:
 
 
 def _tiles(identification: Identification) -> Markup:
-    bent, tiles = bent_percent(identification), []
+    bent, tiles = bias_percent(identification), []
     for name, found in identification.final.parameters.items():
         half = half_interval(found)
         before = f"without the missing effects: {percent(bent[name])}" if name in bent else ""
@@ -138,32 +132,30 @@ def _tiles(identification: Identification) -> Markup:
 
 
 def _errors(identification: Identification, gallery: Gallery) -> Markup:
-    share = identification.verdict.unexplained_fraction
-    state = (
-        f"Unexplained: the residual stays significantly above the noise floor; {number(100.0 * share, 2)} % of what "
-        "the declared model leaves above it is still there."
-        if identification.verdict.unexplained
-        else "The residual is at the noise floor: nothing significant is unexplained."
-    )
-    left = identification.disturbance
-    if left is not None and identification.final.error.holdout_measure == "holdout_torque_relative":
-        state = left_over(left, identification.axis)
     drawn = [*residual_figures(identification), *spectrum_figures(identification)]
     figures = [gallery.place(figure) for figure in drawn]
     return section(
         "residual",
-        "What is left unexplained",
-        paragraph(state),
+        "Residual",
+        *_at_the_noise_floor(identification),
         disturbance_table(identification),
         gallery.place(shape_figure(identification)),
         error_table(identification),
         paragraph(sentence(identification.holdout_note), class_="note"),
-        *_where_it_lives(identification),
+        *_residual_contents(identification),
         *figures,
     )
 
 
-def _where_it_lives(identification: Identification) -> list[Markup]:
+def _at_the_noise_floor(identification: Identification) -> list[Markup]:
+    """That nothing is left; where something is, the verdict says how much."""
+    by_torque = identification.final.error.holdout_measure == "holdout_torque_relative"
+    if identification.verdict.unexplained or (by_torque and identification.disturbance is not None):
+        return []
+    return [paragraph("The residual is at the noise floor: nothing significant is unexplained.")]
+
+
+def _residual_contents(identification: Identification) -> list[Markup]:
     """What the residual holds in words, before and after, so that one sees what went away."""
     found = {"declared model": identification.residual_before, "final model": identification.residual_after}
     return [
@@ -174,22 +166,17 @@ def _where_it_lives(identification: Identification) -> list[Markup]:
 
 def _candidates(identification: Identification) -> Markup:
     verdict = identification.verdict
-    never = [
-        capital(f"{joined([plain(n) for n in names.split(' / ')])}: {why}")
-        for names, why in verdict.never_separable.items()
-    ]
     return section(
         "candidates",
-        "What was tried",
+        "Effects tried",
         candidate_table(verdict.candidates, identification.noise_floor.holdout_rate_rms),
-        _titled("Cannot be distinguished on these data", pairs(verdict.confusable_with)),
-        _titled("Cannot be separated by any torque and rate", never),
         _titled("Follow-up", follow_up_lines(identification.follow_up) if identification.follow_up else ()),
     )
 
 
 def _sets(identification: Identification, recording: Recording, gallery: Gallery) -> Markup:
-    determined = determined_table(hindsight(identification, recording))
+    remarked = {one.name for one in identification.per_set if one.advice}
+    determined = determined_table(compare_with_bound(identification, recording), remarked)
     if not identification.per_set and identification.joint is None:
         return section("sets", "What the data could determine", determined) if determined.html else determined
     return section(
@@ -211,7 +198,7 @@ def _motion(identification: Identification, gallery: Gallery) -> Markup:
     figures = [gallery.place(figure) for figure in motion_figures(identification)]
     total = len(identification.traces)
     note = f"The {RUNS} of {total} runs with the largest error; recording.h5 has all." if total > RUNS else ""
-    hint = "Drag to zoom, double-click to see all, click a name in the legend to hide or show it."
+    hint = "Drag to zoom, double-click to see all, click a legend entry to hide or show it."
     return section("motion", "Measured and simulated", paragraph(f"{note} {hint}".strip(), class_="note"), *figures)
 
 

@@ -28,14 +28,14 @@ POINTS = 3000  # of one line
 RUNS = 12  # drawn at most; result.json and recording.h5 have all
 
 
-def left_over(trace: RunTraces, simulated: Array) -> Array:
+def motion_error(trace: RunTraces, simulated: Array) -> Array:
     """Measured less simulated, NaN where a sample does not count, (n,)."""
     return np.where(trace.keep > 0.0, trace.measured - simulated, np.nan)
 
 
-def worst_first(traces: Sequence[RunTraces]) -> list[int]:
+def by_decreasing_error(traces: Sequence[RunTraces]) -> list[int]:
     """Numbers of the runs, the one with the largest error of the final model first."""
-    errors = [float(np.nan_to_num(_rms(left_over(t, t.simulated_after)))) for t in traces]
+    errors = [float(np.nan_to_num(_rms(motion_error(t, t.simulated_after)))) for t in traces]
     return sorted(range(len(traces)), key=lambda i: -errors[i])
 
 
@@ -46,7 +46,7 @@ def _rms(values: Array) -> float:
 
 def motion_figures(identification: Identification) -> list[Figure]:
     """One figure a run, in the order played; of very many runs those with the largest error."""
-    drawn = sorted(worst_first(identification.traces)[:RUNS])
+    drawn = sorted(by_decreasing_error(identification.traces)[:RUNS])
     return [_run(identification, identification.traces[i]) for i in drawn]
 
 
@@ -60,10 +60,10 @@ def _run(identification: Identification, trace: RunTraces) -> Figure:
         ),
     ]
     panels = [Panel("", axis(name, unit)), Panel("", axis("error", unit), "measured minus the declared model")]
-    before = left_over(trace, trace.simulated_before)
+    before = motion_error(trace, trace.simulated_before)
     drawn.append(lines(*line(time, before, POINTS), "error, declared model", BEFORE, 2, width=0.9, showlegend=False))
     if two:
-        after = left_over(trace, trace.simulated_after)
+        after = motion_error(trace, trace.simulated_after)
         drawn.append(lines(*line(time, trace.simulated_after, POINTS), "final model", AFTER, width=1.0))
         drawn.append(lines(*line(time, after, POINTS), "error, final model", AFTER, 3, width=0.9, showlegend=False))
         panels.append(Panel("", axis("error", unit), "measured minus the final model"))

@@ -21,7 +21,7 @@ from identify.report.page.figure import (
     once_in_legend,
     points,
 )
-from identify.report.page.motion import left_over
+from identify.report.page.motion import motion_error
 from identify.report.page.quantities import QUANTITIES, axis
 from identify.report.page.thinning import binned_mean, cloud, line
 from identify.results import Identification, RunTraces
@@ -74,7 +74,7 @@ def residual_of(trace: RunTraces, which: Which, torque: bool, lowpass_hz: float 
     if torque:
         found = trace.torque_residual_before if which == "before" else trace.torque_residual_after
         return np.where(trace.keep * settled(trace, lowpass_hz) > 0.0, np.asarray(found), np.nan)
-    return left_over(trace, trace.simulated_before if which == "before" else trace.simulated_after)
+    return motion_error(trace, trace.simulated_before if which == "before" else trace.simulated_after)
 
 
 def _titled(identification: Identification) -> tuple[str, bool]:
@@ -111,7 +111,7 @@ def _against_time(identification: Identification) -> Figure:
     layout["shapes"] = _noise_bands(identification, torque, len(models))
     return Figure(
         label="Residual against time, before and after",
-        caption="Each panel has its own scale. Green band: twice the noise floor either way."
+        caption="Each panel has its own scale. Green band: plus and minus twice the noise floor."
         + (f" Thick: mean over {SMOOTH_BINS} stretches of a run." if torque else "")
         + _lowpass_note(identification, torque),
         traces=once_in_legend(drawn),
@@ -153,8 +153,10 @@ def _against(
     panels = [Panel(axis(name, unit), title, NAMES[which]) for which in models]
     return Figure(
         label=f"Residual against {name}, before and after",
-        caption=f"Residual against {name}: a sample of the points and their mean. Where the mean leaves zero, "
-        f"the model lacks something that depends on the {name}. Green band: twice the noise floor either way.",
+        caption=(
+            f"Residual against {name}: a sample of the points and their mean. Where the mean differs from zero, the "
+            f"model lacks an effect that depends on the {name}. Green band: plus and minus twice the noise floor."
+        ),
         traces=drawn,
         layout=grid(panels, columns=len(models), gap=0.1)
         | {"showlegend": False, "shapes": _noise_bands(identification, torque, len(models))},
@@ -178,8 +180,11 @@ def _by_direction(identification: Identification) -> Figure:
     panels = [Panel(axis(quantities.angle, quantities.angle_unit), title, NAMES[which]) for which in models]
     return Figure(
         label=f"Residual against {quantities.angle} for either direction of motion, before and after",
-        caption=f"The same by direction of motion: positive {quantities.rate} (forward) and negative (backward). Two "
-        "means that part show friction or a loop; two that run together show a spring, gravity or cogging.",
+        caption=(
+            f"The same by direction of motion: positive {quantities.rate} (forward) and negative (backward). If the "
+            "two means differ, the cause is friction or hysteresis; if they coincide, it is a spring, gravity or "
+            "cogging."
+        ),
         traces=once_in_legend(drawn),
         layout=grid(panels, columns=len(models), gap=0.1),
         height=300,

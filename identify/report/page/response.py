@@ -9,7 +9,7 @@ import numpy as np
 
 from identify.frequency.measured_response import measured_response
 from identify.frequency.model_response import Size, linear_response
-from identify.frequency.spectra import TRUSTED, VAGUE, Complex, Record, Response, decibel
+from identify.frequency.spectra import LARGEST_GAIN_ERROR, TRUSTED, Complex, Record, Response, decibel
 from identify.report.page.figure import (
     AFTER,
     BEFORE,
@@ -36,7 +36,7 @@ FINE = 700  # frequencies of a drawn line
 WIDER = 1.3  # the line goes on to this many times the highest and lowest measured frequency
 TICKS_HZ = [digit * 10.0**decade for decade in range(-3, 4) for digit in (1, 2, 5)]
 HOW = {
-    "whole periods": "over whole periods, the first left out",
+    "whole periods": "over whole periods, without the first",
     "segments": "over half-overlapping segments",
     "local polynomial": "by local polynomials over the whole record",
 }
@@ -257,15 +257,18 @@ def _figure(
 
 def _caption(sets: Sequence[SetResponse], left_out: Sequence[str]) -> str:
     how = dict.fromkeys(HOW[s.measured.method] for s in sets)
-    told = f"Estimated {joined(list(how))}. Lines: J, C, K and the linear effects of each model. "
+    caption = f"Estimated {joined(list(how))}. Lines: J, C, K and the linear effects of each model. "
     if left_out:
-        told += (
-            f"{joined([plain(n) for n in left_out])} depends on the amplitude and is in none of the lines: the open "
-            "circles are the model simulated with all its effects, estimated in the same way. "
+        caption += (
+            f"{joined([plain(n) for n in left_out])} depends on the amplitude and is not included in the lines: open "
+            "circles show the simulation with all effects, estimated in the same way. "
         )
     pale = sum(int(np.sum(~s.measured.trusted)) for s in sets)
-    told += "Off by: distance of simulation and measurement over the larger of the two. "
-    told += f"Dotted: coherence {TRUSTED:g}; below it, or known to worse than {100 * VAGUE:g} %: a pale cross"
-    return told + (
+    caption += "Off by: difference between simulation and measurement, relative to the larger of the two. "
+    caption += (
+        f"Dotted: coherence {TRUSTED:g}. Pale crosses: coherence below it, or a standard error above "
+        f"{100 * LARGEST_GAIN_ERROR:g} %"
+    )
+    return caption + (
         f" ({pale} of {sum(len(s.measured.frequency_hz) for s in sets)} points)." if pale else " (none here)."
     )

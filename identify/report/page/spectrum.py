@@ -115,9 +115,11 @@ def _of_torque(identification: Identification) -> Figure:
     layout["annotations"] += names
     return Figure(
         label=f"Spectrum of the {q.torque} residual, before and after, with the band of the sensor's noise",
-        caption=f"Amplitude density of the {q.torque} residual, up to the low-pass. Green: where white noise of the "
-        f"sensor's size would put it ({100 * CONFIDENCE:.0f} %). What stands above the band is a {q.torque} that was "
-        "not recorded or that the model lacks.",
+        caption=(
+            f"Amplitude density of the {q.torque} residual, up to the low-pass. Green: the band of white noise of the "
+            f"sensor's rms ({100 * CONFIDENCE:.0f} %). A density above the band is a {q.torque} that was not recorded "
+            "or is missing from the model."
+        ),
         traces=once_in_legend(drawn),
         layout=layout,
         height=330,
@@ -143,9 +145,11 @@ def _of_motion(identification: Identification) -> Figure:
     layout["annotations"] += names
     return Figure(
         label="Residual against frequency, before and after, with the noise floor, harmonics and free lines",
-        caption="Amplitude density of measured less simulated. Dashed green: white noise of the sensor's own size; "
-        "what stands above it at some frequency is motion that the model does not have. Triangles and squares: odd and "
-        "even multiples of a played tone that stand out. Dotted: a line that belongs to no set's excitation.",
+        caption=(
+            "Amplitude density of measured minus simulated motion. Dashed green: white noise of the sensor's rms; a "
+            "density above it is motion that is missing from the model. Triangles and squares: significant odd and "
+            "even harmonics of an excitation frequency. Dotted: a line that is not a harmonic of any excitation."
+        ),
         traces=once_in_legend(drawn),
         layout=layout,
         height=330,

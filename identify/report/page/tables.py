@@ -10,10 +10,10 @@ from identify.report.page.quantities import QUANTITIES
 from identify.results import Candidate, Identification, ModelResult, ParameterEstimate
 from identify.wording import (
     SYMBOLS,
-    bent_percent,
+    bias_percent,
     capital,
     declared_number,
-    errors_in_turn,
+    errors_by_model,
     frequency,
     half_of,
     interval_of,
@@ -23,10 +23,8 @@ from identify.wording import (
     readable,
     signed,
     title,
-    told_apart,
     unit,
     value_of,
-    without,
 )
 from rig import effects
 
@@ -38,7 +36,7 @@ SCREENED = "screened out"
 def parameter_table(identification: Identification) -> Markup:
     """Before and after with intervals, and how far the declared model bends each parameter."""
     before, after = identification.before, identification.after
-    bent = bent_percent(identification)
+    bent = bias_percent(identification)
     names = list(dict.fromkeys([*before.parameters, *(after.parameters if after else ())]))
     given = ["declared"] if identification.declared else []
     rows: list[list[Piece]] = []
@@ -55,7 +53,7 @@ def parameter_table(identification: Identification) -> Markup:
         [*head, "unit"],
         rows,
         "Fitted to all samples not declared held out. Declared model: only its own terms, without the added effects."
-        + (" Declared: the numbers under model: in the configuration, which are not used by the fit." if given else ""),
+        + (" Declared: the values under model: in the configuration, which the fit does not use." if given else ""),
     )
 
 
@@ -108,7 +106,7 @@ def error_table(identification: Identification) -> Markup:
         (f"{q.torque} residual over {q.torque}", "residual_torque_relative", "%", None),
         ("the same, held-out samples", "holdout_torque_relative", "%", None),
     ]
-    models = errors_in_turn(identification)
+    models = errors_by_model(identification)
     rows: list[list[Piece]] = []
     for words, key, its_unit, least in kinds:
         values = [getattr(error, key) for error in models.values()]
@@ -154,12 +152,12 @@ def candidate_table(candidates: Sequence[Candidate], floor: float) -> Markup:
 def _screened_out(several: Sequence[Candidate]) -> Markup:
     """What a quick look at the residual ruled out, folded away: one line a round."""
     rounds = sorted({c.round for c in several})
-    told = [
+    lines = [
         f"Round {r}: " + ", ".join(plain(c.effect) for c in sorted(several, key=lambda c: c.delta_bic) if c.round == r)
         for r in rounds
     ]
     head = f"Screened out by the residual, without a full fit ({len(several)})"
-    return element("details", element("summary", head), bullets(told)) if told else Markup("")
+    return element("details", element("summary", head), bullets(lines)) if lines else Markup("")
 
 
 def _times(value: float | None, floor: float) -> Piece:
@@ -178,7 +176,7 @@ def set_table(identification: Identification) -> Markup:
     units = {n: next(unit(one.parameters[n].unit) for one in sets if n in one.parameters) for n in names}
     head: list[Piece] = ["set", "frequency"]
     head += [join([SYMBOLS.get(n, plain(n)), element("small", f" ({units[n]})")]) for n in names]
-    head += ["objective", "repeats", "J < J_dec", "what it says"]
+    head += ["objective", "repeats", "J < J_dec", "remark"]
     rows: list[list[Piece]] = []
     for one in sets:
         values = [_with_half(one.parameters.get(n)) for n in names]
@@ -229,7 +227,7 @@ def effect_cards(identification: Identification) -> Markup:
 
 
 def _card(identification: Identification, name: str) -> Markup:
-    effect, verdict = effects.get(name), identification.verdict
+    effect = effects.get(name)
     numbers = [
         f"{parameter.name.replace('_', ' ')} = {value_of(shown)} {unit(shown.unit)} "
         f"(95 %: {interval_of(shown)}), {parameter.meaning}"
@@ -237,18 +235,11 @@ def _card(identification: Identification, name: str) -> Markup:
         if (found := identification.final.effect_parameters.get(name, {}).get(parameter.name)) is not None
         for shown in [readable(found)]
     ]
-    lines: list[Piece] = [effect.sign, f"Source: {effect.source}."]
-    if name in verdict.contribution:
-        lines.append(without(verdict.contribution[name]))
-    rivals = verdict.confusable_with.get(name, ())
-    if rivals:
-        parted = f" {capital(told_apart(effect.separated_by))}." if effect.separated_by else ""
-        lines.append(f"On these data hard to distinguish from {', '.join(plain(r) for r in rivals)}.{parted}")
     return element(
         "article",
         element("h3", capital(plain(name))),
         paragraph(effect.meaning),
         element("pre", effect.equation),
-        bullets([*numbers, *lines]),
+        bullets([*numbers, effect.sign, f"Source: {effect.source}."]),
         class_="card",
     )

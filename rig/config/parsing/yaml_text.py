@@ -102,8 +102,8 @@ def read_text(path: Path) -> str:
         raise ConfigError(f"{path}: cannot be read: {reason}; check the path and its permissions") from error
     if len(raw) > MAX_FILE_BYTES:
         raise ConfigError(
-            f"{path}: larger than {MAX_FILE_BYTES} bytes, which no configuration needs: is it a recording? "
-            "Name recordings under recorded.runs"
+            f"{path}: larger than {MAX_FILE_BYTES} bytes, so it is probably a recording: name recordings under "
+            "recorded.runs of a configuration"
         )
     try:
         text = raw.decode("utf-8-sig")

@@ -1,4 +1,4 @@
-"""Whether the heaps in which HDF5 keeps its texts have an end.
+"""Checks that the text heaps of an HDF5 file end.
 
 The library walks a heap from object to object by the sizes that stand there; over one object of no size it walks on the
 spot for ever, and no signal gets through to Python meanwhile. So they are walked here before the library sees the file.

@@ -15,7 +15,7 @@ def read(path: Path) -> Sequence[Run]:
     """Every run that tells anything. Raises RecordingError where there is none."""
     contents = read_journal(path)
     try:
-        runs = [run_from_journal(run) for run in contents.runs if tells_something(run)]
+        runs = [run_from_journal(run) for run in contents.runs if is_worth_reading(run)]
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise RecordingError(
             f"{path}: its frames are intact but not in the format of this version ({error!r}): "
@@ -26,7 +26,7 @@ def read(path: Path) -> Sequence[Run]:
     return runs
 
 
-def tells_something(run: JournalRun) -> bool:
+def is_worth_reading(run: JournalRun) -> bool:
     """Whether a run is worth reading: one that was cut in its first milliseconds must not spoil those before it.
 
     A whole run is always read, so that what is wrong with it is said.

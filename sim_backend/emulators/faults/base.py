@@ -1,4 +1,4 @@
-"""What a fault is, and what it may do to an emulated bench."""
+"""The interface of a fault: what it may change on an emulated bench."""
 
 from __future__ import annotations
 

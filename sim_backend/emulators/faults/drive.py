@@ -91,7 +91,7 @@ class AdapterReplugged(AdapterUnplugged):
 
 
 class BothUnplugged(AdapterUnplugged):
-    """Gyro and CAN adapter vanish together: the hub they hang on."""
+    """Gyro and CAN adapter vanish together, as when their hub is unplugged."""
 
     def begin(self, bench: Bench, now_s: float) -> None:
         """Once and for all."""
@@ -175,7 +175,7 @@ class DrivePreOperational(DriveCommanded):
 
 
 class DriveOff(Fault):
-    """The drive takes its enable away without a word: safe torque off, or its supply gone."""
+    """The drive disables itself without a message: safe torque off, or loss of its supply."""
 
     def begin(self, bench: Bench, now_s: float) -> None:
         """Once."""

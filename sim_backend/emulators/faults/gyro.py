@@ -26,7 +26,7 @@ class GyroSilent(Fault):
 
 
 class GyroChecksum(Fault):
-    """Every datagram has one bit turned over."""
+    """Every datagram has one inverted bit."""
 
     def gyro_bytes(self, data: bytes) -> bytes:
         """One bit, anywhere."""
@@ -161,7 +161,7 @@ class GyroFlagged(Fault):
 
 
 class GyroSaturated(Fault):
-    """The rate leaves the full scale."""
+    """The rate exceeds the full scale."""
 
     def rate(self, rate_rad_s: float) -> float:
         """Far beyond it."""

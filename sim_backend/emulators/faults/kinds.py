@@ -1,4 +1,4 @@
-"""The faults there are, and the name under which each is asked for."""
+"""The table of faults by name."""
 
 from __future__ import annotations
 

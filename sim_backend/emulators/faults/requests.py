@@ -1,4 +1,4 @@
-"""Faults asked for live: JSON lines on a descriptor, read without ever waiting."""
+"""Faults requested live: JSON lines on a descriptor, read without waiting."""
 
 from __future__ import annotations
 

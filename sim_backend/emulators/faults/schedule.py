@@ -1,4 +1,4 @@
-"""Faults on request: when each takes hold of an emulated bench, and for how long."""
+"""When each requested fault begins and ends."""
 
 from __future__ import annotations
 

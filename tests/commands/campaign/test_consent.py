@@ -57,7 +57,7 @@ def asked(monkeypatch: pytest.MonkeyPatch, keyboard: int, answer: str) -> str:
 
 def test_a_yes_typed_before_the_question_is_no_consent(terminal: int, monkeypatch: pytest.MonkeyPatch) -> None:
     os.write(terminal, b"yes\nyes\n")
-    with pytest.raises(UsageError, match="the answer was not yes"):
+    with pytest.raises(UsageError, match="not answered with yes"):
         asked(monkeypatch, terminal, "no\n")
 
 

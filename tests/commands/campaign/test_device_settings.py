@@ -82,7 +82,7 @@ def test_values_keys_settings_bit_rate_and_ports_are_told_in_one_round(tmp_path:
         (6, "bench.gyroscope.baud: 'quick' is not allowed"),
         (7, "bench.gyroscope.settings.filtr_hz: unknown key; did you mean filter_hz?"),
         (9, "bench.amplifier.settings.rated_torque: unknown key"),
-        (11, "bench.amplifier.can.channel: /dev/ttyX9 is the port that bench.gyroscope.port names as well"),
+        (11, "bench.amplifier.can.channel: /dev/ttyX9 is also the port of the gyroscope (bench.gyroscope.port"),
         (12, "bench.amplifier.can.bitrate: 123456 is not one of a Lawicel adapter's: 10000, 20000"),
         (13, "bench.amplifier.can.options.listen: unknown key; slcan_bulk knows listen_only"),
     )
@@ -200,7 +200,7 @@ def test_a_device_without_an_emulator_is_told_only_where_it_is_emulated(backend:
     moteus = {"backend": backend, "bench": {"amplifier": amplifier}}
     ((path, text),) = device_faults(moteus, EMULATED)
     assert path == ("bench", "amplifier", "device")
-    assert text == "'moteus' has no emulator; emulated are cia402, odrive"
+    assert text == "'moteus' has no emulator: choose one of cia402, odrive"
     assert list(device_faults(moteus)) == []
 
 

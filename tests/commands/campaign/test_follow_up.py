@@ -8,7 +8,7 @@ from typing import Any, cast
 import pytest
 
 from commands.campaign.context import CommandContext, Options
-from commands.campaign.follow_up import NOBODY_AGREED, play_follow_up
+from commands.campaign.follow_up import NOT_CONFIRMED, play_follow_up
 from rig.config.load import load_config
 from rig.errors import UsageError
 
@@ -17,7 +17,7 @@ REPLAY = ("bench.replay=somewhere",)
 
 
 def refused(monkeypatch: pytest.MonkeyPatch, terminal: bool, *overrides: str, emulate: bool = False) -> str:
-    monkeypatch.setattr("commands.campaign.follow_up._somebody_there", lambda: terminal)
+    monkeypatch.setattr("commands.campaign.follow_up._on_terminal", lambda: terminal)
     nothing = cast(Any, None)
     context = CommandContext(Options(BENCH, emulate=emulate), nothing, nothing)
     with pytest.raises(UsageError) as caught:
@@ -27,7 +27,7 @@ def refused(monkeypatch: pytest.MonkeyPatch, terminal: bool, *overrides: str, em
 
 def test_a_campaign_without_a_terminal_and_its_replay_say_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     live = refused(monkeypatch, False, emulate=True)
-    assert live == NOBODY_AGREED
+    assert live == NOT_CONFIRMED
     assert refused(monkeypatch, False, *REPLAY) == live
     assert refused(monkeypatch, True, *REPLAY) == live, "as an operator who said no"
 

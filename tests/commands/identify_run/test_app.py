@@ -61,7 +61,7 @@ def test_numbers_that_the_file_declares_stand_beside_the_fitted_ones_and_default
     result = json.loads((tmp_path / "out" / "result.json").read_text())
     assert result["declared"] == {"inertia": 1.163, "stiffness": 39030.0}
     assert result["plausibility"][0]["parameters"] == ["inertia", "stiffness"]
-    assert "J and K are about 1/57 of the declared numbers" in " ".join(done.stdout.split())
+    assert "J and K are about 1/57 of the declared values" in " ".join(done.stdout.split())
 
 
 def test_one_that_is_not_accepted_ends_in_1_with_all_results_and_the_reason(

@@ -67,7 +67,7 @@ def test_without_one_whole_set_nothing_is_identified(
     done = command(app, write_config(tmp_path), "--quiet", "--out", tmp_path / "out")
     assert done.exit_code == 3
     assert accepted.given == []
-    assert f"No set was complete, so nothing is identified. What was recorded is in {tmp_path / 'out'}" in done.stderr
+    assert f"No set was completed, so nothing was identified. The recording is in {tmp_path / 'out'}" in done.stderr
 
 
 def test_where_a_fault_came_before_the_first_sample_nothing_is_said_to_be_recorded(
@@ -78,7 +78,8 @@ def test_where_a_fault_came_before_the_first_sample_nothing_is_said_to_be_record
     assert done.exit_code == 3
     assert "What was recorded is" not in done.stderr
     assert (
-        f"Nothing was recorded, since it ended before the first sample of a set; {tmp_path / 'out'} has" in done.stderr
+        f"Nothing was recorded: the campaign ended before the first sample of a set. {tmp_path / 'out'} holds"
+        in done.stderr
     )
 
 
@@ -135,13 +136,13 @@ def test_a_terminal_lost_during_the_identification_ends_in_130_with_results_mark
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, accepted: Identifier
 ) -> None:
     def note_and_lose(self: Terminal, text: str) -> None:
-        self.on_loss("Stopped because its terminal is gone")
+        self.on_loss("Stopped because the terminal was closed")
 
     monkeypatch.setattr(Terminal, "note", note_and_lose)
     out = tmp_path / "out"
     assert command(app, write_config(tmp_path), "--quiet", "--out", out).exit_code == 130
     result = json.loads((out / "result.json").read_text())
-    assert result["aborted"] is True and "terminal is gone" in result["reasons"][0]
+    assert result["aborted"] is True and "terminal was closed" in result["reasons"][0]
 
 
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT])

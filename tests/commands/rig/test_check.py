@@ -33,7 +33,7 @@ def test_the_torques_of_the_paper_within_ten_degrees_are_refused_set_by_set_with
     lines = done.stderr.splitlines()
     for name in PAPER_SETS:
         (line,) = [line for line in lines if name in line]
-        assert "would travel" in line and "deg" in line and "N m is allowed" in line
+        assert "would move the platform" in line and "deg" in line and "N m is allowed" in line
 
 
 def test_what_passes_by_its_word_does_pass(tmp_path: Path) -> None:
@@ -49,7 +49,7 @@ def test_a_forecast_for_a_platform_of_unit_inertia_says_so(tmp_path: Path) -> No
     model = "model: {inertia_kg_m2: 1.0, stiffness_nm_rad: 300.0, inertia_unknown: true}\n"
     lines = command(app, "check", write_config(tmp_path, TWO_SETS + model)).stdout.splitlines()
     told = next(i for i, line in enumerate(lines) if "unit inertia (model.inertia_unknown)" in line)
-    assert told < next(i for i, line in enumerate(lines) if "would travel" in line)
+    assert told < next(i for i, line in enumerate(lines) if "would move the platform" in line)
 
 
 def test_a_wrong_file_is_refused_with_its_line(tmp_path: Path) -> None:
@@ -106,4 +106,4 @@ def test_a_free_decay_without_torque_promises_ratios_only(tmp_path: Path) -> Non
     (tmp_path / "decay.csv").write_text(f"time_s,angle_rad\n{rows}\n")
     done = command(app, "check", write_config(tmp_path, "backend: recorded\nrecorded: {runs: [{file: decay.csv}]}\n"))
     assert done.exit_code == 0, done.output
-    assert "without torque only ratios can be determined; expected C/J" in done.stdout
+    assert "a decay without torque determines only ratios; expected C/J" in done.stdout

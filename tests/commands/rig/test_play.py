@@ -85,7 +85,7 @@ def test_a_refused_campaign_leaves_no_folder_behind(tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = command(app, "play", write_config(tmp_path), "--set", "limits.torque_nm=10", "--out", out)
     assert done.exit_code == 2
-    assert "At most 10.000 N m is allowed" in done.stderr
+    assert "At most 10.00 N m is allowed" in done.stderr
     assert not out.exists()
 
 
@@ -267,7 +267,7 @@ def test_recordings_cannot_be_played_but_their_campaign_can_be_simulated(tmp_pat
     text = TWO_SETS.replace("backend: simulated", "backend: recorded") + "recorded: {runs: [{file: a.csv}]}\n"
     config = write_config(tmp_path, text)
     refused = command(app, "play", config, "--out", tmp_path / "out")
-    assert refused.exit_code == 2 and "nothing to play" in refused.stderr
+    assert refused.exit_code == 2 and "plays nothing" in refused.stderr
     assert command(app, "play", config, "--dry-run", "--out", tmp_path / "out").exit_code == 0
 
 

@@ -72,7 +72,7 @@ def test_what_is_cut_is_said_and_what_is_there_is_exported(played: Path, tmp_pat
     before = contents(folder)
     done = command(app, "recover", folder)
     assert done.exit_code == 0, done.output
-    assert "result.json: absent" in done.stdout
+    assert "result.json: missing" in done.stdout
     assert "the program was killed" in done.stdout and "7 Hz: CUT SHORT" in done.stdout
     runs = read_recording_h5(folder / "recording.h5").runs
     whole = read_recording_h5(played / "recording.h5").runs
@@ -212,7 +212,7 @@ def test_what_cannot_be_resumed_is_said(tmp_path: Path) -> None:
     recorded.write_text("backend: recorded\nrecorded: {runs: [{file: a.csv}]}\n")
     for line, said in (
         ((config, "--resume", tmp_path / "absent"), "is not a folder"),
-        ((config, "--resume", tmp_path), "play the campaign anew"),
+        ((config, "--resume", tmp_path), "play the campaign again"),
         ((recorded, "--resume", tmp_path), "nothing to resume"),
     ):
         done = command(identify_run, *line, "--out", tmp_path / "out")

@@ -35,14 +35,14 @@ def test_the_sets_are_recovered_from_the_capture_alone_and_can_be_identified(onl
     capture = (only_raw / "raw" / "wire.cap").read_bytes()
     done = command(app, "recover", only_raw)
     assert done.exit_code == 0, done.output
-    assert "no journal with a sample: the raw capture is played through the drivers" in done.stdout
-    assert "the names of the sets are lost with the journal" in done.stdout
+    assert "no journal holds a sample: the raw capture is decoded by the drivers instead" in done.stdout
+    assert "the names of the sets were in the journal and are lost" in done.stdout
     runs = read_recording_h5(only_raw / "recording.h5").runs
     assert [run.name for run in runs] == ["set 1", "set 2"]
     assert all(f"{run.name}: {len(run.time_s)} samples" in done.stdout for run in runs)
     assert (only_raw / "raw" / "wire.cap").read_bytes() == capture
     loaded = load_config(only_raw / "recovered.yaml")
-    assert "The declared model is not in it" in loaded.text
+    assert "The declared model was lost" in loaded.text
     assert len(read_recording(loaded).runs) == 2
 
 
@@ -67,6 +67,6 @@ def test_where_nothing_was_played_neither_journal_nor_capture_is_promised(bench:
     done = command(app, "recover", tmp_path)
     assert done.exit_code == 2
     assert "no journal with a sample in it" in done.stderr
-    assert "raw/wire.cap: ends before anything was played" in done.stderr
+    assert "raw/wire.cap: ends before the first set" in done.stderr
     assert "bench.replay" not in done.stderr
     assert not (tmp_path / "recording.h5").exists()

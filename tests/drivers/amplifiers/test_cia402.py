@@ -247,5 +247,5 @@ def without(bench, *objects):
 
 
 def test_a_drive_without_a_reaction_to_a_lost_computer_is_refused_at_contact(bench):
-    with pytest.raises(DeviceFault, match=r"has no 0x6007 and no 0x1029: nothing makes it cut the torque"):
+    with pytest.raises(DeviceFault, match=r"has no 0x6007 and no 0x1029, so it would not cut the torque"):
         without(bench, cia402.ABORT_CONNECTION_OPTION).amplifier.contact(bench.link)

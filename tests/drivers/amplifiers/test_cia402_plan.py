@@ -42,7 +42,7 @@ def test_position_drives_are_read_and_refused_for_what_they_lack(name, modes, to
     drive = dictionary(name)
     assert drive[cia402.SUPPORTED_MODES].default == modes
     assert tuple(i for i in TORQUE_OBJECTS if i in drive) == torque_objects
-    lacks = r"its object dictionary lacks 0x6071 \(target torque\): take a drive with a torque mode"
+    lacks = r"its object dictionary lacks 0x6071 \(target torque\): use a drive with a torque mode"
     with pytest.raises(ConfigError, match=lacks):
         plan_drive(drive, wish, peak_is_declared=True, reference_is_declared=True)
     drive[cia402.TARGET_TORQUE] = standard_dictionary(1)[cia402.TARGET_TORQUE]  # would not make it a torque drive

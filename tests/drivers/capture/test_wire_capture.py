@@ -8,7 +8,7 @@ from drivers.capture import wire_capture
 from drivers.capture.wire_capture import Capture, export, read_capture, unpack_frame
 from drivers.codecs.lawicel import CanFrame
 from rig.errors import Aborted, DeviceFault, RecordingError
-from rig.recording.steady import SteadyFile
+from rig.recording.tail_file import TailedFile
 from tests.drivers.wireless import play
 
 
@@ -56,7 +56,7 @@ def full_disk(monkeypatch):
     def refuse(self, data):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(SteadyFile, "write", refuse)
+    monkeypatch.setattr(TailedFile, "write", refuse)
 
 
 def test_a_disk_that_is_full_already_is_told_before_the_drive_is_armed(bench, monkeypatch):

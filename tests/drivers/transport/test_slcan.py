@@ -139,8 +139,8 @@ def test_interface_is_registered_with_python_can():
 
 
 def test_a_port_that_never_stops_sending_is_no_adapter(port, monkeypatch):
-    monkeypatch.setattr("drivers.transport.slcan.TALKS_S", 0.01)
+    monkeypatch.setattr("drivers.transport.slcan.LONGEST_FLUSH_S", 0.01)
     port.wait_readable = lambda timeout_s: True
     port.read = lambda: b"\x90\x00"
-    with pytest.raises(can.CanInitializationError, match=r"keeps sending.*swapped"):
+    with pytest.raises(can.CanInitializationError, match=r"still sending.*swapped"):
         SlcanBulkBus(port)

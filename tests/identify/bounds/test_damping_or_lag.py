@@ -19,7 +19,7 @@ def runs(*sets: tuple[float, float], soft_s: float = 0.0) -> list[Trace]:
 
 def test_slow_sets_are_said_to_leave_damping_and_delay_open() -> None:
     said = lag_for_damping(Platform(*TRUTH), WEAK, runs((85.0, 0.5), (85.0, 1.0), soft_s=1.0), "rotary")
-    assert "1 ms of it that nobody declared is 0.68 N m s/rad of the 0.0450 that C is here" in said
+    assert "undeclared 1 ms adds 0.68 N m s/rad to the identified C of 0.0450 N m s/rad" in said
     assert "29 Hz" in said
 
 

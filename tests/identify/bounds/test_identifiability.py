@@ -110,14 +110,16 @@ def test_a_set_below_the_noise_is_told_how_much_more_torque_it_needs() -> None:
 
 def test_without_stiffness_the_smallest_that_would_show_is_said() -> None:
     lines = told(*sines((0.1, 1.0)), platform=replace(PAPER, stiffness_nm_rad=0.0))
-    assert any("declared as 0: below" in line and "cannot be distinguished from zero" in line for line in lines)
+    assert any("declared as 0; a value below" in line and "cannot be distinguished from 0" in line for line in lines)
     assert not any("NOT determined" in line or "nan" in line for line in lines)
 
 
 def test_a_free_decay_without_torque_gives_ratios_only() -> None:
     run = decay_run(PAPER, duration_s=5.0)
     lines = of_recorded_campaign(Recording((run,)), PAPER)
-    assert any("without torque only ratios can be determined; expected C/J" in line and "K/J" in line for line in lines)
+    assert any(
+        "a decay without torque determines only ratios; expected C/J" in line and "K/J" in line for line in lines
+    )
     assert not any("cannot" in line for line in lines)
 
 
@@ -131,7 +133,7 @@ def test_a_delay_and_an_effect_are_parameters_like_any_other() -> None:
 
 
 def test_a_gyro_that_does_not_say_its_noise_is_assumed_to_be_the_papers() -> None:
-    assert "0.05 deg/s a sample (assumed" in told(*sines((20.0, 1.0)), noise=None)[0]
+    assert "0.05 deg/s per sample (assumed" in told(*sines((20.0, 1.0)), noise=None)[0]
 
 
 def test_two_copies_of_a_parameter_have_rank_one_less_and_no_bound() -> None:

@@ -47,7 +47,7 @@ def test_a_term_that_is_one_with_a_lost_one_is_lost_as_well() -> None:
 
 def test_in_a_single_run_inertia_goes_with_a_lost_stiffness_however_little_they_correlate() -> None:
     why = undetermined(fitted(np.array([0.01, 0.1, 2.0])), {0}, alone=True)
-    assert "a combination with stiffness" in why[("inertia",)]
+    assert "only its combination with stiffness" in why[("inertia",)]
 
 
 def test_a_parameter_of_a_run_that_no_fit_looked_at_is_not_listed() -> None:

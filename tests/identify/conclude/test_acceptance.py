@@ -6,7 +6,7 @@ import pytest
 
 from identify.conclude.acceptance import too_much_left
 from identify.results import Dependence, Disturbance
-from identify.wording import left_over
+from identify.wording import residual_torque_sentence
 from rig.config.identify import AcceptConfig
 
 RATE = Dependence("rate", 0.03, 0.03, 1e-9)
@@ -33,6 +33,6 @@ def test_each_limit_is_named_where_it_is_passed(left: Disturbance, words: str) -
 def test_within_all_limits_it_is_accepted_and_told_in_a_sentence() -> None:
     left = Disturbance(0.1, "N*m", 0.1, (RATE,), {"inertia": 1.0, "damping": 5.0})
     assert too_much_left(left, AcceptConfig(), "rotary") == []
-    assert "3.0 % on the rate" in left_over(left, "rotary")
-    assert "3.0 % on the speed" in left_over(left, "linear")
-    assert "changes J by 1.0 % and C by 5.0 %" in left_over(left, "rotary")
+    assert "3.0 % depends on the rate" in residual_torque_sentence(left, "rotary")
+    assert "3.0 % depends on the speed" in residual_torque_sentence(left, "linear")
+    assert "changes J by 1.0 % and C by 5.0 %" in residual_torque_sentence(left, "rotary")

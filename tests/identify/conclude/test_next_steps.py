@@ -55,7 +55,7 @@ def test_a_run_that_begins_in_motion_is_said_to_hide_what_remembers() -> None:
     late = replace(first, rate_rad_s=np.roll(first.rate_rad_s, -300))
     steps = next_steps(replace(found, traces=(late, *others)))
     assert len(steps) == 2
-    assert "begins in motion" in steps[0] and first.name in steps[0]
+    assert "starts in motion" in steps[0] and first.name in steps[0]
 
 
 def test_a_decay_is_not_told_to_raise_its_torque() -> None:

@@ -37,9 +37,9 @@ def said(found: Identification, declared: Mapping[str, float] = REFERENCE) -> tu
 @pytest.mark.parametrize(
     ("factor", "words"),
     [
-        (1.0 / DEGREES, "J, C and K are about 1/57 of the declared numbers, as if the rate were in deg/s"),
-        (1.1 * DEGREES, "converted from deg/s all the same"),
-        (1000.0, "J, C and K are about 1000 times the declared numbers, as if the torque were in mN m"),
+        (1.0 / DEGREES, "J, C and K are about 1/57 of the declared values, as if the rate were in deg/s"),
+        (1.1 * DEGREES, "converted from deg/s"),
+        (1000.0, "J, C and K are about 1000 times the declared values, as if the torque were in mN m"),
         (2.0 * np.pi, "turns per second and read as rad/s"),
         (1.0 / 9.81, "the rate were in rpm and read as rad/s, or the torque in kgf m"),
     ],
@@ -51,7 +51,7 @@ def test_a_factor_that_all_share_is_a_unit_of_torque_or_rate(factor: float, word
 
 def test_a_damping_that_was_a_guess_has_no_veto_and_is_not_named() -> None:
     (sentence,) = said(fitted(inertia=1.0 / DEGREES, stiffness=1.0 / DEGREES))
-    assert sentence.startswith("J and K are about 1/57 of the declared numbers")
+    assert sentence.startswith("J and K are about 1/57 of the declared values")
 
 
 def test_an_encoder_is_spoken_of_as_an_angle_and_a_linear_axis_knows_no_degrees() -> None:
@@ -63,10 +63,10 @@ def test_an_encoder_is_spoken_of_as_an_angle_and_a_linear_axis_knows_no_degrees(
 @pytest.mark.parametrize(
     ("times", "words"),
     [
-        ({"stiffness": DEGREES}, "K is about 57 times the declared number, while J agrees, as if it were per degree"),
-        ({"stiffness": (2 * np.pi) ** 2}, "a frequency in Hz taken for rad/s"),
-        ({"inertia": 1e-4}, "J is about 1/10000 of the declared number, while K agrees, as if it were in kg cm^2"),
-        ({"stiffness": -1.0}, "K is the opposite of the declared number, while J agrees: check the sign"),
+        ({"stiffness": DEGREES}, "K is about 57 times the declared value, while J agrees, as if it were per degree"),
+        ({"stiffness": (2 * np.pi) ** 2}, "a frequency in Hz instead of rad/s"),
+        ({"inertia": 1e-4}, "J is about 1/10000 of the declared value, while K agrees, as if it were in kg cm^2"),
+        ({"stiffness": -1.0}, "K is the opposite of the declared value, while J agrees: check the sign"),
         ({"damping": DEGREES}, "while J and K agree, as if it were per deg/s"),
     ],
 )
@@ -116,7 +116,7 @@ def test_a_decay_is_compared_by_its_ratios() -> None:
     assert GOOD.after is not None
     parameters = {"stiffness_over_inertia": estimate(ratio * (2 * np.pi) ** 2, 1.0, "1/s^2")}
     decay = replace(GOOD, torque_free=True, after=replace(GOOD.after, parameters=parameters))
-    assert "Hz taken for rad/s" in said(decay)[0]
+    assert "Hz instead of rad/s" in said(decay)[0]
     assert with_declared(decay, REFERENCE).declared["stiffness_over_inertia"] == pytest.approx(ratio)
 
 

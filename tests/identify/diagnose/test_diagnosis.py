@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identify.diagnose.diagnosis import Sensor, diagnose
-from identify.diagnose.wording import WORTH_OF_PAST, diagnosis_sentences, told
+from identify.diagnose.wording import WORTH_OF_PAST, diagnosis_sentences, is_significant
 from identify.results import RunTraces, Share
 from rig.platform import Platform
 from tests.identify.leftover import diagnosed, diagnosis_of, leftover
@@ -18,15 +18,15 @@ from tests.rig.effects.values import VALUES
 
 def share(found: Share | None) -> float:
     """What is told of it."""
-    return found.share if told(found) and found is not None else 0.0
+    return found.share if is_significant(found) and found is not None else 0.0
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 10))])
 def test_of_a_clean_platform_with_white_noise_nothing_is_said(seed: int) -> None:
     found = diagnosed(seed=seed)
     assert found.harmonics is not None
-    assert not told(found.harmonics.repeats)
-    assert not told(found.direction) and not told(found.memory, WORTH_OF_PAST)
+    assert not is_significant(found.harmonics.repeats)
+    assert not is_significant(found.direction) and not is_significant(found.memory, WORTH_OF_PAST)
     assert found.free_lines == ()
     (only,) = diagnosis_sentences(found, "rotary")
     assert "shows no structure" in only
@@ -57,7 +57,7 @@ def test_a_pump_is_a_free_line_at_its_frequency_and_size_and_nothing_else(hertz:
     (line,) = found.free_lines
     assert line.frequency_hz == pytest.approx(hertz, abs=0.1)
     assert line.size == pytest.approx(np.hypot(0.05, 0.06), rel=0.1), "N m"
-    assert not told(found.direction) and not told(found.memory, WORTH_OF_PAST)
+    assert not is_significant(found.direction) and not is_significant(found.memory, WORTH_OF_PAST)
 
 
 def test_a_free_line_beside_multiples_of_most_sets_is_no_harmonic() -> None:
@@ -84,24 +84,24 @@ def test_friction_changes_sign_with_the_direction_and_a_spring_does_not() -> Non
 def test_what_remembers_is_told_as_memory(name: str) -> None:
     found = diagnosed({name: VALUES[name]})
     assert found.memory is not None
-    assert told(found.memory, WORTH_OF_PAST)
+    assert is_significant(found.memory, WORTH_OF_PAST)
     assert found.memory.share > 0.5
 
 
 @pytest.mark.parametrize("name", ["coulomb_friction", "stribeck_friction", "cubic_stiffness", "backlash",
                                   "quadratic_stiffness", "stiffness_drift", "cogging"])  # fmt: skip
 def test_what_knows_only_the_present_is_no_memory(name: str) -> None:
-    assert not told(diagnosed({name: VALUES[name]}).memory, WORTH_OF_PAST)
+    assert not is_significant(diagnosed({name: VALUES[name]}).memory, WORTH_OF_PAST)
 
 
 def test_the_sentences_name_shares_orders_and_what_makes_them() -> None:
     said = " ".join(diagnosis_sentences(diagnosed({"cubic_stiffness": VALUES["cubic_stiffness"]}), "rotary"))
-    assert "times as large as the sensor's noise alone" in said
+    assert "times the level of the sensor's noise" in said
     assert "in odd harmonics (3rd 5" in said
     assert "cubic spring" in said and "even" not in said and "direction" not in said
     pump = diagnosed({"periodic_disturbance": {"sine": 0.08, "cosine": 0.0, "frequency": 17.3}})
     line = diagnosis_sentences(pump, "rotary")[-1]
-    assert line.startswith("A line at 17.3") and "not locked to the excitation of any set: 0.08" in line
+    assert line.startswith("A spectral line at 17.3") and "is not a harmonic of any excitation" in line
     assert "N·m" in line
 
 

@@ -82,7 +82,7 @@ def test_what_was_played_stands_in_result_and_summary() -> None:
 
 def test_where_the_campaign_was_not_accepted_the_plan_is_what_to_run_next() -> None:
     found = replace(sample(2.0)[0], accepted=False, follow_up=FollowUp(plan(400.0)))
-    assert "Play follow_up.yaml: A slow sine parts them." in next_steps(found)
+    assert "Play follow_up.yaml." in next_steps(found)
 
 
 def test_a_plan_and_what_has_none_are_said_in_words() -> None:
@@ -92,11 +92,11 @@ def test_a_plan_and_what_has_none_are_said_in_words() -> None:
             Unparted("actuator_lag", "sensor_lag", "measure the current"),
             Unparted("backlash", "cogging", "no excitation"),
         ),
-        note="it is not played: nobody can be asked",
+        note="it was not played: identify.follow_up is never",
     )
     said = lines(follow_up)
-    assert said[0].startswith("follow_up.yaml (12 s): a slow sine")
-    assert said[1].startswith("It is not played") and len(said) == 4
+    assert said[0] == "follow_up.yaml (12 s) holds the excitation that the verdict describes."
+    assert said[1].startswith("It was not played") and len(said) == 2
     # What can never be told apart the verdict says by itself.
     told = verdict_sentences(follow_up, {"sensor_lag / actuator_lag": "they answer alike"})
     assert [s for s in told if "lag" in s] == []

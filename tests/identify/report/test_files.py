@@ -185,7 +185,7 @@ def test_without_torque_the_declared_inertia_sets_the_scale_of_all_that_is_a_tor
 def test_without_torque_the_scale_is_said_also_where_no_ratio_stands_in_the_tables(found: Identification) -> None:
     decay = replace(with_final(found, platform=RATIOS, parameters={}), torque_free=True)
     assert "the declared inertia sets the scale" in model_text(decay, DECLARED)
-    assert "right only as far as the declared inertia of 0.0185 is" in model_text(decay, DECLARED)
+    assert "in proportion to the declared inertia of 0.0185 kg m^2" in model_text(decay, DECLARED)
 
 
 def test_without_torque_and_without_a_declared_inertia_nothing_in_n_m_is_made_up(found: Identification) -> None:

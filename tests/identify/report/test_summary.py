@@ -18,7 +18,6 @@ def test_a_person_hears_verdict_parameters_errors_sets_and_outcome() -> None:
         "+822 %",
         "held-out rate, free run",
         "0.0008727",
-        "Presliding friction explains these data about as well as Coulomb friction.",
         "undetermined",
         "Max_Error",
     ):
@@ -46,6 +45,14 @@ def test_what_was_dropped_or_not_determined_is_said_with_its_reason_and_what_to_
         "held-out position, free run",
     ):
         assert words in said, words
+
+
+def test_what_the_reasons_say_is_not_said_again() -> None:
+    found = unhappy()
+    reasons = (*found.reasons, "stiffness_over_inertia is not determined: no run returns to rest: record one that does")
+    said = summary(replace(found, reasons=reasons), 200)
+    assert said.count("no run returns to rest") == 1
+    assert "Not determined by these data" not in said
 
 
 def test_a_campaign_that_fails_says_so_last() -> None:

@@ -110,7 +110,7 @@ def test_noise_in_the_recorded_torque_swells_at_the_resonance_and_is_not_the_sen
 def test_what_a_clean_torque_leaves_is_not_blamed_on_its_noise() -> None:
     found, _ = found_in(recorded(None, {"cubic_stiffness": {"factor": 300.0}}), [])
     assert found.verdict.unexplained
-    assert torque_noise.told(found) == ""
+    assert torque_noise.describe(found) == ""
 
 
 def test_two_runs_of_different_noise_have_no_colour_in_common() -> None:

@@ -156,7 +156,7 @@ def test_a_model_known_per_unit_of_inertia_makes_a_twin_and_moves_no_bench(tmp_p
     model = load(tmp_path, "backend: simulated\n" + models).config.model
     assert model.platform() == TWIN
     assert not model.inertia_declared
-    with pytest.raises(ConfigError, match=r"model: .*per unit of an inertia that nobody gave"):
+    with pytest.raises(ConfigError, match=r"model: .*the values of this model are per unit of inertia"):
         load(tmp_path, "backend: bench\n" + models, "model.inertia_kg_m2=0.5")
 
 

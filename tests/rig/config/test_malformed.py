@@ -54,7 +54,7 @@ CASES = {
     "endless integer": (RUNS + f"identify: {{seed: {'9' * 5000}}}", ":5: identify.seed", "9999", "number"),
     "whole number beyond all floats": (RUNS + f"identify: {{j_dec: {'9' * 400}}}", ":5: identify.j_dec", "9", "finite"),
     "brackets without end": ("a: " + "[{" * 60_000, "rig.yaml", "nested too deeply", "at most 40 levels"),
-    "text turned around": (RUNS + 'name: "a\\u202eb"', ":5: name", "folder's name", "letters"),
+    "text turned around": (RUNS + 'name: "a\\u202eb"', ":5: name", "name of a folder", "letters"),
     "set turned around": (
         'backend: simulated\nsimulated: {}\nexcitation:\n  sets: [{torque_nm: 1, frequency_hz: 1, name: "\\u202ea"}]',
         ":4: excitation.sets.0.name",
@@ -93,7 +93,7 @@ CASES = {
         "a list",
     ),
     "term twice": (RUNS + "model: {terms: [inertia, inertia]}", ":5: model.terms", "twice", "once"),
-    "no inertia term": (RUNS + "model: {terms: [damping]}", ":5: model.terms", "inertia has to stay", "leave out"),
+    "no inertia term": (RUNS + "model: {terms: [damping]}", ":5: model.terms", "inertia is required", "leave out"),
     "unknown effect": (
         RUNS + "model:\n  effects:\n    coulomb_frictoin: {level_nm: 1}",
         ":7: model.effects.coulomb_frictoin",
@@ -131,8 +131,8 @@ CASES = {
         "at least 0",
     ),
     "window backwards": (RUNS + "      from_s: 3\n      to_s: 2", ":4: recorded.runs.0", "to_s = 2", "later than"),
-    "nothing to fit": (RUNS + "      use: holdout", "recorded", "nothing is left to fit", "mark one use: fit"),
-    "zero scale": (RUNS + "  scale: {torque: 0}", ":5: recorded.scale.torque", "erases", "factor to SI"),
+    "nothing to fit": (RUNS + "      use: holdout", "recorded", "there is nothing to fit", "set use: fit"),
+    "zero scale": (RUNS + "  scale: {torque: 0}", ":5: recorded.scale.torque", "erases", "converts to SI"),
     "column used twice": (
         RUNS + "  columns: {rate: a, angle: a}",
         ":5: recorded.columns",
@@ -145,7 +145,7 @@ CASES = {
         "an address, not a file",
         "download it first",
     ),
-    "name with a path": (RUNS + "name: ../../etc", ":5: name", "folder's name", "letters, digits"),
+    "name with a path": (RUNS + "name: ../../etc", ":5: name", "name of a folder", "letters, digits"),
     "duplicate key": (RUNS + "name: a\nname: b", ":6: name", "given twice (first on line 5)", "keep one"),
     "bad indentation": ("backend: recorded\n recorded: 1", ":2:", "not YAML", "indentation"),
     "tab": ("backend: recorded\nrecorded:\n\truns: 1", ":3:", "not YAML", "spaces, never with tabs"),

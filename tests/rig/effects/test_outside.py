@@ -103,7 +103,7 @@ def test_a_model_file_counts_its_effect_files_from_where_it_stands(tmp_path: Pat
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (("EFFECT = Effect", "OTHER = Effect"), "holds no effect"),
+        (("EFFECT = Effect", "OTHER = Effect"), "defines no effect"),
         (('name="eddy_brake"', 'name="creep"'), "the name 'creep' is taken"),
         (('name="eddy_brake"', 'name="Eddy brake"'), "lower-case"),
         (("@kernel", "@(lambda f: f)"), "decorated with @kernel"),

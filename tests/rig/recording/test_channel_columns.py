@@ -109,7 +109,7 @@ def test_an_empty_or_a_wild_channel_is_refused_with_its_key_or_line(tmp_path: Pa
         ("{w: {kind: temperature, torque_constant_nm_a: 1}}", r"torque_constant_nm_a belongs to kind: current"),
         ("{w: {kind: other, scale: 0}}", r"a factor of 0 erases the column"),
         ("{w: {kind: other, colum: T}}", r"unknown key 'colum', did you mean 'column'"),
-        ("{" + ", ".join(f"x{i}: {{kind: other}}" for i in range(9)) + "}", r"9 channels, at most 8 are looked at"),
+        ("{" + ", ".join(f"x{i}: {{kind: other}}" for i in range(9)) + "}", r"9 channels, at most 8 are allowed"),
     ],
 )  # fmt: skip
 def test_a_wrong_declaration_is_said_with_its_key_and_what_is_allowed(tmp_path: Path, channels: str, said: str) -> None:

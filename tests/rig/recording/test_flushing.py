@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import rig.recording.journal as journal_module
-import rig.recording.steady as steady_module
+import rig.recording.tail_file as tail_file_module
 from rig.excitation import PlannedSet, Sine
 from rig.guard import Tick
 from rig.interface import GyroSample, TorqueSample
@@ -46,7 +46,7 @@ def test_a_slow_sync_does_not_hold_up_what_is_written(tmp_path: Path, monkeypatc
     journal = Journal.create(tmp_path / "a.journal", {}, flush_interval_s=0.002)
     journal.begin_run("r", {})
     with monkeypatch.context() as patch:
-        patch.setattr(steady_module, "sync", slow)
+        patch.setattr(tail_file_module, "sync", slow)
         patch.setattr(journal_module, "SYNC_EVERY_S", 0.002)
         with journal.flushing_in_background():
             journal.append("samples", (0.0, 1.0, 1.0))
@@ -69,7 +69,7 @@ def test_what_the_disk_refuses_to_sync_is_said(tmp_path: Path, monkeypatch: pyte
     journal.append("samples", (0.0, 1.0, 1.0))
     journal.flush()
     with monkeypatch.context() as patch:
-        patch.setattr(steady_module, "sync", broken)
+        patch.setattr(tail_file_module, "sync", broken)
         journal._sync_quietly()
     with pytest.raises(journal_module.JournalError, match="Input/output error"):
         journal.append("samples", (0.1, 1.0, 1.0))

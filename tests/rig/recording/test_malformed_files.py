@@ -220,8 +220,8 @@ def test_a_device_is_refused(tmp_path: Path) -> None:
 
 def test_a_home_that_does_not_exist_is_said(tmp_path: Path) -> None:
     message = refusal(tmp_path, "~no-such-user-here/run.csv")
-    assert "~ means no home folder" in message
-    assert "give the whole path" in message
+    assert "the home folder (~) is unknown" in message
+    assert "give the absolute path" in message
 
 
 def test_all_wrong_files_are_said_at_once(tmp_path: Path) -> None:
@@ -233,5 +233,5 @@ def test_a_stretch_cannot_be_fitted_and_held_out(tmp_path: Path) -> None:
     np.savez(tmp_path / "run.npz", **motion())
     entry = "      use: fit\n      to_s: 0.3\n    - {file: run.npz, use: holdout, from_s: 0.2}\n"
     message = refusal(tmp_path, "run.npz", entry=entry)
-    assert "0.2 to 0.3 s is both use: fit and use: holdout" in message
+    assert "0.2 to 0.3 s has both use: fit and use: holdout" in message
     assert "do not overlap" in message

@@ -66,7 +66,7 @@ ARRAYS: dict[str, tuple[Columns, str, str, str, str]] = {
         "",
         "",
         "the time looks like milliseconds",
-        "recorded.scale.time: 0.001; if it is in seconds, say so",
+        "recorded.scale.time: 0.001; if it is in seconds, set",
     ),
     "time in us, rate only": (
         {k: v for k, v in changed(time_s=T * 1e6).items() if k != "angle_rad"},

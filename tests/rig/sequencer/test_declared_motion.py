@@ -14,7 +14,7 @@ from rig.guard import Guard, Trip
 from rig.interface import Exchange, GyroSample
 from rig.platform import Platform
 from rig.sequencer import Sequencer
-from rig.sequencer.declared_motion import explained, suspicion
+from rig.sequencer.declared_motion import explained, suspected_parameter
 from tests.rig.scripted import ScriptedRig
 
 SLOW = planned((Sine(torque_nm=20, frequency_hz=0.5, duration_s=2.0),))
@@ -24,7 +24,7 @@ FREE = Platform(0.5, 0.1, 0.0, terms=("inertia", "damping"))
 
 
 def travel(allowed_deg: float) -> Trip:
-    return Trip("travel (limits.travel_deg; 0.1 deg of it is what the gyro may have drifted)", allowed_deg, allowed_deg,
+    return Trip("travel (limits.travel_deg; 0.1 deg of it is possible drift of the gyro)", allowed_deg, allowed_deg,
                 "deg", 0.2, "Lower torque_nm.")  # fmt: skip
 
 
@@ -33,35 +33,35 @@ def rate(allowed_deg_s: float) -> Trip:
 
 
 def test_below_the_resonance_it_is_the_stiffness() -> None:
-    said = suspicion(travel(10.0), SPRING, SLOW, 5.0)
+    said = suspected_parameter(travel(10.0), SPRING, SLOW, 5.0)
     assert said.startswith("The declared model predicted at most 1.71 ")
     assert "the declared stiffness may be too large." in said
 
 
 def test_above_the_resonance_and_without_a_spring_it_is_the_inertia() -> None:
-    assert "the declared inertia may be too large" in suspicion(rate(1e4), SPRING, FAST, 5.0)
-    assert suspicion(rate(3e3), FREE, SLOW, 5.0).endswith("the declared inertia may be too large.")
+    assert "the declared inertia may be too large" in suspected_parameter(rate(1e4), SPRING, FAST, 5.0)
+    assert suspected_parameter(rate(3e3), FREE, SLOW, 5.0).endswith("the declared inertia may be too large.")
 
 
 def test_a_set_just_below_the_resonance_may_ring_because_the_inertia_is_too_small() -> None:
     below = planned((Sine(torque_nm=20, frequency_hz=15, duration_s=1.0),))
-    assert "the declared inertia may be too small" in suspicion(travel(90.0), SPRING, below, 5.0)
+    assert "the declared inertia may be too small" in suspected_parameter(travel(90.0), SPRING, below, 5.0)
 
 
 def test_without_a_spring_the_sets_before_count() -> None:
-    twice = suspicion(travel(1e5), FREE, SLOW * 2, 0.5)
-    once = suspicion(travel(1e5), FREE, SLOW, 0.5)
+    twice = suspected_parameter(travel(1e5), FREE, SLOW * 2, 0.5)
+    once = suspected_parameter(travel(1e5), FREE, SLOW, 0.5)
     assert twice != once
 
 
 def test_a_prediction_near_the_limit_and_other_limits_say_nothing_of_the_model() -> None:
-    assert suspicion(travel(2.0), SPRING, SLOW, 5.0) == ""
+    assert suspected_parameter(travel(2.0), SPRING, SLOW, 5.0) == ""
     stale = Trip("gyro stale (limits.stale_gyro_ms)", 30.0, 20.0, "ms", 0.2, "Check the cable.")
-    assert suspicion(stale, SPRING, SLOW, 5.0) == ""
+    assert suspected_parameter(stale, SPRING, SLOW, 5.0) == ""
 
 
 def test_a_model_that_runs_away_predicts_nothing() -> None:
-    assert suspicion(travel(90.0), Platform(0.02, -5.0, 677.3), SLOW, 5.0) == ""
+    assert suspected_parameter(travel(90.0), Platform(0.02, -5.0, 677.3), SLOW, 5.0) == ""
 
 
 def test_only_a_trip_during_a_set_is_explained() -> None:

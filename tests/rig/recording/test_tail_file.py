@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import rig.recording.steady as steady_module
+import rig.recording.tail_file as tail_file_module
 from commands.campaign.campaign_part import CampaignPart
 from drivers.capture.account import summary_of
 from drivers.capture.wire_capture import TICK, Capture, read_capture
 from rig.recording.journal import Journal
 from rig.recording.journal_reader import read_journal
-from rig.recording.steady import RESERVED_BYTES, SteadyFile, missing_of, opened, record, tail_of, whole
+from rig.recording.tail_file import RESERVED_BYTES, TailedFile, missing_of, opened, record, tail_of, whole
 
 
 class Hanging:
@@ -36,11 +36,11 @@ class Hanging:
 @pytest.fixture
 def hanging(monkeypatch: pytest.MonkeyPatch) -> Hanging:
     sync = Hanging()
-    monkeypatch.setattr(steady_module, "sync", sync)
+    monkeypatch.setattr(tail_file_module, "sync", sync)
     return sync
 
 
-def _syncing(file: SteadyFile, sync: Hanging) -> threading.Thread:
+def _syncing(file: TailedFile, sync: Hanging) -> threading.Thread:
     thread = threading.Thread(target=file.sync)
     thread.start()
     assert sync.entered.wait(5.0)
@@ -51,7 +51,7 @@ def test_what_comes_during_a_sync_is_readable_at_once_and_in_the_file_itself_aft
     tmp_path: Path, hanging: Hanging
 ) -> None:
     path = tmp_path / "a"
-    file = SteadyFile(path)
+    file = TailedFile(path)
     file.expect_syncs()
     file.write(b"one ")
     thread = _syncing(file, hanging)
@@ -70,7 +70,7 @@ def test_what_comes_during_a_sync_is_readable_at_once_and_in_the_file_itself_aft
 def test_a_sync_includes_what_came_during_the_one_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a"
     synced: list[bytes] = []
-    file = SteadyFile(path)
+    file = TailedFile(path)
     file.expect_syncs()
 
     def during(descriptor: int) -> None:
@@ -78,7 +78,7 @@ def test_a_sync_includes_what_came_during_the_one_before(tmp_path: Path, monkeyp
         if len(synced) == 1:
             file.write(b"two")
 
-    monkeypatch.setattr(steady_module, "sync", during)
+    monkeypatch.setattr(tail_file_module, "sync", during)
     file.write(b"one ")
     file.sync()
     file.sync()
@@ -91,7 +91,7 @@ def test_a_tail_that_is_begun_anew_leaves_nothing_wrong_behind(tmp_path: Path, m
     random = np.random.default_rng(5)
     path = tmp_path / "a"
     expected = bytearray()
-    file = SteadyFile(path)
+    file = TailedFile(path)
     file.expect_syncs()
 
     def during(descriptor: int) -> None:
@@ -101,7 +101,7 @@ def test_a_tail_that_is_begun_anew_leaves_nothing_wrong_behind(tmp_path: Path, m
             file.write(piece)
             assert whole(path) == expected
 
-    monkeypatch.setattr(steady_module, "sync", during)
+    monkeypatch.setattr(tail_file_module, "sync", during)
     for _ in range(60):
         piece = random.bytes(int(random.integers(1, 3000)))
         expected.extend(piece)
@@ -114,7 +114,7 @@ def test_a_tail_that_is_begun_anew_leaves_nothing_wrong_behind(tmp_path: Path, m
 
 def test_without_a_tail_a_write_goes_to_the_file_itself(tmp_path: Path, hanging: Hanging) -> None:
     path = tmp_path / "a"
-    file = SteadyFile(path)
+    file = TailedFile(path)
     file.write(b"one ")
     thread = _syncing(file, hanging)
     file.write(b"two")
@@ -128,7 +128,7 @@ def test_where_nothing_more_can_be_written_what_was_taken_stays_in_the_tail(
     tmp_path: Path, hanging: Hanging, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "a"
-    file = SteadyFile(path)
+    file = TailedFile(path)
     file.expect_syncs()
     file.write(b"one ")
     thread = _syncing(file, hanging)
@@ -141,7 +141,7 @@ def test_where_nothing_more_can_be_written_what_was_taken_stays_in_the_tail(
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(steady_module, "_write_all", full)
+        patch.setattr(tail_file_module, "_write_all", full)
         with pytest.raises(OSError, match="No space left"):
             file.write(b"three")
         assert path.read_bytes() == b"one "
@@ -162,7 +162,7 @@ def test_a_tail_that_was_cut_gives_what_is_sound_and_nothing_else(tmp_path: Path
 def test_a_tail_from_elsewhere_does_no_harm(tmp_path: Path) -> None:
     path = tmp_path / "a"
     path.write_bytes(b"0123")
-    lies = b"".join(steady_module._HEAD.pack(b"ISPT", 4, 1 << k % 32, 0) for k in range(50_000))
+    lies = b"".join(tail_file_module._HEAD.pack(b"ISPT", 4, 1 << k % 32, 0) for k in range(50_000))
     tail_of(path).write_bytes(lies)
     begun_s = time.process_time()
     assert whole(path) == b"0123"
@@ -184,7 +184,7 @@ def test_a_file_of_many_gigabytes_is_not_taken_into_memory_for_its_tail(
     tail_of(path).write_bytes(record(4, b"45"))
     with opened(path) as file:
         assert file.read() == b"012345"
-    monkeypatch.setattr(steady_module, "LONGEST_JOINED", 3)
+    monkeypatch.setattr(tail_file_module, "LONGEST_JOINED", 3)
     with opened(path) as file:
         assert file.read() == b"0123"
 
@@ -222,7 +222,7 @@ WRITER = """
 import sys, threading, time
 from collections import defaultdict
 from pathlib import Path
-import rig.recording.steady as steady
+import rig.recording.tail_file as steady
 from drivers.capture.wire_capture import Capture
 from rig.recording.journal import Journal
 

@@ -1,4 +1,7 @@
-"""Where nothing pulls the platform back, every set begins where the ones before left it and it adds up."""
+"""Sets simulated on the declared platform: travel, rate and torque of one set, and of all sets in sequence.
+
+Without a restoring spring every set begins where the one before it left the platform, so that travel adds up.
+"""
 
 from __future__ import annotations
 

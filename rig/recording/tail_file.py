@@ -43,7 +43,7 @@ def record(offset: int, data: bytes) -> bytes:
     return _HEAD.pack(MARKER, offset, len(data), zlib.crc32(data, zlib.crc32(head))) + data
 
 
-class SteadyFile:
+class TailedFile:
     """Writer. ``write`` and ``sync`` may be called by two threads at once. All methods raise OSError.
 
     A new file is made, an existing one never overwritten.
