@@ -133,6 +133,12 @@ def page(effect: Effect) -> str:
         f"**Family** {effect.family} · **Source** {effect.source}", "", f"**Sign** {effect.sign}", "",
         "| parameter | unit | bounds | how found | key in rig.yaml | meaning |", "|---|---|---|---|---|---|", *rows,
     ]  # fmt: skip
+    for form in effects.forms(effect.name):
+        other = effects.get(form)
+        out += [
+            "", "## In another form", "", f"Models may hold `{form}`, which goes by the same name in a verdict:", "",
+            f"    {other.equation}", "", f"**Source** {other.source}",
+        ]  # fmt: skip
     out += ["", "## What it is confused with", ""]
     out += [
         f"- `{rival}`{', always' if alike.travel_deg == math.inf else ''}: {alike.why}."

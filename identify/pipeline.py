@@ -11,11 +11,13 @@ from threadpoolctl import threadpool_limits
 from identify.conclude.conclusion import Case, conclude
 from identify.conclude.declared_values import declared_values
 from identify.conclude.error_figures import floor_of, in_torque, measure
+from identify.estimate.by_prediction_error import by_prediction_error
 from identify.estimate.cross_validation import Judged
-from identify.estimate.final_fit import Fitted, by_output_error, by_regression, noise_of_all
+from identify.estimate.final_fit import Fitted, by_output_error, by_regression
 from identify.estimate.fit import Fit
 from identify.estimate.initial_guess import Start, first_guess
 from identify.genetic.per_set import each_set
+from identify.model.parameters import Name
 from identify.model.structure import Structure, shape_values
 from identify.results import (
     UNITS,
@@ -37,8 +39,8 @@ from identify.select.contribution import contributions
 from identify.select.field_search import Found, search_in_torque
 from identify.select.fitter import Fits
 from identify.select.free_decay import FreeDecay
+from identify.select.likelihood_search import LikelihoodSearch
 from identify.select.search_state import Search
-from identify.select.sensor_limited import SensorLimited
 from identify.signals.prepare import channels_of, prepare
 from identify.signals.trace import loads_differ
 from rig import effects
@@ -48,8 +50,6 @@ from rig.errors import Aborted
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
-TWICE_THE_NOISE = 2.0
-MUCH_CLOSER = 0.5  # times the free-run error of the other fit
 STOPPED = "the search was interrupted; missing effects are not yet determined"
 NOTHING_YET = (
     "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
@@ -133,16 +133,17 @@ class _Identifier:
 
     def _driven(self, shapes: dict[str, tuple[float, ...]]) -> Identification:
         """The way for runs with torque: by prediction error, and in torque where that leaves something to be named."""
-        search: SensorLimited | None = None
+        search: LikelihoodSearch | None = None
         try:
             self.say("fitting the declared model")
-            search = SensorLimited.of(
+            search = LikelihoodSearch.of(
                 self.traces, self.split, self.structure, declared_values(self.declared, self.torque_free), self.start,
                 self._allowed(), self.say,
             )  # fmt: skip
             at_noise = search.run() or self.colour is not None
             found, fits = search.found, Fits(self.traces, self.split, len(self.structure.effects) + 1)
-            if at_noise or self._other_cause(found, fits):
+            both = all(t.beside is not None for t in self.traces)  # output error simulates one channel
+            if (at_noise and not both) or self._other_cause(found, fits):
                 return self._concluded(found, fits)
             self.say("a torque that was not recorded is left beside the sensor's noise")
             self.more_than_noise = True
@@ -153,10 +154,8 @@ class _Identifier:
             return self._stopped(search.found)
 
     def _other_cause(self, found: Search, fits: Fits) -> bool:
-        """Whether no effect but a line of the sensor or a run unlike the others may be what is left."""
-        after = self._after(found)
-        line = standing_line(after, self.traces) if TONE not in found.best.structure.effects else None
-        return line is not None or self._apart(found, fits, after) is not None
+        """Whether no effect but a few runs whose torque was another may be what is left."""
+        return self._apart(found, fits, found.best.structure, found.best.values()) is not None
 
     def _decay(self, shapes: dict[str, tuple[float, ...]]) -> Identification:
         """The way for runs without torque, which are judged by how they swing on alone."""
@@ -217,7 +216,8 @@ class _Identifier:
     def _doubted(self, search: Search, fits: Fits, before: Fitted, after: Fitted) -> Fitted:
         """The final fit, or another one where something else may pass for what was found."""
         line = standing_line(after, self.traces) if TONE not in self.structure.effects else None
-        apart = self._apart(search, fits, after) if line is None or line.of_torque else None
+        named = after.structure, after.values
+        apart = self._apart(search, fits, *named) if line is None or line.of_torque else None
         if apart is not None:
             search.leave_open("", run_heterogeneity.told(apart, self.recording.axis == "linear"), search.base)
             self.say("no effect is named: the runs disagree with each other, and that alone explains as much")
@@ -232,12 +232,14 @@ class _Identifier:
             return after
         return self._after(search) if search.best.structure != self.structure else before
 
-    def _apart(self, search: Search, fits: Fits, after: Fitted) -> run_heterogeneity.RunsApart | None:
+    def _apart(
+        self, search: Search, fits: Fits, structure: Structure, values: dict[Name, float]
+    ) -> run_heterogeneity.RunsApart | None:  # fmt: skip
         """What would explain all that the declared model leaves, if it is likelier than what was named."""
         apart = run_heterogeneity.runs_apart(fits, self.structure, search.base.values())
-        if apart is None or after.structure == self.structure:
+        if apart is None or structure == self.structure:
             return apart
-        named = fits.whole(after.structure, after.values)
+        named = fits.whole(structure, values)
         return apart if named is None or run_heterogeneity.as_likely(apart, named) else None
 
     @staticmethod
@@ -301,19 +303,15 @@ class _Identifier:
 
     def _before(self, search: Search) -> Fitted:
         # A decay is judged by its free run, which the regression does not look at.
-        if self.torque_free or search.base.sigma < 2.0 * search.floor or self.structure.effects:
+        if self.torque_free or search.base.sigma < 2.0 * search.floor:
             return by_output_error(
                 self.traces, self.structure, search.base.values(), search.horizon,
                 self.split.final, self.split.everything,
             )  # fmt: skip
-        return self._regressed(search.base)
+        return self._predicted(search.base)
 
     def _after(self, search: Search) -> Fitted:
-        """Output error where the model runs free at the sensor's noise; else regression in torque units.
-
-        Far above the sensor's noise the rest is a torque that nothing here describes, and what it adds to a
-        prediction grows with the horizon; weighed as a torque it does the least harm to the parameters.
-        """
+        """Output error where the model runs free at the sensor's noise; else prediction error with its disturbance."""
         structure = search.best.structure
         self.say(f"final fit with {', '.join(structure.effects) or 'fewer terms'}")
         fitted = by_output_error(
@@ -324,13 +322,13 @@ class _Identifier:
             return self._with_dropped_damping(search, fitted)
         if self.torque_free:
             return fitted
-        if fitted.sigma < TWICE_THE_NOISE * noise_of_all(self.traces):
-            return fitted  # over its horizon the model is right: what throws a free run off is a moment, not a torque
-        regressed = self._regressed(search.best)
-        runs = fitted.free_run, regressed.free_run
-        if all(r is not None for r in runs) and runs[0].sigma < MUCH_CLOSER * runs[1].sigma:  # type: ignore[union-attr]
-            return fitted  # a few disturbed seconds keep it from the noise; a torque's weights lead far astray
-        return regressed
+        return self._predicted(search.best)
+
+    def _predicted(self, best: Judged) -> Fitted:
+        fitted, _ = by_prediction_error(
+            self.traces, best.structure, best.values(), self.split.final, self.split.everything
+        )  # fmt: skip
+        return fitted
 
     def _regressed(self, best: Judged) -> Fitted:
         return by_regression(

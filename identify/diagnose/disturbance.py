@@ -85,8 +85,9 @@ def free_forms(regression: TorqueRegression) -> list[FreeForm]:
     """The terms that are tried, without what the linear model has of the same quantity."""
     angle, rate, _, torque, time, run = regression.series()
     slow = 0.05 * float(np.sqrt(np.mean(rate**2))) + 1e-300
+    driven = [] if regression.torque_free else [_spline("torque", torque)]
     out = [
-        _spline("angle", angle), _spline("rate", rate), _spline("torque", torque),
+        _spline("angle", angle), _spline("rate", rate), *driven,
         FreeForm("direction", np.tanh(rate / slow)[:, None], np.array([-1.0, 1.0]), np.array([[-1.0], [1.0]])),
     ]  # fmt: skip
     if float(np.max(time)) > 0.0:

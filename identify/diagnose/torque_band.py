@@ -1,8 +1,13 @@
-"""Torque, motion and the torque of effects behind one low-pass, at the samples where the platform moves."""
+"""Torque, motion and the torque of effects behind one low-pass, at the samples where the platform moves.
+
+A run without torque is one whose inertia is known to be one: the deceleration is what damping, stiffness and effects,
+all per unit of inertia, have to explain.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -41,6 +46,7 @@ class TorqueBand:
 
     def __init__(self, traces: Sequence[Trace], split: Split, cutoff_hz: float, scale: Scale) -> None:
         self.traces, self.cutoff_hz, self.scale = list(traces), cutoff_hz, scale
+        self.torque_free = all(t.torque is None for t in traces)
         self.runs = 1 + max(t.number for t in traces)
         step = max(1, int(1.0 / (SAMPLES_A_PERIOD * cutoff_hz * traces[0].step_s)))
         self._rows = [self._rows_of(t, step) for t in traces]
@@ -114,7 +120,7 @@ class TorqueBand:
             t = self.traces[i]
             pieces = t.torque_pieces(drive)
             if pieces is None:
-                return np.zeros(len(self._rows[i]))
+                return -self._motion[i][2]
             return self._passed(i, at_samples(pieces[0], len(t.measured), pieces[1]))
 
         return self._kept(("torque", i, drive), make)
@@ -131,7 +137,8 @@ class TorqueBand:
         t = self.traces[i]
         angle, rate, acceleration = self._motion[i]
         terms = {"inertia": acceleration, "damping": rate, "stiffness": angle}
-        out: dict[Name, Array] = {(k,): terms[k].copy() for k in TERMS if k in structure.terms}
+        known = ("inertia",) if self.torque_free else ()
+        out: dict[Name, Array] = {(k,): terms[k].copy() for k in TERMS if k in structure.terms and k not in known}
         drive = tuple((n, tuple(shapes[n])) for n in structure.effects if effects.get(n).place is Place.DRIVE)
         for name in structure.effects:
             effect = effects.get(name)
@@ -154,6 +161,23 @@ class TorqueBand:
                 here = (self._rows[i] >= a) & (self._rows[i] <= b)
                 own += [here.astype(float), here * (self._rows[i] - a) * t.step_s]
         return np.column_stack([*out.values(), *own]) if out or own else np.zeros((len(target), 0)), list(out), target
+
+    def noise_floor_nm(self, values: Mapping[Name, float]) -> float:
+        """What the sensor's noise alone leaves of the torque, root mean square, from simulated noise."""
+        rng = np.random.default_rng(1)
+        inertia = 1.0 if self.torque_free else values.get(("inertia",), 0.0)
+        squares: list[Array] = []
+        for trace, rows in zip(self.traces, self._rows, strict=True):
+            noise = trace.noise * rng.standard_normal(len(trace.measured))
+            only = replace(trace, measured=noise, motion=None, _series={})
+            angle, rate, acceleration = (x[rows] for x in motion(only, self.cutoff_hz))
+            left = (inertia + trace.run.added_inertia_kg_m2) * acceleration + values.get(("damping",), 0.0) * rate
+            left = left + values.get(("stiffness",), 0.0) * (angle - np.mean(angle))
+            if trace.biased:
+                line = np.column_stack([np.ones(len(rows)), rows])
+                left = left - line @ np.linalg.lstsq(line, left, rcond=None)[0]
+            squares.append(left**2)
+        return float(np.sqrt(np.mean(np.concatenate(squares))))
 
     def series(self) -> tuple[Array, Array, Array, Array, Array, Array]:
         """Angle, rate, acceleration, torque, time and number of the run at every sample behind the low-pass."""

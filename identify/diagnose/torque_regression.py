@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -217,27 +216,14 @@ class TorqueRegression(TorqueBand):
                 ]
         return strongest(hz), strongest(orders)
 
-    def with_effect(self, base: TorqueFit, name: str) -> TorqueFit | None:
-        """The structure with one effect more, at its best shapes: a grid, then a local search."""
+    def polished(self, base: TorqueFit, name: str, shape: tuple[float, ...]) -> TorqueFit | None:
+        """The structure with one effect more, its shapes searched for from those of a grid; None without shapes."""
         effect = effects.get(name)
-        if effect.place is Place.SENSOR:
-            return None
         axes = [p for p in effect.parameters if not p.linear]
+        if not axes:
+            return None
         starts = [p.start(self.scale) if p.start else (1.0,) for p in axes]
         structure = base.structure.plus(name)
-
-        def at(shape: tuple[float, ...]) -> TorqueFit:
-            return self.solve(structure, {**base.shapes, name: shape})
-
-        tried = [at(tuple(shape)) for shape in product(*starts)]
-        if not tried:
-            return None
-        tried = [f for f in tried if in_order(f.values, name)]
-        if not tried:
-            return None
-        best = min(tried, key=lambda f: f.fitted_nm)
-        if not axes:
-            return best
         bounds = [
             (max(p.low, min(s) / BEYOND, 1e-12), min(p.high, BEYOND * max(s)))
             for p, s in zip(axes, starts, strict=True)
@@ -246,16 +232,25 @@ class TorqueRegression(TorqueBand):
         def inside(u: Any) -> tuple[float, ...]:
             return tuple(float(np.clip(np.exp(x), lo, hi)) for x, (lo, hi) in zip(u, bounds, strict=True))
 
-        begin: Any = np.log(np.maximum(best.shapes[name], 1e-12))
+        begin: Any = np.log(np.maximum(shape, 1e-12))
         simplex = np.vstack([begin, begin + 0.25 * np.eye(len(begin))])
         options: Any = {"maxfev": EVALUATIONS, "initial_simplex": simplex, "xatol": 1e-3}
 
         def loss(u: Any) -> float:
-            return at(inside(u)).fitted_nm
+            return self.left_at(structure, {**base.shapes, name: inside(u)})
 
         found: Any = minimize(loss, begin, method="Nelder-Mead", options=options)
-        polished = at(inside(found.x))
-        return polished if polished.fitted_nm < best.fitted_nm and in_order(polished.values, name) else best
+        best = min((shape, inside(found.x)), key=lambda s: self.left_at(structure, {**base.shapes, name: s}))
+        return self.solve(structure, {**base.shapes, name: best})
+
+    def left_at(self, structure: Structure, shapes: Shapes) -> float:
+        """What a structure leaves at given shapes on the samples fitted, over the torque that it passes on."""
+        wide, target, names = self.stacked(structure, shapes)
+        low = np.array([self._low(n) for n in names] + [-np.inf] * (wide.shape[1] - len(names)))
+        x = bounded(wide.T @ wide, wide.T @ target, low)
+        mine = [k for k, n in enumerate(names) if len(n) > 1 and feeds_on_torque(n[0])]
+        passed = target - wide[:, mine] @ x[mine]
+        return rms(target - wide @ x) / max(rms(passed), 1e-300)
 
     def sureness(self, base: TorqueFit, richer: TorqueFit) -> tuple[float, float]:
         """Standard errors by which the squared residual on held-out samples is lower, block by block.

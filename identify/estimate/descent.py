@@ -76,7 +76,7 @@ class _Step:
 
     matrix: Array
     right: Array
-    biases: list[tuple[Array, float]]
+    biases: Sequence[tuple[Array, float]]
 
 
 class Descent:
@@ -234,7 +234,7 @@ class Descent:
             matrix += (wide.T @ wide - pivot * np.outer(across, across)) / variance
             right += (wide.T @ z - pivot * across * own) / variance
             biases.append((across, own))
-            information += (part.columns.T @ part.columns - pivot * np.outer(across[:p], across[:p]))
+            information += part.columns.T @ part.columns - pivot * np.outer(across[:p], across[:p])
             apart = spread - level  # the scale of all variances is free: only what differs between samples tells
             matrix += 0.5 * apart.T @ apart
             right -= 0.5 * apart.T @ (1.0 - z * z / variance)

@@ -26,21 +26,36 @@ class TorqueLook:
 
     Attributes
     ----------
-    left_nm
-        Root mean square residual on held-out samples.
-    start
-        Its parameter values for a fit to begin from, and those of the rest beside it.
+    fit
+        The model with it.
     """
 
     effect: str
-    left_nm: float
-    start: dict[Name, float]
+    fit: TorqueFit
+
+    @property
+    def left_nm(self) -> float:
+        """Root mean square residual on held-out samples."""
+        return self.fit.held_nm
+
+    @property
+    def start(self) -> dict[Name, float]:
+        """Its parameter values for a fit to begin from, and those of the rest beside it."""
+        return dict(self.fit.values)
 
 
 def torque_looks(
-    regression: TorqueRegression, now: TorqueFit, names: Sequence[str], most: int
+    regression: TorqueRegression, now: TorqueFit, names: Sequence[str], most: int, polish: bool = False
 ) -> list[TorqueLook]:  # fmt: skip
-    """The candidates that leave least on top of a model, what leaves least first; none that was fitted to nothing."""
+    """The candidates that leave least on top of a model, what leaves least first; none that was fitted to nothing.
+
+    Parameters
+    ----------
+    most
+        How many.
+    polish
+        Search for the best shapes beside those of the grid.
+    """
     lines_hz, orders = regression.lines(now)
     regression.scale = replace(regression.scale, lines_hz=lines_hz, orders=orders)
     base = _stacked(regression, now, now.structure.effects, now.shapes)
@@ -56,9 +71,10 @@ def torque_looks(
             found.append((squares, name, shape))
     looks = []
     for _, name, shape in sorted(found)[:most]:
-        fit = regression.solve(now.structure.plus(name), {**now.shapes, name: shape})
+        fit = regression.polished(now, name, shape) if polish else None
+        fit = fit or regression.solve(now.structure.plus(name), {**now.shapes, name: shape})
         if in_order(fit.values, name) and not gains_at_zero(fit.values, name):
-            looks.append(TorqueLook(name, fit.held_nm, dict(fit.values)))
+            looks.append(TorqueLook(name, fit))
     return sorted(looks, key=lambda w: w.left_nm)
 
 

@@ -33,6 +33,7 @@ BLOCKS = 30  # of all runs together, over which scores scatter: their ratio is t
 CHANCE = 0.95  # quantile of a ratio of variances: what chance alone reaches is no sign of a wrong likelihood
 FEWEST_RUNS = 4  # whose scores show whether runs differ
 ALONE = 1e-3  # of a parameter's influence, that the others leave: of less only rounding is seen
+TRUSTED = 1.5  # inflation up to which what the likelihood takes the disturbance for is believed
 EVIDENT = 0.1  # of the sensor's variance, that a disturbance adds to the prediction error: a smaller one weighs nothing
 
 
@@ -89,22 +90,25 @@ class Weigher:
     def evidence(self, effect: str, now: Fit, new: Fit) -> Evidence:
         """A model with one effect or term more against the one without it."""
         added = [n for n in new.names if n not in now.names]
-        return Evidence(
-            effect, new, now.cost - new.cost, inflation(self.problem.columns_at(new), new, added),
-            (new.penalised - new.cost) - (now.penalised - now.cost),
-            1.0 if effect not in TERMS and effects.get(effect).place is Place.SENSOR else self.weight(now, new),
-        )  # fmt: skip
+        inflated = inflation(self.problem.columns_at(new), new, added)
+        torqueless = effect not in TERMS and effects.get(effect).place is Place.SENSOR
+        weight = 1.0 if torqueless else self.weight(now, new, inflated < TRUSTED)
+        price = (new.penalised - new.cost) - (now.penalised - now.cost)
+        return Evidence(effect, new, now.cost - new.cost, inflated, price, weight)
 
-    def weight(self, now: Fit, new: Fit) -> float:
+    def weight(self, now: Fit, new: Fit, trusted: bool) -> float:
         """Share of the disturbance that goes: of its power in the band of the motion, or of its white part.
 
         The power in the band is what the residual in torque has on held-out samples, and what the likelihood takes the
-        disturbance for. The first knows no model of it but sees the sensor's noise as well, the second the reverse.
+        disturbance for. The first knows no model of it but sees the sensor's noise as well, the second the reverse, so
+        the second counts only where the likelihood can be ``trusted``.
         """
         shares = [1.0 - self.left(self.in_torque(new)) / self.left(self.in_torque(now))]
-        if disturbed(now) > 1.0 + EVIDENT:
+        if trusted and disturbed(now) > 1.0 + EVIDENT:
             cutoff_hz = self.regression.cutoff_hz
-            shares.append(1.0 - in_band(new.noise, cutoff_hz) * new.variance / (in_band(now.noise, cutoff_hz) * now.variance))
+            shares.append(
+                1.0 - in_band(new.noise, cutoff_hz) * new.variance / (in_band(now.noise, cutoff_hz) * now.variance)
+            )
             shares.append(1.0 - new.noise.white * new.variance / (now.noise.white * now.variance))
         return float(max(shares))
 
@@ -171,7 +175,8 @@ def inflation(parts: Sequence[Columns], fit: Fit, names: Sequence[Name]) -> floa
 
     each = max(1, round(BLOCKS / len(parts)))
     blocks = [
-        x[rows].T @ z[rows] for x, z in zip(own, scaled, strict=True) for rows in np.array_split(np.arange(len(z)), each)
+        x[rows].T @ z[rows]
+        for x, z in zip(own, scaled, strict=True) for rows in np.array_split(np.arange(len(z)), each)
     ]  # fmt: skip
     found = [1.0, ratio(blocks)]
     if len(parts) >= FEWEST_RUNS:
@@ -184,7 +189,9 @@ def _without_bias(part: Columns) -> tuple[Array, Array]:
     power = float(one @ one)
     if power <= 0.0:
         return part.columns, part.scaled
-    return part.columns - np.outer(one, one @ part.columns) / power, part.scaled - one * float(one @ part.scaled) / power
+    return part.columns - np.outer(one, one @ part.columns) / power, part.scaled - one * float(
+        one @ part.scaled
+    ) / power
 
 
 @lru_cache(maxsize=32)

@@ -10,14 +10,12 @@ from scipy.linalg import block_diag
 
 from identify.diagnose.disturbance import disturbance_of
 from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
-from identify.diagnose.torque_residual import torque_noise_floor
 from identify.estimate.by_prediction_error import by_prediction_error
 from identify.estimate.cross_validation import Judged
 from identify.estimate.final_fit import Fitted, covariance_of, free_run_of
 from identify.estimate.fit import Fit
 from identify.estimate.initial_guess import Start, scale_of
 from identify.estimate.output_error import Estimate
-from identify.estimate.prediction_error import PredictionError
 from identify.model.parameters import names_of
 from identify.model.structure import Structure
 from identify.results import Candidate, Disturbance
@@ -25,7 +23,6 @@ from identify.runs.holdout import Split
 from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced
 from identify.select.evidence import along, in_band
-from identify.select.likelihood_look import LikelihoodLook
 from identify.select.search_state import Search
 from identify.select.torque_search import TorqueSearch, Weighed
 from identify.signals.trace import Trace, loads_differ
@@ -36,7 +33,7 @@ HIGHEST = 0.2  # of the sample rate of what is searched: the low-pass cuts off n
 MUCH_LEFT = 0.05  # of the torque: where nothing explains that, a wider band is looked at
 # Times the cut-off at which the sensor's noise is ten times as much torque: an angle is differentiated twice.
 WIDER = {"angle": 10.0**0.4, "rate": 10.0 ** (2.0 / 3.0)}
-CLEARLY_LESS = 0.75  # times the power that prediction error's model leaves on held-out samples
+CLEARLY_LESS, ABOUT_AS_MUCH = 0.75, 1.25  # times the power that prediction error's model leaves on held-out samples
 NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
 PERCENT = 100.0
 
@@ -111,14 +108,12 @@ def search_in_torque(
     scale = scale_of(few, start.platform, ())
     offered = [n for n in allowed if n not in structure.effects and _possible(n, traces)]
 
-    likelihood = LikelihoodLook(PredictionError(few), scale)
-
     def at(cutoff_hz: float) -> TorqueSearch:
         regression = TorqueRegression(few, parts, cutoff_hz, scale)
         base = regression.solve(structure, shapes)
-        floor = torque_noise_floor(few, base.values, cutoff_hz, [t.keep for t in few])
+        floor = regression.noise_floor_nm(base.values)
         acceleration = float(np.sqrt(np.mean(regression.series()[2] ** 2)))
-        return TorqueSearch(regression, base, floor, acceleration, offered, say, likelihood)
+        return TorqueSearch(regression, base, floor, acceleration, offered, say)
 
     highest = HIGHEST / few[0].step_s
     search = at(min(start.cutoff_hz, highest))
@@ -128,10 +123,10 @@ def search_in_torque(
     if disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on:
         say("what is left depends on something: looking at it as a torque")
         best = search.run()
-        if search.left(best) > CLEARLY_LESS * search.left(trial):
-            best = trial
-        else:
+        if _better(search, best, trial):
             by_likelihood = None
+        else:
+            best = trial
     left = best.held_nm / search.regression.torque_nm
     if by_likelihood is None and best.structure.effects == structure.effects and left > MUCH_LEFT:
         wider = min(WIDER[few[0].channel] * start.cutoff_hz, highest)
@@ -169,6 +164,15 @@ def search_in_torque(
         told, before, after, disturbance, (errors(base), errors(best)),
         lambda: disturbance_of(regression, base, floor, unit),
     )  # fmt: skip
+
+
+def _better(search: TorqueSearch, best: TorqueFit, trial: TorqueFit) -> bool:
+    """Whether the model that the search in torque found stands in place of prediction error's, which lacks something.
+
+    On samples not fitted it has to leave clearly less, or about as much with fewer parameters.
+    """
+    ratio = search.left(best) / search.left(trial)
+    return ratio < CLEARLY_LESS or (ratio < ABOUT_AS_MUCH and len(best.values) < len(trial.values))
 
 
 def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> Fitted:

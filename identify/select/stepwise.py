@@ -23,7 +23,7 @@ from identify.runs.measured_channels import simplicity
 from identify.select.evidence import Evidence, Weigher, disturbed
 from identify.signals.spectral_lines import foreign_lines_hz, ringing_hz, rings_hz
 from rig import effects
-from rig.effects.base import Place, Scale
+from rig.effects.base import Scale
 from rig.platform import TERMS
 
 # What decides a name. All in units of the cost (minus twice the log-likelihood) or as shares.
@@ -101,7 +101,9 @@ class Stepwise:
             if chosen is None:
                 break
             new = tried[chosen]
-            self.say(f"added {chosen}: log-likelihood +{0.5 * new.gain:.3g}, {100.0 * new.weight:.0f} % of the disturbance")
+            self.say(
+                f"added {chosen}: log-likelihood +{0.5 * new.gain:.3g}, {100.0 * new.weight:.0f} % of the disturbance"
+            )
             self.best = self.pruned(new.fit, [e for e in self._added(new.fit) if e != chosen])
         self.best = self.judged_again(self.best)
         self.best = self.pruned(self.best, [*self.best.structure.terms, *self._added(self.best)])
@@ -120,7 +122,7 @@ class Stepwise:
         return replace(scale, rings_hz=rings_hz(traces, left, natural_hz))
 
     def names(self, now: Fit) -> list[str]:
-        """What may be added, or put in the place of a special case; of an effect that is there, one more of the same."""
+        """What may be added, or put in the place of a special case; of an effect that is there, one more of it."""
         have = now.structure.effects
         more = [m for n in have for m in effects.further(effects.first_of(n)) if m not in have][:1]
         return [n for n in (*self.allowed, *more) if n not in have]
@@ -178,7 +180,9 @@ class Stepwise:
                 continue
             for special in held:
                 own = {k: v + _gain(now, special) if k[1] in linear else v for k, v in own.items()}
-            fits.append(self.problem.fit(structure.plus(name), {**rest, **own}, now.noise, FEW, carry=now.shots, thorough=False))
+            fits.append(
+                self.problem.fit(structure.plus(name), {**rest, **own}, now.noise, FEW, carry=now.shots, thorough=False)
+            )
         best = min(fits, key=lambda f: f.cost)
         return best if np.isfinite(best.cost) else None
 
@@ -216,12 +220,9 @@ class Stepwise:
             for other, fit in self._instead(now, rest, name).items():
                 near = fit.penalised - now.penalised < FAR_BEHIND * (rest.cost - now.cost)
                 fits[other] = self.further(fit) if near else fit
-            evidence = self.weigher.evidence(name, rest, now)
-            self._needed[name] = evidence.support
-            close = self.undecided(fits)
-            if len(close) > 1 and self.whole is not None:
-                close = {n: self.on_all(f) for n, f in close.items()}
-            chosen, alike = decided(close, evidence.inflation)
+            seen = {n: self.weigher.evidence(n, rest, f) for n, f in fits.items()}
+            self._needed[name] = seen[name].support
+            chosen, alike = self._best_of(name, seen)
             if chosen != name:
                 self.say(f"replaced {name} by {chosen}: it fits better beside the other effects")
                 now = fits[chosen]
@@ -229,20 +230,19 @@ class Stepwise:
             self.rivals[chosen] = {n: fits[n] for n in alike if n != chosen}
         return now
 
-    def undecided(self, fits: Mapping[str, Fit]) -> dict[str, Fit]:
-        """Those that all samples may still find best: by as much as more samples tell."""
-        more = max(1.0, self.samples / max(next(iter(fits.values())).count, 1))
-        best = min(f.penalised for f in fits.values())
-        close = {n: f for n, f in fits.items() if f.penalised - best < APART * more}
-
-        def cannot_gain(rich: str) -> bool:  # it holds a simpler one and is no likelier: nor will it be
-            return any(
-                (close[n].cost - close[rich].cost) * more < close[rich].penalised - close[rich].cost
-                - (close[n].penalised - close[n].cost)
-                for n in effects.get(rich).nests if n in close
-            )  # fmt: skip
-
-        return {n: f for n, f in close.items() if not cannot_gain(n)}
+    def _best_of(self, name: str, seen: Mapping[str, Evidence]) -> tuple[str, list[str]]:
+        """Of an effect and others in its place, the one that is named, and all that are as likely."""
+        best = seen[name]
+        for other in seen.values():
+            if other.weight > WEIGHT and other.support > best.support and other.behind(best) > APART:
+                best = other
+        alike = [n for n, e in seen.items() if e is best or (e.behind(best) < APART and e.weight > WEIGHT)]
+        more = max(1.0, self.samples / max(best.fit.count, 1))
+        close = [n for n, e in seen.items() if e is best or e.behind(best) < APART * more]
+        if len(close) > 1 and self.whole is not None:
+            decisive = max(seen[n].inflation for n in close)
+            return decided({n: self.on_all(seen[n].fit) for n in close}, decisive)
+        return min(alike, key=lambda n: (*plainness(n), -seen[n].support)), alike
 
     def on_all(self, fit: Fit) -> Fit:
         """The same model on all samples."""
@@ -260,7 +260,9 @@ class Stepwise:
                 continue
             structure = replace(now.structure, effects=tuple(other if e == name else e for e in now.structure.effects))
             own: dict[Name, float] = {(other, p.name): _gain(now, name) for p in parameters}
-            fits[other] = self.problem.fit(structure, {**rest_values, **own}, now.noise, FEW, carry=now.shots, thorough=False)
+            fits[other] = self.problem.fit(
+                structure, {**rest_values, **own}, now.noise, FEW, carry=now.shots, thorough=False
+            )
         explained = rest.cost - now.cost
         for group in self.shortlist(rest, looks):
             other = group[0].effect
@@ -285,7 +287,9 @@ class Stepwise:
             if not self._asked(now, name, own):
                 continue
             start = {n: v for n, v in now.values.items() if n[0] != name}
-            without = self.problem.fit(now.structure.minus(name), start, now.noise, FEW, carry=now.shots, thorough=False)
+            without = self.problem.fit(
+                now.structure.minus(name), start, now.noise, FEW, carry=now.shots, thorough=False
+            )
             evidence = self.weigher.evidence(name, without, now)
             soaks = name == "stiffness" and self._may_soak(now)
             light = evidence.weight < WEIGHT and (name not in TERMS or soaks)
@@ -321,10 +325,8 @@ def _gain(fit: Fit, name: str) -> float:
 def far_apart(some: Mapping[Name, float], other: Mapping[Name, float], name: str) -> bool:
     """Whether two starts of an effect differ so much that a fit from one may not come to the other."""
     numbers = [(name, p.name) for p in effects.get(name).parameters if not p.per_run]
-    return any(
-        max(abs(some.get(g, 0.0)), abs(other.get(g, 0.0))) > OTHER_START * min(abs(some.get(g, 0.0)), abs(other.get(g, 0.0)))
-        for g in numbers
-    )  # fmt: skip
+    sizes = [(abs(some.get(n, 0.0)), abs(other.get(n, 0.0))) for n in numbers]
+    return any(max(pair) > OTHER_START * min(pair) for pair in sizes)
 
 
 def decided(fits: Mapping[str, Fit], inflation: float = 1.0) -> tuple[str, list[str]]:
@@ -334,7 +336,6 @@ def decided(fits: Mapping[str, Fit], inflation: float = 1.0) -> tuple[str, list[
     return min(alike, key=lambda n: (*plainness(n), fits[n].penalised)), alike
 
 
-def plainness(name: str) -> tuple[int, int, bool]:
-    """What goes first among candidates that do as well: no channel, fewer parameters, the drive before the sensor."""
-    effect = effects.get(name)
-    return simplicity(name), len(effect.parameters), effect.place is Place.SENSOR
+def plainness(name: str) -> tuple[int, int]:
+    """What goes first among candidates that do as well: no channel, fewer parameters."""
+    return simplicity(name), len(effects.get(name).parameters)

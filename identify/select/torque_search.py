@@ -8,11 +8,10 @@ candidates that carry nearly as much the simplest is taken, of these the likelie
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
-from identify.diagnose.torque_regression import TorqueFit, TorqueRegression, gains_at_zero
-from identify.select.likelihood_look import LikelihoodLook, shape_of
+from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
+from identify.propose.torque_looks import torque_looks
 from rig import effects
 from rig.effects.base import Place
 
@@ -24,7 +23,7 @@ AS_HEAVY = 0.05  # of what is left: candidates that differ by less carry the sam
 RIVAL = 0.02  # of what is left: rivals carry as much as what was taken, to that
 TOLD_APART = 10.0  # fall of the penalised cost that parts two candidates (Kass and Raftery 1995: very strong)
 INERTIA_MATTERS = 0.2  # of the torque: below, the motion hardly shows the inertia
-HEAVIEST = 4  # candidates that are fitted by prediction error
+POLISHED = 8  # candidates whose shapes are searched for beside those of a grid
 MOST = 6  # effects that one recording is believed to show
 
 
@@ -81,14 +80,13 @@ class TorqueSearch:
     acceleration: float
     allowed: Sequence[str]
     say: Callable[[str], None] = lambda text: None
-    likelihood: LikelihoodLook | None = None
     rounds: list[tuple[Weighed, ...]] = field(default_factory=list)
 
     def run(self) -> TorqueFit:
         """Add effects as long as one carries weight, then drop what no longer does."""
         now = self.without_soaking_stiffness(self.base)
         while len(now.structure.effects) < MOST + len(self.base.structure.effects):
-            looks = self.judged(now, self.looks(now))
+            looks = self.looks(now)
             self.rounds.append(tuple(looks))
             chosen = self.choice(looks)
             if chosen is None:
@@ -120,27 +118,6 @@ class TorqueSearch:
             return 1.0
         return float((old / max(new, 1e-9 * old)) ** 2)
 
-    def judged(self, now: TorqueFit, looks: list[Weighed]) -> list[Weighed]:
-        """The same with the likelihood's word on the most promising: at its shapes, if they carry more."""
-        if self.likelihood is None:
-            return looks
-        model = self.likelihood.model(now.structure, now.values)
-        asked = self.likelihood.proposals(model, [w.effect for w in looks])
-        heavy = [w for w in looks if w.counts][:HEAVIEST]
-        starts = {**asked, **{w.effect: w.fit.values for w in heavy}}
-        found = []
-        for look in looks:
-            fit = self.likelihood.fitted(model, look.effect, starts[look.effect]) if look.effect in starts else None
-            if fit is None:
-                found.append(look)
-                continue
-            shapes = {**now.shapes, look.effect: shape_of(fit, look.effect)}
-            there = self.regression.solve(now.structure.plus(look.effect), shapes)
-            other = self.weighed(look.effect, now, there)
-            better = other if other.weight > look.weight else look
-            found.append(replace(better, evidence=model.penalised - fit.penalised))
-        return sorted(found, key=lambda w: -w.weight)
-
     def looks(self, now: TorqueFit) -> list[Weighed]:
         """All candidates on top of a model, the heaviest first."""
         spring = "stiffness" in now.structure.terms
@@ -153,15 +130,8 @@ class TorqueSearch:
             and (answers or effects.get(n).place is not Place.DRIVE)  # a late torque shows in what it sets in motion
             and not set(effects.get(n).nests) & set(have)  # what holds one that is there is asked in its place
         ]  # fmt: skip
-        lines_hz, orders = self.regression.lines(now)
-        self.regression.scale = replace(self.regression.scale, lines_hz=lines_hz, orders=orders)
-        with ThreadPoolExecutor(2) as workers:
-            fits = list(workers.map(lambda n: self.regression.with_effect(now, n), names))
-        found = [
-            self.weighed(n, now, f) for n, f in zip(names, fits, strict=True)
-            if f is not None and not gains_at_zero(f.values, n)
-        ]  # fmt: skip
-        return sorted(found, key=lambda w: -w.weight)
+        looks = torque_looks(self.regression, now, names, POLISHED, polish=True)
+        return sorted((self.weighed(w.effect, now, w.fit) for w in looks), key=lambda w: -w.weight)
 
     @staticmethod
     def choice(looks: Sequence[Weighed]) -> Weighed | None:

@@ -59,7 +59,7 @@ def check_effects(given: EffectValues) -> EffectValues:
     wrong: list[tuple[tuple[str | int, ...], str]] = []
     checked: dict[str, Mapping[str, float]] = {}
     for name, values in given.items():
-        if name in known:
+        if effects.exists(name):
             checked[name], faults = _check_values(effects.get(name), values)
             wrong += [((name, *key), text) for key, text in faults]
         else:

@@ -154,10 +154,7 @@ def _riccati(  # type: ignore[no-untyped-def]
                     for a in range(n):
                         for b in range(n):
                             p[a, b] -= g[a] * g[b] / s
-            if keep[i]:
-                calm = calm + 1 if change <= 0.0 and i > first else 0
-            else:
-                calm = 0
+            calm = calm + 1 if keep[i] and change <= 0.0 and i > first else 0
             _onward(phi, q, p, half)
         elif keep[i]:
             variance[i] = variance[i - 1]

@@ -59,6 +59,11 @@ def known() -> tuple[str, ...]:
     return (*names(), *_channels.names())
 
 
+def exists(name: str) -> bool:
+    """Whether a model may hold an effect of that name: a known one, one more of it, or another form of it."""
+    return name in known() or name in _FURTHER or name in _FORMS
+
+
 def get(name: str) -> Effect:
     """The effect of that name; its module is loaded when first asked for.
 
@@ -145,6 +150,6 @@ def file_of(name: str) -> Path | None:
 
 
 __all__ = [
-    "Effect", "Parameter", "Place", "Scale", "declare_channels", "file_of", "filter_kernel", "first_of", "forms",
-    "further", "get", "kernel", "known", "names", "of_channel", "read_file",
+    "Effect", "Parameter", "Place", "Scale", "declare_channels", "exists", "file_of", "filter_kernel", "first_of",
+    "forms", "further", "get", "kernel", "known", "names", "of_channel", "read_file",
 ]  # fmt: skip

@@ -7,7 +7,7 @@ import pytest
 
 from rig.arrays import Array
 from rig.dynamics import Equations, Grid, TorqueSignal
-from rig.dynamics.predictor import Noise, gains_of, predict_ahead
+from rig.dynamics.predictor import RATE, Noise, Sensing, gains_of, predict_ahead
 from rig.platform import Platform
 
 STEP = 2e-3
@@ -31,11 +31,12 @@ def innovations(torque: Array, angle: Array, noise: Noise, effects: dict[str, di
     grid = Grid(TIME, TorqueSignal(TIME, torque, "zero_order"), 8)
     keep = np.ones(len(TIME), dtype=bool)
     spans = [(0, len(TIME) - 1)]
-    gains = gains_of(JCK, noise, STEP, False, 0.0, keep, spans)
+    gains = gains_of(JCK, noise, STEP, Sensing(False, 1.0), keep, spans)
+    read = angle[:, None]
     predicted, _ = predict_ahead(
-        equations, grid.shaft_torque(equations), grid.step_s, 8, spans, np.zeros((1, 2)), angle, keep, gains, False, 0.0
+        equations, grid.shaft_torque(equations), grid.step_s, 8, spans, np.zeros((1, 2)), read, keep, gains, False, 0.0
     )  # fmt: skip
-    return np.asarray((angle - predicted) / np.sqrt(gains.variance))
+    return np.asarray((read - predicted) / np.sqrt(gains.variance))[:, 0]
 
 
 def test_without_a_disturbance_the_prediction_is_the_simulation() -> None:
@@ -73,7 +74,54 @@ def test_dry_friction_stops_what_noise_would_move() -> None:
 def test_a_lost_sample_makes_the_next_ones_less_certain_for_a_while() -> None:
     keep = np.ones(len(TIME), dtype=bool)
     keep[1000:1010] = False
-    gains = gains_of(JCK, Noise(white=1e4), STEP, True, 0.0, keep, [(0, len(TIME) - 1)])
+    gains = gains_of(JCK, Noise(white=1e4), STEP, Sensing(True), keep, [(0, len(TIME) - 1)])
     assert gains.variance[1010] > 1.5 * gains.variance[990]
     assert gains.variance[1600] == pytest.approx(gains.variance[990], rel=1e-3)
     assert not np.any(gains.gain[1000:1010])
+
+
+SPANS = [(0, len(TIME) - 1)]
+KEEP = np.ones(len(TIME), dtype=bool)
+LATE = {"sensor_lag_second_order": {"time": 4e-3}}
+
+
+def read_by_gyro(noise: Noise, sensing: Sensing, effects: dict[str, dict[str, float]], bias: Array) -> Array:
+    """Scaled innovations of a gyro behind a low-pass, (n,), of a platform that no hidden torque disturbs."""
+    rng = np.random.default_rng(5)
+    torque = np.sin(2.0 * np.pi * 1.3 * TIME) + 0.5 * np.sin(2.0 * np.pi * 4.1 * TIME)
+    grid = Grid(TIME, TorqueSignal(TIME, torque, "zero_order"), 8)
+    true = Equations(Platform(*JCK, LATE))
+    read = grid.simulate(true, (0.0, 0.0)).sensed_rate_rad_s + bias + SIGMA * rng.standard_normal(len(TIME))
+    equations = Equations(Platform(*JCK, effects))
+    gains = gains_of(JCK, noise, STEP, sensing, KEEP, SPANS)
+    predicted, _ = predict_ahead(
+        equations, grid.shaft_torque(equations), grid.step_s, 8, SPANS, np.zeros((1, 2)), read[:, None], KEEP, gains,
+        True, 0.0,
+    )  # fmt: skip
+    return np.asarray((read[:, None] - predicted) / np.sqrt(gains.variance))[:, 0]
+
+
+def test_a_gyro_behind_its_low_pass_is_predicted_to_its_noise_though_the_rate_is_corrected_all_the_time() -> None:
+    noise = Noise(white=1e-4 * STEP / SIGMA**2)
+    left = read_by_gyro(noise, Sensing(True, lag=(4e-3, 8e-6)), LATE, np.zeros(len(TIME)))
+    blind = read_by_gyro(noise, Sensing(True), {}, np.zeros(len(TIME)))
+    assert np.sqrt(np.mean(left**2)) < 1.05 * SIGMA
+    assert np.sqrt(np.mean(blind**2)) > 2.0 * SIGMA
+
+
+def test_a_bias_that_walks_is_followed() -> None:
+    per_s = 1e-3
+    walk = np.cumsum(per_s * np.sqrt(STEP) * np.random.default_rng(6).standard_normal(len(TIME)))
+    sensing = Sensing(True, lag=(4e-3, 8e-6))
+    followed = read_by_gyro(Noise(walk=per_s**2 / SIGMA**2), sensing, LATE, walk)
+    ignored = read_by_gyro(Noise(), sensing, LATE, walk)
+    assert np.sqrt(np.mean(followed[500:] ** 2)) < 1.1 * SIGMA < 3.0 * SIGMA < np.sqrt(np.mean(ignored[500:] ** 2))
+
+
+def test_an_encoder_beside_a_gyro_makes_the_next_angle_more_certain_than_either_alone() -> None:
+    noise = Noise(white=1e2)
+    alone = gains_of(JCK, noise, STEP, Sensing(False, 1.0), KEEP, SPANS)
+    both = gains_of(JCK, noise, STEP, Sensing(True, 1.0), KEEP, SPANS)
+    assert alone.variance.shape == (len(TIME), 1) and both.variance.shape == (len(TIME), 2)
+    assert both.variance[-1, 1] < alone.variance[-1, 0]
+    assert both.gain[-1, 0, RATE] > 0.0

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rig import effects
+from rig.config.effects import check_effects
 from rig.dynamics import Equations, TorqueSignal, simulate
 from rig.effects import Place, Scale
 from rig.platform import Platform
@@ -37,7 +38,15 @@ def test_every_promised_name_is_there_and_has_a_test_value() -> None:
 def test_every_file_beside_the_registry_is_an_effect_of_it() -> None:
     folder = Path(effects.__file__).parent
     files = {p.stem for p in folder.glob("*.py") if not p.stem.startswith("_")} - {"base"}
-    assert files == set(effects._MODULES.values())
+    assert files == set(effects._MODULES.values()) | set(effects._FORMS)
+
+
+@pytest.mark.parametrize("name", [*effects._FURTHER, *effects._FORMS])
+def test_a_model_may_hold_one_more_of_an_effect_or_another_form_of_it(name: str) -> None:
+    assert name not in effects.known()
+    values = {p.name: max(p.low, 0.1) for p in effects.get(name).parameters}
+    assert check_effects({name: values}) == {name: values}
+    assert effects.first_of(name) in effects.known()
 
 
 @ALL

@@ -1,8 +1,4 @@
-"""The search as far as the sensor's noise lets it see: by prediction error, on samples that tell most, decided on all.
-
-What it finds stands where its last model predicts down to the sensor's noise. Where a torque that nobody recorded is
-left it does not: whether that is a disturbance or an effect outside the library is a matter of weight, in torque.
-"""
+"""The search by prediction error on one recording: on samples that tell most, decided on all where models lie close."""
 
 from __future__ import annotations
 
@@ -12,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from identify.diagnose.torque_regression import TorqueRegression
-from identify.diagnose.torque_residual import torque_noise_floor
 from identify.estimate.cross_validation import Judged, horizon_s
 from identify.estimate.fit import Fit
 from identify.estimate.initial_guess import Start, scale_of
@@ -38,7 +33,7 @@ MORE = 1.5  # times the samples: else there is nothing more to be seen in all of
 
 
 @dataclass
-class SensorLimited:
+class LikelihoodSearch:
     """The search by prediction error on one recording.
 
     Attributes
@@ -57,7 +52,7 @@ class SensorLimited:
     def of(
         cls, traces: Sequence[Trace], split: Split, structure: Structure, declared: Mapping[Name, float], start: Start,
         allowed: Sequence[str], say: Callable[[str], None],
-    ) -> SensorLimited:  # fmt: skip
+    ) -> LikelihoodSearch:  # fmt: skip
         """The search, its first model fitted.
 
         Parameters
@@ -82,7 +77,7 @@ class SensorLimited:
         offered = [n for n in allowed if n not in structure.effects and _possible(n, traces)]
         cutoff_hz = min(start.cutoff_hz, HIGHEST / few[0].step_s)
         regression = TorqueRegression(few, parts, cutoff_hz, scale_of(few, start.platform, ()))
-        floor = torque_noise_floor(few, base.values, cutoff_hz, [t.keep for t in few])
+        floor = regression.noise_floor_nm(base.values)
         weigher = Weigher(problem, regression, floor)
         return cls(Stepwise(problem, base, offered, weigher, say, whole, count), traces, structure)
 
