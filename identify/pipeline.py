@@ -147,7 +147,7 @@ class _Identifier:
                 return self._concluded(found, fits)
             self.say("a torque that was not recorded is left beside the sensor's noise")
             self.more_than_noise = True
-            return self._in_torque(shapes, (search.stepwise.best, found))
+            return self._in_torque(shapes, (search.stepwise.best, found), search.stepwise.trusted)
         except (Aborted, KeyboardInterrupt):
             if search is None:
                 raise
@@ -190,14 +190,18 @@ class _Identifier:
             found = replace(found, verdict=replace(found.verdict, sentences=(NOTHING_YET,)))
         return replace(found, aborted=True, accepted=False, reasons=(STOPPED,))
 
-    def _in_torque(self, shapes: dict[str, tuple[float, ...]], known: tuple[Fit, Search]) -> Identification:
+    def _in_torque(
+        self, shapes: dict[str, tuple[float, ...]], known: tuple[Fit, Search], trusted: bool
+    ) -> Identification:  # fmt: skip
         """The way for measured data: what the model lacks is told by the torque that it leaves."""
         unit = UNITS[self.recording.axis]["torque"]
         found = search_in_torque(
-            self.traces, self.split, self.structure, shapes, self.start, self._allowed(), unit, self.say, known
+            self.traces, self.split, self.structure, shapes, self.start, self._allowed(), unit, self.say, known,
+            trusted,
         )  # fmt: skip
         after = found.after
-        line = standing_line(after, self.traces) if self.more_than_noise and TONE in found.named else None
+        gyro = all(t.channel == "rate" and t.beside is None for t in self.traces)  # an encoder has no line of its own
+        line = standing_line(after, self.traces) if gyro and TONE in found.named else None
         if line is not None:
             found.search.leave_open(TONE, told(line, self.recording.axis, self.traces[0].channel), found.search.base)
             self.say(f"not named: {TONE}; the line may come from the sensor itself")
@@ -308,7 +312,7 @@ class _Identifier:
                 self.traces, self.structure, search.base.values(), search.horizon,
                 self.split.final, self.split.everything,
             )  # fmt: skip
-        return self._predicted(search.base)
+        return self._regressed(search.base)
 
     def _after(self, search: Search) -> Fitted:
         """Output error where the model runs free at the sensor's noise; else prediction error with its disturbance."""

@@ -271,6 +271,8 @@ def _series(case: Case, before: Measured, after: Measured) -> tuple[RunTraces, .
 
 def _correlation(fitted: Fitted) -> dict[str, float]:
     size = np.sqrt(np.maximum(np.diag(fitted.covariance), 1e-300))
+    if not np.all(np.isfinite(fitted.covariance)):
+        return {}
     out = {}
     for i in range(len(fitted.names)):
         for k in range(i):

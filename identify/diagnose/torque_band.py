@@ -168,6 +168,8 @@ class TorqueBand:
         inertia = 1.0 if self.torque_free else values.get(("inertia",), 0.0)
         squares: list[Array] = []
         for trace, rows in zip(self.traces, self._rows, strict=True):
+            if len(rows) == 0:
+                continue
             noise = trace.noise * rng.standard_normal(len(trace.measured))
             only = replace(trace, measured=noise, motion=None, _series={})
             angle, rate, acceleration = (x[rows] for x in motion(only, self.cutoff_hz))

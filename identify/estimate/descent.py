@@ -32,6 +32,9 @@ FARTHEST = 4.0  # by which a logarithm of the noise may change in one step
 ENOUGH = 0.5  # fall of the cost below which a fit has arrived
 TRIALS = 7  # step lengths tried before a direction is given up
 DAMPING = 1e-4
+DOWN = (1e-3, 1e-6, 1e-10)  # times the disturbance: how far below a model is looked at with parameters that follow
+FOLLOWED = 5  # steps in which they do
+FAR = 2.0  # times the sensor's variance: less of a disturbance is found step by step
 FURTHER = (  # times white density, slow variance and time constant: where else a noise is looked for
     (0.01, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 10.0, 1.0), (1.0, 0.1, 0.1), (1.0, 0.03, 0.01),
     (1.0, 1.0, 10.0),
@@ -291,8 +294,30 @@ class Descent:
             cost = self._cost(looks)
             if cost < self.cost - ENOUGH:
                 self.noise, self.looks, self.cost = noise, looks, cost
+        self._without_disturbance()
         self.damping = DAMPING
         return self.cost < before - ENOUGH
+
+    def _without_disturbance(self) -> None:
+        """Far less of a disturbance, if that is likelier once the parameters have followed.
+
+        A model that is right may otherwise stay where the disturbance explains all that is left, and the sensor has no
+        noise: between the two lies a ridge.
+        """
+        if self._disturbed() < FAR:
+            return
+        here = self._place()
+        for factor in DOWN:
+            q = here[0]
+            self.noise = self.problem.within(replace(q, white=factor * q.white, slow=factor * q.slow))
+            self.looks = self._looks(self.x, self.noise, self.bias)
+            self.cost, self.damping = self._cost(self.looks), DAMPING
+            for _ in range(FOLLOWED):
+                if not self._down(False) or self.cost < here[-1] - ENOUGH:
+                    break
+            if self.cost < here[-1] - ENOUGH:
+                return
+            self._go(here)
 
     def _place(self) -> tuple[Noise, Array, Array, list[Look], float]:
         return self.noise, self.x, self.bias, self.looks, self.cost

@@ -34,6 +34,7 @@ MUCH_LEFT = 0.05  # of the torque: where nothing explains that, a wider band is 
 # Times the cut-off at which the sensor's noise is ten times as much torque: an angle is differentiated twice.
 WIDER = {"angle": 10.0**0.4, "rate": 10.0 ** (2.0 / 3.0)}
 CLEARLY_LESS, ABOUT_AS_MUCH = 0.75, 1.25  # times the power that prediction error's model leaves on held-out samples
+UNFOLLOWED = 0.5  # of the residual in torque, that the likelihood takes the disturbance for
 NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
 PERCENT = 100.0
 
@@ -87,6 +88,7 @@ class TorqueErrors:
 def search_in_torque(
     traces: Sequence[Trace], split: Split, structure: Structure, shapes: dict[str, tuple[float, ...]], start: Start,
     allowed: Sequence[str], unit: str, say: Callable[[str], None], known: tuple[Fit, Search],
+    trusted: bool,
 ) -> Found:  # fmt: skip
     """Find what the declared model lacks, and fit both models with their disturbance.
 
@@ -103,6 +105,9 @@ def search_in_torque(
     known
         The model that the search by prediction error has found, and that search as the report tells it. It stands
         where what it leaves depends on nothing, or where the search in torque leaves as much on held-out samples.
+    trusted
+        Whether its likelihood is right about the disturbance: then a model that it leaves little of stands, though its
+        effects cannot be followed along the measured motion (a play, a hysteresis).
     """
     few, parts = reduced(traces, split)
     scale = scale_of(few, start.platform, ())
@@ -120,10 +125,13 @@ def search_in_torque(
     trial = along(search.regression, known[0])
     by_likelihood: tuple[Fit, Search] | None = known
     best = trial
-    if disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on:
-        say("what is left depends on something: looking at it as a torque")
+    size_nm = float(np.sqrt(in_band(known[0].noise, search.regression.cutoff_hz) * known[0].variance))
+    unfollowed = trusted and size_nm < UNFOLLOWED * trial.held_nm
+    if not unfollowed:
+        say("looking at what is left as a torque")
+        depends = bool(disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on)
         best = search.run()
-        if _better(search, best, trial):
+        if _better(search, best, trial, depends):
             by_likelihood = None
         else:
             best = trial
@@ -144,11 +152,9 @@ def search_in_torque(
     else:
         after = _final(regression, best, traces, split)
     disturbance = disturbance_of(regression, best, floor, unit)
-    if by_likelihood and any(
-        e not in best.structure.effects and effects.get(e).place is not Place.SENSOR for e in final.effects
-    ):
-        size = float(np.sqrt(in_band(by_likelihood[0].noise, cutoff) * by_likelihood[0].variance))
-        disturbance = Disturbance(size, unit, size / regression.torque_nm, (), {})
+    lost = [e for e in final.effects if e not in best.structure.effects and effects.get(e).place is not Place.SENSOR]
+    if by_likelihood and (unfollowed or lost):
+        disturbance = Disturbance(size_nm, unit, size_nm / regression.torque_nm, (), {})
 
     def errors(fit: TorqueFit) -> TorqueErrors:
         size = regression.torque_nm
@@ -166,13 +172,14 @@ def search_in_torque(
     )  # fmt: skip
 
 
-def _better(search: TorqueSearch, best: TorqueFit, trial: TorqueFit) -> bool:
-    """Whether the model that the search in torque found stands in place of prediction error's, which lacks something.
+def _better(search: TorqueSearch, best: TorqueFit, trial: TorqueFit, depends: bool) -> bool:
+    """Whether the model that the search in torque found stands in place of prediction error's.
 
-    On samples not fitted it has to leave clearly less, or about as much with fewer parameters.
+    On samples not fitted it has to leave clearly less. Where what prediction error's leaves ``depends`` on something, it
+    lacks an effect or has a wrong one: then about as much, with fewer parameters, is enough.
     """
     ratio = search.left(best) / search.left(trial)
-    return ratio < CLEARLY_LESS or (ratio < ABOUT_AS_MUCH and len(best.values) < len(trial.values))
+    return ratio < CLEARLY_LESS or (depends and ratio < ABOUT_AS_MUCH and len(best.values) < len(trial.values))
 
 
 def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> Fitted:

@@ -20,7 +20,7 @@ from identify.model.parameters import Name
 from identify.propose.innovation_score import InnovationScores, Score
 from identify.propose.torque_looks import TorqueLook, torque_looks
 from identify.runs.measured_channels import simplicity
-from identify.select.evidence import Evidence, Weigher, disturbed
+from identify.select.evidence import TRUSTED, Evidence, Weigher, disturbed
 from identify.signals.spectral_lines import foreign_lines_hz, ringing_hz, rings_hz
 from rig import effects
 from rig.effects.base import Scale
@@ -42,8 +42,8 @@ FEW, MANY = 14, 25  # steps of a fit that is compared, and of one that is kept
 CERTAIN = 30.0  # standard errors beyond which nobody asks whether a term is needed
 NEAR = 0.9  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
 FAR_BEHIND = 0.2  # of what an effect explains: another that leaves more than that is no rival
-COMPARABLE = 0.3  # of what an effect explains, that the score of another promises: with less it is no rival
-OTHER_START = 1.5  # times the other: gains that far apart are both begun from
+COMPARABLE = 0.3  # of the score of an effect, that another has in its place: with less it is no rival
+OTHER_START = 1.5  # times the power in torque that a look leaves: a fit that leaves more is begun from there, too
 
 
 @dataclass(frozen=True)
@@ -86,6 +86,7 @@ class Stepwise:
     rivals: dict[str, dict[str, Fit]] = field(default_factory=dict)
     dropped: list[tuple[str, str]] = field(default_factory=list)
     best: Fit = None  # type: ignore[assignment]
+    inflation: dict[str, float] = field(default_factory=dict)  # of every effect that was added, beside all others
     _needed: dict[str, float] = field(default_factory=dict)  # support of an effect beside all others
 
     def __post_init__(self) -> None:
@@ -108,6 +109,11 @@ class Stepwise:
         self.best = self.judged_again(self.best)
         self.best = self.pruned(self.best, [*self.best.structure.terms, *self._added(self.best)])
         return self.best
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the likelihood is right about every effect of its model, and so about the disturbance it leaves."""
+        return all(self.inflation.get(e, 1.0) < TRUSTED for e in self._added(self.best))
 
     def scale(self, fit: Fit) -> Scale:
         """How large the motion is, and the lines in what a model predicts wrongly."""
@@ -133,9 +139,9 @@ class Stepwise:
         looks = InnovationScores(self.problem, now, self.scale(now)).all(names)
         heavy = self.heaviest(now, names)
         short = self.shortlist(now, looks)
-        starts: dict[str, list[Mapping[Name, float]]] = {v[0].effect: [v[0].start] for v in short}
+        starts: dict[str, list[Mapping[Name, float] | TorqueLook]] = {v[0].effect: [v[0].start] for v in short}
         for look in heavy:
-            starts.setdefault(look.effect, []).append(look.start)
+            starts.setdefault(look.effect, []).append(look)
         fits = {n: f for n, s in starts.items() if (f := self.fitted(now, n, s)) is not None}
         most = max((now.cost - f.cost for f in fits.values()), default=0.0)
         fits = {n: self.further(f) if now.cost - f.cost > NEAR * most else f for n, f in fits.items()}
@@ -163,7 +169,7 @@ class Stepwise:
         wanted = {n for v in short for n in (*effects.get(v[0].effect).nests, *effects.get(v[0].effect).lower_order)}
         return short + [v for v in worth if v[0].effect in wanted and v not in short]
 
-    def fitted(self, now: Fit, name: str, starts: Sequence[Mapping[Name, float]]) -> Fit | None:
+    def fitted(self, now: Fit, name: str, starts: Sequence[Mapping[Name, float] | TorqueLook]) -> Fit | None:
         """A candidate fitted on top of a model, in the place of what it contains: the best from all starts."""
         effect = effects.get(name)
         held = [e for e in self._added(now) if e in effect.nests]
@@ -173,11 +179,12 @@ class Stepwise:
             structure = structure.minus(special)
         fits: list[Fit] = []
         for start in starts:
-            own = {k: v for k, v in start.items() if k[0] == name}
-            if len(start) > len(own):  # in torque: the rest begins there, too, and the disturbance is looked for anew
-                if not fits or far_apart(own, fits[0].values, name):
-                    fits.append(self.problem.fit(structure.plus(name), {**rest, **start}, None, FEW, thorough=False))
+            if isinstance(start, TorqueLook):  # the rest begins there, too, and the disturbance is looked for anew
+                if not fits or self._leaves_more(fits[0], start):
+                    begin = {**rest, **start.start}
+                    fits.append(self.problem.fit(structure.plus(name), begin, None, FEW, thorough=False))
                 continue
+            own = {k: v for k, v in start.items() if k[0] == name}
             for special in held:
                 own = {k: v + _gain(now, special) if k[1] in linear else v for k, v in own.items()}
             fits.append(
@@ -185,6 +192,11 @@ class Stepwise:
             )
         best = min(fits, key=lambda f: f.cost)
         return best if np.isfinite(best.cost) else None
+
+    def _leaves_more(self, fit: Fit, start: TorqueLook) -> bool:
+        """Whether a fit has missed what the same effect takes in torque."""
+        left = self.weigher.left(self.weigher.in_torque(fit))
+        return left > OTHER_START * self.weigher.left(start.fit)
 
     def further(self, fit: Fit) -> Fit:
         """The same with more steps."""
@@ -215,7 +227,7 @@ class Stepwise:
             if name not in now.structure.effects:
                 continue
             bare = {k: v for k, v in now.values.items() if k[0] != name}
-            rest = self.problem.fit(now.structure.minus(name), bare, now.noise, MANY, carry=now.shots)
+            rest = self.problem.fit(now.structure.minus(name), bare, now.noise, MANY, carry=now.shots, thorough=False)
             fits: dict[str, Fit] = {name: now}
             for other, fit in self._instead(now, rest, name).items():
                 near = fit.penalised - now.penalised < FAR_BEHIND * (rest.cost - now.cost)
@@ -223,6 +235,7 @@ class Stepwise:
             seen = {n: self.weigher.evidence(n, rest, f) for n, f in fits.items()}
             self._needed[name] = seen[name].support
             chosen, alike = self._best_of(name, seen)
+            self.inflation[chosen] = seen[chosen].inflation
             if chosen != name:
                 self.say(f"replaced {name} by {chosen}: it fits better beside the other effects")
                 now = fits[chosen]
@@ -239,10 +252,19 @@ class Stepwise:
         alike = [n for n, e in seen.items() if e is best or (e.behind(best) < APART and e.weight > WEIGHT)]
         more = max(1.0, self.samples / max(best.fit.count, 1))
         close = [n for n, e in seen.items() if e is best or e.behind(best) < APART * more]
+        close = [n for n in close if not self._cannot_gain(seen, n, close, more)]
         if len(close) > 1 and self.whole is not None:
             decisive = max(seen[n].inflation for n in close)
             return decided({n: self.on_all(seen[n].fit) for n in close}, decisive)
         return min(alike, key=lambda n: (*plainness(n), -seen[n].support)), alike
+
+    @staticmethod
+    def _cannot_gain(seen: Mapping[str, Evidence], rich: str, close: Sequence[str], more: float) -> bool:
+        """Whether an effect holds a simpler one and is no likelier, so that more samples will not make it so."""
+        return any(
+            (seen[rich].gain - seen[n].gain) * more < seen[rich].price - seen[n].price
+            for n in effects.get(rich).nests if n in close
+        )  # fmt: skip
 
     def on_all(self, fit: Fit) -> Fit:
         """The same model on all samples."""
@@ -263,10 +285,10 @@ class Stepwise:
             fits[other] = self.problem.fit(
                 structure, {**rest_values, **own}, now.noise, FEW, carry=now.shots, thorough=False
             )
-        explained = rest.cost - now.cost
+        own_score = next((v[0].gain for v in looks if v[0].effect == name), 0.0)
         for group in self.shortlist(rest, looks):
             other = group[0].effect
-            if other == name or group[0].gain < COMPARABLE * explained:
+            if other == name or group[0].gain < COMPARABLE * own_score:
                 continue
             found = self.fitted(rest, other, [group[0].start])
             if found is not None and (other not in fits or found.cost < fits[other].cost):
@@ -320,13 +342,6 @@ class Stepwise:
 def _gain(fit: Fit, name: str) -> float:
     """An effect's first gain."""
     return next((fit.values[(name, p.name)] for p in effects.get(name).parameters if p.linear and not p.per_run), 0.0)
-
-
-def far_apart(some: Mapping[Name, float], other: Mapping[Name, float], name: str) -> bool:
-    """Whether two starts of an effect differ so much that a fit from one may not come to the other."""
-    numbers = [(name, p.name) for p in effects.get(name).parameters if not p.per_run]
-    sizes = [(abs(some.get(n, 0.0)), abs(other.get(n, 0.0))) for n in numbers]
-    return any(max(pair) > OTHER_START * min(pair) for pair in sizes)
 
 
 def decided(fits: Mapping[str, Fit], inflation: float = 1.0) -> tuple[str, list[str]]:

@@ -72,8 +72,9 @@ def _noise_in_common(run: Run) -> float | None:
     f, power = signal.welch(differenced, nperseg=length)
     noise = max(noise_of(angle), rounding_of(angle) or 0.0)
     of_noise = 2.0 * (noise * 2.0 * np.sin(np.pi * f) / step) ** 2
-    _, alike = signal.coherence(rate, differenced, nperseg=length)
-    blind = (power < MOSTLY * of_noise) & (f > 0.05) & (f < 0.48)
+    with np.errstate(all="ignore"):
+        _, alike = signal.coherence(rate, differenced, nperseg=length)
+    blind = np.isfinite(alike) & (power < MOSTLY * of_noise) & (f > 0.05) & (f < 0.48)
     return float(np.mean(alike[blind])) if np.sum(blind) >= FEW_BINS else None
 
 

@@ -23,6 +23,7 @@ from rig.recording.run import Array
 EVEN = 0.02  # of a period: samples so close to the beat are on it
 SCATTER = 0.9  # of a period: stamps that scatter by more have no beat
 HOLE = 1.9  # periods between two samples beyond which one is missing
+WANDERING = 0.3  # of a period: spacings that scatter by more belong to no beat, however slow its wander
 NEAR = 1.5  # periods: instants that lie no farther from samples on both sides are read off a spline
 MOST_HOLES = 20  # times as many missing samples as there are
 MOVES = 4  # each along the motion that the one before made out
@@ -98,7 +99,8 @@ def beat_of(name: str, time_s: Array) -> Beat:
         return Beat(float(time_s[-1] / index[-1]), 0.0, index)
     beat = _scattered(time_s, step)
     if beat is None:  # stamps of a software loop that wander: samples lie anywhere, and none is missing but in holes
-        step = float(np.mean(spacing[spacing < HOLE * step]))
+        near = spacing[spacing < HOLE * step]
+        step = float(np.mean(near)) if np.std(near) < WANDERING * step else step
         beat = Beat(step, 0.0, np.rint(time_s / step).astype(np.int64))
     return beat
 

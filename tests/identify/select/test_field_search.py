@@ -52,7 +52,7 @@ def test_coulomb_friction_of_a_servo_is_named_alone_and_what_is_left_is_told() -
     assert found.verdict.effects == ("coulomb_friction",)
     assert found.final.effect_parameters["coulomb_friction"]["level"].value == pytest.approx(0.02, rel=0.05)
     assert found.final.error.holdout_measure == "holdout_torque_relative"
-    assert any(s.startswith("The final model leaves a torque of") for s in found.verdict.sentences)
+    assert any(s.startswith("The final model leaves a residual torque of") for s in found.verdict.sentences)
     right(found, RUBBING)
 
 
