@@ -9,6 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from identify.conclude.conclusion import Case, conclude
+from identify.conclude.decay_disturbance import left_of_a_decay
 from identify.conclude.declared_values import declared_values
 from identify.conclude.error_figures import floor_of, in_torque, measure
 from identify.estimate.by_prediction_error import by_prediction_error
@@ -283,9 +284,12 @@ class _Identifier:
             per_set, joint = each_set(
                 self.traces, after, self.start, centre, self.settings, self.recording.axis
             )  # fmt: skip
+        left = measured.disturbance if measured else None
+        if self.torque_free:
+            left = left_of_a_decay(self.traces, self.split, after, self.start, self.recording.axis)
         case = Case(
             self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
-            self.declared, self.left_out, self.colour, measured.disturbance if measured else None,
+            self.declared, self.left_out, self.colour, left,
         )  # fmt: skip
         scale = self._torque_scale(after) if in_full else None
         return conclude(case, search, before, after, measured_before, measured_after, floor, per_set, joint, scale)

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identify.estimate.fit import Fit, Prediction
+from identify.estimate.fit import Columns, Fit, Look, Prediction
 from identify.estimate.output_error import held_still, shots_for
 from identify.model.parameters import Name, bounds_of, names_of, ordered
 from identify.model.structure import Structure
 from identify.simulate.shots import RUNAWAY, Shots
 from rig import effects
 from rig.arrays import Array
-from rig.dynamics.predictor import RATE, Gains, Noise
+from rig.dynamics.predictor import RATE, Noise
 from rig.effects.base import Place
 
 if TYPE_CHECKING:
@@ -39,38 +39,6 @@ FURTHER = (  # times white density, slow variance and time constant: where else 
     (0.01, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 10.0, 1.0), (1.0, 0.1, 0.1), (1.0, 0.03, 0.01),
     (1.0, 1.0, 10.0),
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Look:
-    """One run's innovations at a parameter vector, m readings a sample."""
-
-    innovations: Array  # (n, m)
-    variance: Array  # (n, m)
-    state: Array  # angle, rate, slow torque after each sample, (n, 3)
-    gains: Gains
-
-
-@dataclass(frozen=True)
-class Columns:
-    """One run's derivatives at a fit, of the samples that count, readings of a sample one after the other.
-
-    Attributes
-    ----------
-    columns
-        What the parameters do to the scaled innovations, (n, p).
-    bias
-        What the run's bias does, (n,); zeros where it has none.
-    scaled
-        Innovations over their standard deviation, (n,).
-    variance
-        Of the innovations, (n,).
-    """
-
-    columns: Array
-    bias: Array
-    scaled: Array
-    variance: Array
 
 
 @dataclass(frozen=True)

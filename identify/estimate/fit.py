@@ -1,4 +1,4 @@
-"""A model fitted to recordings: its parameters, its noise, its likelihood."""
+"""A model fitted to recordings: its parameters, its noise, its likelihood, and what it is computed from."""
 
 from __future__ import annotations
 
@@ -11,10 +11,42 @@ from identify.model.parameters import Name, platform_of
 from identify.model.structure import Structure
 from identify.simulate.shots import Shots
 from rig.arrays import Array
-from rig.dynamics.predictor import Noise
+from rig.dynamics.predictor import Gains, Noise
 from rig.platform import Platform
 
 SINGULAR = 1e-12  # smallest over largest eigenvalue of the scaled information that still determines a direction
+
+
+@dataclass(frozen=True)
+class Look:
+    """One run's innovations at a parameter vector, m readings a sample."""
+
+    innovations: Array  # (n, m)
+    variance: Array  # (n, m)
+    state: Array  # angle, rate, slow torque after each sample, (n, 3)
+    gains: Gains
+
+
+@dataclass(frozen=True)
+class Columns:
+    """One run's derivatives at a fit, of the samples that count, readings of a sample one after the other.
+
+    Attributes
+    ----------
+    columns
+        What the parameters do to the scaled innovations, (n, p).
+    bias
+        What the run's bias does, (n,); zeros where it has none.
+    scaled
+        Innovations over their standard deviation, (n,).
+    variance
+        Of the innovations, (n,).
+    """
+
+    columns: Array
+    bias: Array
+    scaled: Array
+    variance: Array
 
 
 @dataclass(frozen=True)

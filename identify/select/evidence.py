@@ -20,8 +20,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
-from identify.estimate.fit import Fit
-from identify.estimate.prediction_error import Columns, PredictionError
+from identify.estimate.fit import Columns, Fit
+from identify.estimate.prediction_error import PredictionError
 from identify.model.parameters import Name
 from rig import effects
 from rig.arrays import Array
@@ -33,6 +33,7 @@ BLOCKS = 30  # of all runs together, over which scores scatter: their ratio is t
 CHANCE = 0.95  # quantile of a ratio of variances: what chance alone reaches is no sign of a wrong likelihood
 FEWEST_RUNS = 4  # whose scores show whether runs differ
 ALONE = 1e-3  # of a parameter's influence, that the others leave: of less only rounding is seen
+WEIGHT = 0.20  # share of the disturbance that an effect takes away to be named: below, it is true but small
 TRUSTED = 1.5  # inflation up to which what the likelihood takes the disturbance for is believed
 EVIDENT = 0.1  # of the sensor's variance, that a disturbance adds to the prediction error: a smaller one weighs nothing
 

@@ -175,8 +175,8 @@ def search_in_torque(
 def _better(search: TorqueSearch, best: TorqueFit, trial: TorqueFit, depends: bool) -> bool:
     """Whether the model that the search in torque found stands in place of prediction error's.
 
-    On samples not fitted it has to leave clearly less. Where what prediction error's leaves ``depends`` on something, it
-    lacks an effect or has a wrong one: then about as much, with fewer parameters, is enough.
+    On samples not fitted it has to leave clearly less. Where what is left ``depends`` on something, prediction error
+    lacks an effect or has a wrong one, and about as much with fewer parameters is enough.
     """
     ratio = search.left(best) / search.left(trial)
     return ratio < CLEARLY_LESS or (depends and ratio < ABOUT_AS_MUCH and len(best.values) < len(trial.values))

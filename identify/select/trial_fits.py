@@ -1,0 +1,177 @@
+"""The candidates of a round, fitted on top of a model: where fits begin, and in whose place.
+
+Which of them are fitted only costs time; what is believed of them is decided elsewhere (``stepwise``, ``evidence``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identify.estimate.fit import Fit
+from identify.estimate.initial_guess import scale_of
+from identify.estimate.prediction_error import PredictionError
+from identify.model.parameters import Name
+from identify.model.structure import Structure
+from identify.propose.innovation_score import InnovationScores, Score
+from identify.propose.torque_looks import TorqueLook, torque_looks
+from identify.runs.measured_channels import simplicity
+from identify.select.evidence import WEIGHT, Weigher
+from identify.signals.spectral_lines import foreign_lines_hz, ringing_hz, rings_hz
+from rig import effects
+from rig.effects.base import Scale
+from rig.platform import TERMS
+
+HOPE = 20.0  # fall of the cost, parameters paid for, that no chance among all candidates and shapes makes
+TRIED = 4  # candidates of a round, by their scores, that are fitted
+HEAVIEST = 3  # candidates by their weight in torque that are fitted beside those
+FAINT = 0.02  # of the best score: what promises so little is not what the round is about
+FEW, MANY = 14, 25  # steps of a fit that is compared, and of one that is kept
+NEAR = 0.9  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
+COMPARABLE = 0.3  # of the score of an effect, that another has in its place: with less it is no rival
+OTHER_START = 1.5  # times the power in torque that a look leaves: a fit that leaves more is begun from there, too
+
+
+@dataclass(frozen=True)
+class TrialFits:
+    """Fits of candidates.
+
+    Attributes
+    ----------
+    problem
+        The runs, and how they are predicted.
+    declared
+        The declared structure.
+    allowed
+        Names of the effects that may be named.
+    weigher
+        What models leave in torque.
+    """
+
+    problem: PredictionError
+    declared: Structure
+    allowed: Sequence[str]
+    weigher: Weigher
+
+    def added(self, now: Fit) -> list[str]:
+        """Effects that the declared model lacks."""
+        return [e for e in now.structure.effects if e not in self.declared.effects]
+
+    def scale(self, fit: Fit) -> Scale:
+        """How large the motion is, and the lines in what a model predicts wrongly."""
+        values, traces = fit.values, self.problem.traces
+        inertia, damping, stiffness = (values.get((t,), 0.0) for t in TERMS)
+        natural_hz = float(np.sqrt(max(stiffness, 0.0) / max(inertia, 1e-300)) / (2.0 * np.pi))
+        left = fit.prediction.innovations
+        noise = float(np.sqrt(fit.variance * self.problem.reading_variance))
+        noise = float(np.sqrt(np.mean([np.mean(r[t.keep] ** 2) for r, t in zip(left, traces, strict=True)]))) or noise
+        lines = foreign_lines_hz(traces, left, noise, natural_hz)
+        scale = scale_of(traces, (inertia, damping, stiffness), lines, ringing_hz(traces, natural_hz))
+        return replace(scale, rings_hz=rings_hz(traces, left, natural_hz))
+
+    def names(self, now: Fit) -> list[str]:
+        """What may be added, or put in the place of a special case; of an effect that is there, one more of it."""
+        have = now.structure.effects
+        more = [m for n in have for m in effects.further(effects.first_of(n)) if m not in have][:1]
+        return [n for n in (*self.allowed, *more) if n not in have]
+
+    def of_a_round(self, now: Fit) -> tuple[list[Score], dict[str, Fit]]:
+        """All candidates' scores on top of a model, and fits of the most promising."""
+        names = self.names(now)
+        looks = InnovationScores(self.problem, now, self.scale(now)).all(names)
+        starts: dict[str, list[Mapping[Name, float] | TorqueLook]] = {
+            v[0].effect: [v[0].start] for v in self.shortlist(now, looks)
+        }
+        for look in self.heaviest(now, names):
+            starts.setdefault(look.effect, []).append(look)
+        fits = {n: f for n, s in starts.items() if (f := self.fitted(now, n, s)) is not None}
+        most = max((now.cost - f.cost for f in fits.values()), default=0.0)
+        fits = {n: self.further(f) if now.cost - f.cost > NEAR * most else f for n, f in fits.items()}
+        return [v[0] for v in looks], fits
+
+    def heaviest(self, now: Fit, names: Sequence[str]) -> list[TorqueLook]:
+        """Candidates that carry much of the disturbance along the measured motion."""
+        there = self.weigher.in_torque(now)
+        left = self.weigher.left(there)
+        nested = {s for e in now.structure.effects for s in effects.get(e).nests}
+        held = [n for n in names if n not in nested and not set(effects.get(n).nests) & set(there.structure.effects)]
+        looks = torque_looks(self.weigher.regression, there, held, HEAVIEST)
+        floor = self.weigher.floor_nm**2
+        return [w for w in looks if 1.0 - max(w.left_nm**2 - floor, 0.0) / left > WEIGHT]
+
+    def shortlist(self, now: Fit, looks: Sequence[list[Score]]) -> list[list[Score]]:
+        """The largest gains beyond their penalty, with their special cases and what comes first by order."""
+        price = float(np.log(max(now.count, 2)))
+        worth = [v for v in looks if v[0].gain > HOPE + price * len(effects.get(v[0].effect).parameters)]
+        if not worth:
+            return []
+        plain = [v for v in worth if not simplicity(v[0].effect)]
+        short = plain[:TRIED] + [v for v in worth if simplicity(v[0].effect)][:2]
+        short = [v for v in short if v[0].gain > FAINT * worth[0][0].gain]
+        wanted = {n for v in short for n in (*effects.get(v[0].effect).nests, *effects.get(v[0].effect).lower_order)}
+        return short + [v for v in worth if v[0].effect in wanted and v not in short]
+
+    def fitted(self, now: Fit, name: str, starts: Sequence[Mapping[Name, float] | TorqueLook]) -> Fit | None:
+        """A candidate fitted on top of a model, in the place of what it contains: the best from all starts."""
+        effect = effects.get(name)
+        held = [e for e in self.added(now) if e in effect.nests]
+        structure, rest = now.structure, {k: v for k, v in now.values.items() if k[0] not in held}
+        linear = {p.name for p in effect.parameters if p.linear}
+        for special in held:
+            structure = structure.minus(special)
+        fits: list[Fit] = []
+        for start in starts:
+            if isinstance(start, TorqueLook):  # the rest begins there, too, and the disturbance is looked for anew
+                if not fits or self._leaves_more(fits[0], start):
+                    begin = {**rest, **start.start}
+                    fits.append(self.problem.fit(structure.plus(name), begin, None, FEW, thorough=False))
+                continue
+            own = {k: v for k, v in start.items() if k[0] == name}
+            for special in held:
+                own = {k: v + _gain(now, special) if k[1] in linear else v for k, v in own.items()}
+            fits.append(
+                self.problem.fit(structure.plus(name), {**rest, **own}, now.noise, FEW, carry=now.shots, thorough=False)
+            )
+        best = min(fits, key=lambda f: f.cost)
+        return best if np.isfinite(best.cost) else None
+
+    def _leaves_more(self, fit: Fit, start: TorqueLook) -> bool:
+        """Whether a fit has missed what the same effect takes in torque."""
+        left = self.weigher.left(self.weigher.in_torque(fit))
+        return left > OTHER_START * self.weigher.left(start.fit)
+
+    def further(self, fit: Fit) -> Fit:
+        """The same with more steps."""
+        more = self.problem.fit(fit.structure, fit.values, fit.noise, MANY, carry=fit.shots)
+        return more if more.cost < fit.cost else fit
+
+    def instead(self, now: Fit, rest: Fit, name: str) -> dict[str, Fit]:
+        """Fits with another effect in the place of one."""
+        looks = InnovationScores(self.problem, rest, self.scale(rest)).all(self.names(rest))
+        fits: dict[str, Fit] = {}
+        rest_values = {n: v for n, v in now.values.items() if n[0] != name}
+        for other in effects.get(name).nests:  # from where the richer one stands: alone its score may point anywhere
+            parameters = effects.get(other).parameters
+            if other not in self.names(now) or not all(p.linear and not p.per_run for p in parameters):
+                continue
+            structure = replace(now.structure, effects=tuple(other if e == name else e for e in now.structure.effects))
+            own: dict[Name, float] = {(other, p.name): _gain(now, name) for p in parameters}
+            fits[other] = self.problem.fit(
+                structure, {**rest_values, **own}, now.noise, FEW, carry=now.shots, thorough=False
+            )
+        own_score = next((v[0].gain for v in looks if v[0].effect == name), 0.0)
+        for group in self.shortlist(rest, looks):
+            other = group[0].effect
+            if other == name or group[0].gain < COMPARABLE * own_score:
+                continue
+            found = self.fitted(rest, other, [group[0].start])
+            if found is not None and (other not in fits or found.cost < fits[other].cost):
+                fits[other] = found
+        return {n: f for n, f in fits.items() if np.isfinite(f.cost)}
+
+
+def _gain(fit: Fit, name: str) -> float:
+    """An effect's first gain."""
+    return next((fit.values[(name, p.name)] for p in effects.get(name).parameters if p.linear and not p.per_run), 0.0)
