@@ -33,7 +33,7 @@ ENOUGH = 0.5  # fall of the cost below which a fit has arrived
 TRIALS = 7  # step lengths tried before a direction is given up
 DAMPING = 1e-4
 DOWN = (1e-3, 1e-6, 1e-10)  # times the disturbance: how far below a model is looked at with parameters that follow
-FOLLOWED = 5  # steps in which they do
+FOLLOWED, CLOSING = 20, 0.9  # steps in which they do, and what each of them leaves of the gap at most
 FAR = 2.0  # times the sensor's variance: less of a disturbance is found step by step
 FURTHER = (  # times white density, slow variance and time constant: where else a noise is looked for
     (0.01, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 10.0, 1.0), (1.0, 0.1, 0.1), (1.0, 0.03, 0.01),
@@ -281,7 +281,8 @@ class Descent:
             self.looks = self._looks(self.x, self.noise, self.bias)
             self.cost, self.damping = self._cost(self.looks), DAMPING
             for _ in range(FOLLOWED):
-                if not self._down(False) or self.cost < here[-1] - ENOUGH:
+                gap = self.cost - here[-1]
+                if not self._down(False) or self.cost < here[-1] - ENOUGH or self.cost - here[-1] > CLOSING * gap:
                     break
             if self.cost < here[-1] - ENOUGH:
                 return

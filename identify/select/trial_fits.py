@@ -21,7 +21,7 @@ from identify.runs.measured_channels import simplicity
 from identify.select.evidence import WEIGHT, Weigher
 from identify.signals.spectral_lines import foreign_lines_hz, ringing_hz, rings_hz
 from rig import effects
-from rig.effects.base import Scale
+from rig.effects.base import Place, Scale
 from rig.platform import TERMS
 
 HOPE = 20.0  # fall of the cost, parameters paid for, that no chance among all candidates and shapes makes
@@ -124,7 +124,8 @@ class TrialFits:
         fits: list[Fit] = []
         for start in starts:
             if isinstance(start, TorqueLook):  # the rest begins there, too, and the disturbance is looked for anew
-                if not fits or self._leaves_more(fits[0], start):
+                begun = starts[0] if fits and not isinstance(starts[0], TorqueLook) else {}
+                if not fits or self._leaves_more(fits[0], start) or self._begun_small(name, begun, start):
                     begin = {**rest, **start.start}
                     fits.append(self.problem.fit(structure.plus(name), begin, None, FEW, thorough=False))
                 continue
@@ -136,6 +137,14 @@ class TrialFits:
             )
         best = min(fits, key=lambda f: f.cost)
         return best if np.isfinite(best.cost) else None
+
+    @staticmethod
+    def _begun_small(name: str, begun: Mapping[Name, float], start: TorqueLook) -> bool:
+        """Whether dry friction was begun far below what it has in torque: where it sticks, a fit stays there."""
+        if effects.get(name).place is not Place.FRICTION:
+            return False
+        gains = [(name, p.name) for p in effects.get(name).parameters if p.linear]
+        return any(OTHER_START * abs(begun.get(g, 0.0)) < abs(start.start.get(g, 0.0)) for g in gains)
 
     def _leaves_more(self, fit: Fit, start: TorqueLook) -> bool:
         """Whether a fit has missed what the same effect takes in torque."""
