@@ -11,10 +11,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize
 
 from identify.diagnose.coloured_residual import bounded, coloured_cost, lines, rms, standard_errors, strongest
 from identify.diagnose.torque_band import TorqueBand
@@ -27,8 +26,6 @@ from rig.effects.base import Place
 
 BLOCK, BLOCKS_A_RUN, FEWEST_BLOCKS = 8, 24, 8  # samples behind the low-pass in a block, and how many blocks
 FEWEST_FOR_LINES, LEAST_TRAVEL_RAD = 64, 0.5  # samples, and travel to show a line against the angle
-EVALUATIONS = 30  # of a shape search
-BEYOND = 4.0  # times the outermost starting values: how far a shape may wander
 
 
 @dataclass(frozen=True)
@@ -62,6 +59,18 @@ class TorqueFit:
     def penalised(self) -> float:
         """The cost with every parameter paid for."""
         return self.cost + len(self.values) * float(np.log(max(self.count, 2)))
+
+
+class _Stacked(NamedTuple):
+    """All runs one below the other: columns, (n, p + extra), the torque, (n,), names of the first p columns.
+
+    Behind those stand ``extra`` columns of what is free in each run.
+    """
+
+    columns: Array
+    target: Array
+    names: list[Name]
+    extra: int
 
 
 class TorqueRegression(TorqueBand):
@@ -128,10 +137,27 @@ class TorqueRegression(TorqueBand):
 
     def stacked(self, structure: Structure, shapes: Shapes) -> tuple[Array, Array, list[Name]]:
         """Columns of a structure over all runs, what is free in each run behind them, target and names; as fitted."""
+        all_ = self._over_all_runs(structure, shapes)
+        return all_.columns[self._fitted], all_.target[self._fitted], all_.names
+
+    def own_columns(self, name: str, shape: tuple[float, ...]) -> Array:
+        """Columns of one effect alone, one a gain, or one a gain and run where every run has its own; as fitted."""
+        parts = [
+            self._columns(i, Structure((), (name,)), {name: shape})[:2] for i in range(len(self.traces))
+        ]  # fmt: skip
+        names: list[Name] = list(dict.fromkeys(n for _, own in parts for n in own))
+        out = []
+        for a, own in parts:
+            full = np.zeros((len(a), len(names)))
+            full[:, [names.index(n) for n in own]] = a[:, : len(own)]
+            out.append(full)
+        return np.concatenate(out)[self._fitted]
+
+    def _over_all_runs(self, structure: Structure, shapes: Shapes) -> _Stacked:
         parts = [self._columns(i, structure, shapes) for i in range(len(self.traces))]
         names: list[Name] = list(dict.fromkeys(n for _, own, _ in parts for n in own))
         extra = sum(a.shape[1] - len(own) for a, own, _ in parts)
-        wide, target, at = [], [], len(names)
+        wide, at = [], len(names)
         for a, own, y in parts:
             full = np.zeros((len(y), len(names) + extra))
             full[:, [names.index(n) for n in own]] = a[:, : len(own)]
@@ -139,27 +165,14 @@ class TorqueRegression(TorqueBand):
             full[:, at : at + more] = a[:, len(own) :]
             at += more
             wide.append(full)
-            target.append(y)
-        return np.concatenate(wide)[self._fitted], np.concatenate(target)[self._fitted], names
+        return _Stacked(np.concatenate(wide), np.concatenate([y for _, _, y in parts]), names, extra)
 
     def solve(self, structure: Structure, shapes: Shapes, filters: Array | None = None) -> TorqueFit:
         """One structure at given shapes; gains within their bounds.
 
         ``filters`` is an autoregression of the residual from elsewhere, for the cost; it is the fit's own where None.
         """
-        parts = [self._columns(i, structure, shapes) for i in range(len(self.traces))]
-        names: list[Name] = list(dict.fromkeys(n for _, own, _ in parts for n in own))
-        extra = sum(a.shape[1] - len(own) for a, own, _ in parts)
-        wide, target, at = [], [], len(names)
-        for a, own, y in parts:
-            full = np.zeros((len(y), len(names) + extra))
-            full[:, [names.index(n) for n in own]] = a[:, : len(own)]
-            more = a.shape[1] - len(own)
-            full[:, at : at + more] = a[:, len(own) :]
-            at += more
-            wide.append(full)
-            target.append(y)
-        a, y = np.concatenate(wide), np.concatenate(target)
+        a, y, names, extra = self._over_all_runs(structure, shapes)
         low = np.array([self._low(n) for n in names] + [-np.inf] * extra)
         folds = self._by_block if extra or any(len(n) == 3 for n in names) else self._by_run
         used = self._used
@@ -171,14 +184,14 @@ class TorqueRegression(TorqueBand):
             held[fold] = (y - a @ bounded(a[others].T @ a[others], a[others].T @ y[others], low))[fold]
         r = y - a @ x
         # A drive that passes on little of the torque leaves little of it unexplained: what counts is the share.
-        scale = self.torque_nm / max(rms(y - self._taken(parts, names, x, a)), 1e-300)
+        scale = self.torque_nm / max(rms(y - self._taken(names, x, a)), 1e-300)
         r, held = scale * r, scale * held
         values = dict(zip(names, x[: len(names)].tolist(), strict=True))
         for name in structure.effects:
             shape_names = [p.name for p in effects.get(name).parameters if not p.linear]
             values |= {(name, k): v for k, v in zip(shape_names, shapes.get(name, ()), strict=True)}
-        ends = np.cumsum([len(t) for t in target])[:-1]
-        run = np.concatenate([np.full(len(t), i) for i, t in enumerate(target)])
+        ends = np.cumsum([len(r) for r in self._rows])[:-1]
+        run = np.concatenate([np.full(len(r), i) for i, r in enumerate(self._rows)])
         cost, filters = coloured_cost(scale * a[used], scale * y[used], run[used], x, filters)
         return TorqueFit(
             structure, {k: tuple(v) for k, v in shapes.items()}, values, rms(r[fitting]), rms(held[self._judged]), cost,
@@ -186,7 +199,7 @@ class TorqueRegression(TorqueBand):
         )  # fmt: skip
 
     @staticmethod
-    def _taken(parts: Any, names: Sequence[Name], x: Array, a: Array) -> Array:
+    def _taken(names: Sequence[Name], x: Array, a: Array) -> Array:
         """What effects that feed on the torque itself take of it, (n,)."""
         mine = [k for k, n in enumerate(names) if len(n) > 1 and feeds_on_torque(n[0])]
         return np.asarray(a[:, mine] @ x[mine]) if mine else np.zeros(len(a))
@@ -215,42 +228,6 @@ class TorqueRegression(TorqueBand):
                     (size, 2.0 * np.pi * f) for size, f in lines(angle[ordered], r[ordered], most / (2.0 * np.pi))
                 ]
         return strongest(hz), strongest(orders)
-
-    def polished(self, base: TorqueFit, name: str, shape: tuple[float, ...]) -> TorqueFit | None:
-        """The structure with one effect more, its shapes searched for from those of a grid; None without shapes."""
-        effect = effects.get(name)
-        axes = [p for p in effect.parameters if not p.linear]
-        if not axes:
-            return None
-        starts = [p.start(self.scale) if p.start else (1.0,) for p in axes]
-        structure = base.structure.plus(name)
-        bounds = [
-            (max(p.low, min(s) / BEYOND, 1e-12), min(p.high, BEYOND * max(s)))
-            for p, s in zip(axes, starts, strict=True)
-        ]
-
-        def inside(u: Any) -> tuple[float, ...]:
-            return tuple(float(np.clip(np.exp(x), lo, hi)) for x, (lo, hi) in zip(u, bounds, strict=True))
-
-        begin: Any = np.log(np.maximum(shape, 1e-12))
-        simplex = np.vstack([begin, begin + 0.25 * np.eye(len(begin))])
-        options: Any = {"maxfev": EVALUATIONS, "initial_simplex": simplex, "xatol": 1e-3}
-
-        def loss(u: Any) -> float:
-            return self.left_at(structure, {**base.shapes, name: inside(u)})
-
-        found: Any = minimize(loss, begin, method="Nelder-Mead", options=options)
-        best = min((shape, inside(found.x)), key=lambda s: self.left_at(structure, {**base.shapes, name: s}))
-        return self.solve(structure, {**base.shapes, name: best})
-
-    def left_at(self, structure: Structure, shapes: Shapes) -> float:
-        """What a structure leaves at given shapes on the samples fitted, over the torque that it passes on."""
-        wide, target, names = self.stacked(structure, shapes)
-        low = np.array([self._low(n) for n in names] + [-np.inf] * (wide.shape[1] - len(names)))
-        x = bounded(wide.T @ wide, wide.T @ target, low)
-        mine = [k for k, n in enumerate(names) if len(n) > 1 and feeds_on_torque(n[0])]
-        passed = target - wide[:, mine] @ x[mine]
-        return rms(target - wide @ x) / max(rms(passed), 1e-300)
 
     def sureness(self, base: TorqueFit, richer: TorqueFit) -> tuple[float, float]:
         """Standard errors by which the squared residual on held-out samples is lower, block by block.

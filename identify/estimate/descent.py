@@ -20,7 +20,7 @@ from identify.model.structure import Structure
 from identify.simulate.shots import RUNAWAY, Shots
 from rig import effects
 from rig.arrays import Array
-from rig.dynamics.predictor import RATE, Noise
+from rig.dynamics.predictor import RATE, SLOW, Gains, Noise, innovations_with
 from rig.effects.base import Place
 
 if TYPE_CHECKING:
@@ -28,12 +28,14 @@ if TYPE_CHECKING:
 
 STEP = 1e-6  # relative step of the differences
 NOISE_STEP = 0.02  # of a logarithm of the noise, in its differences
-FARTHEST = 4.0  # by which a logarithm of the noise may change in one step
+FARTHEST = 4.0  # by which a logarithm of the noise may fall in one step
+RISE = 1e12  # times itself, that a number of the noise may become in one step
 ENOUGH = 0.5  # fall of the cost below which a fit has arrived
 TRIALS = 7  # step lengths tried before a direction is given up
 DAMPING = 1e-4
 DOWN = (1e-3, 1e-6, 1e-10)  # times the disturbance: how far below a model is looked at with parameters that follow
-FOLLOWED, CLOSING = 20, 0.9  # steps in which they do, and what each of them leaves of the gap at most
+FOLLOWED, CLOSING = 20, 0.7  # steps in which they do, and what each of them leaves of the gap at most
+EARLY = 3  # steps after which a model that is right is near enough for it
 FAR = 2.0  # times the sensor's variance: less of a disturbance is found step by step
 FURTHER = (  # times white density, slow variance and time constant: where else a noise is looked for
     (0.01, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 10.0, 1.0), (1.0, 0.1, 0.1), (1.0, 0.03, 0.01),
@@ -118,11 +120,24 @@ class Descent:
         """Whether the model has dry friction."""
         return any(effects.get(e).place is Place.FRICTION for e in self.structure.effects)
 
-    def down(self, steps: int, thorough: bool) -> int:
-        """Steps until it has arrived; how many are left. A thorough fit then looks at other noises."""
+    def down(self, steps: int, thorough: bool, roughly: float = 0.0, least: float = np.inf) -> int:
+        """Steps until it has arrived; how many are left. A thorough fit then looks at other noises.
+
+        ``roughly`` is the share of the whole fall that a step has to bring to be followed by another; ``least`` is the
+        cost that it must be below once models that are right are near it.
+        """
+        first, looked = self.cost, False
         for left in range(steps, 0, -1):
-            if not self.step() and (left == 1 or not thorough or not self.other_noise()):
+            before = self.cost
+            if steps - left == EARLY:
+                self._without_disturbance()
+                if self.cost > least:
+                    return left
+            if self.step() and before - self.cost > roughly * (first - self.cost):
+                continue
+            if left == 1 or not thorough or not self.other_noise(lower=not looked):
                 return left - 1
+            looked = True
         return 0
 
     def step(self) -> bool:
@@ -152,43 +167,57 @@ class Descent:
         return float(self.count * np.log(squares / self.count) + log)
 
     def _all_columns(self, of_noise: bool) -> list[tuple[Columns, Array, Array]]:
-        return list(self.problem.workers.map(lambda i: self._columns(i, of_noise), range(len(self.shots))))
+        """Every run's derivatives; the predictions they need side by side, of all runs and parameters."""
+        free = [k for k in range(len(self.names)) if not self.still[k]]
+        tasks = [
+            (i, k) for i, s in enumerate(self.shots) for k in free
+            if len(self.names[k]) < 3 or int(self.names[k][2]) == s.number
+        ]  # fmt: skip
+        moved = dict(zip(tasks, self.problem.workers.map(lambda t: self._moved(*t), tasks), strict=True))
+        return list(self.problem.workers.map(lambda i: self._columns(i, moved, of_noise), range(len(self.shots))))
 
     @RUNAWAY
-    def _columns(self, i: int, of_noise: bool) -> tuple[Columns, Array, Array]:
-        """Derivatives of one run's scaled innovations, where the descent stands.
+    def _moved(self, i: int, k: int) -> Array:
+        """What a parameter does to one run's scaled innovations, (n,)."""
+        p, s, base, w = self.problem, self.shots[i], self.looks[i], self.weights[i]
+        h = STEP * self.scale[k] * (-1.0 if self.x[k] + STEP * self.scale[k] > self.high[k] else 1.0)
+        there = self.x.copy()
+        there[k] += h
+        # What a parameter does to the gains matters to no innovation that is white, and gains cost a prediction.
+        other = p.look(s, self.structure, self.names, there, self.noise, self.bias[i], base.gains)
+        return np.asarray(((base.innovations[w] - other.innovations[w]) / (h * np.sqrt(base.variance[w]))).ravel())
 
-        With what the logarithms of the noise do to them, (n, k), and what parameters and noise do to the logarithm of
-        their variance, (n, p + k).
+    @RUNAWAY
+    def _columns(self, i: int, moved: Mapping[tuple[int, int], Array], of_noise: bool) -> tuple[Columns, Array, Array]:
+        """Derivatives of one run's scaled innovations, where the descent stands; ``moved`` are those of parameters.
+
+        With what the logarithms of the noise do to them, (n, k), and to the logarithm of their variance, (n, k).
+        The noise and the bias act through the linear part: no prediction is needed for theirs.
         """
         p, s, base, w = self.problem, self.shots[i], self.looks[i], self.weights[i]
         root = np.sqrt(base.variance[w])
-        scaled = base.innovations[w] / root
+        spans = [(a, b - 1) for a, b in s.edges]
 
-        def change(x: Array, noise: Noise, bias: float, h: float) -> tuple[Array, Array]:
-            # What a parameter does to the gains matters to no innovation that is white, and gains cost a prediction.
-            kept = base.gains if noise is self.noise else None
-            other = p.look(s, self.structure, self.names, x, noise, bias, kept)
-            moved = (-(other.innovations[w] - base.innovations[w]) / h / root).ravel()
-            return moved, (np.log(other.variance[w] / base.variance[w]) / h).ravel()
+        def followed(gains: Gains, h: float, bias: float = 0.0) -> Array:
+            e = innovations_with(base.gains, gains, base.innovations, base.state[:, SLOW], s.trace.keep, spans, bias)
+            return np.asarray(((base.innovations[w] - e[w]) / (h * root)).ravel())
 
-        kinds, p_ = self.kinds if of_noise else [], len(self.x)
-        columns, ones = np.zeros((scaled.size, p_)), np.zeros(scaled.size)
-        pulled, spread = np.zeros((scaled.size, len(kinds))), np.zeros((scaled.size, p_ + len(kinds)))
-        for k, name in enumerate(self.names):
-            if self.still[k] or (len(name) == 3 and int(name[2]) != s.number):
-                continue
-            h = STEP * self.scale[k] * (-1.0 if self.x[k] + STEP * self.scale[k] > self.high[k] else 1.0)
-            moved = self.x.copy()
-            moved[k] += h
-            columns[:, k], spread[:, k] = change(moved, self.noise, self.bias[i], h)
+        scaled = (base.innovations[w] / root).ravel()
+        kinds = self.kinds if of_noise else []
+        columns, ones = np.zeros((scaled.size, len(self.x))), np.zeros(scaled.size)
+        pulled, spread = np.zeros((scaled.size, len(kinds))), np.zeros((scaled.size, len(kinds)))
+        for k in range(len(self.x)):
+            if (i, k) in moved:
+                columns[:, k] = moved[(i, k)]
         if s.trace.biased:
             h = 1e-4 * p.rate_rad_s
-            ones, _ = change(self.x, self.noise, self.bias[i] + h, h)
+            ones = followed(base.gains, h, h)
         for k, kind in enumerate(kinds):
-            there = replace(self.noise, **{kind: getattr(self.noise, kind) * float(np.exp(NOISE_STEP))})
-            pulled[:, k], spread[:, p_ + k] = change(self.x, there, self.bias[i], NOISE_STEP)
-        return Columns(columns, ones, scaled.ravel(), base.variance[w].ravel()), pulled, spread
+            changed = replace(self.noise, **{kind: getattr(self.noise, kind) * float(np.exp(NOISE_STEP))})
+            gains = p.gains_at(s, self.structure, self.names, self.x, changed)
+            pulled[:, k] = followed(gains, NOISE_STEP)
+            spread[:, k] = (np.log(gains.variance[w] / base.variance[w]) / NOISE_STEP).ravel()
+        return Columns(columns, ones, scaled, base.variance[w].ravel()), pulled, spread
 
     def _solvable(self, of_noise: bool) -> _Step:
         """The normal equations where the descent stands; the information of the parameters is kept."""
@@ -207,8 +236,8 @@ class Descent:
             biases.append((across, own))
             information += part.columns.T @ part.columns - pivot * np.outer(across[:p], across[:p])
             apart = spread - level  # the scale of all variances is free: only what differs between samples tells
-            matrix += 0.5 * apart.T @ apart
-            right -= 0.5 * apart.T @ (1.0 - z * z / variance)
+            matrix[p:, p:] += 0.5 * apart.T @ apart
+            right[p:] -= 0.5 * apart.T @ (1.0 - z * z / variance)
         self.information, self._informed = information, (self.noise, self.x.tobytes())
         return _Step(matrix, right, biases)
 
@@ -228,7 +257,7 @@ class Descent:
             d[free] = np.linalg.lstsq(scaled + self.damping * np.eye(len(right)), right, rcond=1e-14)[0]
             d = d / size
             x = ordered(self.names, np.clip(self.x + d[:p], self.low, self.high))
-            change = np.concatenate([x - self.x, np.clip(d[p:], -FARTHEST, FARTHEST)])
+            change = np.concatenate([x - self.x, logs_of(d[p:])])
             noise = self._with_logs(change[p:])
             bias = self.bias + np.array([own - across @ change for across, own in found.biases])
             looks = self._looks(x, noise, bias)
@@ -246,11 +275,11 @@ class Descent:
         }
         return self.problem.within(replace(self.noise, **values))
 
-    def other_noise(self) -> bool:
+    def other_noise(self, lower: bool = True) -> bool:
         """Whether a noise that is quite another one is likelier; if so the descent goes on from there.
 
         Beside the right one the likelihood is a quadratic in its logarithms; far off it is flat, or has a valley for
-        a disturbance that is slow and another for one that is fast.
+        a disturbance that is slow and another for one that is fast. ``lower``: far below is looked at, too.
         """
         before = self.cost
         for white, slow, time in FURTHER:
@@ -262,7 +291,8 @@ class Descent:
             cost = self._cost(looks)
             if cost < self.cost - ENOUGH:
                 self.noise, self.looks, self.cost = noise, looks, cost
-        self._without_disturbance()
+        if lower:
+            self._without_disturbance()
         self.damping = DAMPING
         return self.cost < before - ENOUGH
 
@@ -298,7 +328,7 @@ class Descent:
         """Median over the samples of the prediction's variance over that without a torque disturbance."""
         p, quiet = self.problem, replace(self.noise, white=0.0, slow=0.0)
         ratios = [
-            (q.variance[w] / p.variance_at(s, self.structure, self.names, self.x, quiet)[w])[:, -1]
+            (q.variance[w] / p.gains_at(s, self.structure, self.names, self.x, quiet).variance[w])[:, -1]
             for s, q, w in zip(self.shots, self.looks, self.weights, strict=True)
         ]  # fmt: skip
         return float(np.median(np.concatenate(ratios)))
@@ -324,6 +354,15 @@ class Descent:
             self.structure, self.names, self.x, self.noise, shots, self.cost, self.count,
             squares / max(self.count, 1), self.information, prediction, self._disturbed(),
         )  # fmt: skip
+
+
+def logs_of(step: Array) -> Array:
+    """What a step in the logarithms of the noise comes to.
+
+    A density far below its best hardly acts: the cost is a straight line in the density itself, not in its logarithm.
+    So what rises is stepped as a density (1 + step times itself), what falls as a logarithm.
+    """
+    return np.where(step > 0.0, np.log1p(np.minimum(step, RISE)), np.maximum(step, -FARTHEST))
 
 
 def replace_bias(s: Shots, bias: float) -> Shots:

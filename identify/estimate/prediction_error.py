@@ -12,12 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from threading import Lock
 from typing import Any
 
 import numpy as np
 
 from identify.estimate.descent import ENOUGH, Descent
 from identify.estimate.fit import Columns, Fit, Look
+from identify.model.mean_slopes import mean_slopes
 from identify.model.parameters import Name, equations_of
 from identify.model.structure import Structure
 from identify.signals.trace import MOST_BIAS_RAD_S, Trace
@@ -34,7 +37,9 @@ LEAST_WALK, LITTLE_WALK, MOST_WALK = 1e-7, 1e-5, 1.0  # of the rate, that a gyro
 LEAST_AHEAD, MOST_AHEAD = 1e-3, 1e8  # times the variance of one reading, of a gyro's noise ahead of its low-pass
 # Of the motion, root mean square, by which a start state may be off: the smoothed motion is worst where a run begins.
 START_RATE, START_ANGLE, UNKNOWN_ANGLE = 0.1, 0.05, 1.0
-KEPT_GAINS = 4  # of a run
+SAME_STEP = 1e-5  # relative: what steps of runs differ by and are the same to a gain
+KEPT_GAINS = 12  # of runs that were sampled alike
+KEPT_SLOPES = 100  # of effects, along all runs
 
 
 class PredictionError:
@@ -68,7 +73,11 @@ class PredictionError:
         self.longest_s = longest
         self.slowest_s = max(LONGEST_SHARE * longest, 10.0 * SHORTEST_SAMPLES * self.step_s)
         self.workers = ThreadPoolExecutor(2)
-        self._gains: dict[int, dict[tuple[object, ...], Gains]] = {}
+        self.longest = max(len(t.measured) for t in traces)
+        self._gains: dict[tuple[object, ...], tuple[dict[tuple[object, ...], Gains], Lock]] = {}
+        self._slopes: dict[tuple[object, ...], Array] = {}
+        self._slopes_lock = Lock()
+        self.start_variance = self._start_variance()
 
     @RUNAWAY
     def cost_at(self, fit: Fit, noise: Noise) -> float:
@@ -104,6 +113,13 @@ class PredictionError:
             float(np.clip(noise.ahead, LEAST_AHEAD * self.step_s, MOST_AHEAD * self.step_s)) if self.gyro else 0.0,
         )
 
+    def noise_of(self, fit: Fit, reading_variance: float) -> Noise:
+        """The noise of a fit to the same recording, sampled otherwise, whose readings had another variance."""
+        ratio, q = reading_variance / self.reading_variance, fit.noise
+        return self.within(
+            replace(q, white=ratio * q.white, slow=ratio * q.slow, walk=ratio * q.walk, ahead=ratio * q.ahead)
+        )  # fmt: skip
+
     def walk(self, share: float) -> float:
         """Density of a walk that takes the gyro's bias so far over a run, of its rate, as ``Noise`` has it."""
         return (share * self.rate_rad_s) ** 2 / self.longest_s / self.reading_variance
@@ -111,6 +127,7 @@ class PredictionError:
     def fit(
         self, structure: Structure, start: Mapping[Name, float], noise: Noise | None = None, iterations: int = 25,
         carry: Sequence[Shots] | None = None, fixed: Sequence[Name] = (), thorough: bool = True,
+        roughly: float = 0.0, least: float = np.inf,
     ) -> Fit:  # fmt: skip
         """Fit all parameters of a structure together with the noise.
 
@@ -126,14 +143,20 @@ class PredictionError:
             Parameters that stay at their start value.
         thorough
             Look at quite other noises, too, before it ends.
+        roughly
+            Share of the whole fall of the cost, that a step has to bring to be followed by another.
+        least
+            Cost that it must be below after a few steps to be followed to its end.
         """
         with np.errstate(all="ignore"):
             descent = Descent(self, structure, start, noise, carry, fixed)
-            left = descent.down(iterations, thorough)
-            while left > 0 and descent.sticks:  # where a run begins stuck is another place with another friction
+            left = descent.down(iterations, thorough, roughly, least)
+            while (
+                left > 0 and descent.sticks and descent.cost < least
+            ):  # where a run begins stuck is another place with another friction
                 values = dict(zip(descent.names, descent.x.tolist(), strict=True))
                 again = Descent(self, structure, values, descent.noise, descent.found().shots, fixed)
-                left = again.down(left, thorough)
+                left = again.down(left, thorough, roughly, least)
                 if not again.cost < descent.cost - ENOUGH:
                     break
                 descent = again
@@ -149,7 +172,7 @@ class PredictionError:
         trace = s.trace
         spans = [(a, b - 1) for a, b in s.edges]
         sensing = self._sensing(trace, equations)
-        gains = kept or self._gains_of(s, equations.jck, noise, sensing, spans)
+        gains = kept or self._gains_of(s, self._linear_part(equations), noise, sensing, spans)
         measured = self._readings(trace)
         predicted, state = predict_ahead(
             equations, s.grid.shaft_torque(equations), s.grid.step_s, round(trace.step_s / s.grid.step_s), spans,
@@ -157,13 +180,30 @@ class PredictionError:
         )  # fmt: skip
         return Look(measured - predicted, gains.variance, state, gains)
 
-    def variance_at(
-        self, s: Shots, structure: Structure, names: Sequence[Name], x: Array, noise: Noise
-    ) -> Array:  # fmt: skip
-        """Variance of every reading's prediction at a parameter vector, (n, m), which no reading is needed for."""
+    def gains_at(self, s: Shots, structure: Structure, names: Sequence[Name], x: Array, noise: Noise) -> Gains:
+        """One run's gains at a parameter vector, which no reading is needed for."""
         equations = equations_of(structure, names, x, s.number, s.added)
         spans = [(a, b - 1) for a, b in s.edges]
-        return self._gains_of(s, equations.jck, noise, self._sensing(s.trace, equations), spans).variance
+        linear = self._linear_part(equations)
+        return self._gains_of(s, linear, noise, self._sensing(s.trace, equations), spans)
+
+    def _linear_part(self, equations: Equations) -> Array:
+        """Inertia, damping and stiffness as the motion meets them, (3,): the effects' mean slopes along it included.
+
+        The spring of a pendulum is gravity, and dry friction damps. Gains of a platform without either would follow
+        another motion (statistical linearisation: Gelb and Vander Velde 1968).
+        """
+        if not equations.body:
+            return equations.jck
+        key = (equations.jck.tobytes(), equations.p.tobytes(), equations.body)
+        with self._slopes_lock:
+            found = self._slopes.get(key)
+            if found is None:
+                found = equations.jck + np.array([0.0, *mean_slopes(equations, self.traces)])
+                if len(self._slopes) > KEPT_SLOPES:
+                    self._slopes.clear()
+                self._slopes[key] = found
+        return found
 
     def _readings(self, trace: Trace) -> Array:
         """What was read at every sample, (n, m), the gyro's reading before the encoder's."""
@@ -197,24 +237,42 @@ class PredictionError:
         self, s: Shots, jck: Array, noise: Noise, sensing: Sensing, spans: list[tuple[int, int]]
     ) -> Gains:  # fmt: skip
         """A run's gains; the last few are kept, because most looks change an effect and not the linear part."""
-        trace = s.trace
-        kept = self._gains.setdefault(trace.number, {})
-        key = (*jck.tolist(), noise, sensing, id(trace), *spans)
-        found = kept.get(key)
-        if found is None:
-            found = gains_of(
-                jck, noise, trace.step_s, sensing, trace.keep, spans, self.start_variance(trace)
-            )  # fmt: skip
-            for old in list(kept)[: max(0, len(kept) + 1 - KEPT_GAINS)]:
-                kept.pop(old, None)
-            kept[key] = found
-        return found
+        keep, spans, group = self._alike(s.trace, spans)
+        even = abs(s.trace.step_s / self.step_s - 1.0) < SAME_STEP
+        step_s = self.step_s if even else s.trace.step_s
+        key = (*jck.tolist(), noise, sensing, step_s, *spans)
+        kept, lock = self._gains.setdefault(group, ({}, Lock()))
+        with lock:
+            found = kept.get(key)
+            if found is None:
+                found = gains_of(jck, noise, step_s, sensing, keep, spans, self.start_variance)
+                for old in list(kept)[: max(0, len(kept) + 1 - KEPT_GAINS)]:
+                    kept.pop(old, None)
+                kept[key] = found
+        n = len(s.trace.measured)
+        return found if n == len(found.gain) else replace(found, gain=found.gain[:n], variance=found.variance[:n])
 
-    def start_variance(self, trace: Trace) -> tuple[float, float]:
+    def _alike(
+        self, trace: Trace, spans: list[tuple[int, int]]
+    ) -> tuple[Any, list[tuple[int, int]], tuple[object, ...]]:
+        """Samples, spans and a name for runs that have the same gains, as far as they go.
+
+        Gains know nothing of what was measured: runs of one piece without a lost sample differ in their length alone.
+        """
+        keep = np.asarray(trace.keep, dtype=bool)
+        seen = np.flatnonzero(keep)
+        told = [(a, b) for a, b in spans if np.any(keep[a : b + 1])]
+        if len(told) == 1 and seen[-1] - seen[0] + 1 == len(seen):
+            n, lead = self.longest, int(seen[0])
+            return np.arange(n) >= lead, [(told[0][0], n - 1)], (lead,)
+        return keep, spans, (keep.tobytes(),)
+
+    def _start_variance(self) -> tuple[float, float]:
         """Of angle and rate at the start of a stretch, read off the smoothed motion; over that of one reading."""
-        rate = (2.0 * trace.fine[4]) ** 2 + (START_RATE * self.rate_rad_s) ** 2
-        known = self.both or trace.channel == "angle"
-        noise = self._noises(trace)[-1] if known else 0.0
+        smoothed = float(np.mean([t.fine[4] ** 2 for t in self.traces]))
+        rate = 4.0 * smoothed + (START_RATE * self.rate_rad_s) ** 2
+        known = self.both or all(t.channel == "angle" for t in self.traces)
+        noise = float(np.sqrt(np.mean([self._noises(t)[-1] ** 2 for t in self.traces]))) if known else 0.0
         angle = 4.0 * noise**2 + ((START_ANGLE if known else UNKNOWN_ANGLE) * self.angle_rad) ** 2
         return angle / self.reading_variance, rate / self.reading_variance
 

@@ -8,16 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize
 
 from identify.diagnose.coloured_residual import bounded
 from identify.diagnose.torque_regression import TorqueFit, TorqueRegression, gains_at_zero, in_order
 from identify.model.parameters import Name
 from identify.propose.screening import grid_of
 from rig import effects
-from rig.arrays import Array
 from rig.effects.base import Place
+
+EVALUATIONS = 30  # of a shape search
+BEYOND = 4.0  # times the outermost starting values: how far a shape may wander
 
 
 @dataclass(frozen=True)
@@ -58,52 +62,71 @@ def torque_looks(
     """
     lines_hz, orders = regression.lines(now)
     regression.scale = replace(regression.scale, lines_hz=lines_hz, orders=orders)
-    base = _stacked(regression, now, now.structure.effects, now.shapes)
-    basis = np.linalg.qr(base[0] / np.maximum(np.linalg.norm(base[0], axis=0), 1e-300))[0]
+    beside = _Beside(regression, now)
     found: list[tuple[float, str, tuple[float, ...]]] = []
     for name in names:
         effect = effects.get(name)
         if effect.place is Place.SENSOR:
             continue
-        left = [(_left(regression, now, basis, name, shape), shape) for shape in grid_of(effect, regression.scale)]
+        left = [(beside.left(name, shape), shape) for shape in grid_of(effect, regression.scale)]
         if left:
             squares, shape = min(left)
             found.append((squares, name, shape))
     looks = []
     for _, name, shape in sorted(found)[:most]:
-        fit = regression.polished(now, name, shape) if polish else None
-        fit = fit or regression.solve(now.structure.plus(name), {**now.shapes, name: shape})
+        best = beside.polished(name, shape) if polish else shape
+        fit = regression.solve(now.structure.plus(name), {**now.shapes, name: best})
         if in_order(fit.values, name) and not gains_at_zero(fit.values, name):
             looks.append(TorqueLook(name, fit))
     return sorted(looks, key=lambda w: w.left_nm)
 
 
-def _stacked(
-    regression: TorqueRegression, now: TorqueFit, names: Sequence[str], shapes: dict[str, tuple[float, ...]]
-) -> tuple[Array, Array, list[Name]]:  # fmt: skip
-    """Columns of a structure over all runs, biases with them, the target, and the columns' names."""
-    return regression.stacked(replace(now.structure, effects=tuple(names)), shapes)
+class _Beside:
+    """What single effects leave beside a model whose own columns are projected out once."""
 
+    def __init__(self, regression: TorqueRegression, now: TorqueFit) -> None:
+        self.regression, self.now = regression, now
+        columns, target, _ = regression.stacked(now.structure, now.shapes)
+        self.basis = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]
+        self.rest = target - self.basis @ (self.basis.T @ target)
 
-def _left(
-    regression: TorqueRegression, now: TorqueFit, basis: Array, name: str, shape: tuple[float, ...]
-) -> float:  # fmt: skip
-    """Sum of squares that a candidate leaves at a shape, relative to the torque it passes on, on samples fitted."""
-    effect = effects.get(name)
-    if effect.place is Place.DRIVE or effect.leans_on:
-        fit = regression.stacked(now.structure.plus(name), {**now.shapes, name: shape})
-        wide, target = fit[0], fit[1]
-        x = bounded(wide.T @ wide, wide.T @ target, np.full(wide.shape[1], -np.inf))
-        left = target - wide @ x
-        return float(left @ left) / max(float(target @ target), 1e-300) * regression.torque_nm**2 * len(target)
-    wide, target, _ = regression.stacked(replace(now.structure, effects=(name,), terms=()), {name: shape})
-    own = wide[:, : sum(p.linear for p in effect.parameters) if not any(p.per_run for p in effect.parameters) else None]
-    target = regression.stacked(now.structure, now.shapes)[1]
-    own = own - basis @ (basis.T @ own)
-    rest = target - basis @ (basis.T @ target)
-    low = np.array([p.low if not p.per_run else -np.inf for p in effect.parameters if p.linear])
-    if len(low) != own.shape[1]:
-        low = np.full(own.shape[1], -np.inf)
-    x = bounded(own.T @ own, own.T @ rest, low)
-    left = rest - own @ x
-    return float(left @ left)
+    def left(self, name: str, shape: tuple[float, ...]) -> float:
+        """Sum of squares that a candidate leaves at a shape, relative to the torque it passes on; as fitted."""
+        effect, regression = effects.get(name), self.regression
+        if effect.place is Place.DRIVE or effect.leans_on:
+            wide, target, _ = regression.stacked(self.now.structure.plus(name), {**self.now.shapes, name: shape})
+            x = bounded(wide.T @ wide, wide.T @ target, np.full(wide.shape[1], -np.inf))
+            left = target - wide @ x
+            return float(left @ left) / max(float(target @ target), 1e-300) * regression.torque_nm**2 * len(target)
+        own = regression.own_columns(name, shape)
+        own = own - self.basis @ (self.basis.T @ own)
+        low = np.array([p.low if not p.per_run else -np.inf for p in effect.parameters if p.linear])
+        if len(low) != own.shape[1]:
+            low = np.full(own.shape[1], -np.inf)
+        x = bounded(own.T @ own, own.T @ self.rest, low)
+        left = self.rest - own @ x
+        return float(left @ left)
+
+    def polished(self, name: str, shape: tuple[float, ...]) -> tuple[float, ...]:
+        """The best shape of an effect near one of a grid."""
+        axes = [p for p in effects.get(name).parameters if not p.linear]
+        if not axes:
+            return shape
+        starts = [p.start(self.regression.scale) if p.start else (1.0,) for p in axes]
+        bounds = [
+            (max(p.low, min(s) / BEYOND, 1e-12), min(p.high, BEYOND * max(s)))
+            for p, s in zip(axes, starts, strict=True)
+        ]
+
+        def inside(u: Any) -> tuple[float, ...]:
+            return tuple(float(np.clip(np.exp(x), lo, hi)) for x, (lo, hi) in zip(u, bounds, strict=True))
+
+        begin: Any = np.log(np.maximum(shape, 1e-12))
+        simplex = np.vstack([begin, begin + 0.25 * np.eye(len(begin))])
+        options: Any = {"maxfev": EVALUATIONS, "initial_simplex": simplex, "xatol": 1e-3}
+
+        def loss(u: Any) -> float:
+            return self.left(name, inside(u))
+
+        found: Any = minimize(loss, begin, method="Nelder-Mead", options=options)
+        return min((shape, inside(found.x)), key=lambda s: self.left(name, s))

@@ -18,7 +18,7 @@ from identify.model.structure import Structure
 from identify.results import Candidate
 from identify.runs.holdout import Split
 from identify.runs.observability import why_unseen
-from identify.runs.reduced import reduced, thinned
+from identify.runs.reduced import reduced
 from identify.select.evidence import Weigher, disturbed
 from identify.select.search_state import Search
 from identify.select.stepwise import AT_NOISE, Stepwise
@@ -73,7 +73,7 @@ class LikelihoodSearch:
         count = sum(t.count for t in traces)
         whole = None
         if count > MORE * base.count:
-            whole = PredictionError(thinned(traces, split.everything, ALL)[0])
+            whole = PredictionError(reduced(traces, split, ALL)[0])
         offered = [n for n in allowed if n not in structure.effects and _possible(n, traces)]
         cutoff_hz = min(start.cutoff_hz, HIGHEST / few[0].step_s)
         regression = TorqueRegression(few, parts, cutoff_hz, scale_of(few, start.platform, ()))

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from identify.estimate.fit import Fit
 from identify.estimate.prediction_error import PredictionError
 from identify.model.parameters import Name
+from identify.model.structure import Structure
 from identify.propose.innovation_score import Score
 from identify.runs.measured_channels import simplicity
 from identify.select.evidence import TRUSTED, WEIGHT, Evidence, Weigher, disturbed
@@ -23,8 +24,7 @@ from rig.platform import TERMS
 
 # What decides a name. All in units of the cost (minus twice the log-likelihood) or as shares.
 APART = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
-AS_HEAVY = 0.05  # of the disturbance: a special case that carries as much, to that, is preferred to the richer effect
-SPECIAL = 0.5  # of the support of a richer effect, with which its special case is preferred
+SPECIAL = 0.8  # of the support of a richer effect, with which its special case is preferred
 AT_NOISE = 1.1  # times the sensor's variance: a model that predicts as closely leaves no disturbance
 MOST = 6  # effects that one recording is believed to show
 # What only costs time.
@@ -73,6 +73,7 @@ class Stepwise:
     dropped: list[tuple[str, str]] = field(default_factory=list)
     best: Fit = None  # type: ignore[assignment]
     inflation: dict[str, float] = field(default_factory=dict)  # of every effect that was added, beside all others
+    _on_all: dict[tuple[frozenset[str], frozenset[str]], Fit] = field(default_factory=dict)
     _needed: dict[str, float] = field(default_factory=dict)  # support of an effect beside all others
 
     def __post_init__(self) -> None:
@@ -113,15 +114,17 @@ class Stepwise:
         if not good:
             return None
         best = max(good.values(), key=lambda e: e.support)
+        for e in good.values():
+            if best.behind(e) > APART:
+                best = e
         special = [
             n for n in effects.get(best.effect).nests
-            if n in good
-            and (good[n].support > SPECIAL * best.support or good[n].weight > best.weight - AS_HEAVY)
+            if n in good and good[n].support > SPECIAL * best.support
         ]  # fmt: skip
         if special:
             best = max((good[n] for n in special), key=lambda e: e.support)
         alike = [n for n, e in good.items() if e is best or e.behind(best) < APART]
-        chosen = min(alike, key=lambda n: (*plainness(n), -good[n].support))
+        chosen = min(alike, key=lambda n: (*plainness(n, good[n].fit), -good[n].support))
         lower = [n for n in effects.get(chosen).lower_order if n in good]
         return lower[0] if lower else chosen
 
@@ -130,12 +133,12 @@ class Stepwise:
         for name in self.trials.added(now):
             if name not in now.structure.effects:
                 continue
-            bare = {k: v for k, v in now.values.items() if k[0] != name}
-            rest = self.problem.fit(now.structure.minus(name), bare, now.noise, MANY, carry=now.shots, thorough=False)
+            rest, others = self._others(now, name)
             fits: dict[str, Fit] = {name: now}
-            for other, fit in self.trials.instead(now, rest, name).items():
+            for other, fit in others.items():
                 near = fit.penalised - now.penalised < FAR_BEHIND * (rest.cost - now.cost)
                 fits[other] = self.trials.further(fit) if near else fit
+            fits = {n: self._without_soaking(f) for n, f in fits.items()}
             seen = {n: self.weigher.evidence(n, rest, f) for n, f in fits.items()}
             self._needed[name] = seen[name].support
             chosen, alike = self._best_of(name, seen)
@@ -147,20 +150,29 @@ class Stepwise:
             self.rivals[chosen] = {n: fits[n] for n in alike if n != chosen}
         return now
 
+    def _others(self, now: Fit, name: str) -> tuple[Fit, dict[str, Fit]]:
+        """A model without an effect, and with others in its place; from the round that added it, if that stands."""
+        without = now.structure.minus(name)
+        for r in reversed(self.rounds):
+            if r.chosen == name and _same(r.now.structure, without):
+                return r.now, {n: e.fit for n, e in r.tried.items() if n != name}
+        bare = {k: v for k, v in now.values.items() if k[0] != name}
+        rest = self.problem.fit(without, bare, now.noise, MANY, carry=now.shots, thorough=False)
+        return rest, self.trials.instead(now, rest, name)
+
     def _best_of(self, name: str, seen: Mapping[str, Evidence]) -> tuple[str, list[str]]:
         """Of an effect and others in its place, the one that is named, and all that are as likely."""
         best = seen[name]
         for other in seen.values():
-            if other.weight > WEIGHT and other.support > best.support and other.behind(best) > APART:
+            if other.weight > WEIGHT and best.behind(other) > APART:
                 best = other
         alike = [n for n, e in seen.items() if e is best or (e.behind(best) < APART and e.weight > WEIGHT)]
         more = max(1.0, self.samples / max(best.fit.count, 1))
-        close = [n for n, e in seen.items() if e is best or e.behind(best) < APART * more]
-        close = [n for n in close if not self._cannot_gain(seen, n, close, more)]
+        close = [n for n in alike if not self._cannot_gain(seen, n, alike, more)]
         if len(close) > 1 and self.whole is not None:
             decisive = max(seen[n].inflation for n in close)
             return decided({n: self.on_all(seen[n].fit) for n in close}, decisive)
-        return min(alike, key=lambda n: (*plainness(n), -seen[n].support)), alike
+        return min(alike, key=lambda n: (*plainness(n, seen[n].fit), -seen[n].support)), alike
 
     @staticmethod
     def _cannot_gain(seen: Mapping[str, Evidence], rich: str, close: Sequence[str], more: float) -> bool:
@@ -173,7 +185,11 @@ class Stepwise:
     def on_all(self, fit: Fit) -> Fit:
         """The same model on all samples."""
         assert self.whole is not None
-        return self.whole.fit(fit.structure, fit.values, self.whole.within(fit.noise), MANY)
+        key = (frozenset(fit.structure.terms), frozenset(fit.structure.effects))
+        if key not in self._on_all:
+            noise = self.whole.noise_of(fit, self.problem.reading_variance)
+            self._on_all[key] = self.whole.fit(fit.structure, fit.values, noise, FEW, thorough=False)
+        return self._on_all[key]
 
     def pruned(self, now: Fit, names: Sequence[str]) -> Fit:
         """Without every term or effect that the data do as well without."""
@@ -207,6 +223,17 @@ class Stepwise:
         pull = now.values.get(("stiffness",), 0.0) * self.problem.angle_rad
         return disturbed(now) > AT_NOISE and pull < WEIGHT * self.problem.torque_nm
 
+    def _without_soaking(self, now: Fit) -> Fit:
+        """The same without a spring that only soaks up what is constant: gravity is a spring of its own."""
+        if "stiffness" not in now.structure.terms or not self._may_soak(now):
+            return now
+        start = {n: v for n, v in now.values.items() if n != ("stiffness",)}
+        without = self.problem.fit(
+            now.structure.minus("stiffness"), start, now.noise, FEW, carry=now.shots, thorough=False
+        )  # fmt: skip
+        evidence = self.weigher.evidence("stiffness", without, now)
+        return without if evidence.support < APART or evidence.weight < WEIGHT else now
+
     def _asked(self, now: Fit, name: str, own: Sequence[Name]) -> bool:
         """Whether it is in doubt that a term or an effect is needed."""
         if name == "stiffness" and self._may_soak(now):
@@ -216,13 +243,18 @@ class Stepwise:
         return self._needed.get(name, 0.0) < CERTAIN**2
 
 
+def _same(one: Structure, other: Structure) -> bool:
+    """Whether two structures have the same terms and effects, in any order."""
+    return set(one.terms) == set(other.terms) and set(one.effects) == set(other.effects)
+
+
 def decided(fits: Mapping[str, Fit], inflation: float = 1.0) -> tuple[str, list[str]]:
     """The simplest of the likeliest, and all that are as likely."""
     best = min(f.penalised for f in fits.values())
     alike = [n for n in fits if fits[n].penalised - best < APART * inflation]
-    return min(alike, key=lambda n: (*plainness(n), fits[n].penalised)), alike
+    return min(alike, key=lambda n: (*plainness(n, fits[n]), fits[n].penalised)), alike
 
 
-def plainness(name: str) -> tuple[int, int]:
-    """What goes first among candidates that do as well: no channel, fewer parameters."""
-    return simplicity(name), len(effects.get(name).parameters)
+def plainness(name: str, fit: Fit) -> tuple[int, int]:
+    """What goes first among candidates that do as well: no channel, fewer parameters in all."""
+    return simplicity(name), len(fit.names)

@@ -30,7 +30,9 @@ HEAVIEST = 3  # candidates by their weight in torque that are fitted beside thos
 FAINT = 0.02  # of the best score: what promises so little is not what the round is about
 FEW, MANY = 14, 25  # steps of a fit that is compared, and of one that is kept
 NEAR = 0.9  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
+BEHIND = 0.3  # of the best fall of the cost so far: what has less after a few steps is not followed
 COMPARABLE = 0.3  # of the score of an effect, that another has in its place: with less it is no rival
+ROUGHLY = 5e-3  # of the fall of the cost: what a step of a fit that is compared has to bring to be followed by another
 OTHER_START = 1.5  # times the power in torque that a look leaves: a fit that leaves more is begun from there, too
 
 
@@ -86,10 +88,26 @@ class TrialFits:
         }
         for look in self.heaviest(now, names):
             starts.setdefault(look.effect, []).append(look)
-        fits = {n: f for n, s in starts.items() if (f := self.fitted(now, n, s)) is not None}
+        fits = self.each_fitted(now, starts)
         most = max((now.cost - f.cost for f in fits.values()), default=0.0)
-        fits = {n: self.further(f) if now.cost - f.cost > NEAR * most else f for n, f in fits.items()}
+        near = [n for n, f in fits.items() if now.cost - f.cost > NEAR * most]
+        for name in near:
+            if not set(effects.get(name).nests) & set(near):  # a special case that is as good is taken in its place
+                fits[name] = self.further(fits[name])
         return [v[0] for v in looks], fits
+
+    def each_fitted(
+        self, now: Fit, starts: Mapping[str, Sequence[Mapping[Name, float] | TorqueLook]]
+    ) -> dict[str, Fit]:
+        """Candidates fitted one after the other; one that begins far behind the best so far is not followed."""
+        fits: dict[str, Fit] = {}
+        least = np.inf
+        for name, begin in starts.items():
+            fit = self.fitted(now, name, begin, least)
+            if fit is not None:
+                fits[name] = fit
+                least = min(least, now.cost - BEHIND * (now.cost - fit.cost))
+        return fits
 
     def heaviest(self, now: Fit, names: Sequence[str]) -> list[TorqueLook]:
         """Candidates that carry much of the disturbance along the measured motion."""
@@ -98,6 +116,8 @@ class TrialFits:
         nested = {s for e in now.structure.effects for s in effects.get(e).nests}
         held = [n for n in names if n not in nested and not set(effects.get(n).nests) & set(there.structure.effects)]
         looks = torque_looks(self.weigher.regression, there, held, HEAVIEST)
+        special = {s for w in looks for s in effects.get(w.effect).nests} - {w.effect for w in looks}
+        looks += torque_looks(self.weigher.regression, there, [n for n in held if n in special], len(special))
         floor = self.weigher.floor_nm**2
         return [w for w in looks if 1.0 - max(w.left_nm**2 - floor, 0.0) / left > WEIGHT]
 
@@ -113,7 +133,9 @@ class TrialFits:
         wanted = {n for v in short for n in (*effects.get(v[0].effect).nests, *effects.get(v[0].effect).lower_order)}
         return short + [v for v in worth if v[0].effect in wanted and v not in short]
 
-    def fitted(self, now: Fit, name: str, starts: Sequence[Mapping[Name, float] | TorqueLook]) -> Fit | None:
+    def fitted(
+        self, now: Fit, name: str, starts: Sequence[Mapping[Name, float] | TorqueLook], least: float = np.inf
+    ) -> Fit | None:  # fmt: skip
         """A candidate fitted on top of a model, in the place of what it contains: the best from all starts."""
         effect = effects.get(name)
         held = [e for e in self.added(now) if e in effect.nests]
@@ -127,14 +149,21 @@ class TrialFits:
                 begun = starts[0] if fits and not isinstance(starts[0], TorqueLook) else {}
                 if not fits or self._leaves_more(fits[0], start) or self._begun_small(name, begun, start):
                     begin = {**rest, **start.start}
-                    fits.append(self.problem.fit(structure.plus(name), begin, None, FEW, thorough=False))
+                    fits.append(
+                        self.problem.fit(
+                            structure.plus(name), begin, None, FEW, thorough=False, roughly=ROUGHLY, least=least
+                        )
+                    )
                 continue
             own = {k: v for k, v in start.items() if k[0] == name}
             for special in held:
                 own = {k: v + _gain(now, special) if k[1] in linear else v for k, v in own.items()}
             fits.append(
-                self.problem.fit(structure.plus(name), {**rest, **own}, now.noise, FEW, carry=now.shots, thorough=False)
-            )
+                self.problem.fit(
+                    structure.plus(name), {**rest, **own}, now.noise, FEW, carry=now.shots, thorough=False,
+                    roughly=ROUGHLY, least=least,
+                )
+            )  # fmt: skip
         best = min(fits, key=lambda f: f.cost)
         return best if np.isfinite(best.cost) else None
 
@@ -168,7 +197,7 @@ class TrialFits:
             structure = replace(now.structure, effects=tuple(other if e == name else e for e in now.structure.effects))
             own: dict[Name, float] = {(other, p.name): _gain(now, name) for p in parameters}
             fits[other] = self.problem.fit(
-                structure, {**rest_values, **own}, now.noise, FEW, carry=now.shots, thorough=False
+                structure, {**rest_values, **own}, now.noise, FEW, carry=now.shots, thorough=False, roughly=ROUGHLY
             )
         own_score = next((v[0].gain for v in looks if v[0].effect == name), 0.0)
         for group in self.shortlist(rest, looks):

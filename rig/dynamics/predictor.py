@@ -98,7 +98,13 @@ class Gains:
     gain: Array
     variance: Array
     slow_decay: float  # of the slow torque, a sample
-    held: Array  # what a sample leaves of the sensor's output and slope, (2, 2)
+    onward: Array  # the linear part over a sample, (6, 6)
+    reads: Array  # what each reading is of the states, (m, 6)
+
+    @property
+    def held(self) -> Array:
+        """What a sample leaves of the sensor's output and slope, (2, 2)."""
+        return np.ascontiguousarray(self.onward[SENSED : SLOPE + 1, SENSED : SLOPE + 1])
 
 
 @jit
@@ -251,8 +257,54 @@ def gains_of(
         _riccati(few, driven, seen, np.array(noises), start[at].copy(), keep, begin, last, gain, variance, bias, SMALL)
     whole = np.zeros((len(keep), m, STATES))
     whole[:, :, there] = gain
-    slow_decay = float(np.exp(-step_s / noise.time_constant_s))
-    return Gains(whole, variance, slow_decay, np.ascontiguousarray(phi[SENSED : SLOPE + 1, SENSED : SLOPE + 1]))
+    return Gains(whole, variance, float(np.exp(-step_s / noise.time_constant_s)), phi, np.array(reads))
+
+
+@jit
+def _follow(spans, e, slow, keep, gain, other, phi, reads, decay, new_decay, bias, out):  # type: ignore[no-untyped-def]
+    states, readings = len(phi), len(reads)
+    d, ahead = np.zeros(states), np.zeros(states)
+    for k in range(len(spans)):
+        d[:] = 0.0
+        for i in range(spans[k, 0], spans[k, 1] + 1):
+            for m in range(readings):
+                moved = e[i, m] - bias * reads[m, states - 1]  # what the last state, the bias, stands for
+                for a in range(states):
+                    moved -= reads[m, a] * d[a]
+                out[i, m] = moved
+                if keep[i]:
+                    for a in range(states):
+                        d[a] += other[i, m, a] * moved - gain[i, m, a] * e[i, m]
+            for a in range(states):
+                ahead[a] = 0.0
+                for b in range(states):
+                    if phi[a, b] != 0.0:
+                        ahead[a] += phi[a, b] * d[b]
+            ahead[2] += (new_decay - decay) * slow[i]
+            d[:] = ahead
+
+
+def innovations_with(
+    gains: Gains, other: Gains, innovations: Array, slow_torque: Array, keep: Any, spans: Sequence[tuple[int, int]],
+    bias: float = 0.0,
+) -> Array:  # fmt: skip
+    """What the innovations would be with other gains, (n, m), the platform taken for linear between the two.
+
+    Parameters
+    ----------
+    gains, innovations, slow_torque
+        Of a prediction: its gains, its innovations (n, m), and its slow disturbance torque after every sample, (n,).
+    other
+        The other gains, of the same platform with another noise.
+    bias
+        By how much the gyro's bias is another.
+    """
+    out = np.empty_like(innovations)
+    _follow(
+        np.array(spans, dtype=np.int64).reshape(-1, 2), innovations, np.ascontiguousarray(slow_torque), keep,
+        gains.gain, other.gain, other.onward, other.reads, gains.slow_decay, other.slow_decay, bias, out,
+    )  # fmt: skip
+    return out
 
 
 @jit
