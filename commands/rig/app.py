@@ -1,4 +1,4 @@
-"""The command `rig`: check, devices, play, emulate, recover, export."""
+"""The command `rig` and its subcommands."""
 
 from __future__ import annotations
 
@@ -114,6 +114,18 @@ def export(
         from commands.rig.export import export_recording
 
         return export_recording(source, to, out)
+
+    raise typer.Exit(run_to_exit_code(command))
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of rig.yaml, for completion and checks in an editor."""
+
+    def command() -> int:
+        from commands.rig.schema import print_schema
+
+        return print_schema()
 
     raise typer.Exit(run_to_exit_code(command))
 
