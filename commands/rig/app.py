@@ -24,6 +24,10 @@ from commands.terminal.options import (
     new_app,
 )
 
+ResultsDir = Annotated[
+    Path, typer.Argument(metavar="DIR", help="The results folder of a campaign.", show_default=False)
+]
+
 app = new_app("Prepare, check and play a campaign on the rig. To identify from it: identify-run.")
 
 
@@ -84,9 +88,7 @@ def play(
 
 @app.command()
 def recover(
-    folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="The results folder of a campaign.", show_default=False)
-    ],
+    folder: ResultsDir,
 ) -> None:
     """Recover a results folder after a kill or a power cut; files that are there are not changed."""
 
@@ -114,6 +116,26 @@ def export(
         from commands.rig.export import export_recording
 
         return export_recording(source, to, out)
+
+    raise typer.Exit(run_to_exit_code(command))
+
+
+@app.command()
+def report(
+    folder: ResultsDir,
+    effects: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--effects", metavar="FILE", help="A file with effects of your own, whose code is run; repeatable."
+        ),
+    ] = None,
+) -> None:
+    """Rebuild report.html of a results folder."""
+
+    def command() -> int:
+        from commands.rig.report import rebuild
+
+        return rebuild(folder, effects or [])
 
     raise typer.Exit(run_to_exit_code(command))
 
