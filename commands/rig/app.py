@@ -141,6 +141,24 @@ def report(
 
 
 @app.command()
+def compare(
+    a: Annotated[Path, typer.Argument(metavar="A", help="A results folder.", show_default=False)],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Another, or a later one.", show_default=False)],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.html", help="Write the comparison as a page, too; never overwritten.")
+    ] = None,
+) -> None:
+    """Compare two results folders: what changed, and whether by more than both 95 % intervals."""
+
+    def command() -> int:
+        from commands.rig.compare import compare_folders
+
+        return compare_folders(a, b, out)
+
+    raise typer.Exit(run_to_exit_code(command))
+
+
+@app.command()
 def schema() -> None:
     """Print the JSON schema of rig.yaml, for completion and checks in an editor."""
 

@@ -12,13 +12,14 @@ from identify.report.files import result_json
 from identify.report.page import report_html
 from identify.report.replaced_file import replace_file
 from identify.report.report_data import FILE, ReportData, read_report_data
+from identify.report.result_file import RESULT, read_result
 from identify.results import Identification
 from rig import effects
 from rig.errors import RecordingError, UsageError
 from rig.recording.hdf5 import read_recording_h5
 from rig.recording.run import Recording
 
-RESULT, RECORDING, REPORT = "result.json", "recording.h5", "report.html"
+RECORDING, REPORT = "recording.h5", "report.html"
 
 
 def rebuild_report(folder: Path, effect_files: Sequence[Path] = ()) -> Path:
@@ -53,21 +54,6 @@ def rebuild_report(folder: Path, effect_files: Sequence[Path] = ()) -> Path:
 
 def _again(folder: Path) -> str:
     return f"so identify again from its recording (recorded.runs: [{{file: {folder}}}])"
-
-
-def read_result(path: Path) -> dict[str, Any]:
-    """result.json. Raises RecordingError where it cannot be read or is no JSON."""
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
-    except RecursionError:
-        raise RecordingError(f"{path}: is damaged (nested too deeply): restore it from a copy") from None
-    except ValueError as error:  # JSON, or bytes that are no text
-        raise RecordingError(f"{path}: is damaged ({error}): restore it from a copy, or identify again") from error
-    if not isinstance(found, dict):
-        raise RecordingError(f"{path}: holds {type(found).__name__} and no result: restore it from a copy")
-    return found
 
 
 def _check_same(folder: Path, result: dict[str, Any], identification: Identification) -> None:
