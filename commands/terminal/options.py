@@ -34,11 +34,10 @@ Quiet = Annotated[
 
 
 def new_app(help_text: str) -> typer.Typer:
-    """An application whose errors are ours to say."""
+    """An application whose errors are ours to say; it completes lines in a shell that was told to ask it."""
     return App(
         help=help_text,
         cls=PlainGroup,
-        add_completion=False,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )

@@ -40,7 +40,7 @@ def test_no_flag_asks_for_a_value(words: tuple[str, ...]) -> None:
 def test_the_flags_of_identify_run_stand_alone_and_other_options_with_their_value() -> None:
     text = help_of(identify_run)
     assert "<bool>" not in text
-    flags = ("--dry-run", "--emulate", "--yes", "--quiet", "--version", "--help")
+    flags = ("--dry-run", "--emulate", "--yes", "--quiet", "--version", "--show-completion", "--help")
     assert [between(text, flag) for flag in flags] == [""] * len(flags)
     assert between(text, "--out") == "DIR"
     assert between(text, "--set") == "A.B.C=VALUE"
