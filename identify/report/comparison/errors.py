@@ -8,6 +8,10 @@ from identify.report.comparison.section import Section
 from identify.wording import SYMBOLS, number, percent, plain, unit
 
 TORQUE = {"rotary": ("torque", "N·m"), "linear": ("force", "N")}
+MEASURES = {
+    "holdout_rate_rms": "the held-out error of the measured channel",
+    "holdout_torque_relative": "the held-out torque residual",
+}
 PERCENT = {"residual_torque_relative": 100.0, "holdout_torque_relative": 100.0}
 
 
@@ -54,7 +58,8 @@ def _error_notes(a: SavedResult, b: SavedResult) -> list[str]:
             f"{number(cutoffs[1], 3)} Hz in B): set identify.lowpass_hz to compare them."
         )
     if one.holdout_measure and two.holdout_measure and one.holdout_measure != two.holdout_measure:
-        notes.append(f"A was decided by {plain(one.holdout_measure)}, B by {plain(two.holdout_measure)}.")
+        first, last = (MEASURES.get(m, plain(m)) for m in (one.holdout_measure, two.holdout_measure))
+        notes.append(f"Models were chosen by {first} in A, by {last} in B.")
     return notes
 
 

@@ -10,6 +10,7 @@ from identify.results import ParameterEstimate
 from identify.wording import number, percent, readable, signed, unit, with_interval
 
 ABSENT = "-"
+IN_MS_BELOW_S = 0.1  # as for a single number: ``readable``; here a zero beside it is in ms too
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,8 @@ def change_of(a: SavedNumber, b: SavedNumber) -> Change:
     if a.unit != b.unit:
         return Change(_alone(a, True), _alone(b, True), ABSENT, ABSENT, "other unit", "")
     first, last = a.estimate(), b.estimate()
-    if readable(first).unit == readable(last).unit:
-        first, last = readable(first), readable(last)
+    if first.unit == "s" and max(abs(first.value), abs(last.value)) < IN_MS_BELOW_S:
+        first, last = _in_ms(first), _in_ms(last)
     difference = last.value - first.value
     if math.isnan(difference):
         relation = "no value"
@@ -65,6 +66,11 @@ def one_sided(a: SavedNumber | None, b: SavedNumber | None, absent: str, relatio
     assert given is not None
     first, last = (absent if one is None else _alone(one) for one in (a, b))
     return Change(first, last, ABSENT, ABSENT, relation, unit(readable(given.estimate()).unit))
+
+
+def _in_ms(one: ParameterEstimate) -> ParameterEstimate:
+    low, high = one.ci95
+    return ParameterEstimate(1e3 * one.value, 1e3 * one.std_error, (1e3 * low, 1e3 * high), "ms")
 
 
 def factor(a: float | None, b: float | None) -> str:

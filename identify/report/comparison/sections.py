@@ -48,7 +48,7 @@ def _overview(a: SavedResult, b: SavedResult, names: tuple[str, str], changed: l
     if a.axis != b.axis:
         first = "One axis is rotary and the other linear: their quantities differ in kind and are not compared."
     elif changed:
-        first = f"Changed by more than both intervals: {', '.join(changed)}."
+        first = f"Changed by more than both intervals: {'; '.join(changed)}."
     else:
         first = "No parameter that both have changed by more than both intervals."
     notes = [first]

@@ -11,18 +11,28 @@ import h5py
 import numpy as np
 import pytest
 
+from identify.conclude.plausibility import with_declared
 from identify.report import report_data
 from identify.report.files import write_results
 from identify.report.rebuild import rebuild_report
 from identify.report.report_data import read_report_data
-from identify.results import Identification
+from identify.results import (
+    Dependence,
+    Disturbance,
+    FollowUp,
+    FollowUpPlan,
+    FollowUpRound,
+    Identification,
+    Parting,
+    Unparted,
+)
 from rig import effects
 from rig.channels import Channel
 from rig.effects import _channels, _outside
 from rig.errors import UsageError
 from rig.platform import Platform
 from rig.recording.run import Recording
-from tests.identify.sample import TRUTH, sample, unhappy
+from tests.identify.sample import TRUTH, estimate, sample, unhappy
 from tests.rig.effects.test_outside import EXAMPLE
 
 DECLARED = Platform(0.0185, 0.06, 650.0)
@@ -32,6 +42,27 @@ def written(folder: Path, found: Identification | None = None, recording: Record
     """A results folder; returns its report."""
     write_results(folder, found or sample(2.0)[0], recording or sample(2.0)[1], DECLARED, "default")
     return (folder / "report.html").read_bytes()
+
+
+def with_everything() -> Identification:
+    """All that an identification may hold besides: a follow-up, a disturbance, rivals, a torque scale, odd numbers."""
+    found = sample(2.0)[0]
+    parting = Parting("coulomb_friction", "stribeck_friction", 900.0)
+    plan = FollowUpPlan({"sets": [{"kind": "sine", "torque_nm": 5.0}]}, (parting,), 0.4, "A sine parts the two.")
+    pair = (("coulomb_friction", "stribeck_friction"),)
+    follow_up = FollowUp(
+        plan, (Unparted("torque_delay", "sensor_lag", "both are late"),), (FollowUpRound(plan, pair, ()),), "played",
+        found.before.error,
+    )  # fmt: skip
+    angle = Dependence("angle", 0.008, 0.0016, 1e-6, (-0.1, 0.0, 0.1), (0.01, -0.02, 0.01))
+    verdict = replace(
+        found.verdict, rival_models={"coulomb_friction": {"stribeck_friction": TRUTH}}, left_open="either of two things"
+    )
+    return replace(
+        with_declared(found, {"inertia": 0.0203 * 57.3, "stiffness": 681.2 * 57.3}), follow_up=follow_up,
+        disturbance=Disturbance(0.02, "N*m", 0.004, (angle,), {"damping": 2.0}), verdict=verdict,
+        torque_scale=estimate(1.07, 0.001, ""), note="another error grew", scale_shows=True,
+    )  # fmt: skip
 
 
 def linear(recording: Recording) -> Recording:
@@ -45,9 +76,10 @@ def linear(recording: Recording) -> Recording:
         (sample(2.0)[0], sample(2.0)[1]),
         (unhappy(), linear(sample(2.0)[1])),
         (replace(sample(2.0)[0], after=None, residual_after=None, aborted=True, accepted=False), sample(2.0)[1]),
+        (with_everything(), sample(2.0)[1]),
         (replace(sample(2.0)[0], joint=None, per_set=()), replace(sample(2.0)[1], info={"backend": "<b>"})),
     ],
-    ids=["accepted", "linear and unhappy", "aborted", "without sets"],
+    ids=["accepted", "linear and unhappy", "aborted", "with everything", "without sets"],
 )  # fmt: skip
 def test_the_report_is_the_same_to_the_byte(tmp_path: Path, found: Identification, recording: Recording) -> None:
     original = written(tmp_path, found, recording)

@@ -231,6 +231,25 @@ def test_errors_stand_with_a_factor_and_low_passes_that_differ_are_said(
     assert ("different low-passes" in notes(sections)) == (a_hz is not None)
 
 
+def test_another_measure_behind_the_choice_of_a_model_is_said(compared: Callable[..., tuple[Section, ...]]) -> None:
+    def by_torque(b: Content) -> None:
+        b["after"]["error"]["holdout_measure"] = "holdout_torque_relative"
+
+    assert (
+        "Models were chosen by the held-out error of the measured channel in A, by the held-out torque residual in B."
+        in notes(compared(by_torque))
+    )
+
+
+def test_a_delay_of_zero_is_in_ms_like_the_one_beside_it(compared: Callable[..., tuple[Section, ...]]) -> None:
+    def none(b: Content) -> None:
+        b["after"]["effect_parameters"]["torque_delay"]["delay"] |= {"value": 0.0, "ci95": [-1e-6, 1e-6]}
+
+    found = row(compared(none), "torque delay, delay")
+    assert found[2] == "0.0000 ± 0.0010"
+    assert found[4:] == ("-100 %", "yes", "ms")
+
+
 def test_the_disturbance_stands_with_what_it_depends_on(compared: Callable[..., tuple[Section, ...]]) -> None:
     def disturbed(b: Content) -> None:
         b["disturbance"] = {
