@@ -1,4 +1,4 @@
-"""The command `rig`: check, devices, play, emulate, recover, export."""
+"""The command `rig` and its subcommands."""
 
 from __future__ import annotations
 
@@ -23,6 +23,10 @@ from commands.terminal.options import (
     Yes,
     new_app,
 )
+
+ResultsDir = Annotated[
+    Path, typer.Argument(metavar="DIR", help="The results folder of a campaign.", show_default=False)
+]
 
 app = new_app("Prepare, check and play a campaign on the rig. To identify from it: identify-run.")
 
@@ -84,9 +88,7 @@ def play(
 
 @app.command()
 def recover(
-    folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="The results folder of a campaign.", show_default=False)
-    ],
+    folder: ResultsDir,
 ) -> None:
     """Recover a results folder after a kill or a power cut; files that are there are not changed."""
 
@@ -114,6 +116,56 @@ def export(
         from commands.rig.export import export_recording
 
         return export_recording(source, to, out)
+
+    raise typer.Exit(run_to_exit_code(command))
+
+
+@app.command()
+def report(
+    folder: ResultsDir,
+    effects: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--effects", metavar="FILE", help="A file with effects of your own, whose code is run; repeatable."
+        ),
+    ] = None,
+) -> None:
+    """Rebuild report.html of a results folder."""
+
+    def command() -> int:
+        from commands.rig.report import rebuild
+
+        return rebuild(folder, effects or [])
+
+    raise typer.Exit(run_to_exit_code(command))
+
+
+@app.command()
+def compare(
+    a: Annotated[Path, typer.Argument(metavar="A", help="A results folder.", show_default=False)],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Another, or a later one.", show_default=False)],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.html", help="Write the comparison as a page, too; never overwritten.")
+    ] = None,
+) -> None:
+    """Compare two results folders: what changed, and whether by more than both 95 % intervals."""
+
+    def command() -> int:
+        from commands.rig.compare import compare_folders
+
+        return compare_folders(a, b, out)
+
+    raise typer.Exit(run_to_exit_code(command))
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of rig.yaml, for completion and checks in an editor."""
+
+    def command() -> int:
+        from commands.rig.schema import print_schema
+
+        return print_schema()
 
     raise typer.Exit(run_to_exit_code(command))
 

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from commands.terminal.plain_flags import App, PlainGroup
+
 ConfigFile = Annotated[Path, typer.Argument(metavar="CONFIG", help="The rig.yaml to work from.", show_default=False)]
 Out = Annotated[
     Path | None,
@@ -32,10 +34,10 @@ Quiet = Annotated[
 
 
 def new_app(help_text: str) -> typer.Typer:
-    """An application whose errors are ours to say."""
-    return typer.Typer(
+    """An application whose errors are ours to say; it completes lines in a shell that was told to ask it."""
+    return App(
         help=help_text,
-        add_completion=False,
+        cls=PlainGroup,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from importlib import import_module
+from typing import Any
 
 from drivers.amplifiers.base import Amplifier
+from drivers.settings import Settings
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError
 
@@ -27,6 +29,16 @@ def make_amplifier(config: AmplifierConfig) -> Amplifier:
     """
     if config.device not in DRIVERS:
         raise ConfigError(f"bench.amplifier.device: no driver called {config.device!r}; there are {', '.join(DRIVERS)}")
-    module, _, name = DRIVERS[config.device].partition(":")
-    driver: Amplifier = getattr(import_module(module), name)(config)
+    driver: Amplifier = _class_of(config.device)(config)
     return driver
+
+
+def settings_model(device: str) -> type[Settings] | None:
+    """The settings that a driver of ``DRIVERS`` takes; None where it does not state them."""
+    model: type[Settings] | None = _class_of(device).settings_model
+    return model
+
+
+def _class_of(device: str) -> Any:
+    module, _, name = DRIVERS[device].partition(":")
+    return getattr(import_module(module), name)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from drivers.bounded_log import FirstAndLast
 from drivers.codecs.lawicel import CanFrame
+from drivers.settings import Settings
 from drivers.timing.retiming import ClockRetiming
 from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import AmplifierConfig
@@ -22,6 +23,7 @@ class Amplifier(ABC):
     """
 
     label = "amplifier"
+    settings_model: type[Settings] | None = None  # of `bench.amplifier.settings`; None: not stated
 
     def __init__(self, config: AmplifierConfig) -> None:
         self.config = config

@@ -43,6 +43,8 @@ class Cia402(Amplifier):
 
     label = "CiA 402 drive"
 
+    settings_model = Cia402Settings
+
     def __init__(self, config: AmplifierConfig) -> None:
         super().__init__(config)
         self.settings = read_settings(Cia402Settings, config.settings, "bench.amplifier.settings")

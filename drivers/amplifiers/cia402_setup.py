@@ -36,25 +36,32 @@ OPTIONAL_OBJECTS = (
 class Cia402Settings(Settings):
     """What differs between makers.
 
-    ``eds`` is the maker's EDS or DCF, relative to where the command is run; without it the objects of the
-    profile are assumed. A torque of 1000 in 0x6071 means ``reference_torque_nm`` at the motor; where that
-    is left out, 0x6076 in units of ``rated_torque_unit_nm`` (0.001 by the profile; some maxon files only
-    make sense in 1e-6). ``peak_torque_nm`` (motor) is needed where the drive has no 0x6072.
-    ``sync: false`` makes the drive act on each frame at once. ``on_lost_host`` is written to 0x6007:
-    1 fault, 2 disable voltage, 3 quick stop.
+    A torque of 1000 in 0x6071 means ``reference_torque_nm`` at the motor; where that is left out, 0x6076 in units of
+    ``rated_torque_unit_nm`` (0.001 by the profile; some maxon files only make sense in 1e-6).
     """
 
     eds: str | None = None
+    """The maker's EDS or DCF, relative to where the command is run; without it the profile's objects are assumed."""
     mode: ModeWish = "auto"
+    """Mode of operation in which the drive takes torque."""
     reference_torque_nm: Annotated[float, Field(gt=0)] | None = None
+    """Torque of the motor that 1000 in 0x6071 means, N m; from 0x6076 if left out."""
     rated_torque_unit_nm: Annotated[float, Field(gt=0)] = 1e-3
+    """Unit of 0x6076, N m."""
     peak_torque_nm: Annotated[float, Field(gt=0)] | None = None
+    """Largest torque of the motor, N m; needed where the drive has no 0x6072."""
     sync: bool = True
+    """false: the drive acts on each frame at once; true: on the next SYNC."""
     on_lost_host: Annotated[int, Field(ge=1, le=3)] = 1
+    """Written to 0x6007: 1 fault, 2 disable voltage, 3 quick stop."""
     host_node: Annotated[int, Field(ge=1, le=127)] = 127
+    """This computer's node number."""
     drive_heartbeat_ms: Annotated[int, Field(ge=5, le=5000)] = 50
+    """Interval of the drive's own heartbeat, ms."""
     sdo_timeout_ms: Annotated[float, Field(ge=10, le=10_000)] = 300.0
+    """Longest wait for an SDO answer, ms."""
     state_timeout_ms: Annotated[float, Field(ge=50, le=30_000)] = 1500.0
+    """Longest wait for a change of state, ms."""
 
 
 @dataclass(frozen=True)

@@ -96,14 +96,18 @@ def decode_registers(data: bytes) -> dict[int, float]:
 
 
 class MoteusSettings(Settings):
-    """``peak_torque_nm`` (motor) is what its servo.max_current_A allows."""
+    """What the controller does not report."""
 
     peak_torque_nm: Annotated[float, Field(gt=0)] = 1.0
+    """Torque of the motor that its servo.max_current_A allows, N m."""
     host_id: Annotated[int, Field(ge=0, le=126)] = 0
+    """This computer's address on the bus."""
 
 
 class Moteus(Amplifier):
     """One controller."""
+
+    settings_model = MoteusSettings
 
     def __init__(self, config: AmplifierConfig) -> None:
         super().__init__(config)

@@ -27,15 +27,20 @@ PROOF_FACTOR = 1.5  # of the watchdog, before the drive must have tripped
 
 
 class OdriveSettings(Settings):
-    """``peak_torque_nm`` (motor) is what the axis' current limit allows; ``torque_constant_nm_a`` for Iq."""
+    """What the axis does not report."""
 
     peak_torque_nm: Annotated[float, Field(gt=0)] = 10.0
+    """Torque of the motor that the axis' current limit allows, N m."""
     torque_constant_nm_a: Annotated[float, Field(gt=0)] = 1.0
+    """Torque per current Iq, N m/A."""
     state_timeout_ms: Annotated[float, Field(ge=50, le=30_000)] = 1500.0
+    """Longest wait for a change of state, ms."""
 
 
 class Odrive(Amplifier):
     """One axis."""
+
+    settings_model = OdriveSettings
 
     def __init__(self, config: AmplifierConfig) -> None:
         super().__init__(config)

@@ -60,15 +60,20 @@ def decode_temperatures(data: bytes) -> tuple[float, float]:
 
 
 class VescSettings(Settings):
-    """``torque_constant_nm_a`` of the motor and ``peak_current_a`` of the controller are declared."""
+    """What the controller does not report."""
 
     torque_constant_nm_a: Annotated[float, Field(gt=0)]
+    """Torque per current of the motor, N m/A."""
     peak_current_a: Annotated[float, Field(gt=0)]
+    """Largest current of the controller, A."""
     timeout_is_set: bool = False
+    """true once the timeout in VESC Tool (App Settings) equals watchdog_ms."""
 
 
 class Vesc(Amplifier):
     """One controller."""
+
+    settings_model = VescSettings
 
     def __init__(self, config: AmplifierConfig) -> None:
         super().__init__(config)

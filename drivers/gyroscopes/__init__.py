@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from importlib import import_module
+from typing import Any
 
 from drivers.gyroscopes.base import Gyroscope
+from drivers.settings import Settings
 from rig.config.bench import GyroscopeConfig
 from rig.errors import ConfigError
 
@@ -26,6 +28,16 @@ def make_gyroscope(config: GyroscopeConfig) -> Gyroscope:
     """
     if config.device not in DRIVERS:
         raise ConfigError(f"bench.gyroscope.device: no driver called {config.device!r}; there are {', '.join(DRIVERS)}")
-    module, _, name = DRIVERS[config.device].partition(":")
-    driver: Gyroscope = getattr(import_module(module), name)(config)
+    driver: Gyroscope = _class_of(config.device)(config)
     return driver
+
+
+def settings_model(device: str) -> type[Settings] | None:
+    """The settings that a driver of ``DRIVERS`` takes; None where it does not state them."""
+    model: type[Settings] | None = _class_of(device).settings_model
+    return model
+
+
+def _class_of(device: str) -> Any:
+    module, _, name = DRIVERS[device].partition(":")
+    return getattr(import_module(module), name)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from drivers.bounded_log import FirstAndLast
 from drivers.codecs.framing import Matcher, StreamFramer
+from drivers.settings import Settings
 from drivers.timing.retiming import ClockRetiming
 from drivers.timing.source_clock import SourceClock
 from rig.config.bench import GyroscopeConfig
@@ -78,6 +79,7 @@ class Gyroscope(ABC):
     """
 
     label = "gyroscope"
+    settings_model: type[Settings] | None = None  # of `bench.gyroscope.settings`; None: not stated
     default_baud = 921_600
     default_rate_hz = 1000.0
     count_modulus = 0

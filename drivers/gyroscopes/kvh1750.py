@@ -18,17 +18,21 @@ from rig.config.bench import GyroscopeConfig
 
 
 class KvhSettings(Settings):
-    """``rotation`` and ``unit`` as the device is set (=ROTFMT, =ROTUNITS); delay of its filter in ms."""
+    """As the device is set."""
 
     rotation: Literal["delta", "rate"] = "delta"
+    """As set with =ROTFMT: angle increments or rate."""
     unit: Literal["rad", "deg"] = "rad"
+    """As set with =ROTUNITS."""
     filter_delay_ms: Annotated[float, Field(ge=0, le=100)] = 0.0
+    """Delay of its filter, ms."""
 
 
 class Kvh1750(Gyroscope):
     """The driver."""
 
     label = "KVH 1750"
+    settings_model = KvhSettings
     default_baud = 921_600
     default_rate_hz = 1000.0
     count_modulus = wire.SEQUENCE_MODULO

@@ -23,19 +23,25 @@ SAMPLE_RATES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0)
 
 
 class Stim300Settings(Settings):
-    """``datagram`` is the identifier (0x90 = rate only); ``filter_hz`` the low-pass the device is set to."""
+    """As the device is set."""
 
     datagram: int = 0x90
+    """Identifier of the datagram; 0x90: rate only."""
     line_ending: bool = False
+    """Datagrams end with carriage return and line feed."""
     filter_hz: Literal[16, 33, 66, 131, 262] = 262
+    """Low-pass that the device is set to, Hz."""
     output: Literal["angular_rate", "incremental_angle"] = "angular_rate"
+    """Unit of the gyroscope's output."""
     delayed_output: bool = False
+    """The output is delayed as the device's manual describes."""
 
 
 class Stim300(Gyroscope):
     """The driver; ``decode`` is called for every packet whose CRC is right."""
 
     label = "STIM300"
+    settings_model = Stim300Settings
     default_baud = 921_600
     default_rate_hz = 2000.0
     count_modulus = 256

@@ -18,16 +18,19 @@ from rig.config.bench import GyroscopeConfig
 
 
 class VectorNavSettings(Settings):
-    """``filter_delay_ms`` is the delay of the rate filter that register 85 is set to."""
+    """As the device is set."""
 
     filter_delay_ms: Annotated[float, Field(ge=0, le=100)] = 0.0
+    """Delay of the rate filter that register 85 is set to, ms."""
     full_scale_deg_s: Annotated[float, Field(gt=0)] = 2000.0
+    """Full scale of the rate, deg/s."""
 
 
 class VectorNav(Gyroscope):
     """The driver, for both kinds of output at once."""
 
     label = "VectorNav"
+    settings_model = VectorNavSettings
     default_baud = 921_600
     default_rate_hz = 400.0
     shortest_sample_bytes = 18  # binary, the rate alone; what the device really sends shows when it is heard

@@ -1,4 +1,4 @@
-"""The results folder: result.json, model.yaml, follow_up.yaml, report.html and recording.h5."""
+"""The results folder: result.json, model.yaml, follow_up.yaml, recording.h5, report.html and report_data.h5."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from identify.follow_up.wording import follow_up_yaml
 from identify.model.parameters import with_inertia
 from identify.report.json_values import finite
 from identify.report.page import report_html
+from identify.report.replaced_file import replace_file
+from identify.report.report_data import FILE as REPORT_DATA
+from identify.report.report_data import image_of, report_data
 from identify.results import (
     Disturbance,
     Errors,
@@ -259,13 +262,13 @@ def write_results(
     journal: JournalContents | None = None,
     inertia_declared: bool = True,
 ) -> tuple[Path, ...]:
-    """Write model.yaml, follow_up.yaml, result.json, recording.h5 and report.html into ``folder``, in that order.
+    """Write model.yaml, follow_up.yaml, result.json, recording.h5, report.html, report_data.h5 into ``folder``.
 
     ``declared`` is the platform of the configuration, ``name`` the campaign's; ``inertia_declared`` is false where
     the inertia is a default that nobody stands for. A recording.h5 that stands
-    there already is left alone. Each file appears whole or not at all, and what is small comes first: on a disk
-    that fills up, the numbers are there. Returns the paths written; model.yaml is left out where no valid model
-    came out, follow_up.yaml where nothing is planned.
+    there already is left alone. Each file appears whole or not at all, in this order: on a disk that fills up, the
+    numbers are there. Returns the paths written; model.yaml is left out where no valid model came out, follow_up.yaml
+    where nothing is planned, report_data.h5 where a campaign is too long for it.
 
     Raises
     ------
@@ -282,20 +285,12 @@ def write_results(
     if follow_up is not None and follow_up.plan is not None:
         texts[follow_up_file_name(len(follow_up.rounds))] = follow_up_yaml(follow_up.plan)
     texts["result.json"] = json.dumps(result_json(identification), indent=1, allow_nan=False) + "\n"
-    written = [_replace(folder / file, text) for file, text in texts.items()]
+    written = [replace_file(folder / file, text) for file, text in texts.items()]
     if not (folder / "recording.h5").exists():
         write_recording_h5(folder / "recording.h5", recording, journal)
         written.append(folder / "recording.h5")
-    written.append(_replace(folder / "report.html", report_html(identification, recording, name)))
+    written.append(replace_file(folder / "report.html", report_html(identification, recording, name)))
+    kept = image_of(report_data(identification, tuple(run.name for run in recording.runs), name))
+    if kept is not None:
+        written.append(replace_file(folder / REPORT_DATA, kept))
     return tuple(written)
-
-
-def _replace(path: Path, text: str) -> Path:
-    partial = path.with_name(path.name + ".part")
-    try:
-        partial.write_text(text, encoding="utf-8", newline="\n")
-        partial.replace(path)
-    except OSError:
-        partial.unlink(missing_ok=True)
-        raise
-    return path

@@ -16,8 +16,11 @@ class ChannelConfig(Section):
     """What a measured channel is: it may then serve as a cause in the ways of its kind."""
 
     kind: ChannelKind
+    """What the channel measures; the kind says in which ways it may act."""
     unit: Annotated[str, Field(max_length=20)] = ""
-    torque_constant_nm_a: Positive | None = None  # of a current; None: from the recorded torque
+    """Unit of the readings; the usual one of the kind if left out."""
+    torque_constant_nm_a: Positive | None = None
+    """Torque per current, N m/A, for kind: current; from the recorded torque if left out."""
 
     @model_validator(mode="after")
     def _constant_of_a_current(self) -> Self:
@@ -35,6 +38,7 @@ class ModelChannel(ChannelConfig):
     """A channel that effects of a model read; they do nothing at ``reference``."""
 
     reference: float
+    """Reading at which the channel's effects do nothing, in the channel's unit."""
 
     def channel(self, name: str) -> Channel:
         """The channel of that name."""

@@ -11,6 +11,7 @@ from rig.config.base import Section
 from rig.excitation import Chirp, FreeDecay, Multisine, RampHoldRelease, Sine
 
 LEAST_SAMPLES = 40  # of a set; an arbitrary floor
+MOST_SETS = 200
 PAPER_SETS: tuple[tuple[float, float], ...] = ((300, 0.5), (300, 1.0), (250, 3.0), (200, 6.0), (150, 9.0))
 
 
@@ -42,17 +43,22 @@ class ExcitationConfig(Section):
     """
 
     sample_rate_hz: Annotated[float, Field(ge=10, le=20_000)] = 1000.0
+    """Ticks of the loop per second, Hz."""
     sets: tuple[AnySet, ...] = Field(default_factory=paper_sets)
+    """What is played, in this order; the paper's five sines if left out."""
     rest_s: Annotated[float, Field(ge=0, le=3600)] = 12.0
+    """Zero torque before each set, s, until the ring of the last one has died out."""
     scale_to_limits: bool = False
+    """true: reduce a set that exceeds a limit; false: refuse it and say which torque passes."""
     margin: Annotated[float, Field(gt=0, le=1)] = 0.95
+    """Share of the travel and rate limits that the forecast may use."""
 
     @field_validator("sets")
     @classmethod
     def _one_to_two_hundred(cls, sets: tuple[AnySet, ...]) -> tuple[AnySet, ...]:
         # After the sets themselves, or one wrong set would also be reported as a list that is too short.
-        if not 1 <= len(sets) <= 200:
-            raise ValueError(f"has {len(sets)} sets: give 1 to 200, or leave the key out for the paper's five")
+        if not 1 <= len(sets) <= MOST_SETS:
+            raise ValueError(f"has {len(sets)} sets: give 1 to {MOST_SETS}, or leave the key out for the paper's five")
         return sets
 
     @model_validator(mode="after")

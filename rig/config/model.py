@@ -21,14 +21,22 @@ class ModelConfig(Section):
     """J a + C w + K th + effects = M. The defaults are the paper's platform (Tab. 1)."""
 
     inertia_kg_m2: Positive = 0.02
+    """Inertia J, kg m^2 (kg on a linear axis)."""
     damping_nm_s_rad: float = 0.045
+    """Damping C, N m s/rad (N s/m on a linear axis)."""
     stiffness_nm_rad: float = 677.3
+    """Stiffness K, N m/rad (N/m on a linear axis)."""
     terms: tuple[Term, ...] = TERMS  # type: ignore[assignment]
-    inertia_unknown: bool = False  # all values are per unit of inertia: of a decay without torque
-    effects_from: tuple[Annotated[str, Field(min_length=1, max_length=4096)], ...] = ()  # files with effects of yours
-    # What its effects read besides angle, rate and torque; stands before them, who are checked against it.
+    """Terms that the platform has; leave out damping or stiffness where there is none."""
+    inertia_unknown: bool = False
+    """All values are per unit of inertia: identified from a decay without torque."""
+    effects_from: tuple[Annotated[str, Field(min_length=1, max_length=4096)], ...] = ()
+    """Python files with effects of your own, in this folder or below; their code is run."""
+    # Stands before the effects, which are checked against it.
     channels: Annotated[Mapping[str, ModelChannel], AfterValidator(check_channels)] = Field(default_factory=dict)
+    """Measured channels that the effects read besides angle, rate and torque, by name."""
     effects: EffectsConfig = Field(default_factory=dict)
+    """Effects of the platform beside J, C and K, by name, each with its parameters."""
 
     @field_validator("terms")
     @classmethod

@@ -29,11 +29,17 @@ class RecordedRun(Section):
     """One file, or one stretch of it."""
 
     file: Annotated[str, Field(max_length=4096)]
+    """Recording, relative to this file or absolute: .csv, .csv.gz, .npz, .mat, .h5, by suffix."""
     use: Literal["auto", "fit", "holdout"] = "auto"
+    """fit: for the parameters; holdout: only for selection and error; auto: the program chooses."""
     from_s: float | None = None
+    """Start of the interval that is used, in the file's time, s."""
     to_s: float | None = None
+    """End of the interval that is used, in the file's time, s."""
     min_rate_rad_s: NonNegative | None = None
+    """Slower samples are left out of the error and the fit, rad/s."""
     added_inertia_kg_m2: NonNegative = 0.0
+    """Known inertia mounted for this run, kg m^2 (kg on a linear axis)."""
 
     _path = field_validator("file")(_check_path)
 
@@ -48,7 +54,9 @@ class ChannelColumn(ChannelConfig):
     """A further column that may serve as a cause; ``column`` is the channel's own name where left out."""
 
     column: ColumnName | None = None
+    """Name of the column; the channel's own name if left out."""
     scale: float = 1.0
+    """Factor from the file's numbers to the channel's unit."""
 
     @field_validator("scale")
     @classmethod
@@ -65,11 +73,17 @@ class Columns(Section):
     """Names of the columns where they are not the default ones, and further columns that may serve as causes."""
 
     time: ColumnName | None = None
+    """Column of the time."""
     torque: ColumnName | None = None
+    """Column of the torque."""
     rate: ColumnName | None = None
+    """Column of the rate."""
     angle: ColumnName | None = None
+    """Column of the angle."""
     valid: ColumnName | None = None
+    """Column that is 0 where a sample was lost."""
     channels: ChannelColumns = Field(default_factory=dict)
+    """Further columns that may serve as causes, by the channel's name."""
 
     @model_validator(mode="after")
     def _each_column_once(self) -> Self:
@@ -85,9 +99,13 @@ class Scale(Section):
     """Factors from the file's numbers to s, N m, rad/s and rad."""
 
     time: Positive = 1.0
+    """Factor from the file's numbers to s."""
     torque: float = 1.0
+    """Factor to N m (N on a linear axis)."""
     rate: float = 1.0
+    """Factor to rad/s (m/s on a linear axis)."""
     angle: float = 1.0
+    """Factor to rad (m on a linear axis)."""
 
     @field_validator("torque", "rate", "angle")
     @classmethod
@@ -104,12 +122,19 @@ class RecordedConfig(Section):
     """The recordings of a campaign that is not played but read."""
 
     runs: tuple[RecordedRun, ...]
+    """The files, one entry a run."""
     columns: Columns = Columns()
+    """Names of the columns where they are not the default ones."""
     scale: Scale = Scale()
+    """Factors from the file's numbers to SI units."""
     axis: Literal["rotary", "linear"] = "rotary"
+    """linear: kg, N and m in the place of kg m^2, N m and rad."""
     torque_hold: Literal["band_limited", "zero_order"] = "band_limited"
+    """zero_order: each torque was held until the next sample; band_limited: it varies between samples."""
     noise: Annotated[float, Field(ge=1e-30, le=1e12)] | None = None
+    """One standard deviation of the measured channel, in its SI unit; estimated if left out."""
     min_rate_rad_s: NonNegative = 0.0
+    """Slower samples of all runs are left out of the error and the fit, rad/s."""
 
     @field_validator("runs")
     @classmethod

@@ -28,14 +28,23 @@ class Config(Section):
     """
 
     name: Annotated[str, Field(min_length=1, max_length=80)]
+    """Name of the campaign, part of the results folder's name; the file's own name if left out."""
     backend: Literal["simulated", "bench", "recorded"]
+    """simulated; bench: real devices; recorded: your own files. Its section is required."""
     model: ModelConfig = ModelConfig()
+    """The expected platform, before anything is measured; or the path of a model.yaml."""
     limits: LimitsConfig = Field(default_factory=LimitsConfig)
+    """What the machine may do, predicted before anything moves and checked on every tick."""
     excitation: ExcitationConfig = Field(default_factory=ExcitationConfig)
+    """What is played; or the path of a follow_up.yaml."""
     simulated: SimulatedConfig = Field(default_factory=SimulatedConfig)
+    """The simulated rig, hidden from the identifier; also for --dry-run and --emulate."""
     bench: BenchConfig | None = None
+    """Real devices, or their emulators."""
     recorded: RecordedConfig | None = None
+    """Recordings made elsewhere."""
     identify: IdentifyConfig = IdentifyConfig()
+    """How to identify, and when to accept."""
 
     @field_validator("name")
     @classmethod

@@ -24,29 +24,20 @@ def rise(x: Any) -> Any:
 
 
 class ExcitationSet(BaseModel):
-    """One stretch of torque, played from rest.
-
-    Parameters
-    ----------
-    name
-        What the report calls it; made from the other keys where absent.
-    duration_s
-        Length; the torque is zero before and after.
-    repeat_scales
-        The set is played again with its torque multiplied by each of these.
-    travel_cap_deg
-        The set is scaled down until its predicted travel stays below this and within all limits.
-    use
-        Whether the run serves the fit or is held out; "auto" leaves it to the identifier.
-    """
+    """One stretch of torque, played from rest."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     name: Annotated[str, Field(max_length=80)] = ""
+    """Name in the report; made from the other keys if left out."""
     duration_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 10.0
+    """Length, s; the torque is zero before and after."""
     repeat_scales: Annotated[tuple[Positive, ...], Field(max_length=20)] = ()
+    """The set is played again with its torque multiplied by each of these."""
     travel_cap_deg: Positive | None = None
+    """The set is reduced until its predicted travel is below this and within all limits, deg."""
     use: Use = "auto"
+    """fit: for the parameters; holdout: only for selection and error; auto: the program chooses."""
 
     @field_validator("name")
     @classmethod

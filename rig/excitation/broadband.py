@@ -21,14 +21,23 @@ class Multisine(ExcitationSet):
     """
 
     kind: Literal["multisine"]
+    """A sum of sines whose phases keep the peak low."""
     torque_nm: Positive
+    """Peak of the sum, N m."""
     frequencies_hz: Annotated[tuple[Positive, ...], Field(max_length=500)] = ()
+    """The frequencies, Hz; or give from_hz and to_hz."""
     from_hz: Positive | None = None
+    """Lowest frequency of the band, Hz."""
     to_hz: Positive | None = None
+    """Highest frequency of the band, Hz."""
     tones: Annotated[int, Field(ge=2, le=500)] = 20
+    """Number of sines in the band."""
     phases: Literal["schroeder", "random"] = "schroeder"
+    """schroeder: a low peak; random: drawn with the seed."""
     seed: Annotated[int, Field(ge=0)] = 0
+    """Seed of random phases."""
     soft_start_s: NotNegative = 0.0
+    """Smooth rise of the amplitude, s."""
 
     @model_validator(mode="after")
     def _list_or_band(self) -> Self:
@@ -79,11 +88,17 @@ class Chirp(ExcitationSet):
     """A sine whose frequency runs from one end of a band to the other over the set."""
 
     kind: Literal["chirp"]
+    """A sine whose frequency runs through a band."""
     torque_nm: Positive
+    """Amplitude, N m."""
     from_hz: Positive
+    """Frequency at the start, Hz."""
     to_hz: Positive
+    """Frequency at the end, Hz."""
     sweep: Literal["linear", "logarithmic"] = "linear"
+    """How the frequency runs."""
     soft_start_s: NotNegative = 0.0
+    """Smooth rise of the amplitude, s."""
 
     def describe(self) -> str:
         """ "chirp 0.5-20 Hz"."""

@@ -13,11 +13,17 @@ class RampHoldRelease(ExcitationSet):
     """Torque rises smoothly, holds and returns as smoothly, ``cycles`` times with alternating sign."""
 
     kind: Literal["ramp_hold_release"]
+    """Rises, holds and returns, with alternating sign."""
     torque_nm: float
+    """Torque that is held, N m."""
     ramp_s: Positive = 2.0
+    """Time of the rise, s."""
     hold_s: NotNegative = 1.0
+    """Time at the full torque, s."""
     release_s: Positive = 2.0
+    """Time of the return, s."""
     cycles: Annotated[int, Field(ge=1, le=1000)] = 1
+    """Number of cycles, each with the other sign."""
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -46,10 +52,15 @@ class FreeDecay(ExcitationSet):
     """Pull slowly to a torque, hold, let go: the rest is the platform's own ring."""
 
     kind: Literal["free_decay"]
+    """Pulls slowly, holds and lets go."""
     torque_nm: float
+    """Torque that is held, N m."""
     pull_s: Positive = 2.0
+    """Time of the pull, s."""
     hold_s: NotNegative = 0.5
+    """Time at the full torque, s."""
     release_s: Annotated[float, Field(ge=0.005)] = 0.01
+    """Time of letting go, s."""
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

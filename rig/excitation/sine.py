@@ -18,9 +18,13 @@ class Sine(ExcitationSet):
     """
 
     kind: Literal["sine"] = "sine"
+    """sine, the default; or multisine, chirp, ramp_hold_release, free_decay."""
     torque_nm: Positive
+    """Amplitude, N m."""
     frequency_hz: Positive
+    """Frequency, Hz."""
     soft_start_s: NotNegative = 0.0
+    """Smooth rise of the amplitude, s; it takes the ring of the platform away."""
 
     @property
     def sine_hz(self) -> float:

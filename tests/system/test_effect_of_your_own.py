@@ -26,6 +26,13 @@ identify:
 """
 
 
+def rebuilt(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    """`rig report`, after the report was lost."""
+    (folder / "report.html").unlink(missing_ok=True)
+    rig = COMMAND.with_name("rig")
+    return subprocess.run([str(rig), "report", str(folder), *options], capture_output=True, text=True, check=False)
+
+
 def test_an_effect_of_the_users_own_is_simulated_named_and_reported(tmp_path: Path) -> None:
     example = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[0]
     (tmp_path / "my_effect.py").write_text(example, encoding="utf-8")
@@ -43,6 +50,13 @@ def test_an_effect_of_the_users_own_is_simulated_named_and_reported(tmp_path: Pa
     assert abs(found["speed"] - 1.2) < 0.05
     report = (out / "report.html").read_text(encoding="utf-8")
     assert "T = level * 2 x / (1 + x^2)" in report
+    again = rebuilt(out)
+    assert again.returncode == 2
+    assert "--effects" in again.stderr
+    again = rebuilt(out, "--effects", str(tmp_path / "my_effect.py"))
+    assert again.returncode == 0, again.stderr
+    assert "runs code" in again.stderr
+    assert (out / "report.html").read_text(encoding="utf-8") == report
     assert f"effects_from:\n- {(tmp_path / 'my_effect.py').resolve()}" in (out / "model.yaml").read_text(
         encoding="utf-8"
     )

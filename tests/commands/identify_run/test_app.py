@@ -30,7 +30,7 @@ simulated:
     effects: {coulomb_friction: {level_nm: 0.123456789}}
 """
 TRUE_NUMBERS = {0.02345678, 0.0456789, 678.9012, 0.123456789}
-ALL_FILES = {"result.json", "report.html", "model.yaml", "recording.h5"}
+ALL_FILES = {"result.json", "report.html", "model.yaml", "recording.h5", "report_data.h5"}
 
 
 def write_recording(folder: Path) -> Path:

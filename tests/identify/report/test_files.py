@@ -201,11 +201,17 @@ def test_a_reason_of_several_lines_cannot_break_out_of_its_comment(found: Identi
     assert yaml.safe_load(model_text(odd, DECLARED))["inertia_kg_m2"] != 99
 
 
-def test_the_folder_gets_all_four_files_and_nothing_half_written(
+def test_the_folder_gets_all_files_and_nothing_half_written(
     found: Identification, recording: Recording, tmp_path: Path
 ) -> None:
     written = write_results(tmp_path, found, recording, DECLARED, "default")
-    assert [path.name for path in written] == ["model.yaml", "result.json", "recording.h5", "report.html"]
+    assert [path.name for path in written] == [
+        "model.yaml",
+        "result.json",
+        "recording.h5",
+        "report.html",
+        "report_data.h5",
+    ]
     assert {path.name for path in tmp_path.iterdir()} == {path.name for path in written}
     assert json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["accepted"] is True
 
@@ -223,7 +229,7 @@ def test_numbers_that_no_model_may_have_give_no_model_yaml(
 ) -> None:
     odd = with_final(found, platform=replace(TRUTH, inertia_kg_m2=-0.02))
     written = write_results(tmp_path, odd, recording, DECLARED, "default")
-    assert [path.name for path in written] == ["result.json", "recording.h5", "report.html"]
+    assert [path.name for path in written] == ["result.json", "recording.h5", "report.html", "report_data.h5"]
 
 
 def test_a_disk_that_has_no_room_for_the_report_has_the_numbers(
