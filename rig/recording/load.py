@@ -17,7 +17,7 @@ from rig.recording.file_faults import FileFaults
 from rig.recording.readers import read_file
 from rig.recording.readers.base import Table
 from rig.recording.run import Recording, Run, printable
-from rig.recording.stated_units import column_named, factor_of
+from rig.recording.stated_units import column_named, factor_of, with_factors_in_place
 from rig.units import DEG
 
 if TYPE_CHECKING:
@@ -79,11 +79,17 @@ def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> lis
     runs: list[Run] = []
     contents = read_file(path)
     for content in contents:
+        factors: Mapping[str, float] = {}
         if isinstance(content, Run):
             run = _own_run(path, content, entry, section)
         else:
-            run = _run_of_table(content, entry, section)
-        runs.append(check_run(_window(run, entry, path), path, section.scale.model_fields_set))
+            columns = _columns(content, section)
+            factors = {q: _factor(content, name, section, q) for q, (name, _) in columns.items()}
+            run = _run_of_table(content, columns, factors, entry, section)
+        try:
+            runs.append(check_run(_window(run, entry, path), path, section.scale.model_fields_set))
+        except RecordingError as error:
+            raise RecordingError(with_factors_in_place(str(error), factors)) from None
     return runs
 
 
@@ -101,11 +107,16 @@ def _own_run(path: Path, run: Run, entry: RecordedRun, section: RecordedConfig) 
     )
 
 
-def _run_of_table(table: Table, entry: RecordedRun, section: RecordedConfig) -> Run:
-    columns = _columns(table, section)
+def _run_of_table(
+    table: Table,
+    columns: Mapping[Quantity, tuple[str, Array]],
+    factors: Mapping[str, float],
+    entry: RecordedRun,
+    section: RecordedConfig,
+) -> Run:
     valid = check_samples(table, {k: values for k, (_, values) in columns.items()})
     channels = _channels(table, section, len(valid))
-    time_s, rate, angle, torque = (_scaled(table, columns, section, q) for q in ("time", "rate", "angle", "torque"))
+    time_s, rate, angle, torque = (_scaled(columns, factors, q) for q in ("time", "rate", "angle", "torque"))
     assert time_s is not None  # _columns refuses a table without time
     keep = np.isfinite(time_s)  # a lost sample may have lost its time too
     has_torque = None if torque is None else keep & np.isfinite(torque)
@@ -159,17 +170,21 @@ def _columns(table: Table, section: RecordedConfig) -> dict[Quantity, tuple[str,
     return {quantity: (name, values[name]) for quantity, name in names.items()}
 
 
+def _factor(table: Table, name: str, section: RecordedConfig, quantity: Quantity) -> float:
+    """To SI units: the factor given, else that of the unit over the column or of the one that its name stands for."""
+    if quantity in section.scale.model_fields_set:
+        given: float = getattr(section.scale, quantity)
+        return given
+    return factor_of(table, name, quantity, section.axis, DEFAULT_NAMES[quantity].get(name))
+
+
 def _scaled(
-    table: Table, columns: Mapping[Quantity, tuple[str, Array]], section: RecordedConfig, quantity: Quantity
-) -> Array | None:
-    """The column in SI units: by the factor given, else by the unit over it or the one that its name stands for."""
+    columns: Mapping[Quantity, tuple[str, Array]], factors: Mapping[str, float], quantity: Quantity
+) -> Array | None:  # fmt: skip
+    """The column in SI units."""
     if quantity not in columns:
         return None
-    name, values = columns[quantity]
-    if quantity in section.scale.model_fields_set:
-        factor: float = getattr(section.scale, quantity)
-    else:
-        factor = factor_of(table, name, quantity, section.axis, DEFAULT_NAMES[quantity].get(name))
+    values, factor = columns[quantity][1], factors[quantity]
     return values if factor == 1.0 else values * factor
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from rig.errors import RecordingError
@@ -18,6 +19,9 @@ _PLAIN_NAMES = {
     "angle": ("angle", "position"),
     "valid": ("valid",),
 }
+
+
+_CURE = re.compile(r"(recorded\.scale\.(time|torque|rate|angle): )([-\d.e]+)")
 
 
 def stated_unit(table: Table, column: str) -> str:
@@ -76,3 +80,12 @@ def factor_of(
             f"{where} has one unit in its name and another, {text!r}, stated with it: correct one of them, or {cure}"
         )
     return unit.factor
+
+
+def with_factors_in_place(message: str, factors: Mapping[str, float]) -> str:
+    """The message of a check of SI values with its factors for the column as stored.
+
+    A factor under ``recorded.scale`` takes the place of the one that was applied and is not multiplied by it.
+    """
+    changed = {quantity: factor for quantity, factor in factors.items() if factor != 1.0}
+    return _CURE.sub(lambda m: f"{m[1]}{float(m[3]) * changed[m[2]]:.6g}" if m[2] in changed else m.group(), message)

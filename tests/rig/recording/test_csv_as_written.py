@@ -97,7 +97,7 @@ def test_a_linear_axis_has_units_of_its_own(tmp_path: Path) -> None:
     text = "time (s),force (kN),speed (mm/s)\n" + rows(T, 1e-3 * TORQUE, 1e3 * RATE)
     agrees(as_read(tmp_path, text, "  axis: linear\n"))
     (tmp_path / "r.csv").write_text(text)
-    assert "'mm/s', a unit of speed and not of rate: set recorded.axis: linear" in refusal(tmp_path, "r.csv")
+    assert "'kN', a unit of force and not of torque: set recorded.axis: linear" in refusal(tmp_path, "r.csv")
 
 
 REFUSED = {
@@ -120,6 +120,15 @@ def test_decimal_commas_between_commas_and_thousands_are_refused_with_the_cure(t
     assert "separate the columns by semicolons" in refusal(tmp_path, "r.csv")
     (tmp_path / "r.csv").write_text("time_s;torque_nm;rate_rad_s\n" + "0,001;1.234,5;2,0\n" * 3)
     assert "use one decimal sign in the whole file" in refusal(tmp_path, "r.csv")
+
+
+def test_a_factor_that_is_advised_takes_the_place_of_the_one_that_was_applied(tmp_path: Path) -> None:
+    text = "time (s),torque (N m),rate (deg/s),angle (rad)\n" + rows(T, TORQUE, -np.degrees(RATE), ANGLE)
+    (tmp_path / "r.csv").write_text(text)
+    message = refusal(tmp_path, "r.csv")
+    assert "opposite signs: set recorded.scale.rate: -0.0174533 or recorded.scale.angle: -1" in message
+    agrees(read(tmp_path, "r.csv", "  scale: {rate: -0.0174532925199433}\n").runs[0])
+    assert "recorded.scale.rate: -0.017455" in refusal(tmp_path, "r.csv", "  scale: {rate: 0.5}\n")
 
 
 @pytest.mark.parametrize(
