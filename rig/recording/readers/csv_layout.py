@@ -145,8 +145,10 @@ def _first_data(lines: Sequence[tuple[int, str]]) -> tuple[int, str | None]:
         return (0 if _is_data(lines[0][1], plain) else 1), plain
     first = len(_trimmed(_split(lines[0][1], plain)))
     for at in (1, 2):
-        whole = at < len(lines) and _is_data(lines[at][1], plain) and len(_split(lines[at][1], plain)) >= first
-        if whole and (at == 1 or _units_below(lines, at)):
+        if at >= len(lines) or len(_split(lines[at][1], plain)) < first:
+            continue
+        has_numbers = any(_is_number(f) for f in _split(lines[at][1], plain) if f.lower() not in _EMPTY)
+        if (at == 1 and _is_data(lines[1][1], plain)) or (at == 2 and has_numbers and _units_below(lines, 2)):
             return at, plain
     stated = _stated_separator(lines)
     for at in range(1, len(lines)):

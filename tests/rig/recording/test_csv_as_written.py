@@ -52,6 +52,7 @@ WRITTEN = {
     "a row of units below default names": "time_s,torque_nm,rate_deg_s\ns,N m,deg/s\n"
     + rows(T, TORQUE, np.degrees(RATE)),
     "a row of units without one for all": "time_s,torque_nm,rate_rad_s,note\ns,,-,\n" + rows(T, TORQUE, RATE, RATE),
+    "a row of units and a column of text": "time,torque,rate,state\nms,mN m,deg/s,\n" + DEGREES.replace("\n", ",OK\n"),
     "a preamble": "Recorder,X1\nDate,2024-05-01\nSample rate,1000\n\ntime,torque,rate\ns,N m,rad/s\n" + SI,
     "a preamble without units": "Project: bench 3\nOperator: Smith\n\ntime_s,torque_nm,rate_rad_s\n" + SI,
     "a spreadsheet's separator": "sep=;\ntime_s;torque_nm;rate_rad_s\n" + SI.replace(",", ";"),
