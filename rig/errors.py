@@ -4,6 +4,8 @@
     |- UsageError (2)          bad command line, config, recording, or a pre-flight refusal
     |  |- ConfigError          a key of rig.yaml: file, line, key, value, what is allowed
     |  |- RecordingError       a recording that cannot be read or trusted
+    |  |- InputError           arguments of a call from Python that cannot be used; also a ValueError
+    |  |- MissingPackage       an optional package that is not installed; also an ImportError
     |  `- PreflightRefusal     the campaign would break a limit; nothing moved
     |- DeviceFault (3)         a device failed, vanished or never answered
     |- SafetyTrip (4)          a limit was broken while playing; torque is off
@@ -35,6 +37,14 @@ class ConfigError(UsageError):
 
 class RecordingError(UsageError):
     """A recording cannot be read, or what it holds cannot be trusted."""
+
+
+class InputError(UsageError, ValueError):
+    """Arguments of a call from Python cannot be used, or what they hold cannot be trusted."""
+
+
+class MissingPackage(UsageError, ImportError):
+    """A call from Python needs an optional package that is not installed."""
 
 
 class PreflightRefusal(UsageError):

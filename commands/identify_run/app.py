@@ -27,7 +27,6 @@ from commands.terminal.options import (
 if TYPE_CHECKING:
     from commands.campaign.results_folder import ResultsFolder
     from rig.config.load import LoadedConfig
-    from rig.recording.run import Recording
 
 app = new_app("")
 
@@ -78,19 +77,11 @@ def _run_recorded(context: CommandContext, loaded: LoadedConfig, folder: Results
     recording = dataclasses.replace(recording, info=dict(recording.info) | provenance(loaded))
     found = identified(context, loaded, recording)
     if not found.aborted:
-        from identify.follow_up.rounds import limits_of
+        from identify.follow_up.rounds import limits_of, sample_rate_hz
 
         allowed = limits_of(found, loaded.config.limits, found.axis == "linear")
-        found = with_plan(context, loaded, recording, found, allowed, _sample_rate_hz(recording))
+        found = with_plan(context, loaded, recording, found, allowed, sample_rate_hz(recording))
     return conclude(context, loaded, folder, recording, found)
-
-
-def _sample_rate_hz(recording: Recording) -> float:
-    """Of the first run, to four digits, within what a rig plays at."""
-    import numpy as np
-
-    rate = 1.0 / float(np.median(np.diff(recording.runs[0].time_s)))
-    return float(f"{min(max(rate, 10.0), 20_000.0):.4g}")
 
 
 def _run_played(context: CommandContext, loaded: LoadedConfig, folder: ResultsFolder) -> int:

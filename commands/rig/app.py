@@ -11,14 +11,19 @@ import typer
 from commands.campaign.context import CommandContext, Options, run_command
 from commands.terminal.exit_codes import run_to_exit_code
 from commands.terminal.options import (
+    AngleColumn,
+    ColumnScale,
     ConfigFile,
     DryRun,
     Emulate,
     Out,
     Overrides,
     Quiet,
+    RateColumn,
     Resume,
     Seed,
+    TimeColumn,
+    TorqueColumn,
     Version,
     Yes,
     new_app,
@@ -166,6 +171,35 @@ def schema() -> None:
         from commands.rig.schema import print_schema
 
         return print_schema()
+
+    raise typer.Exit(run_to_exit_code(command))
+
+
+@app.command()
+def init(
+    source: Annotated[
+        Path | None,
+        typer.Argument(metavar="[CSV]", help="A recording: CSV, NPZ, MAT, HDF5. None: a bench.", show_default=False),
+    ] = None,
+    time: TimeColumn = None,
+    torque: TorqueColumn = None,
+    rate: RateColumn = None,
+    angle: AngleColumn = None,
+    time_scale: ColumnScale = None,
+    torque_scale: ColumnScale = None,
+    rate_scale: ColumnScale = None,
+    angle_scale: ColumnScale = None,
+    axis: Annotated[str | None, typer.Option(metavar="AXIS", help="rotary or linear. Default: by the units.")] = None,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Where to write; never over a file.")] = Path("rig.yaml"),
+    yes: Annotated[bool, typer.Option("--yes", help="Take all guesses, and say them.")] = False,
+) -> None:
+    """Write a commented rig.yaml: from the columns of a recording, or from the ports of this machine."""
+
+    def command() -> int:
+        from commands.rig.init import InitOptions, init, terminal
+
+        columns = (time, torque, rate, angle), (time_scale, torque_scale, rate_scale, angle_scale)
+        return init(source, InitOptions.of(*columns, axis, out, yes), terminal())
 
     raise typer.Exit(run_to_exit_code(command))
 

@@ -13,13 +13,15 @@ NO_ADAPTERS = ("virtual", "udp_multicast", "serial")  # offered by python-can ev
 Lister = Callable[[], list[Any]]
 
 
-def _serial_ports() -> list[Any]:
+def serial_ports() -> list[Any]:
+    """The serial ports of this machine, as pyserial describes them."""
     from serial.tools import list_ports
 
     return sorted(list_ports.comports(), key=lambda port: str(port.device))
 
 
-def _can_adapters() -> list[Any]:
+def can_adapters() -> list[Any]:
+    """The CAN adapters that python-can finds: interface, channel, and more."""
     import can
 
     earlier = logging.root.manager.disable
@@ -30,13 +32,13 @@ def _can_adapters() -> list[Any]:
         logging.disable(earlier)
 
 
-def device_lines(serial_ports: Lister = _serial_ports, can_adapters: Lister = _can_adapters) -> list[str]:
+def device_lines(ports: Lister = serial_ports, adapters: Lister = can_adapters) -> list[str]:
     """What is there, one line each; a listing that fails is said in its place and does not hide the other."""
     return [
-        *_listing("Serial ports", serial_ports, _serial_line, "None detected. Plug the gyro in, or check its driver."),
+        *_listing("Serial ports", ports, _serial_line, "None detected. Plug the gyro in, or check its driver."),
         *_listing(
             "CAN adapters",
-            can_adapters,
+            adapters,
             _can_line,
             "None detected. Serial (slcan) adapters are listed under serial ports.",
         ),

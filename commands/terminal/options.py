@@ -32,6 +32,13 @@ Quiet = Annotated[
     bool, typer.Option("--quiet", help="Print only errors and warnings (REAL torque, code from files, low disk space).")
 ]
 
+TimeColumn = Annotated[str | None, typer.Option(metavar="COL", help="Column of the time.")]
+TorqueColumn = Annotated[str | None, typer.Option(metavar="COL", help="Column of the torque; none: a free decay.")]
+RateColumn = Annotated[str | None, typer.Option(metavar="COL", help="Column of the rate; none: not measured.")]
+AngleColumn = Annotated[str | None, typer.Option(metavar="COL", help="Column of the angle; none: not measured.")]
+_SCALE = "Its unit (mN m, deg/s), or the factor to SI units."
+ColumnScale = Annotated[str | None, typer.Option(metavar="FACTOR", help=_SCALE)]
+
 
 def new_app(help_text: str) -> typer.Typer:
     """An application whose errors are ours to say; it completes lines in a shell that was told to ask it."""

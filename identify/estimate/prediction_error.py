@@ -20,10 +20,10 @@ import numpy as np
 
 from identify.estimate.descent import ENOUGH, Descent
 from identify.estimate.fit import Columns, Fit, Look
-from identify.model.mean_slopes import mean_slopes
 from identify.model.parameters import Name, equations_of
 from identify.model.structure import Structure
 from identify.signals.trace import MOST_BIAS_RAD_S, Trace
+from identify.simulate.mean_slopes import mean_slopes
 from identify.simulate.shots import RUNAWAY, Shots
 from rig import effects
 from rig.arrays import Array

@@ -96,6 +96,12 @@ def limits_of(found: Identification, limits: LimitsConfig, linear: bool) -> Peak
     )
 
 
+def sample_rate_hz(recording: Recording) -> float:
+    """Of the first run, to four digits, within what a rig plays at: at which a follow-up of recorded runs is played."""
+    rate = 1.0 / float(np.median(np.diff(recording.runs[0].time_s)))
+    return float(f"{min(max(rate, 10.0), 20_000.0):.4g}")
+
+
 def _swing(angle_rad: np.ndarray, time_s: np.ndarray) -> float:
     """Largest deviation from a straight line: a gyro's bias makes a ramp of an angle that is its integral."""
     line = np.polynomial.Polynomial.fit(time_s, angle_rad, 1)

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from rig.config.parsing.messages import faults_of, place_of, shown
 from rig.config.parsing.overrides import apply_override
-from rig.config.parsing.yaml_text import Document, Fault, KeyPath, dotted, parse, read_text
+from rig.config.parsing.yaml_text import Document, Fault, KeyPath, Place, dotted, parse, read_text
 from rig.config.root import BACKENDS, Config, name_from_stem
 from rig.errors import ConfigError
 
@@ -76,6 +76,20 @@ def load_config(
     _read_effects(document, path.parent, included, announce)
     config = _validate(document, name_from_stem(path.stem), also_wrong)
     return LoadedConfig(config, text, path, tuple(overrides), included)
+
+
+def check_config(data: Mapping[str, Any], source: str) -> Config:
+    """The configuration that a mapping as in rig.yaml stands for; files in it are relative to the current folder.
+
+    ``data`` holds plain values as YAML would give them (str, int, float, bool, None, list, dict).
+
+    Raises ConfigError whose message has one line a fault: ``source``, key, value, what is allowed.
+    """
+    document = Document(json.loads(json.dumps(data)), {(): Place(source)})
+    included: dict[str, str] = {}
+    _include_files(document, Path(), included)
+    _read_effects(document, Path(), included, lambda text: None)
+    return _validate(document, source, lambda data: ())
 
 
 def _include_files(document: Document, folder: Path, included: dict[str, str]) -> None:

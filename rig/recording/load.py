@@ -13,16 +13,18 @@ import numpy as np
 from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.recording.checks import check_channel, check_run, check_samples, missing_column
+from rig.recording.file_faults import FileFaults
 from rig.recording.readers import read_file
 from rig.recording.readers.base import Table
 from rig.recording.run import Recording, Run, printable
+from rig.recording.stated_units import column_named, factor_of, with_factors_in_place
+from rig.units import DEG
 
 if TYPE_CHECKING:
     from rig.config.load import LoadedConfig
     from rig.config.recorded import RecordedConfig, RecordedRun
 
 Quantity = Literal["time", "torque", "rate", "angle", "valid"]
-DEG = math.pi / 180
 # Default names, and the factor to SI units that the name itself stands for.
 DEFAULT_NAMES: Mapping[Quantity, Mapping[str, float]] = {
     "time": {"time_s": 1.0},
@@ -43,7 +45,7 @@ def read_recording(loaded: LoadedConfig) -> Recording:
     if section is None:
         raise ValueError("the configuration has no recorded section")
     runs: list[Run] = []
-    wrong: list[str] = []
+    faults = FileFaults()
     sources: list[Path] = []
     for entry in section.runs:
         path = loaded.folder / Path(entry.file)
@@ -51,14 +53,13 @@ def read_recording(loaded: LoadedConfig) -> Recording:
             path = _expanded(loaded.folder, entry.file)
             found = runs_of_file(path, entry, section)
         except RecordingError as error:
-            wrong.append(str(error))
+            faults.add(path, str(error))
             continue
         runs += found
         sources += [path] * len(found)
-    if not wrong:
-        wrong += _fitted_and_held_out(runs, sources)
+    wrong = faults.lines() or _fitted_and_held_out(runs, sources)
     if wrong:
-        raise RecordingError("\n".join(dict.fromkeys(wrong)))
+        raise RecordingError("\n".join(wrong))
     info = {"backend": "recorded", "files": [str(path) for path in sources], "config_text": loaded.text}
     return Recording(_with_unique_names(runs), axis=section.axis, noise=section.noise, info=info)
 
@@ -78,11 +79,17 @@ def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> lis
     runs: list[Run] = []
     contents = read_file(path)
     for content in contents:
+        factors: Mapping[str, float] = {}
         if isinstance(content, Run):
             run = _own_run(path, content, entry, section)
         else:
-            run = _run_of_table(content, entry, section)
-        runs.append(check_run(_window(run, entry, path), path, section.scale.model_fields_set))
+            columns = _columns(content, section)
+            factors = {q: _factor(content, name, section, q) for q, (name, _) in columns.items()}
+            run = _run_of_table(content, columns, factors, entry, section)
+        try:
+            runs.append(check_run(_window(run, entry, path), path, section.scale.model_fields_set))
+        except RecordingError as error:
+            raise RecordingError(with_factors_in_place(str(error), factors)) from None
     return runs
 
 
@@ -100,11 +107,16 @@ def _own_run(path: Path, run: Run, entry: RecordedRun, section: RecordedConfig) 
     )
 
 
-def _run_of_table(table: Table, entry: RecordedRun, section: RecordedConfig) -> Run:
-    columns = _columns(table, section)
+def _run_of_table(
+    table: Table,
+    columns: Mapping[Quantity, tuple[str, Array]],
+    factors: Mapping[str, float],
+    entry: RecordedRun,
+    section: RecordedConfig,
+) -> Run:
     valid = check_samples(table, {k: values for k, (_, values) in columns.items()})
     channels = _channels(table, section, len(valid))
-    time_s, rate, angle, torque = (_scaled(columns, section, q) for q in ("time", "rate", "angle", "torque"))
+    time_s, rate, angle, torque = (_scaled(columns, factors, q) for q in ("time", "rate", "angle", "torque"))
     assert time_s is not None  # _columns refuses a table without time
     keep = np.isfinite(time_s)  # a lost sample may have lost its time too
     has_torque = None if torque is None else keep & np.isfinite(torque)
@@ -144,9 +156,9 @@ def _columns(table: Table, section: RecordedConfig) -> dict[Quantity, tuple[str,
     names: dict[Quantity, str] = {}
     for quantity, defaults in DEFAULT_NAMES.items():
         named = getattr(section.columns, quantity)
-        if named is not None and named not in table.names:
+        name = column_named(table, quantity, named, list(defaults))
+        if named is not None and name is None:
             raise missing_column(table, quantity, [named], mapped=True)
-        name = named or next((n for n in defaults if n in table.names), None)
         if name is not None:
             names[quantity] = name
     if "time" not in names:
@@ -158,14 +170,21 @@ def _columns(table: Table, section: RecordedConfig) -> dict[Quantity, tuple[str,
     return {quantity: (name, values[name]) for quantity, name in names.items()}
 
 
-def _scaled(columns: Mapping[Quantity, tuple[str, Array]], section: RecordedConfig, quantity: Quantity) -> Array | None:
-    """The column in SI units: by the factor given, else by the one that its name stands for."""
+def _factor(table: Table, name: str, section: RecordedConfig, quantity: Quantity) -> float:
+    """To SI units: the factor given, else that of the unit over the column or of the one that its name stands for."""
+    if quantity in section.scale.model_fields_set:
+        given: float = getattr(section.scale, quantity)
+        return given
+    return factor_of(table, name, quantity, section.axis, DEFAULT_NAMES[quantity].get(name))
+
+
+def _scaled(
+    columns: Mapping[Quantity, tuple[str, Array]], factors: Mapping[str, float], quantity: Quantity
+) -> Array | None:  # fmt: skip
+    """The column in SI units."""
     if quantity not in columns:
         return None
-    name, values = columns[quantity]
-    by_name = DEFAULT_NAMES[quantity].get(name, 1.0)
-    given: float = getattr(section.scale, quantity)
-    factor = given if quantity in section.scale.model_fields_set else by_name
+    values, factor = columns[quantity][1], factors[quantity]
     return values if factor == 1.0 else values * factor
 
 

@@ -47,10 +47,11 @@ def _rms(values: Array) -> float:
 def motion_figures(identification: Identification) -> list[Figure]:
     """One figure a run, in the order played; of very many runs those with the largest error."""
     drawn = sorted(by_decreasing_error(identification.traces)[:RUNS])
-    return [_run(identification, identification.traces[i]) for i in drawn]
+    return [run_figure(identification, identification.traces[i]) for i in drawn]
 
 
-def _run(identification: Identification, trace: RunTraces) -> Figure:
+def run_figure(identification: Identification, trace: RunTraces) -> Figure:
+    """Measured and simulated motion of one run, and the error before and after."""
     name, unit = QUANTITIES[identification.axis].measured(trace)
     time, two = trace.time_s - trace.time_s[0], identification.after is not None
     drawn = [

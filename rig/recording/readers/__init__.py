@@ -17,6 +17,9 @@ MAX_FILE_BYTES = 2 * 1024**3
 _BY_SUFFIX = {
     ".csv.gz": "csv_text",
     ".csv": "csv_text",
+    ".tsv": "csv_text",
+    ".txt": "csv_text",
+    ".lvm": "csv_text",
     ".npz": "npz",
     ".mat": "mat",
     ".hdf5": "h5",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +26,15 @@ class Table:
     """Named columns of one file.
 
     ``read`` gives the columns asked for, each float64 of shape (n,), and raises RecordingError for what is
-    not a plain column of numbers. ``label`` says where a sample stands in the file.
+    not a plain column of numbers. ``label`` says where a sample stands in the file, ``units`` what stood as the unit
+    of a column besides its name.
     """
 
     path: Path
     names: tuple[str, ...]
     read: Callable[[Sequence[str]], Mapping[str, Array]]
     label: Callable[[int], str] = index_label
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 def too_long(path: Path, count: int) -> RecordingError:

@@ -44,7 +44,11 @@ def line_replaced(number: int, text: str) -> str:
 # text of run.csv, then cause and cure
 TEXTS = {
     "text in a number": (line_replaced(7, "0.005,oops,2,0"), "line 7, column 'torque_nm': 'oops'", "valid"),
-    "row of units": (line_replaced(2, "s,Nm,rad/s,rad"), "line 2, column 'time_s': 's'", "a row of units?"),
+    "row of unknown units": (
+        line_replaced(2, "foo,bar,baz,qux"),
+        "column 'time_s': 'foo'",
+        "a row of units that are not",
+    ),
     "underscore": (line_replaced(7, "0.005,1_000,2,0"), "line 7, column 'torque_nm': '1_000'", "correct it"),
     "empty field": (line_replaced(7, "0.005,,2,0"), "line 7: torque is nan", "mark the row valid = 0"),
     "cut row": (GOOD[: GOOD.rindex(",")], "line 501 has 3 fields where the header names 4", "may be cut"),
@@ -225,8 +229,21 @@ def test_a_home_that_does_not_exist_is_said(tmp_path: Path) -> None:
 
 
 def test_all_wrong_files_are_said_at_once(tmp_path: Path) -> None:
+    (tmp_path / "b.csv").write_text("time_s,torque_nm\n0,1\n")
+    (tmp_path / "c.txt").write_bytes(b"")
     message = refusal(tmp_path, "a.csv", entry="    - file: b.csv\n    - file: c.txt\n")
     assert [line.split(": ")[0].rpartition("/")[2] for line in message.splitlines()] == ["a.csv", "b.csv", "c.txt"]
+
+
+def test_a_fault_that_several_files_share_is_said_once_with_their_names(tmp_path: Path) -> None:
+    for name in "abcdefg":
+        (tmp_path / f"{name}.csv").write_text(csv_of(motion(20 + ord(name) - ord("a"))))
+    entries = "".join(f"    - file: {name}.csv\n" for name in "bcdefg")
+    message = refusal(tmp_path, "a.csv", entry=f"{entries}    - file: gone.csv\n")
+    first, second = message.splitlines()
+    assert "a.csv: 20 valid samples, at least 40 are needed" in first
+    assert first.endswith("(the same in b.csv, c.csv, d.csv, e.csv and 2 more)")
+    assert "gone.csv: no such file" in second and "the same" not in second
 
 
 def test_a_stretch_cannot_be_fitted_and_held_out(tmp_path: Path) -> None:

@@ -1,0 +1,126 @@
+"""What `rig init` cannot know from a file: asked on a terminal, guessed on request, else named as missing options."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, TypeVar
+
+from commands.rig.init_yaml import number_value
+from commands.terminal.display import plain
+from commands.terminal.exit_codes import say
+from rig.errors import UsageError
+
+if TYPE_CHECKING:
+    from rig.recording.guessing.columns import Column
+    from rig.recording.guessing.roles import Choice, Quantity
+    from rig.recording.guessing.scales import Factor
+
+Ask = Callable[[str], str]
+Answer = TypeVar("Answer")
+NONE = "none"  # as an answer: there is no such column
+TRIES = 3
+LISTED = 40  # columns
+
+
+def show(lines: Sequence[str]) -> None:
+    """Lines to stdout, without what could steer a terminal."""
+    sys.stdout.writelines(f"{plain(line)}\n" for line in lines)
+    sys.stdout.flush()
+
+
+def column_named(columns: tuple[Column, ...], quantity: str, name: str) -> Column | None:
+    """The column of that name; None for "none". Raises UsageError."""
+    found = next((c for c in columns if c.name == name and c.values is not None), None)
+    if found is not None or name == NONE:
+        return found
+    usable = ", ".join(repr(c.name) for c in columns[:LISTED] if c.values is not None)
+    raise UsageError(f"--{quantity} {name[:60]!r} is no column of numbers: choose one of {usable}, or {NONE}")
+
+
+def factor_from(quantity: str, text: str, axis: str) -> Factor:
+    """A factor as typed: a number, or a unit. Raises UsageError."""
+    from rig.recording.guessing.scales import Factor
+    from rig.units import DIMENSIONS, SI, unit_of
+
+    dimension = DIMENSIONS[axis][quantity]
+    try:
+        value = float(text)
+    except ValueError:
+        unit = unit_of(text)
+        if unit is None or unit.dimension != dimension:
+            raise UsageError(
+                f"--{quantity}-scale {text[:40]!r} is neither a number nor a known unit of {dimension}: give the "
+                f"factor to {SI[dimension]}, e.g. 0.001, or a unit"
+            ) from None
+        return Factor(unit.factor, f"{unit.text}, as given", True)
+    if value == 0.0 or not abs(value) < float("inf"):
+        raise UsageError(f"--{quantity}-scale {text} is not allowed: give a factor to {SI[dimension]} other than zero")
+    return Factor(value, f"factor to {SI[dimension]}, as given", True)
+
+
+class Questions:
+    """Asks what is not sure, or takes the guess, or remembers that somebody has to say it."""
+
+    def __init__(self, yes: bool, ask: Ask | None) -> None:
+        self._yes, self._ask = yes, None if yes else ask
+        self._guessed: set[tuple[str, str]] = set()
+        self._missing: list[str] = []
+        self._have_guesses = True
+
+    def is_guess(self, quantity: str, what: str) -> bool:
+        """Whether the "column" or "scale" of a quantity is a guess that nobody confirmed."""
+        return (quantity, what) in self._guessed
+
+    def column(self, quantity: Quantity, choice: Choice, columns: tuple[Column, ...]) -> Choice:
+        """The choice, once it is sure. Raises UsageError where no answer can be used."""
+        from rig.recording.guessing.roles import Choice
+
+        if choice.sure:
+            return choice
+        guess = choice.column.name if choice.column else NONE
+        if self._ask is not None:
+            question = f"Which column is the {quantity}? (guess: {choice.why}; {NONE}: there is none) [{plain(guess)}] "
+            found = self._answer(question, guess, lambda text: column_named(columns, quantity, text))
+            return Choice(found, "as answered", True)
+        self._take(quantity, "column", guess, choice.why, f"--{quantity} COL")
+        return choice
+
+    def factor(self, quantity: Quantity, found: Factor, column: Column, axis: str) -> Factor:
+        """The factor, once it is sure. Raises UsageError where no answer can be used."""
+        if found.sure:
+            return found
+        guess = "" if found.value is None else number_value(found.value)
+        if self._ask is not None:
+            question = f"Unit of {plain(column.name)!r}, or factor to SI units? (guess: {plain(found.why)}) [{guess}] "
+            return self._answer(question, guess, lambda text: factor_from(quantity, text, axis))
+        option = f"--{quantity}-scale FACTOR (or a unit)"
+        if found.value is None:
+            self._missing.append(f"{quantity}: column {column.name!r}: {found.why}: give {option}")
+            self._have_guesses = False
+        else:
+            self._take(quantity, "scale", guess, found.why, option)
+        return found
+
+    def finish(self) -> None:
+        """Raise UsageError that lists everything that somebody has to say."""
+        if self._missing:
+            listed = "".join(f"\n  {line}" for line in self._missing)
+            accept = ", or accept the guesses with --yes" if self._have_guesses else ""
+            raise UsageError(f"not clear from the file; nothing was written. Give the options{accept}:{listed}")
+
+    def _answer(self, question: str, guess: str, read: Callable[[str], Answer]) -> Answer:
+        assert self._ask is not None
+        for _ in range(TRIES):
+            try:
+                return read(self._ask(question).strip() or guess)
+            except UsageError as error:
+                say(str(error))
+        raise UsageError(f"no answer that could be used in {TRIES} tries: give it as an option (rig init --help)")
+
+    def _take(self, quantity: str, what: str, guess: str, why: str, option: str) -> None:
+        if self._yes:
+            self._guessed.add((quantity, what))
+            show([f"guess: {quantity}: {what} {guess!r} ({why})"])
+        else:
+            self._missing.append(f"{quantity}: {what} {guess!r} is a guess ({why}): give {option}")

@@ -1,0 +1,165 @@
+"""Which column is the time, the torque, the rate, the angle: by words, by units, and by what the numbers do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import permutations
+from typing import Literal
+
+import numpy as np
+
+from rig.arrays import Array
+from rig.recording.consistency import angle_over_rate
+from rig.recording.guessing.columns import Column
+from rig.recording.run import Run
+from rig.units import DIMENSIONS
+
+Quantity = Literal["time", "torque", "rate", "angle"]
+QUANTITIES: tuple[Quantity, ...] = ("time", "rate", "angle", "torque")  # in the order of the choice
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+WORDS: dict[Quantity, frozenset[str]] = {
+    "time": _words("time t zeit timestamp clock sec seconds elapsed second temps tiempo x"),
+    "torque": _words("torque torq trq moment drehmoment couple tau m mot force f kraft load τ"),
+    "rate": _words(
+        "rate speed velocity vel omega w gyro gyr gz drehrate drehzahl geschwindigkeit geschw qd dq dtheta thetadot "
+        "rpm spd ω"
+    ),
+    "angle": _words("angle position pos theta th phi q winkel lage encoder enc ang weg θ φ"),
+}
+CURRENT = _words("current i iq strom amps")
+NOT_MEASURED = _words("ref reference cmd command set setpoint soll target demand desired error err limit")
+COUNTERS = _words("index sample samples n nr no count counter row id zeile")
+LONG = 5  # letters from which a word counts inside of another: motordrehmoment
+SAME_MOTION = 0.99  # correlation of an angle and an integrated rate
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The column of a quantity, None for none; ``why`` in words, ``sure`` where nobody has to be asked."""
+
+    column: Column | None
+    why: str
+    sure: bool
+
+
+def guess_roles(columns: Sequence[Column], given: dict[Quantity, Column | None]) -> dict[Quantity, Choice]:
+    """One choice a quantity. ``given`` are those that somebody named, None for "there is none"."""
+    chosen = {q: Choice(c, "as given", True) for q, c in given.items()}
+    left = [c for c in columns if c.values is not None and all(c is not g for g in given.values())]
+    for quantity in QUANTITIES:
+        if quantity in chosen:
+            continue
+        made = _time(left) if quantity == "time" else _by_words(quantity, left)
+        if made.column is not None:
+            left = [c for c in left if c is not made.column]
+        chosen[quantity] = made
+    if not {"rate", "angle"} & set(given):
+        chosen |= _by_motion(chosen, left)
+        left = [c for c in left if all(c is not one.column for one in chosen.values())]
+    elif chosen["rate"].column is None and chosen["angle"].column is None and "rate" not in given:
+        chosen["rate"] = _last_that_moves(chosen, left)
+    if chosen["torque"].column is None and "torque" not in given:
+        chosen["torque"] = _remaining_torque(left)
+    return chosen
+
+
+def _score(column: Column, quantity: Quantity) -> float:
+    """How well words and unit fit; above zero is a candidate."""
+    score = 0.0
+    unit = column.known_unit
+    fitting = {DIMENSIONS[axis][quantity] for axis in DIMENSIONS}
+    if unit is not None:
+        is_current = quantity == "torque" and unit.dimension == "current"
+        score += 2.0 if unit.dimension in fitting else 0.5 if is_current else -4.0
+    score += 2.0 if _has_word(column, WORDS[quantity]) else 0.0
+    if quantity == "torque" and _has_word(column, CURRENT):
+        score += 0.5
+    if quantity == "angle" and _has_word(column, WORDS["rate"]):
+        score -= 1.5  # angular velocity, angle rate
+    return score - (1.0 if score > 0 and set(column.words) & NOT_MEASURED else 0.0)
+
+
+def _has_word(column: Column, words: frozenset[str]) -> bool:
+    return any(w in words or any(len(k) >= LONG and k in w for k in words) for w in column.words)
+
+
+def _by_words(quantity: Quantity, left: Sequence[Column]) -> Choice:
+    scores = [(_score(c, quantity), c) for c in left]
+    best = max((s for s, _ in scores), default=0.0)
+    if best <= 0.0:
+        return Choice(None, "no name or unit says so", quantity in ("rate", "angle"))
+    several = [c for s, c in scores if s == best]
+    why = "by its name" if _has_word(several[0], WORDS[quantity]) else "by its unit"
+    if len(several) > 1:
+        others = ", ".join(repr(c.name) for c in several[1:4])
+        return Choice(several[0], f"{why}, as {others} might be, too", False)
+    return Choice(several[0], why, True)
+
+
+def _time(left: Sequence[Column]) -> Choice:
+    rising = [c for c in left if c.increases]
+    named = [c for c in left if _score(c, "time") > 0.0]
+    both = [c for c in rising if c in named]
+    if both:
+        best = max(both, key=lambda c: (_score(c, "time"), -left.index(c)))
+        return Choice(best, "its name or unit says time, and it increases", True)
+    plain = [c for c in rising if not set(c.words) & COUNTERS]
+    if len(plain) == 1 or (plain and len(plain) < len(left) and plain[0] is left[0]):
+        return Choice(plain[0], "it increases", len(plain) == 1)
+    if named:
+        return Choice(named[0], "its name or unit says time, but it does not increase throughout", False)
+    if rising:
+        return Choice(rising[0], "it increases", len(rising) == 1)
+    return Choice(None, "no column increases throughout", False)
+
+
+def _by_motion(chosen: dict[Quantity, Choice], left: Sequence[Column]) -> dict[Quantity, Choice]:
+    """Angle and rate where words alone do not part them: one column is the integral of the other."""
+    time, named = chosen["time"].column, [one for q in ("rate", "angle") if (one := chosen[q]).column is not None]
+    if any(one.sure for one in named) or len(named) == 2:
+        return {}
+    among = [c for one in named if (c := one.column)] + [c for c in left if c.moves and c.known_unit is None]
+    if named:  # several columns fit one word: those alone
+        quantity: Quantity = "rate" if chosen["rate"].column is not None else "angle"
+        among = [c for c in among if _score(c, quantity) > 0.0]
+    if time is None or time.values is None or not time.increases:
+        return {}
+    # With its sign: at a single tone either is the other's integral, up to a negative factor.
+    pairs = [(found[1], a, w) for a, w in permutations(among[:8], 2) if (found := relation(time.values, a, w))]
+    if pairs:
+        strength, angle, rate = max(pairs, key=lambda pair: pair[0])
+        if strength > SAME_MOTION:
+            return {
+                "angle": Choice(angle, f"{rate.name!r} is its derivative", bool(named)),
+                "rate": Choice(rate, f"it is the derivative of {angle.name!r}", bool(named)),
+            }
+    return {} if named else {"rate": _last_that_moves(chosen, left)}
+
+
+def _last_that_moves(chosen: dict[Quantity, Choice], left: Sequence[Column]) -> Choice:
+    moving = [c for c in left if c.moves and c.known_unit is None and c is not chosen["torque"].column]
+    return Choice(moving[-1], "it is the last column that moves", False) if moving else Choice(None, "", True)
+
+
+def relation(time_s: Array, angle: Column, rate: Column) -> tuple[float, float] | None:
+    """Factor and correlation of one column against the integral of another, both as stored."""
+    if angle.values is None or rate.values is None:
+        return None
+    good = np.isfinite(time_s) & np.isfinite(angle.values) & np.isfinite(rate.values)
+    run = Run("", time_s[good], np.ones(int(good.sum()), bool), rate.values[good], angle.values[good])
+    return angle_over_rate(run)
+
+
+def _remaining_torque(left: Sequence[Column]) -> Choice:
+    moving = [c for c in left if c.moves and c.known_unit is None and not set(c.words) & COUNTERS]
+    if len(moving) == 1:
+        return Choice(moving[0], "it is the only column left", False)
+    if not moving:
+        return Choice(None, "no column is left, so this is a free decay", True)
+    return Choice(None, "no name or unit says so", False)

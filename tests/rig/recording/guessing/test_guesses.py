@@ -1,0 +1,120 @@
+"""Names, units and numbers say which column is what; where they do not, nobody is told that they do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rig.errors import RecordingError
+from rig.recording.guessing.columns import columns_of
+from rig.recording.guessing.roles import Choice, Quantity, guess_roles
+from rig.recording.guessing.scales import Factor, axis_of, guess_factors
+from rig.recording.load import DEFAULT_NAMES
+from rig.recording.readers.base import Table
+
+T = np.arange(500) * 2e-3
+RATE = 3.0 * np.cos(9.0 * T) * np.exp(-0.5 * T) + np.sin(31.0 * T)
+ANGLE = np.concatenate([[0.0], np.cumsum(np.diff(T) * (RATE[1:] + RATE[:-1]) / 2)])
+TORQUE = np.sin(9.0 * T) + 0.2 * np.cos(70.0 * T)
+DEG, RPM = np.pi / 180, np.pi / 30
+
+
+def table(**columns: np.ndarray) -> Table:
+    named = {name.replace("__", " "): values for name, values in columns.items()}
+    return Table(Path("r.csv"), tuple(named), lambda names: {n: named[n] for n in names})
+
+
+def guessed(**columns: np.ndarray) -> tuple[dict[Quantity, Choice], dict[Quantity, Factor]]:
+    roles = guess_roles(columns_of(table(**columns)), {})
+    return roles, guess_factors(roles, axis_of(roles), {q: list(DEFAULT_NAMES[q]) for q in roles})
+
+
+def names_of(roles: dict[Quantity, Choice]) -> dict[str, str | None]:
+    return {q: choice.column.name if choice.column else None for q, choice in roles.items()}
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("t", "tau", "omega", "theta"),
+        ("Zeit", "Drehmoment", "Winkelgeschwindigkeit", "Winkel"),
+        ("Time", "MotorTorque", "AngularVelocity", "AngularPosition"),
+        ("timestamp", "torque_meas", "gyro_z", "encoder"),
+        ("elapsed", "actual torque", "angle rate", "angle"),
+        ("t", "M", "w", "phi"),
+        ("t", "Moment", "Winkelgeschw.", "Lage"),
+    ],
+)
+def test_usual_names_are_known(names: tuple[str, str, str, str]) -> None:
+    roles, _ = guessed(**dict(zip(names, (T, TORQUE, RATE, ANGLE), strict=True)))
+    assert names_of(roles) == dict(zip(("time", "torque", "rate", "angle"), names, strict=True))
+    assert all(choice.sure for choice in roles.values())
+
+
+def test_the_measured_torque_goes_before_the_commanded_one_and_a_counter_is_no_time() -> None:
+    roles, _ = guessed(index=np.arange(500.0), time=T, torque_cmd=TORQUE, torque_actual=TORQUE, speed=RATE)
+    assert names_of(roles) == {"time": "time", "torque": "torque_actual", "rate": "speed", "angle": None}
+
+
+def test_columns_without_a_telling_name_are_parted_by_what_the_numbers_do_and_are_not_sure() -> None:
+    roles, factors = guessed(a=T, b=np.degrees(ANGLE), c=TORQUE, d=RATE)
+    assert names_of(roles) == {"time": "a", "torque": "c", "rate": "d", "angle": "b"}
+    assert not roles["rate"].sure and not roles["angle"].sure and not roles["torque"].sure
+    assert factors["angle"].value == pytest.approx(DEG) and factors["rate"].value == 1.0
+
+
+def test_two_angles_by_name_are_parted_by_which_is_the_derivative() -> None:
+    roles, _ = guessed(t=T, torque=TORQUE, theta_a=RATE, theta_b=ANGLE)
+    assert names_of(roles) == {"time": "t", "torque": "torque", "rate": "theta_a", "angle": "theta_b"}
+    roles, _ = guessed(t=T, torque=TORQUE, theta_a=ANGLE, theta_b=ANGLE + 0.1)
+    assert roles["angle"].column is not None and not roles["angle"].sure
+    assert "'theta_b' might be" in roles["angle"].why
+
+
+@pytest.mark.parametrize(
+    ("of_angle", "of_rate", "sure"),
+    [(DEG, 1.0, True), (1.0, DEG, True), (DEG, RPM, True), (1.0, RPM, True), (1.0, 1.0, False), (DEG, DEG, False)],
+)
+def test_angle_and_rate_say_each_others_unit(of_angle: float, of_rate: float, sure: bool) -> None:
+    _, factors = guessed(t=T, torque=TORQUE, omega=RATE / of_rate, theta=ANGLE / of_angle)
+    assert factors["angle"].value == pytest.approx(of_angle)
+    assert factors["rate"].value == pytest.approx(of_rate)
+    assert (factors["angle"].sure, factors["rate"].sure) == (sure, sure)
+
+
+def test_a_known_unit_gives_the_other_channels_and_an_opposite_sign_is_said_and_asked() -> None:
+    _, factors = guessed(t=T, torque=TORQUE, omega=RATE / RPM, theta_deg=ANGLE / DEG)
+    assert factors["rate"] == Factor(pytest.approx(RPM), "rpm, as it agrees with the angle", True)
+    _, factors = guessed(t=T, torque=TORQUE, omega=-RATE, theta_deg=ANGLE / DEG)
+    assert factors["rate"].value == -1.0 and not factors["rate"].sure
+    assert "with the opposite sign" in factors["rate"].why
+
+
+def test_a_unit_in_the_name_is_taken_and_one_that_is_not_stated_is_asked() -> None:
+    _, factors = guessed(time_ms=1e3 * T, torque_mNm=TORQUE, speed_rpm=RATE)
+    assert [factors[q].value for q in ("time", "torque", "rate")] == [1e-3, 1e-3, pytest.approx(RPM)]
+    assert all(factor.sure for factor in factors.values())
+    _, factors = guessed(t=1e3 * T, M=TORQUE, w=np.degrees(RATE))
+    assert (factors["time"].value, factors["time"].sure) == (1e-3, False)
+    assert (factors["torque"].value, factors["torque"].sure) == (1.0, False)
+    assert factors["rate"].value == pytest.approx(DEG) and not factors["rate"].sure
+
+
+def test_what_nobody_can_guess_has_no_guess() -> None:
+    _, factors = guessed(sample=np.arange(500.0), current=TORQUE, rate_rad_s=RATE)
+    assert factors["time"].value is None and not factors["time"].sure
+    _, factors = guessed(**{"time_s": T, "current__[A]": TORQUE, "rate_rad_s": RATE})
+    assert factors["torque"].value is None and "in 'A'" in factors["torque"].why
+
+
+def test_a_linear_axis_is_known_by_its_units() -> None:
+    roles, factors = guessed(t_s=T, force_N=TORQUE, position_mm=1e3 * ANGLE)
+    assert axis_of(roles) == "linear"
+    assert factors["angle"].value == 1e-3 and factors["torque"].value == 1.0
+
+
+def test_without_two_columns_of_numbers_the_file_is_refused_with_the_reasons() -> None:
+    with pytest.raises(RecordingError, match=r"fewer than two columns of numbers.*'b' has 3 numbers"):
+        columns_of(table(a=T, b=np.where(np.arange(500) < 3, T, np.nan)))

@@ -1,0 +1,168 @@
+"""CSV as other programs write it: units, preambles, decimal commas, time stamps are read, or refused with the cure."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rig.recording.readers import read_file
+from rig.recording.readers.base import Table
+from rig.recording.readers.timestamps import Stamps
+from rig.recording.run import Run
+from tests.rig.recording.support import motion, read, refusal
+
+M = motion(120)
+T, TORQUE, RATE, ANGLE = M["time_s"], M["torque_nm"], M["rate_rad_s"], M["angle_rad"]
+
+
+def rows(*columns: np.ndarray, delimiter: str = ",") -> str:
+    return "".join(delimiter.join(repr(float(v)) for v in row) + "\n" for row in zip(*columns, strict=True))
+
+
+def quoted(text: str) -> str:
+    return "".join(",".join(f'"{field}"' for field in line.split(";")) + "\n" for line in text.splitlines())
+
+
+def comma(text: str) -> str:
+    return text.replace(".", ",")
+
+
+def as_read(folder: Path, text: str, options: str = "", file: str = "r.csv", encoding: str = "utf-8") -> Run:
+    (folder / file).write_bytes(text.encode(encoding))
+    return read(folder, file, options).runs[0]
+
+
+def agrees(run: Run) -> None:
+    np.testing.assert_allclose(run.time_s, T, atol=1e-12)
+    assert run.rate_rad_s is not None and run.torque_nm is not None
+    np.testing.assert_allclose(run.rate_rad_s, RATE, rtol=1e-12)
+    np.testing.assert_allclose(run.torque_nm, TORQUE, rtol=1e-12)
+
+
+DEGREES = rows(1e3 * T, 1e3 * TORQUE, np.degrees(RATE))
+SI = rows(T, TORQUE, RATE)
+WRITTEN = {
+    "units in brackets": "time (ms),torque [mN m],rate (deg/s)\n" + DEGREES,
+    "units behind a slash": "t/ms,torque/mNm,rate/(deg/s)\n" + DEGREES,
+    "a row of units": "time,torque,rate\nms,mN m,deg/s\n" + DEGREES,
+    "a row of units in brackets": "Time,Torque,Rate\n(ms),(mN·m),(°/s)\n\n" + DEGREES,
+    "a row of units below default names": "time_s,torque_nm,rate_deg_s\ns,N m,deg/s\n"
+    + rows(T, TORQUE, np.degrees(RATE)),
+    "a row of units without one for all": "time_s,torque_nm,rate_rad_s,note\ns,,-,\n" + rows(T, TORQUE, RATE, RATE),
+    "a row of units and a column of text": "time,torque,rate,state\nms,mN m,deg/s,\n" + DEGREES.replace("\n", ",OK\n"),
+    "a preamble": "Recorder,X1\nDate,2024-05-01\nSample rate,1000\n\ntime,torque,rate\ns,N m,rad/s\n" + SI,
+    "a preamble without units": "Project: bench 3\nOperator: Smith\n\ntime_s,torque_nm,rate_rad_s\n" + SI,
+    "a spreadsheet's separator": "sep=;\ntime_s;torque_nm;rate_rad_s\n" + SI.replace(",", ";"),
+    "decimal commas": "time_s;torque_nm;rate_rad_s\n" + comma(rows(T, TORQUE, RATE, delimiter=";")),
+    "decimal commas after whole numbers": "time_s;torque_nm;rate_rad_s\n0;0;2\n"
+    + comma(rows(T[1:], TORQUE[1:], RATE[1:], delimiter=";")),
+    "decimal commas in quotes": "time_s,torque_nm,rate_rad_s\n" + quoted(comma(rows(T, TORQUE, RATE, delimiter=";"))),
+    "decimal commas and tabs": "time_s\ttorque_nm\trate_rad_s\n" + comma(rows(T, TORQUE, RATE, delimiter="\t")),
+    "spaces in units between spaces": "time (s)   torque (N m)   rate (rad/s)\n"
+    + rows(T, TORQUE, RATE, delimiter="   "),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WRITTEN)
+def test_it_is_read_in_si_units(case: str, tmp_path: Path) -> None:
+    agrees(as_read(tmp_path, WRITTEN[case]))
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "utf-8", "utf-16"])
+def test_a_degree_sign_is_one_in_every_encoding(encoding: str, tmp_path: Path) -> None:
+    agrees(as_read(tmp_path, "time (ms),torque (mN·m),rate (°/s)\n" + DEGREES, encoding=encoding))
+
+
+def test_a_labview_file_is_read_below_its_header(tmp_path: Path) -> None:
+    head = (
+        "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\nDecimal_Separator\t.\n"
+        "***End_of_Header***\t\n\t\nChannels\t2\t\t\nSamples\t120\t120\t\nDate\t2024/05/01\t2024/05/01\t\n"
+        "X0\t0.0\t0.0\t\nDelta_X\t0.001\t0.001\t\n***End_of_Header***\t\t\t\n"
+    )
+    text = f"{head}time_s\ttorque_nm\trate_rad_s\tComment\n{rows(T, TORQUE, RATE, delimiter=chr(9))}"
+    agrees(as_read(tmp_path, text, file="run.lvm"))
+
+
+def test_a_mapped_name_is_found_without_its_unit_and_a_given_scale_stands(tmp_path: Path) -> None:
+    text = "T (ms),M (A),W (deg/s)\n" + rows(1e3 * T, TORQUE / 2.0, np.degrees(RATE))
+    agrees(as_read(tmp_path, text, "  columns: {time: T, torque: M, rate: W}\n  scale: {torque: 2.0}\n"))
+    agrees(
+        as_read(tmp_path, text, '  columns: {time: T, torque: "M (A)", rate: "W (deg/s)"}\n  scale: {torque: 2.0}\n')
+    )
+
+
+def test_a_linear_axis_has_units_of_its_own(tmp_path: Path) -> None:
+    text = "time (s),force (kN),speed (mm/s)\n" + rows(T, 1e-3 * TORQUE, 1e3 * RATE)
+    agrees(as_read(tmp_path, text, "  axis: linear\n"))
+    (tmp_path / "r.csv").write_text(text)
+    assert "'kN', a unit of force and not of torque: set recorded.axis: linear" in refusal(tmp_path, "r.csv")
+
+
+REFUSED = {
+    "time (s),torque (V),rate (rad/s)": "is in 'V', a unit of voltage and not of torque: set recorded.scale.torque",
+    "time (s),torque (N m),rate (furlong)": "is in 'furlong', a unit that is not known: set recorded.scale.rate",
+    "time_s,torque_nm,rate_rad_s (deg/s)": "has no column",
+    "time_s,torque_nm,rate_rad_s\ns,N m,deg/s": "one unit in its name and another, 'deg/s', stated with it",
+    "Head,1\nRow 2,3": "no line above names their 3 columns: add one",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("head", REFUSED)
+def test_what_cannot_be_converted_is_refused_with_the_cure(head: str, tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text(f"{head}\n{SI}")
+    assert REFUSED[head] in refusal(tmp_path, "r.csv")
+
+
+def test_decimal_commas_between_commas_and_thousands_are_refused_with_the_cure(tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text("time_s,torque_nm,rate_rad_s\n" + comma(SI))
+    assert "separate the columns by semicolons" in refusal(tmp_path, "r.csv")
+    (tmp_path / "r.csv").write_text("time_s;torque_nm;rate_rad_s\n" + "0,001;1.234,5;2,0\n" * 3)
+    assert "use one decimal sign in the whole file" in refusal(tmp_path, "r.csv")
+
+
+def test_a_factor_that_is_advised_takes_the_place_of_the_one_that_was_applied(tmp_path: Path) -> None:
+    text = "time (s),torque (N m),rate (deg/s),angle (rad)\n" + rows(T, TORQUE, -np.degrees(RATE), ANGLE)
+    (tmp_path / "r.csv").write_text(text)
+    message = refusal(tmp_path, "r.csv")
+    assert "opposite signs: set recorded.scale.rate: -0.0174533 or recorded.scale.angle: -1" in message
+    agrees(read(tmp_path, "r.csv", "  scale: {rate: -0.0174532925199433}\n").runs[0])
+    assert "recorded.scale.rate: -0.017455" in refusal(tmp_path, "r.csv", "  scale: {rate: 0.5}\n")
+
+
+@pytest.mark.parametrize(
+    "stamp",
+    [
+        "%Y-%m-%d %H:%M:%S.%f",
+        "%Y-%m-%dT%H:%M:%S.%f+02:00",
+        "%d.%m.%Y %H:%M:%S,%f",
+        "%Y/%m/%d %H:%M:%S.%f",
+        "%H:%M:%S.%f",
+    ],
+)
+def test_time_stamps_are_seconds(stamp: str, tmp_path: Path) -> None:
+    start = datetime(2024, 12, 31, 23, 59, 59, 950_000)  # passes midnight
+    stamps = [(start + timedelta(seconds=float(t))).strftime(stamp) for t in T]
+    numbers = rows(TORQUE, RATE, delimiter=";").splitlines()
+    numbers = [comma(line) for line in numbers] if ",%f" in stamp else numbers
+    lines = "".join(f"{s};{line}\n" for s, line in zip(stamps, numbers, strict=True))
+    run = as_read(tmp_path, f"time_s;torque_nm;rate_rad_s\n{lines}")
+    np.testing.assert_allclose(run.time_s - run.time_s[0], T, atol=1e-9)
+    assert run.time_s[0] == pytest.approx(86_399.95)
+
+
+def test_a_date_that_may_be_two_is_refused_with_the_cure(tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text("time_s,torque_nm,rate_rad_s\n" + "05/06/2024 12:00:00.1,1,2\n" * 3)
+    assert "write the date as 2024-12-31 or 31.12.2024" in refusal(tmp_path, "r.csv")
+    with pytest.raises(ValueError, match="yesterday"):
+        Stamps().seconds("yesterday")
+
+
+def test_the_units_below_the_names_go_with_the_table(tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text("t,M,note\n(s),[N m],-\n0,1,2\n1,2,3\n")
+    table = read_file(tmp_path / "r.csv")[0]
+    assert isinstance(table, Table)
+    assert table.units == {"t": "s", "M": "N m"}
+    np.testing.assert_array_equal(table.read(["M"])["M"], [1.0, 2.0])
