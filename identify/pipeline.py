@@ -15,7 +15,6 @@ from identify.conclude.error_figures import floor_of, in_torque, measure
 from identify.estimate.by_prediction_error import by_prediction_error
 from identify.estimate.cross_validation import Judged
 from identify.estimate.final_fit import Fitted, by_output_error, by_regression
-from identify.estimate.fit import Fit
 from identify.estimate.initial_guess import Start, first_guess
 from identify.genetic.per_set import each_set
 from identify.model.parameters import Name
@@ -148,7 +147,7 @@ class _Identifier:
                 return self._concluded(found, fits)
             self.say("a torque that was not recorded is left beside the sensor's noise")
             self.more_than_noise = True
-            return self._in_torque(shapes, (search.stepwise.best, found), search.stepwise.trusted)
+            return self._in_torque(shapes, search, found)
         except (Aborted, KeyboardInterrupt):
             if search is None:
                 raise
@@ -192,13 +191,13 @@ class _Identifier:
         return replace(found, aborted=True, accepted=False, reasons=(STOPPED,))
 
     def _in_torque(
-        self, shapes: dict[str, tuple[float, ...]], known: tuple[Fit, Search], trusted: bool
+        self, shapes: dict[str, tuple[float, ...]], search: LikelihoodSearch, found_there: Search
     ) -> Identification:  # fmt: skip
         """The way for measured data: what the model lacks is told by the torque that it leaves."""
         unit = UNITS[self.recording.axis]["torque"]
         found = search_in_torque(
-            self.traces, self.split, self.structure, shapes, self.start, self._allowed(), unit, self.say, known,
-            trusted,
+            self.traces, self.split, self.structure, shapes, self.start, self._allowed(), unit, self.say,
+            (search.stepwise.best, found_there), search.stepwise.trusted, search.stepwise.weigher.regression,
         )  # fmt: skip
         after = found.after
         gyro = all(t.channel == "rate" and t.beside is None for t in self.traces)  # an encoder has no line of its own

@@ -7,7 +7,7 @@ free-form term (a spline) beside the model takes it up, and how far J, C and K m
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +23,7 @@ KNOTS = 7  # inner knots of a spline, at even shares of the samples
 SURE = 4.0  # standard errors over blocks of held-out samples; by chance once in 30,000
 LEAST = 0.02  # of the power that is left: less is not worth a word
 SHOWN = 25  # places at which a term's shape is given
+OUTER = (0.8, 0.95)  # shares of the samples inside of which nothing is touched
 PAST_S = (0.05, 0.5)  # of the run: time constants with which a rate is remembered
 
 
@@ -48,9 +49,9 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
     """
     left = float(np.sqrt(max(fit.held_nm**2 - floor_nm**2, 0.0)))
     relative = left / max(regression.torque_nm, 1e-300)
-    found: list[tuple[Dependence, FreeForm]] = []
+    found: list[tuple[Dependence, TorqueFit]] = []
     for term in free_forms(regression):
-        richer, gains = regression.following(fit, term.columns)
+        richer, gains = regression.beside(fit, term.columns)
         by_size, by_ratio = regression.sureness(fit, richer)
         sure = max(by_size, by_ratio)
         share = 1.0 - richer.held_nm**2 / max(fit.held_nm**2, 1e-300)
@@ -61,46 +62,64 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
             Dependence(
                 term.on, size, size / regression.torque_nm, float(norm.sf(sure)), tuple(term.at.tolist()),
                 tuple((term.shape @ gains).tolist()),
-            ), term,
+            ), richer,
         ))  # fmt: skip
     found.sort(key=lambda f: -f[0].torque_rms)
-    moves = _moves(regression, fit, [t for _, t in found])
+    found = [f for i, f in enumerate(found) if f[0].on not in [g[0].on for g in found[:i]]]
+    moves = _moves(fit, [richer for _, richer in found])
     return Disturbance(left, unit, relative, tuple(d for d, _ in found), moves)
 
 
-def _moves(regression: TorqueRegression, fit: TorqueFit, terms: Sequence[FreeForm]) -> Mapping[str, float]:
+def _moves(fit: TorqueFit, richer: Sequence[TorqueFit]) -> Mapping[str, float]:
     """How far J, C and K move with the free-form term of what is left beside the model, in percent: the most of any."""
     out: dict[str, float] = {}
-    for term in terms:
-        _, gains = regression.following(fit, term.columns)
-        moved = regression.moved_by(fit, term.columns @ gains)
+    for other in richer:
         for name in TERMS:
             here = fit.values.get((name,))
             if here:
-                out[name] = max(out.get(name, 0.0), 100.0 * abs(moved.get((name,), 0.0) / here))
+                out[name] = max(out.get(name, 0.0), 100.0 * abs(other.values[(name,)] / here - 1.0))
     return out
 
 
 def free_forms(regression: TorqueRegression) -> list[FreeForm]:
     """The terms that are tried, without what the linear model has of the same quantity."""
-    angle, rate, _, torque, time, run = regression.series()
+    _, rate, _, torque, time, run = regression.series()
     slow = 0.05 * float(np.sqrt(np.mean(rate**2))) + 1e-300
-    driven = [] if regression.torque_free else [_spline("torque", torque)]
+    driven = [] if regression.torque_free else [_spline("torque", regression)]
+    ends = np.array([-1.0, 1.0])
     out = [
-        _spline("angle", angle), _spline("rate", rate), *driven,
-        FreeForm("direction", np.tanh(rate / slow)[:, None], np.array([-1.0, 1.0]), np.array([[-1.0], [1.0]])),
+        _spline("angle", regression), _beyond("angle", regression), _spline("rate", regression), *driven,
+        FreeForm(
+            "direction", regression.along("rate", lambda v: np.tanh(v / slow)[:, None]), ends, ends[:, None]
+        ),
     ]  # fmt: skip
     if float(np.max(time)) > 0.0:
-        out.append(_spline("time", time))
+        angle = regression.series()[0]
+        out += [_over_time(time), _changing(time, [angle, rate, *([] if regression.torque_free else [torque])])]
     out.append(_history(rate, run, regression))
     return [f for f in out if f.columns.shape[1] > 0 and np.all(np.isfinite(f.columns))]
 
 
-def _spline(on: str, x: Array) -> FreeForm:
+def _spline(on: str, regression: TorqueRegression) -> FreeForm:
     """Cubic splines of a quantity with what is constant and linear in it taken out."""
+    x = regression.values_of(on)
+    free, at = _free_splines(x)
+    if free is None:
+        return FreeForm(on, np.zeros((len(regression.series()[0]), 0)), np.zeros(0), np.zeros((0, 0)))
+    return FreeForm(on, regression.along(on, free), at, free(at))
+
+
+def _over_time(time: Array) -> FreeForm:
+    """The same of the time in a run."""
+    free, at = _free_splines(time)
+    return FreeForm("time", np.zeros((len(time), 0)) if free is None else free(time), at, free(at) if free else at)
+
+
+def _free_splines(x: Array) -> tuple[Callable[[Array], Array] | None, Array]:
+    """Splines with knots at even shares of the values, and places at which to show them; None of too few values."""
     inner = np.unique(np.quantile(x, np.linspace(0.0, 1.0, KNOTS + 2)))
     if len(inner) < 4:
-        return FreeForm(on, np.zeros((len(x), 0)), np.zeros(0), np.zeros((0, 0)))
+        return None, np.zeros(0)
     knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
 
     def basis(values: Array) -> Array:
@@ -111,12 +130,31 @@ def _spline(on: str, x: Array) -> FreeForm:
 
     columns = basis(x)
     line = np.linalg.lstsq(straight(x), columns, rcond=None)[0]
-    at = np.linspace(inner[0], inner[-1], SHOWN)
-    free = columns - straight(x) @ line
-    _, s, v = np.linalg.svd(free, full_matrices=False)
-    keep = s > 1e-6 * s[0]
-    shape = (basis(at) - straight(at) @ line) @ v[keep].T
-    return FreeForm(on, free @ v[keep].T, at, shape)
+    _, s, v = np.linalg.svd(columns - straight(x) @ line, full_matrices=False)
+    kept = v[s > 1e-6 * s[0]].T
+    return lambda values: (basis(values) - straight(values) @ line) @ kept, np.linspace(inner[0], inner[-1], SHOWN)
+
+
+def _beyond(on: str, regression: TorqueRegression) -> FreeForm:
+    """What begins at the ends of a quantity's range, as a stop does: straight from the outer shares of samples on."""
+    x = regression.values_of(on)
+    middle = float(np.median(x))
+    starts = [(s, float(np.quantile(s * (x - middle), share))) for s in (-1.0, 1.0) for share in OUTER]
+
+    def hinges(values: Array) -> Array:
+        return np.stack([s * np.maximum(s * (values - middle) - b, 0.0) for s, b in starts], axis=1)
+
+    at = np.linspace(float(np.min(x)), float(np.max(x)), SHOWN)
+    return FreeForm(on, regression.along(on, hinges), at, hinges(at))
+
+
+def _changing(time: Array, series: Sequence[Array]) -> FreeForm:
+    """What angle, rate and torque pass on, changing with time: a gain that warms up, a spring that sets."""
+    along = (time - np.mean(time)) / max(float(np.ptp(time)), 1e-300)
+    shape = np.stack([along, along**2 - np.mean(along**2)], axis=1)
+    return FreeForm(
+        "time", np.column_stack([shape * x[:, None] for x in series]), np.zeros(0), np.zeros((0, 2 * len(series)))
+    )  # fmt: skip
 
 
 def _history(rate: Array, run: Array, regression: TorqueRegression) -> FreeForm:

@@ -6,7 +6,7 @@ all per unit of inertia, have to explain.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -30,6 +30,8 @@ FOLDS, BLOCKS = 3, 9  # a third of the runs, or of the blocks of each run, is he
 STILL, STILL_PERIODS = 5.0, 0.5  # standard deviations of the smoothed rate, for so many periods of the cut-off
 AROUND_REVERSAL, MOST_AROUND = 0.6, 0.35  # periods of the cut-off left out either side, up to a share of samples
 
+_QUANTITIES = {"angle": 0, "rate": 1, "torque": 3}  # of a trace's fine motion
+
 
 class TorqueBand:
     """The columns of structures in torque over a set of runs, at the samples where the platform moves.
@@ -45,7 +47,7 @@ class TorqueBand:
     """
 
     def __init__(self, traces: Sequence[Trace], split: Split, cutoff_hz: float, scale: Scale) -> None:
-        self.traces, self.cutoff_hz, self.scale = list(traces), cutoff_hz, scale
+        self.traces, self.split, self.cutoff_hz, self.scale = list(traces), split, cutoff_hz, scale
         self.torque_free = all(t.torque is None for t in traces)
         self.runs = 1 + max(t.number for t in traces)
         step = max(1, int(1.0 / (SAMPLES_A_PERIOD * cutoff_hz * traces[0].step_s)))
@@ -180,6 +182,22 @@ class TorqueBand:
                 left = left - line @ np.linalg.lstsq(line, left, rcond=None)[0]
             squares.append(left**2)
         return float(np.sqrt(np.mean(np.concatenate(squares))))
+
+    def values_of(self, quantity: str) -> Array:
+        """Angle, rate or torque of all runs as they are, ahead of the low-pass, at the samples behind it, (n,)."""
+        k = _QUANTITIES[quantity]
+        return np.concatenate(
+            [np.asarray(t.fine[k])[::UPSAMPLING][r] for t, r in zip(self.traces, self._rows, strict=True)]
+        )  # fmt: skip
+
+    def along(self, quantity: str, of: Callable[[Array], Array]) -> Array:
+        """Functions of angle, rate or torque, (n, k) for (n,) values, behind the low-pass as a torque is, (m, k)."""
+        k = _QUANTITIES[quantity]
+        out = []
+        for i, t in enumerate(self.traces):
+            columns = of(np.asarray(t.fine[k])[::UPSAMPLING])
+            out.append(np.stack([self._passed(i, c) for c in columns.T], axis=1))
+        return np.concatenate(out)
 
     def series(self) -> tuple[Array, Array, Array, Array, Array, Array]:
         """Angle, rate, acceleration, torque, time and number of the run at every sample behind the low-pass."""

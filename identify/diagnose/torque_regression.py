@@ -25,6 +25,7 @@ from rig.arrays import Array
 from rig.effects.base import Place
 
 BLOCK, BLOCKS_A_RUN, FEWEST_BLOCKS = 8, 24, 8  # samples behind the low-pass in a block, and how many blocks
+RIDGE = 1e-9  # of their own size, on the gains of free-form columns: two of them may be alike
 FEWEST_FOR_LINES, LEAST_TRAVEL_RAD = 64, 0.5  # samples, and travel to show a line against the angle
 
 
@@ -76,27 +77,40 @@ class _Stacked(NamedTuple):
 class TorqueRegression(TorqueBand):
     """Fits structures in torque over a set of runs."""
 
-    def following(self, fit: TorqueFit, columns: Array) -> tuple[TorqueFit, Array]:
-        """A model whose residual is followed by further columns, and their gains; the model stays as it is."""
-        r = np.concatenate(fit.residuals)
-        used, low = self._used, np.full(columns.shape[1], -np.inf)
-
-        def gains(rows: Any) -> Array:
-            a = columns[rows]
-            return bounded(
-                a.T @ a + 1e-9 * np.eye(a.shape[1]) * float(np.mean(np.sum(a * a, axis=0))), a.T @ r[rows], low
-            )
-
-        g = gains(self._fitted)
-        held = np.concatenate(fit.held).copy()
-        for fold in self._by_run:
-            held[fold] -= (columns @ gains(used & ~fold))[fold]
-        left = r - columns @ g
-        ends = np.cumsum([len(x) for x in fit.residuals])[:-1]
+    def beside(self, fit: TorqueFit, columns: Array) -> tuple[TorqueFit, Array]:
+        """A model fitted together with further columns, and the gains of these; what it leaves on samples held out."""
+        a, y, names, extra = self._over_all_runs(fit.structure, fit.shapes)
+        wide = np.column_stack([a, columns])
+        low = np.array([self._low(n) for n in names] + [-np.inf] * (extra + columns.shape[1]))
+        ridge = np.zeros(wide.shape[1])
+        ridge[a.shape[1] :] = RIDGE * float(np.mean(np.sum(columns * columns, axis=0)))
+        x, held = self._with_folds(wide, y, low, self._folds(names, extra), ridge)
+        scale = self.torque_nm / max(rms(y - self._taken(names, x[: a.shape[1]], a)), 1e-300)
+        r, held = scale * (y - wide @ x), scale * held
+        ends = np.cumsum([len(rows) for rows in self._rows])[:-1]
         return replace(
-            fit, fitted_nm=rms(left[used]), held_nm=rms(held[self._judged]), residuals=np.split(left, ends),
+            fit, values={**fit.values, **dict(zip(names, x[: len(names)].tolist(), strict=True))},
+            fitted_nm=rms(r[self._fitted]), held_nm=rms(held[self._judged]), residuals=np.split(r, ends),
             held=np.split(held, ends),
-        ), g  # fmt: skip
+        ), x[a.shape[1] :]  # fmt: skip
+
+    def _folds(self, names: Sequence[Name], extra: int) -> list[Any]:
+        """Samples held out in turn: whole runs, unless something is fitted for every run."""
+        return self._by_block if extra or any(len(n) == 3 for n in names) else self._by_run
+
+    def _with_folds(
+        self, a: Array, y: Array, low: Array, folds: Sequence[Any], ridge: Any = 0.0
+    ) -> tuple[Array, Array]:
+        """Least squares, and the residual where every fold was left out of its own fit."""
+
+        def solved(rows: Any) -> Array:
+            return bounded(a[rows].T @ a[rows] + np.diag(np.broadcast_to(ridge, a.shape[1])), a[rows].T @ y[rows], low)
+
+        x = solved(self._fitted)
+        held = y - a @ x
+        for fold in folds:
+            held[fold] = (y - a @ solved(self._used & ~fold))[fold]
+        return x, held
 
     def left_by(self, structure: Structure, values: Mapping[Name, float]) -> float:
         """Root mean square residual at given parameters, biases fitted, N m."""
@@ -126,14 +140,6 @@ class TorqueRegression(TorqueBand):
             columns.append(both[:, :-1])
             residuals.append(both[:, -1])
         return columns, residuals, names
-
-    def moved_by(self, fit: TorqueFit, torque: Array) -> dict[Name, float]:
-        """How far the parameters move where a torque, one value a sample, is taken off what they explain."""
-        parts = [self._columns(i, fit.structure, fit.shapes) for i in range(len(self.traces))]
-        names = list(dict.fromkeys(n for _, own, _ in parts for n in own if len(n) < 3))
-        wide = np.concatenate([a[:, [own.index(n) for n in names]] for a, own, _ in parts])[self._used]
-        x = bounded(wide.T @ wide, wide.T @ torque[self._used], np.full(len(names), -np.inf))
-        return dict(zip(names, x.tolist(), strict=True))
 
     def stacked(self, structure: Structure, shapes: Shapes) -> tuple[Array, Array, list[Name]]:
         """Columns of a structure over all runs, what is free in each run behind them, target and names; as fitted."""
@@ -174,14 +180,8 @@ class TorqueRegression(TorqueBand):
         """
         a, y, names, extra = self._over_all_runs(structure, shapes)
         low = np.array([self._low(n) for n in names] + [-np.inf] * extra)
-        folds = self._by_block if extra or any(len(n) == 3 for n in names) else self._by_run
-        used = self._used
-        fitting = self._fitted
-        x = bounded(a[fitting].T @ a[fitting], a[fitting].T @ y[fitting], low)
-        held = y - a @ x
-        for fold in folds:
-            others = used & ~fold
-            held[fold] = (y - a @ bounded(a[others].T @ a[others], a[others].T @ y[others], low))[fold]
+        used, fitting = self._used, self._fitted
+        x, held = self._with_folds(a, y, low, self._folds(names, extra))
         r = y - a @ x
         # A drive that passes on little of the torque leaves little of it unexplained: what counts is the share.
         scale = self.torque_nm / max(rms(y - self._taken(names, x, a)), 1e-300)

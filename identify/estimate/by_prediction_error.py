@@ -22,7 +22,7 @@ DEAD = 1e-280  # of information: what a parameter without any influence leaves o
 
 def by_prediction_error(
     traces: Sequence[Trace], structure: Structure, start: Mapping[Name, float], use: Sequence[Any],
-    everything: Sequence[Any], free_run: bool = True,
+    everything: Sequence[Any], free_run: bool = True, like: Fit | None = None,
 ) -> tuple[Fitted, Fit]:  # fmt: skip
     """A model fitted with its disturbance, with the covariance that this likelihood gives.
 
@@ -32,10 +32,12 @@ def by_prediction_error(
         Samples that fit, and all that are looked at, one boolean array a run.
     free_run
         Whether the model is simulated over the whole of each run besides.
+    like
+        A fit to the same recording whose noise to begin from.
     """
     few, masks = thinned(traces, use, MOST_SAMPLES)
     problem = PredictionError(few, masks)
-    fit = problem.fit(structure, start, iterations=STEPS)
+    fit = problem.fit(structure, start, problem.noise_of(like) if like else None, STEPS)
     values = dict(fit.values)
     held = free_run_of(traces, structure, values, everything) if free_run else None
     determined = tuple(bool(x > DEAD) for x in np.diag(fit.information))

@@ -35,6 +35,7 @@ TRIALS = 7  # step lengths tried before a direction is given up
 DAMPING = 1e-4
 DOWN = (1e-3, 1e-6, 1e-10)  # times the disturbance: how far below a model is looked at with parameters that follow
 FOLLOWED, CLOSING = 20, 0.7  # steps in which they do, and what each of them leaves of the gap at most
+ROUGHLY = 5e-3  # of the difference to the model it is compared with, that the last step of a fit brings
 EARLY = 3  # steps after which a model that is right is near enough for it
 FAR = 2.0  # times the sensor's variance: less of a disturbance is found step by step
 FURTHER = (  # times white density, slow variance and time constant: where else a noise is looked for
@@ -120,20 +121,21 @@ class Descent:
         """Whether the model has dry friction."""
         return any(effects.get(e).place is Place.FRICTION for e in self.structure.effects)
 
-    def down(self, steps: int, thorough: bool, roughly: float = 0.0, least: float = np.inf) -> int:
+    def down(self, steps: int, thorough: bool, against: float | None = None, least: float = np.inf) -> int:
         """Steps until it has arrived; how many are left. A thorough fit then looks at other noises.
 
-        ``roughly`` is the share of the whole fall that a step has to bring to be followed by another; ``least`` is the
-        cost that it must be below once models that are right are near it.
+        ``against`` is the cost of the model that it is compared with: then it need not arrive closer than to a small
+        share of the difference. ``least`` is the cost that it must be below once models that are right are near it.
         """
-        first, looked = self.cost, False
+        looked = False
         for left in range(steps, 0, -1):
             before = self.cost
             if steps - left == EARLY:
                 self._without_disturbance()
                 if self.cost > least:
                     return left
-            if self.step() and before - self.cost > roughly * (first - self.cost):
+            enough = 0.0 if against is None else ROUGHLY * max(against - self.cost, 0.0)
+            if self.step() and before - self.cost > enough:
                 continue
             if left == 1 or not thorough or not self.other_noise(lower=not looked):
                 return left - 1

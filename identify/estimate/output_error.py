@@ -162,7 +162,7 @@ def shots_for(
         equations = Equations(platform_of(structure, names, x, trace.number, trace.run.added_inertia_kg_m2))
         substeps = min(MAX_SUBSTEPS, equations.substeps(trace.step_s))
         substeps = int(np.clip((substeps + 1) // 2, 2, COARSEST)) if coarse else substeps
-        if equations.sensor.names:
+        if equations.sensor.names and not coarse:  # a lag is exact along a parabola: two steps are enough to compare
             substeps = int(np.clip(np.ceil(trace.step_s / trace.straight_s), substeps, max(substeps, COARSEST)))
         if trace.torque is not None and trace.torque.hold == "zero_order":
             # A step that spans several held values sees only their mean: that alone is a sigma or two.

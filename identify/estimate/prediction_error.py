@@ -113,9 +113,10 @@ class PredictionError:
             float(np.clip(noise.ahead, LEAST_AHEAD * self.step_s, MOST_AHEAD * self.step_s)) if self.gyro else 0.0,
         )
 
-    def noise_of(self, fit: Fit, reading_variance: float) -> Noise:
+    def noise_of(self, fit: Fit) -> Noise:
         """The noise of a fit to the same recording, sampled otherwise, whose readings had another variance."""
-        ratio, q = reading_variance / self.reading_variance, fit.noise
+        theirs = float(np.mean([self._noises(s.trace)[0] ** 2 for s in fit.shots]))
+        ratio, q = theirs / self.reading_variance, fit.noise
         return self.within(
             replace(q, white=ratio * q.white, slow=ratio * q.slow, walk=ratio * q.walk, ahead=ratio * q.ahead)
         )  # fmt: skip
@@ -127,7 +128,7 @@ class PredictionError:
     def fit(
         self, structure: Structure, start: Mapping[Name, float], noise: Noise | None = None, iterations: int = 25,
         carry: Sequence[Shots] | None = None, fixed: Sequence[Name] = (), thorough: bool = True,
-        roughly: float = 0.0, least: float = np.inf,
+        against: float | None = None, least: float = np.inf,
     ) -> Fit:  # fmt: skip
         """Fit all parameters of a structure together with the noise.
 
@@ -143,20 +144,20 @@ class PredictionError:
             Parameters that stay at their start value.
         thorough
             Look at quite other noises, too, before it ends.
-        roughly
-            Share of the whole fall of the cost, that a step has to bring to be followed by another.
+        against
+            Cost of the model that it is compared with: a small share of the difference is as near as it has to come.
         least
             Cost that it must be below after a few steps to be followed to its end.
         """
         with np.errstate(all="ignore"):
             descent = Descent(self, structure, start, noise, carry, fixed)
-            left = descent.down(iterations, thorough, roughly, least)
+            left = descent.down(iterations, thorough, against, least)
             while (
                 left > 0 and descent.sticks and descent.cost < least
             ):  # where a run begins stuck is another place with another friction
                 values = dict(zip(descent.names, descent.x.tolist(), strict=True))
                 again = Descent(self, structure, values, descent.noise, descent.found().shots, fixed)
-                left = again.down(left, thorough, roughly, least)
+                left = again.down(left, thorough, against, least)
                 if not again.cost < descent.cost - ENOUGH:
                     break
                 descent = again

@@ -66,19 +66,6 @@ class Evidence:
         """Fall of the cost as far as it can be believed, parameters paid for."""
         return self.gain / self.inflation - self.price
 
-    def behind(self, other: Evidence) -> float:
-        """By how much another model on the same samples is likelier, as far as that can be believed; zero if it is not.
-
-        The smaller of two numbers: the fall of the penalised cost, and the square of its standard errors, read off how
-        it scatters over blocks of the record (Vuong 1989), which asks nothing of either model.
-        """
-        fall = self.fit.penalised - other.fit.penalised
-        if fall <= 0.0:
-            return 0.0
-        mine, others = block_costs(self.fit), block_costs(other.fit)
-        scatter = float(np.std(mine - others, ddof=1)) * np.sqrt(len(mine))
-        return min(fall, (fall / max(scatter, 1e-300)) ** 2)
-
 
 class Weigher:
     """Weighs models of one recording against each other.
@@ -128,6 +115,20 @@ class Weigher:
     def in_torque(self, fit: Fit) -> TorqueFit:
         """A model along the measured motion, its gains fitted there."""
         return along(self.regression, fit)
+
+
+def behind(one: Fit, other: Fit) -> float:
+    """By how much another model on the same samples is likelier, as far as that can be believed; zero if it is not.
+
+    The smaller of two numbers: the fall of the penalised cost, and the square of its standard errors, read off how it
+    scatters over blocks of the record (Vuong 1989), which asks nothing of either model.
+    """
+    fall = one.penalised - other.penalised
+    if fall <= 0.0:
+        return 0.0
+    difference = block_costs(one) - block_costs(other)
+    scatter = float(np.std(difference, ddof=1)) * np.sqrt(len(difference))
+    return min(fall, (fall / max(scatter, 1e-300)) ** 2)
 
 
 def block_costs(fit: Fit) -> Array:

@@ -21,7 +21,6 @@ from identify.model.structure import Structure
 from identify.results import Candidate, Disturbance
 from identify.runs.holdout import Split
 from identify.runs.observability import why_unseen
-from identify.runs.reduced import reduced
 from identify.select.evidence import along, in_band
 from identify.select.search_state import Search
 from identify.select.torque_search import TorqueSearch, Weighed
@@ -88,7 +87,7 @@ class TorqueErrors:
 def search_in_torque(
     traces: Sequence[Trace], split: Split, structure: Structure, shapes: dict[str, tuple[float, ...]], start: Start,
     allowed: Sequence[str], unit: str, say: Callable[[str], None], known: tuple[Fit, Search],
-    trusted: bool,
+    trusted: bool, along_few: TorqueRegression,
 ) -> Found:  # fmt: skip
     """Find what the declared model lacks, and fit both models with their disturbance.
 
@@ -108,13 +107,16 @@ def search_in_torque(
     trusted
         Whether its likelihood is right about the disturbance: then a model that it leaves little of stands, though its
         effects cannot be followed along the measured motion (a play, a hysteresis).
+    along_few
+        The samples that search looked at, in torque.
     """
-    few, parts = reduced(traces, split)
+    few, parts = along_few.traces, along_few.split
     scale = scale_of(few, start.platform, ())
     offered = [n for n in allowed if n not in structure.effects and _possible(n, traces)]
 
     def at(cutoff_hz: float) -> TorqueSearch:
-        regression = TorqueRegression(few, parts, cutoff_hz, scale)
+        same = cutoff_hz == along_few.cutoff_hz
+        regression = along_few if same else TorqueRegression(few, parts, cutoff_hz, scale)
         base = regression.solve(structure, shapes)
         floor = regression.noise_floor_nm(base.values)
         acceleration = float(np.sqrt(np.mean(regression.series()[2] ** 2)))
@@ -148,7 +150,9 @@ def search_in_torque(
     if final == structure:
         after = before
     elif by_likelihood:
-        after, _ = by_prediction_error(traces, final, by_likelihood[0].values, split.final, split.everything)
+        after, _ = by_prediction_error(
+            traces, final, by_likelihood[0].values, split.final, split.everything, like=by_likelihood[0]
+        )  # fmt: skip
     else:
         after = _final(regression, best, traces, split)
     disturbance = disturbance_of(regression, best, floor, unit)

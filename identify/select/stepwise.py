@@ -17,19 +17,24 @@ from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.propose.innovation_score import Score
 from identify.runs.measured_channels import simplicity
-from identify.select.evidence import TRUSTED, WEIGHT, Evidence, Weigher, disturbed
+from identify.select.evidence import TRUSTED, WEIGHT, Evidence, Weigher, behind, disturbed
 from identify.select.trial_fits import FEW, HOPE, MANY, TrialFits
 from rig import effects
 from rig.platform import TERMS
 
 # What decides a name. All in units of the cost (minus twice the log-likelihood) or as shares.
 APART = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
+AS_HEAVY = 0.05  # of the disturbance: what a richer effect carries besides, to be preferred where nothing else is sure
 SPECIAL = 0.8  # of the support of a richer effect, with which its special case is preferred
 AT_NOISE = 1.1  # times the sensor's variance: a model that predicts as closely leaves no disturbance
 MOST = 6  # effects that one recording is believed to show
 # What only costs time.
 CERTAIN = 30.0  # standard errors beyond which nobody asks whether a term is needed
-FAR_BEHIND = 0.2  # of what an effect explains: another that leaves more than that is no rival
+PROMISING = 0.1  # of the score of what was added: another with less was no rival then and is not asked again
+FAR_BEHIND = 0.1  # of what an effect explains: another that leaves more than that is no rival
+
+
+_Key = tuple[frozenset[str], frozenset[str]]
 
 
 @dataclass(frozen=True)
@@ -73,7 +78,8 @@ class Stepwise:
     dropped: list[tuple[str, str]] = field(default_factory=list)
     best: Fit = None  # type: ignore[assignment]
     inflation: dict[str, float] = field(default_factory=dict)  # of every effect that was added, beside all others
-    _on_all: dict[tuple[frozenset[str], frozenset[str]], Fit] = field(default_factory=dict)
+    _on_all: dict[_Key, Fit] = field(default_factory=dict)
+    _lacking: dict[_Key, Fit] = field(default_factory=dict)  # fits with one effect less than one that was tried
     _needed: dict[str, float] = field(default_factory=dict)  # support of an effect beside all others
 
     def __post_init__(self) -> None:
@@ -115,16 +121,13 @@ class Stepwise:
             return None
         best = max(good.values(), key=lambda e: e.support)
         for e in good.values():
-            if best.behind(e) > APART:
+            if behind(best.fit, e.fit) > APART:
                 best = e
-        special = [
-            n for n in effects.get(best.effect).nests
-            if n in good and good[n].support > SPECIAL * best.support
-        ]  # fmt: skip
+        special = [n for n in effects.get(best.effect).nests if n in good and prefers_special(good[n], best)]
         if special:
             best = max((good[n] for n in special), key=lambda e: e.support)
-        alike = [n for n, e in good.items() if e is best or e.behind(best) < APART]
-        chosen = min(alike, key=lambda n: (*plainness(n, good[n].fit), -good[n].support))
+        alike = [n for n, e in good.items() if e is best or behind(e.fit, best.fit) < APART]
+        chosen = self.plainest({n: good[n].fit for n in alike})
         lower = [n for n in effects.get(chosen).lower_order if n in good]
         return lower[0] if lower else chosen
 
@@ -154,25 +157,44 @@ class Stepwise:
         """A model without an effect, and with others in its place; from the round that added it, if that stands."""
         without = now.structure.minus(name)
         for r in reversed(self.rounds):
-            if r.chosen == name and _same(r.now.structure, without):
+            if r.chosen == name and _key(r.now.structure) == _key(without):
                 return r.now, {n: e.fit for n, e in r.tried.items() if n != name}
-        bare = {k: v for k, v in now.values.items() if k[0] != name}
-        rest = self.problem.fit(without, bare, now.noise, MANY, carry=now.shots, thorough=False)
-        return rest, self.trials.instead(now, rest, name)
+        rest = self._lacking.get(_key(without))
+        if rest is None:
+            bare = {k: v for k, v in now.values.items() if k[0] != name}
+            rest = self.problem.fit(without, bare, now.noise, MANY, carry=now.shots, thorough=False)
+        return rest, self.trials.instead(now, rest, name, self._promising())
+
+    def _promising(self) -> set[str]:
+        """Effects whose score was not far behind what was added, in any round."""
+        out: set[str] = set()
+        for r in self.rounds:
+            own = next((s.gain for s in r.scores if s.effect == r.chosen), 0.0)
+            out |= {s.effect for s in r.scores if s.gain > PROMISING * own} | set(r.tried)
+        return out
 
     def _best_of(self, name: str, seen: Mapping[str, Evidence]) -> tuple[str, list[str]]:
         """Of an effect and others in its place, the one that is named, and all that are as likely."""
         best = seen[name]
         for other in seen.values():
-            if other.weight > WEIGHT and best.behind(other) > APART:
+            special = best.effect in effects.get(other.effect).nests and prefers_special(best, other)
+            if other.weight > WEIGHT and behind(best.fit, other.fit) > APART and not special:
                 best = other
-        alike = [n for n, e in seen.items() if e is best or (e.behind(best) < APART and e.weight > WEIGHT)]
+        alike = [n for n, e in seen.items() if e is best or (behind(e.fit, best.fit) < APART and e.weight > WEIGHT)]
         more = max(1.0, self.samples / max(best.fit.count, 1))
         close = [n for n in alike if not self._cannot_gain(seen, n, alike, more)]
         if len(close) > 1 and self.whole is not None:
-            decisive = max(seen[n].inflation for n in close)
-            return decided({n: self.on_all(seen[n].fit) for n in close}, decisive)
-        return min(alike, key=lambda n: (*plainness(n, seen[n].fit), -seen[n].support)), alike
+            fits = {n: self.on_all(seen[n].fit) for n in close}
+            likeliest = min(fits.values(), key=lambda f: f.penalised)
+            alike = [n for n, f in fits.items() if behind(f, likeliest) < APART]
+        return self.plainest({n: seen[n].fit for n in alike}), alike
+
+    def plainest(self, fits: Mapping[str, Fit]) -> str:
+        """Of candidates that do as well: no channel, fewest parameters, least torque left on held-out samples."""
+        return min(
+            fits,
+            key=lambda n: (simplicity(n), len(fits[n].names), self.weigher.left(self.weigher.in_torque(fits[n])), n),
+        )  # fmt: skip
 
     @staticmethod
     def _cannot_gain(seen: Mapping[str, Evidence], rich: str, close: Sequence[str], more: float) -> bool:
@@ -185,9 +207,9 @@ class Stepwise:
     def on_all(self, fit: Fit) -> Fit:
         """The same model on all samples."""
         assert self.whole is not None
-        key = (frozenset(fit.structure.terms), frozenset(fit.structure.effects))
+        key = _key(fit.structure)
         if key not in self._on_all:
-            noise = self.whole.noise_of(fit, self.problem.reading_variance)
+            noise = self.whole.noise_of(fit)
             self._on_all[key] = self.whole.fit(fit.structure, fit.values, noise, FEW, thorough=False)
         return self._on_all[key]
 
@@ -205,6 +227,7 @@ class Stepwise:
             without = self.problem.fit(
                 now.structure.minus(name), start, now.noise, FEW, carry=now.shots, thorough=False
             )
+            self._lacking[_key(without.structure)] = without
             evidence = self.weigher.evidence(name, without, now)
             soaks = name == "stiffness" and self._may_soak(now)
             light = evidence.weight < WEIGHT and (name not in TERMS or soaks)
@@ -243,18 +266,15 @@ class Stepwise:
         return self._needed.get(name, 0.0) < CERTAIN**2
 
 
-def _same(one: Structure, other: Structure) -> bool:
-    """Whether two structures have the same terms and effects, in any order."""
-    return set(one.terms) == set(other.terms) and set(one.effects) == set(other.effects)
+def prefers_special(special: Evidence, rich: Evidence) -> bool:
+    """Whether a special case is taken before the richer effect that holds it.
+
+    It is if it has most of its support; and where the likelihood cannot be trusted, if it carries as much torque.
+    """
+    as_heavy = rich.inflation >= TRUSTED and special.weight > rich.weight - AS_HEAVY
+    return special.support > SPECIAL * rich.support or as_heavy
 
 
-def decided(fits: Mapping[str, Fit], inflation: float = 1.0) -> tuple[str, list[str]]:
-    """The simplest of the likeliest, and all that are as likely."""
-    best = min(f.penalised for f in fits.values())
-    alike = [n for n in fits if fits[n].penalised - best < APART * inflation]
-    return min(alike, key=lambda n: (*plainness(n, fits[n]), fits[n].penalised)), alike
-
-
-def plainness(name: str, fit: Fit) -> tuple[int, int]:
-    """What goes first among candidates that do as well: no channel, fewer parameters in all."""
-    return simplicity(name), len(fit.names)
+def _key(structure: Structure) -> _Key:
+    """A structure, whatever the order of its terms and effects."""
+    return frozenset(structure.terms), frozenset(structure.effects)

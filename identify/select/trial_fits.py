@@ -5,7 +5,7 @@ Which of them are fitted only costs time; what is believed of them is decided el
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,7 +32,6 @@ FEW, MANY = 14, 25  # steps of a fit that is compared, and of one that is kept
 NEAR = 0.9  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
 BEHIND = 0.3  # of the best fall of the cost so far: what has less after a few steps is not followed
 COMPARABLE = 0.3  # of the score of an effect, that another has in its place: with less it is no rival
-ROUGHLY = 5e-3  # of the fall of the cost: what a step of a fit that is compared has to bring to be followed by another
 OTHER_START = 1.5  # times the power in torque that a look leaves: a fit that leaves more is begun from there, too
 
 
@@ -151,7 +150,7 @@ class TrialFits:
                     begin = {**rest, **start.start}
                     fits.append(
                         self.problem.fit(
-                            structure.plus(name), begin, None, FEW, thorough=False, roughly=ROUGHLY, least=least
+                            structure.plus(name), begin, None, FEW, thorough=False, against=now.cost, least=least
                         )
                     )
                 continue
@@ -161,7 +160,7 @@ class TrialFits:
             fits.append(
                 self.problem.fit(
                     structure.plus(name), {**rest, **own}, now.noise, FEW, carry=now.shots, thorough=False,
-                    roughly=ROUGHLY, least=least,
+                    against=now.cost, least=least,
                 )
             )  # fmt: skip
         best = min(fits, key=lambda f: f.cost)
@@ -185,9 +184,10 @@ class TrialFits:
         more = self.problem.fit(fit.structure, fit.values, fit.noise, MANY, carry=fit.shots)
         return more if more.cost < fit.cost else fit
 
-    def instead(self, now: Fit, rest: Fit, name: str) -> dict[str, Fit]:
-        """Fits with another effect in the place of one."""
-        looks = InnovationScores(self.problem, rest, self.scale(rest)).all(self.names(rest))
+    def instead(self, now: Fit, rest: Fit, name: str, among: Collection[str]) -> dict[str, Fit]:
+        """Fits with another effect, of ``among``, in the place of one."""
+        names = [n for n in self.names(rest) if n in among or n == name]
+        looks = InnovationScores(self.problem, rest, self.scale(rest)).all(names)
         fits: dict[str, Fit] = {}
         rest_values = {n: v for n, v in now.values.items() if n[0] != name}
         for other in effects.get(name).nests:  # from where the richer one stands: alone its score may point anywhere
@@ -197,14 +197,15 @@ class TrialFits:
             structure = replace(now.structure, effects=tuple(other if e == name else e for e in now.structure.effects))
             own: dict[Name, float] = {(other, p.name): _gain(now, name) for p in parameters}
             fits[other] = self.problem.fit(
-                structure, {**rest_values, **own}, now.noise, FEW, carry=now.shots, thorough=False, roughly=ROUGHLY
+                structure, {**rest_values, **own}, now.noise, FEW, carry=now.shots, thorough=False, against=rest.cost
             )
         own_score = next((v[0].gain for v in looks if v[0].effect == name), 0.0)
         for group in self.shortlist(rest, looks):
             other = group[0].effect
             if other == name or group[0].gain < COMPARABLE * own_score:
                 continue
-            found = self.fitted(rest, other, [group[0].start])
+            least = rest.cost - BEHIND * (rest.cost - now.cost)
+            found = self.fitted(rest, other, [group[0].start], least)
             if found is not None and (other not in fits or found.cost < fits[other].cost):
                 fits[other] = found
         return {n: f for n, f in fits.items() if np.isfinite(f.cost)}
