@@ -26,6 +26,7 @@ from rig.dynamics.equations import MAX_SUBSTEPS
 from rig.platform import Platform
 from rig.recording.run import Array
 
+LAGGING = 4  # fine steps a sample, behind a lag of the sensor, while models are compared
 COARSEST = 16  # fine steps a sample while models are compared
 ROBUST_FROM = 12  # shots: fewer show no outlier
 OUTLIER = 4.0  # times the median error of a shot
@@ -162,8 +163,9 @@ def shots_for(
         equations = Equations(platform_of(structure, names, x, trace.number, trace.run.added_inertia_kg_m2))
         substeps = min(MAX_SUBSTEPS, equations.substeps(trace.step_s))
         substeps = int(np.clip((substeps + 1) // 2, 2, COARSEST)) if coarse else substeps
-        if equations.sensor.names and not coarse:  # a lag is exact along a parabola: two steps are enough to compare
-            substeps = int(np.clip(np.ceil(trace.step_s / trace.straight_s), substeps, max(substeps, COARSEST)))
+        if equations.sensor.names:  # a lag is exact along a parabola
+            most = LAGGING if coarse else COARSEST
+            substeps = int(np.clip(np.ceil(trace.step_s / trace.straight_s), substeps, max(substeps, most)))
         if trace.torque is not None and trace.torque.hold == "zero_order":
             # A step that spans several held values sees only their mean: that alone is a sigma or two.
             held = trace.step_s / trace.torque.shortest_s
