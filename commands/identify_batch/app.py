@@ -116,6 +116,7 @@ def _run(options: Options, terminal: Terminal, stops: StopRequests) -> int:
         more = ", ..." if len(others) > MOST_OTHERS_NAMED else ""
         terminal.show(f"{len(others)} match(es) are no recorded campaign and are left out: {named}{more}")
     with RowJournal(journal_path(options.out)) as journal:
+        terminal.note(f"reading {len(paths)} recorded campaign(s)")
         jobs = _jobs(options, paths)
         missing = [job for job in jobs if not _stands(journal.rows.get(job.path), job, options.retry_failed)]
         if len(missing) < len(jobs):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 import json
@@ -194,12 +195,18 @@ def _texts_of(job: Job) -> list[str]:
 
 
 def _in_a_process_of_its_own(job: Job) -> Row:
-    done = subprocess.run(
-        [sys.executable, "-m", ALONE], input=json.dumps(dataclasses.asdict(job)), capture_output=True, text=True,
-        encoding="utf-8", check=False,
-    )  # fmt: skip
+    """Its stdin stays open while this worker lives: with the worker it ends too."""
+    with subprocess.Popen(
+        [sys.executable, "-m", ALONE], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        text=True, encoding="utf-8", errors="replace",
+    ) as process:  # fmt: skip
+        assert process.stdin is not None and process.stdout is not None
+        with contextlib.suppress(BrokenPipeError):  # it has ended already, which its output says
+            process.stdin.write(json.dumps(dataclasses.asdict(job)) + "\n")
+            process.stdin.flush()
+        said = process.stdout.read()
     try:
-        row: Row = json.loads(done.stdout.splitlines()[-1])
+        row: Row = json.loads(said.splitlines()[-1])
     except (IndexError, ValueError):
-        raise ProcessEnded(f"ended with {done.returncode}: {done.stderr[-500:]}") from None
+        raise ProcessEnded(f"its process ended with {process.returncode}: {said[-500:]}".rstrip(": ")) from None
     return row

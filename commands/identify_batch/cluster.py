@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import signal
 import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 INSTALL = "pip install 'isp-rig[batch]'"
 CONNECT_S = 10.0  # until a scheduler that does not answer is given up
 START_S = 120.0  # in which a local worker comes back after a kill, on a busy machine
-ASK_S = 10.0  # for what is asked of all workers at once
 # One thread each: small matrices gain nothing from a second, and the processes fill the cores.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 SET_UP = "commands.identify_batch.worker_process"
@@ -122,8 +122,39 @@ def local_workers(count: int, say: Callable[[str], None]) -> Iterator[DaskPool]:
             "silence_logs": logging.CRITICAL, "memory_limit": 0, "security": Security.temporary(),
             "host": "127.0.0.1", "env": ONE_THREAD, "preload": [SET_UP],
         }  # fmt: skip
-        with LocalCluster(**options) as cluster, Client(cluster, set_as_default=False) as client:
+        with (
+            _loop_without_signals() as loop,
+            LocalCluster(loop=loop, **options) as cluster,
+            Client(cluster, set_as_default=False) as client,
+        ):
             yield DaskPool(client, "this machine", count, say)
+
+
+@contextlib.contextmanager
+def _loop_without_signals() -> Iterator[Any]:
+    """A loop in a thread that blocks Ctrl-C; processes that it starts inherit that, so that it ends the client alone.
+
+    On Windows the workers ignore it themselves, from a moment after they have been started.
+    """
+    from distributed.utils import LoopRunner
+
+    runner = LoopRunner(asynchronous=False)
+    blocked = [getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name)]
+    has_masks = hasattr(signal, "pthread_sigmask")
+    if has_masks:
+        from multiprocessing import resource_tracker
+
+        resource_tracker.ensure_running()  # when it is started it unblocks Ctrl-C in the thread that starts it
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, blocked) if has_masks else None
+    try:
+        runner.start()
+    finally:
+        if before is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    try:
+        yield runner.loop
+    finally:
+        runner.stop()
 
 
 @contextlib.contextmanager
@@ -134,7 +165,8 @@ def scheduler_workers(address: str, say: Callable[[str], None]) -> Iterator[Dask
     """
     from distributed import Client
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in [n for n in logging.root.manager.loggerDict if n.partition(".")[0] == "distributed"]:
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters of it is said in words of our own
     try:
         client = Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError, TypeError) as error:

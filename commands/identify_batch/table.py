@@ -42,7 +42,16 @@ def _value(value: Any, kind: str) -> Any:
         return None
     if kind == TIME:
         return moment(value)
+    if kind == TEXT:
+        return _as_utf8(value)
+    if kind == TEXTS:
+        return [_as_utf8(one) for one in value]
     return float(value) if kind == NUMBER else value
+
+
+def _as_utf8(text: str) -> str:
+    """Bytes of a file's name that are no UTF-8 as ``\\udcff``: Parquet takes no others."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def moment(text: str) -> datetime | None:

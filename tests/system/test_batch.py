@@ -53,7 +53,11 @@ def batch(pattern: str, table: Path, *options: str) -> subprocess.CompletedProce
 @contextmanager
 def begun(pattern: str, table: Path, *options: str) -> Iterator[subprocess.Popen[str]]:
     client = subprocess.Popen(
-        arguments(pattern, table, *options), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        arguments(pattern, table, *options),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
     )
     try:
         yield client
@@ -144,17 +148,23 @@ def test_a_client_that_is_killed_loses_no_finished_campaign_and_leaves_no_worker
 
 @pytest.mark.slow
 @posix
-def test_ctrl_c_ends_with_130_keeps_what_is_done_and_says_how_to_go_on(campaigns: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("when", ["starting", "identifying"])
+def test_ctrl_c_ends_with_130_keeps_what_is_done_and_says_how_to_go_on(
+    when: str, campaigns: Path, tmp_path: Path
+) -> None:
+    """As a terminal does it: the signal goes to the workers too."""
     table = tmp_path / "t.parquet"
     with begun(f"{campaigns}/*", table, "--workers", "2") as client:
-        wait_for(lambda: len(journaled(table)) > 0)
-        client.send_signal(signal.SIGINT)
+        wait_for(lambda: bool(workers_of(client)) if when == "starting" else len(journaled(table)) > 0)
+        workers = workers_of(client)
+        os.killpg(client.pid, signal.SIGINT)
         out, err = client.communicate(timeout=FAR_S)
     assert client.returncode == 130, err
     assert out == ""
     assert f"of {COUNT} rows are kept in {table}.journal: the same command goes on there" in err
     assert "Stopped by Ctrl-C" in err
     assert "Traceback" not in err
+    assert not psutil.wait_procs(workers, timeout=FAR_S)[1]
 
 
 @contextmanager

@@ -147,7 +147,7 @@ def test_a_campaign_that_ends_its_process_is_not_taken_for_a_result(played: Path
     (tmp_path / "own.py").write_text("import os\nos._exit(3)\n", encoding="utf-8")
     config = tmp_path / "rig.yaml"
     config.write_text("model: {effects_from: own.py}\n" + RECORDED.format(file=played), encoding="utf-8")
-    with pytest.raises(ProcessEnded, match="ended with 3"):
+    with pytest.raises(ProcessEnded, match="its process ended with 3"):
         identify_campaign(job(config))
 
 

@@ -51,3 +51,9 @@ def test_a_table_that_cannot_be_written_leaves_the_old_one(tmp_path: Path, monke
         write_table(tmp_path / "t.parquet", ROWS[:1])
     assert [p.name for p in tmp_path.iterdir()] == ["t.parquet"]
     assert (tmp_path / "t.parquet").read_bytes() == before
+
+
+def test_a_name_of_a_file_that_is_no_text_is_shown_by_its_bytes(tmp_path: Path) -> None:
+    write_table(tmp_path / "t.parquet", [ROWS[0] | {"path": "a\udcff", "effects": ["b\udcfe"]}])
+    (row,) = pq.read_table(tmp_path / "t.parquet").to_pylist()
+    assert (row["path"], row["effects"]) == (r"a\udcff", [r"b\udcfe"])
