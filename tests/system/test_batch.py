@@ -21,6 +21,7 @@ from tests.commands.identify_batch.campaigns import play
 COMMAND = str(Path(sys.executable).parent / "identify-batch")
 COUNT = 4
 FAR_S = 120.0  # on a busy machine
+BUSY_AGAIN_S = 1.0  # after a row a worker has its next campaign, which takes longer than this
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
 
 
@@ -99,6 +100,7 @@ def test_a_worker_that_is_killed_in_the_middle_changes_nothing(
     table = tmp_path / "t.parquet"
     with begun(f"{campaigns}/*", table, "--workers", "2") as client:
         wait_for(lambda: len(journaled(table)) > 0)
+        time.sleep(BUSY_AGAIN_S)
         workers_of(client)[0].send_signal(signal.SIGKILL)
         _, err = client.communicate(timeout=600)
     assert client.returncode == 0, err
@@ -114,6 +116,7 @@ def test_a_campaign_whose_worker_is_killed_too_often_is_a_failed_row_and_the_oth
     table = tmp_path / "t.parquet"
     with begun(f"{campaigns}/*", table, "--workers", "2", "--attempts", "1") as client:
         wait_for(lambda: len(journaled(table)) > 0)
+        time.sleep(BUSY_AGAIN_S)
         workers_of(client)[0].send_signal(signal.SIGKILL)
         _, err = client.communicate(timeout=600)
     assert client.returncode == 1, err
