@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from pydantic import ValidationError
@@ -92,19 +92,59 @@ def check_config(data: Mapping[str, Any], source: str) -> Config:
     return _validate(document, source, lambda data: ())
 
 
-def _include_files(document: Document, folder: Path, included: dict[str, str]) -> None:
+def config_as_recorded(
+    text: str, path: Path, recorded_overrides: Sequence[str], included: Mapping[str, str], overrides: Sequence[str] = ()
+) -> Config:
+    """The configuration that a recording quotes, with its own ``--set`` texts and then those of today applied.
+
+    ``path`` is where the file was, ``included`` the text of the files that it named. Nothing is read from disk and no
+    code is run: a recording may come from anywhere.
+
+    Raises ConfigError with a line a fault, also where the configuration names effects of the user's own.
+    """
+    document = parse(text, str(path))
+    if not isinstance(document.data, dict):
+        raise ConfigError(f"{path}:1: has to be a mapping of keys, not {shown(document.data)}")
+
+    def kept(file: Path) -> str:
+        named = [t for key, t in included.items() if PureWindowsPath(key).name == file.name]
+        if str(file) not in included and len(named) != 1:
+            raise ConfigError(f"{file}: its text is not in the recording: give the values themselves")
+        return included.get(str(file), named[0] if named else "")
+
+    _include_files(document, path.parent, {}, kept)
+    for override in (*recorded_overrides, *overrides):
+        apply_override(document, override)
+        _include_files(document, path.parent, {}, kept)
+    for key in MODELS:
+        section: Any = document.data
+        for part in key:
+            section = section.get(part) if isinstance(section, dict) else None
+        if isinstance(section, dict) and section.get("effects_from"):
+            raise ConfigError(
+                f"{path}: {dotted((*key, 'effects_from'))} names code, and code that a recording names is not run: "
+                "review it, then identify from a rig.yaml that names both (backend: recorded)"
+            )
+    return _validate(document, name_from_stem(PureWindowsPath(path).stem), lambda data: ())
+
+
+def _include_files(
+    document: Document, folder: Path, included: dict[str, str], read: Callable[[Path], str] = read_text
+) -> None:
     for key in INCLUDES:
         parent: Any = document.data
         for part in key[:-1]:
             parent = parent.get(part) if isinstance(parent, dict) else None
         if isinstance(parent, dict) and isinstance(parent.get(key[-1]), str):
-            parent[key[-1]] = _included(document, key, folder / parent[key[-1]], included)
+            parent[key[-1]] = _included(document, key, folder / parent[key[-1]], included, read)
 
 
-def _included(document: Document, key: KeyPath, path: Path, included: dict[str, str]) -> Any:
+def _included(
+    document: Document, key: KeyPath, path: Path, included: dict[str, str], read: Callable[[Path], str]
+) -> Any:
     """The mapping in a file that stands for a section, with its places and faults added to ``document``."""
     try:
-        included[str(path)] = read_text(path)
+        included[str(path)] = read(path)
         model = parse(included[str(path)], str(path))
     except ConfigError as error:
         document.faults.append(Fault(place_of(document, key), key, f"names {_A_FILE[key[-1]]}: {error}"))

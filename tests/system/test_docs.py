@@ -75,7 +75,8 @@ def links() -> list[tuple[Path, str]]:
 
 
 PROGRAM = re.compile(
-    r"(?:(?:^|bin/)(identify-run(?=\s|$)|rig [a-z]+\b)|\bpython3? (-m benchmarks[\w.]+\w|benchmarks/[\w/]+\.py))(.*)"
+    r"(?:(?:^|bin/)(identify-(?:run|batch)(?=\s|$)|rig [a-z]+\b)"
+    r"|\bpython3? (-m benchmarks[\w.]+\w|benchmarks/[\w/]+\.py))(.*)"
 )
 
 
@@ -201,7 +202,7 @@ def test_every_command_answers_help_and_has_its_documented_options() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("command", ["python -m benchmarks.peers", "identify-run"])
+@pytest.mark.parametrize("command", ["python -m benchmarks.peers", "identify-run", "identify-batch"])
 def test_a_command_starts_in_a_process_of_its_own(command: str) -> None:
     program, *rest = as_started(command)
     module, _, function = program.partition(":")
@@ -214,9 +215,9 @@ def test_a_command_starts_in_a_process_of_its_own(command: str) -> None:
     assert "usage" in done.stdout.lower()
 
 
-def test_both_programs_and_the_benchmarks_are_documented_and_benchmarks_as_modules() -> None:
+def test_all_programs_and_the_benchmarks_are_documented_and_benchmarks_as_modules() -> None:
     commands = documented_commands()
-    assert {"identify-run", "rig check", "rig play"} <= set(commands)
+    assert {"identify-run", "identify-batch", "rig check", "rig play"} <= set(commands)
     assert any(command.startswith("python -m benchmarks.") for command in commands)
     assert not any(command.startswith("python benchmarks/") for command in commands)
     own = [name_of(p) for p in (ROOT / "benchmarks").rglob("*.py") if "python benchmarks/" in text_of(p)]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from rig.config.load import LoadedConfig, load_config
+from rig.config.load import LoadedConfig, config_as_recorded, load_config
 from rig.config.model import ModelConfig, model_yaml
 from rig.errors import ConfigError
 from rig.platform import Platform
@@ -203,3 +203,31 @@ def test_the_example_for_a_recording_of_ones_own_is_a_good_config() -> None:
     loaded = load_config(Path(__file__).parents[3] / "examples" / "recorded.yaml")
     assert loaded.config.recorded is not None
     assert loaded.config.recorded.runs[0].file == "my_recording.csv"
+
+
+def test_a_configuration_that_a_recording_quotes_is_read_without_the_disk(tmp_path: Path) -> None:
+    (tmp_path / "arm.yaml").write_text("model: {damping_nm_s_rad: 0.3}\n", encoding="utf-8")
+    loaded = load(tmp_path, "model: arm.yaml\n" + SMALLEST, "identify.seed=7")
+    (tmp_path / "arm.yaml").unlink()
+    quoted = config_as_recorded(loaded.text, loaded.path, loaded.overrides, loaded.included)
+    assert quoted == loaded.config
+    assert quoted.model.declared_numbers == {"damping": 0.3}
+    newer = config_as_recorded(loaded.text, loaded.path, loaded.overrides, loaded.included, ["identify.seed=8"])
+    assert newer.identify.seed == 8
+
+
+def test_a_recording_from_another_system_finds_the_model_that_it_quotes() -> None:
+    text, included = "model: arm.yaml\n" + SMALLEST, {"D:\\rigs\\arm.yaml": "model: {damping_nm_s_rad: 0.3}\n"}
+    config = config_as_recorded(text, Path("D:\\rigs\\bench.yaml"), (), included)
+    assert (config.model.damping_nm_s_rad, config.name) == (0.3, "bench")
+    with pytest.raises(ConfigError, match="its text is not in the recording"):
+        config_as_recorded(text, Path("rig.yaml"), (), {})
+
+
+def test_code_that_a_quoted_configuration_names_is_not_run(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text("raise SystemExit\n", encoding="utf-8")
+    for section in ("model", "simulated: {platform"):
+        closed = "}" * section.count("{")
+        text = f"{section}: {{effects_from: {tmp_path / 'own.py'}}}{closed}\n" + SMALLEST
+        with pytest.raises(ConfigError, match="code that a recording names is not run"):
+            config_as_recorded(text, tmp_path / "rig.yaml", (), {})
