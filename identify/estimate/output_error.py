@@ -152,6 +152,12 @@ def held_still(names: Sequence[Name], traces: Sequence[Trace], use: Sequence[Any
     return np.array([name in fixed or (len(name) == 3 and name[2] not in seen) for name in names])
 
 
+def _behind_a_lag(step_s: float, equations: Equations) -> int:
+    """Fine steps a sample that a lag of the sensor needs at most; it is exact along a parabola."""
+    times = [t for values in equations.sensor.values for t in values if t > 0.0]
+    return int(np.clip(np.ceil(2.0 * step_s / min(times)), LAGGING, COARSEST)) if times else LAGGING
+
+
 def shots_for(
     traces: Sequence[Trace], structure: Structure, names: Sequence[Name], x: Array,
     shot_s: float | None, use: Sequence[Any] | None, carry: Sequence[Shots] | None, coarse: bool, finer: int = 1,
@@ -164,7 +170,7 @@ def shots_for(
         substeps = min(MAX_SUBSTEPS, equations.substeps(trace.step_s))
         substeps = int(np.clip((substeps + 1) // 2, 2, COARSEST)) if coarse else substeps
         if equations.sensor.names:  # a lag is exact along a parabola
-            most = LAGGING if coarse else COARSEST
+            most = _behind_a_lag(trace.step_s, equations) if coarse else COARSEST
             substeps = int(np.clip(np.ceil(trace.step_s / trace.straight_s), substeps, max(substeps, most)))
         if trace.torque is not None and trace.torque.hold == "zero_order":
             # A step that spans several held values sees only their mean: that alone is a sigma or two.

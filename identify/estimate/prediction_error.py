@@ -200,7 +200,12 @@ class PredictionError:
         with self._slopes_lock:
             found = self._slopes.get(key)
             if found is None:
-                found = equations.jck + np.array([0.0, *mean_slopes(equations, self.traces)])
+                inertia, damping, stiffness = equations.jck.tolist()
+                damps, pulls = mean_slopes(equations, self.traces)
+                # Gains of a linear part that runs away are none; an effect that drives it does so for a while only.
+                found = np.array(
+                    [inertia, damping + max(damps, 0.0), max(stiffness + pulls, min(stiffness, 0.0))]
+                )  # fmt: skip
                 if len(self._slopes) > KEPT_SLOPES:
                     self._slopes.clear()
                 self._slopes[key] = found
