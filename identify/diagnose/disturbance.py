@@ -15,6 +15,7 @@ from scipy.interpolate import BSpline
 from scipy.stats import norm
 
 from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
+from identify.model.parameters import Name
 from identify.results import Dependence, Disturbance
 from rig.arrays import Array
 from rig.platform import TERMS
@@ -49,9 +50,11 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
     """
     left = float(np.sqrt(max(fit.held_nm**2 - floor_nm**2, 0.0)))
     relative = left / max(regression.torque_nm, 1e-300)
-    found: list[tuple[Dependence, TorqueFit]] = []
+    found: list[tuple[Dependence, Mapping[Name, float]]] = []
     for term in free_forms(regression):
-        richer, gains = regression.beside(fit, term.columns)
+        # What is explained is a torque: with the parameters free, a function of it would explain it by itself.
+        explain = regression.following if term.on == "torque" else regression.beside
+        richer, gains = explain(fit, term.columns)
         by_size, by_ratio = regression.sureness(fit, richer)
         sure = max(by_size, by_ratio)
         share = 1.0 - richer.held_nm**2 / max(fit.held_nm**2, 1e-300)
@@ -62,22 +65,31 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
             Dependence(
                 term.on, size, size / regression.torque_nm, float(norm.sf(sure)), tuple(term.at.tolist()),
                 tuple((term.shape @ gains).tolist()),
-            ), richer,
+            ), _moved(regression, fit, richer, term, gains),
         ))  # fmt: skip
     found.sort(key=lambda f: -f[0].torque_rms)
     found = [f for i, f in enumerate(found) if f[0].on not in [g[0].on for g in found[:i]]]
-    moves = _moves(fit, [richer for _, richer in found])
+    moves = _moves(fit, [moved for _, moved in found])
     return Disturbance(left, unit, relative, tuple(d for d, _ in found), moves)
 
 
-def _moves(fit: TorqueFit, richer: Sequence[TorqueFit]) -> Mapping[str, float]:
+def _moved(
+    regression: TorqueRegression, fit: TorqueFit, richer: TorqueFit, term: FreeForm, gains: Array
+) -> Mapping[Name, float]:  # fmt: skip
+    """By how much parameters are others with a free-form term beside them."""
+    if term.on == "torque":
+        return regression.moved_by(fit, term.columns @ gains)
+    return {n: v - fit.values[n] for n, v in richer.values.items() if n in fit.values}
+
+
+def _moves(fit: TorqueFit, moved: Sequence[Mapping[Name, float]]) -> Mapping[str, float]:
     """How far J, C and K move with the free-form term of what is left beside the model, in percent: the most of any."""
     out: dict[str, float] = {}
-    for other in richer:
+    for by in moved:
         for name in TERMS:
             here = fit.values.get((name,))
             if here:
-                out[name] = max(out.get(name, 0.0), 100.0 * abs(other.values[(name,)] / here - 1.0))
+                out[name] = max(out.get(name, 0.0), 100.0 * abs(by.get((name,), 0.0) / here))
     return out
 
 

@@ -77,6 +77,36 @@ class _Stacked(NamedTuple):
 class TorqueRegression(TorqueBand):
     """Fits structures in torque over a set of runs."""
 
+    def following(self, fit: TorqueFit, columns: Array) -> tuple[TorqueFit, Array]:
+        """A model whose residual is followed by further columns, and their gains; the model stays as it is."""
+        r = np.concatenate(fit.residuals)
+        used, low = self._used, np.full(columns.shape[1], -np.inf)
+
+        def gains(rows: Any) -> Array:
+            a = columns[rows]
+            return bounded(
+                a.T @ a + RIDGE * np.eye(a.shape[1]) * float(np.mean(np.sum(a * a, axis=0))), a.T @ r[rows], low
+            )
+
+        g = gains(self._fitted)
+        held = np.concatenate(fit.held).copy()
+        for fold in self._by_run:
+            held[fold] -= (columns @ gains(used & ~fold))[fold]
+        left = r - columns @ g
+        ends = np.cumsum([len(x) for x in fit.residuals])[:-1]
+        return replace(
+            fit, fitted_nm=rms(left[used]), held_nm=rms(held[self._judged]), residuals=np.split(left, ends),
+            held=np.split(held, ends),
+        ), g  # fmt: skip
+
+    def moved_by(self, fit: TorqueFit, torque: Array) -> dict[Name, float]:
+        """How far the parameters move where a torque, one value a sample, is taken off what they explain."""
+        parts = [self._columns(i, fit.structure, fit.shapes) for i in range(len(self.traces))]
+        names = list(dict.fromkeys(n for _, own, _ in parts for n in own if len(n) < 3))
+        wide = np.concatenate([a[:, [own.index(n) for n in names]] for a, own, _ in parts])[self._used]
+        x = bounded(wide.T @ wide, wide.T @ torque[self._used], np.full(len(names), -np.inf))
+        return dict(zip(names, x.tolist(), strict=True))
+
     def beside(self, fit: TorqueFit, columns: Array) -> tuple[TorqueFit, Array]:
         """A model fitted together with further columns, and the gains of these; what it leaves on samples held out."""
         a, y, names, extra = self._over_all_runs(fit.structure, fit.shapes)
