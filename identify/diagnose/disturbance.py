@@ -76,10 +76,18 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
 def _moved(
     regression: TorqueRegression, fit: TorqueFit, richer: TorqueFit, term: FreeForm, gains: Array
 ) -> Mapping[Name, float]:  # fmt: skip
-    """By how much parameters are others with a free-form term beside them."""
+    """By how much parameters are others with a free-form term beside them.
+
+    The stiffness is that at the start angle: what the term adds to the slope there is part of it.
+    """
     if term.on == "torque":
         return regression.moved_by(fit, term.columns @ gains)
-    return {n: v - fit.values[n] for n, v in richer.values.items() if n in fit.values}
+    moved = {n: v - fit.values[n] for n, v in richer.values.items() if n in fit.values}
+    if term.on == "angle" and ("stiffness",) in moved:
+        slope = np.gradient(term.shape @ gains, term.at)
+        start = float(np.clip(0.0, term.at[0], term.at[-1]))
+        moved[("stiffness",)] += float(np.interp(start, term.at, slope))
+    return moved
 
 
 def _moves(fit: TorqueFit, moved: Sequence[Mapping[Name, float]]) -> Mapping[str, float]:
