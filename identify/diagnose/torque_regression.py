@@ -10,19 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from identify.diagnose.coloured_residual import bounded, coloured_cost, lines, rms, standard_errors, strongest
 from identify.diagnose.torque_band import TorqueBand
-from identify.model.effect_torque import torque_along
+from identify.model.effect_torque import feeds_on_torque
 from identify.model.parameters import Name
 from identify.model.structure import Shapes, Structure
 from rig import effects
 from rig.arrays import Array
-from rig.effects.base import Place
 
 BLOCK, BLOCKS_A_RUN, FEWEST_BLOCKS = 8, 24, 8  # samples behind the low-pass in a block, and how many blocks
 RIDGE = 1e-9  # of their own size, on the gains of free-form columns: two of them may be alike
@@ -283,27 +281,3 @@ class TorqueRegression(TorqueBand):
         """Fall of the penalised cost, the residual's colour taken from either model, whichever does better."""
         behind = self.solve(richer.structure, richer.shapes, base.filters)
         return base.penalised - min(richer.penalised, behind.penalised)
-
-
-@lru_cache(maxsize=256)
-def feeds_on_torque(name: str) -> bool:
-    """Whether an effect on the shaft changes with the torque itself, as friction under load does."""
-    effect = effects.get(name)
-    if effect.place in (Place.DRIVE, Place.SENSOR) or effect.states or effect.reads is not None:
-        return False
-    p = np.array([1.0, 1.0, 1.0, *(1.0 if q.linear else max(q.low, 0.1) for q in effect.parameters)])
-    one, out = np.full(2, 0.1), np.zeros(2)
-    torque_along(effect.kernel.address, one, one, one, np.array([1.0, 3.0]), 1.0, np.zeros(0), 1, p, False, 1.0, out)
-    return bool(out[0] != out[1])
-
-
-def in_order(values: Mapping[Name, float], name: str) -> bool:
-    """Whether of every ordered pair of an effect the first is the smaller (static friction is at least Coulomb's)."""
-    pairs = effects.get(name).ordered
-    return all(values.get((name, a), 0.0) <= values.get((name, b), 0.0) * (1.0 + 1e-9) for a, b in pairs)
-
-
-def gains_at_zero(values: Mapping[Name, float], name: str) -> bool:
-    """Whether an effect was fitted to nothing: all its gains at zero."""
-    gains = [values.get((name, p.name), 0.0) for p in effects.get(name).parameters if p.linear and not p.per_run]
-    return bool(gains) and not any(gains)

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identify.estimate.fit import Columns, Fit, Look, Prediction
-from identify.estimate.output_error import held_still, shots_for
+from identify.estimate.output_error import held_still
 from identify.model.parameters import Name, bounds_of, names_of, ordered
 from identify.model.structure import Structure
+from identify.simulate.all_runs import shots_for
 from identify.simulate.shots import RUNAWAY, Shots
 from rig import effects
 from rig.arrays import Array

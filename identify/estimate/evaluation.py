@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from identify.estimate.output_error import Estimate, refine, shots_for
+from identify.estimate.output_error import Estimate, refine
 from identify.model.parameters import Name, equations_of, names_of
 from identify.model.structure import Structure
 from identify.signals.trace import Trace
+from identify.simulate.all_runs import shots_for
 from identify.simulate.sensitivities import linearise
 from identify.simulate.shots import RUNAWAY, Shots, losses_of, moved, predict
 from rig.recording.run import Array

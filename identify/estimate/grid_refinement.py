@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from identify.estimate.output_error import Estimate, held_still, shots_for
+from identify.estimate.output_error import Estimate, held_still
 from identify.model.parameters import Name, bounds_of, ordered
 from identify.signals.trace import Trace
+from identify.simulate.all_runs import shots_for
 from identify.simulate.sensitivities import at_residual, linearise
 from identify.simulate.shots import RUNAWAY, Shots, moved, residual_at
 from rig.recording.run import Array

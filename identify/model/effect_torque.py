@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numba as nb
 import numpy as np
 
+from rig import effects
 from rig.dynamics.native import call, pointer
+from rig.effects.base import Place
 
 
 @nb.njit(cache=True, error_model="numpy", nogil=True)
@@ -50,3 +54,15 @@ def torque_along(kernel, angle, rate, time, torque, step, z, substeps, p, fricti
                 call(kernel, a1, w1, t, torque[i], pm, pd, pp)
                 for j in range(states):
                     zz[j] += h * dz[j]
+
+
+@lru_cache(maxsize=256)
+def feeds_on_torque(name: str) -> bool:
+    """Whether an effect on the shaft changes with the torque itself, as friction under load does."""
+    effect = effects.get(name)
+    if effect.place in (Place.DRIVE, Place.SENSOR) or effect.states or effect.reads is not None:
+        return False
+    p = np.array([1.0, 1.0, 1.0, *(1.0 if q.linear else max(q.low, 0.1) for q in effect.parameters)])
+    one, out = np.full(2, 0.1), np.zeros(2)
+    torque_along(effect.kernel.address, one, one, one, np.array([1.0, 3.0]), 1.0, np.zeros(0), 1, p, False, 1.0, out)
+    return bool(out[0] != out[1])

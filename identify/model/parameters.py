@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -87,3 +87,15 @@ def ordered(names: Sequence[Name], values: Array) -> Array:
             if out[i] > out[k]:
                 out[i] = out[k] = 0.5 * (out[i] + out[k])
     return out
+
+
+def in_order(values: Mapping[Name, float], name: str) -> bool:
+    """Whether of every ordered pair of an effect the first is the smaller (static friction is at least Coulomb's)."""
+    pairs = effects.get(name).ordered
+    return all(values.get((name, a), 0.0) <= values.get((name, b), 0.0) * (1.0 + 1e-9) for a, b in pairs)
+
+
+def gains_at_zero(values: Mapping[Name, float], name: str) -> bool:
+    """Whether an effect was fitted to nothing: all its gains at zero."""
+    gains = [values.get((name, p.name), 0.0) for p in effects.get(name).parameters if p.linear and not p.per_run]
+    return bool(gains) and not any(gains)

@@ -16,9 +16,9 @@ import numpy as np
 
 from identify.estimate.evaluation import settled
 from identify.estimate.final_fit import Fitted
-from identify.estimate.output_error import shots_for
 from identify.model.parameters import equations_of
 from identify.signals.trace import UPSAMPLING, Trace, loads_differ
+from identify.simulate.all_runs import shots_for
 from identify.simulate.shots import RUNAWAY, Shots, losses_of, predict
 from identify.wording import joined, number
 from rig.dynamics import Equations

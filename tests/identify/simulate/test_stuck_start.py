@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identify.estimate.output_error import refine, shots_for
+from identify.estimate.output_error import refine
 from identify.model.structure import Structure
 from identify.signals.prepare import prepare
+from identify.simulate.all_runs import shots_for
 from identify.simulate.stuck_start import holding_nm
 from rig.dynamics import Equations
 from rig.platform import Platform
