@@ -180,10 +180,11 @@ def _better(search: TorqueSearch, best: TorqueFit, trial: TorqueFit, depends: bo
     """Whether the model that the search in torque found stands in place of prediction error's.
 
     On samples not fitted it has to leave clearly less. Where what is left ``depends`` on something, prediction error
-    lacks an effect or has a wrong one, and about as much with fewer parameters is enough.
+    lacks an effect or has a wrong one, and about as much with fewer parameters is enough, or less with as many.
     """
-    ratio = search.left(best) / search.left(trial)
-    return ratio < CLEARLY_LESS or (depends and ratio < ABOUT_AS_MUCH and len(best.values) < len(trial.values))
+    ratio, more = search.left(best) / search.left(trial), len(best.values) - len(trial.values)
+    enough = (ratio < ABOUT_AS_MUCH and more < 0) or (ratio < 1.0 / ABOUT_AS_MUCH and more == 0)
+    return ratio < CLEARLY_LESS or (depends and enough)
 
 
 def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> Fitted:
