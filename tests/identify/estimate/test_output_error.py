@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from identify.estimate.evaluation import evaluate
-from identify.estimate.output_error import bounds_of, make_shots, names_of, ordered, refine
+from identify.estimate.output_error import bounds_of, names_of, ordered, refine
 from identify.model.structure import Structure
 from identify.signals.prepare import prepare
+from identify.simulate.shots import make_shots
 from rig.recording.run import Recording
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, sine_run, traces_of
 
