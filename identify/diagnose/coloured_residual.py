@@ -41,10 +41,11 @@ def bounded(g: Array, b: Array, low: Array) -> Array:
     """Least squares from normal equations with lower bounds: what would go below is held at its bound."""
     if not (np.all(np.isfinite(g)) and np.all(np.isfinite(b))):
         return np.zeros(len(b))  # an effect that ran away along a noisy motion explains nothing
-    size = np.sqrt(np.maximum(np.diag(g), 1e-300))
+    none = np.diag(g) <= 0.0  # no sample knows of it: rounding, divided by its size, would be anything
+    size = np.where(none, 1.0, np.sqrt(np.maximum(np.diag(g), 1e-300)))
     g, b = g / np.outer(size, size), b / size
-    bound = np.where(np.isfinite(low), low * size, -np.inf)
-    held = np.zeros(len(b), dtype=bool)
+    bound = np.where(none, 0.0, np.where(np.isfinite(low), low * size, -np.inf))
+    held = none.copy()
     x = np.zeros(len(b))
     for _ in range(len(b) + 1):
         free = ~held

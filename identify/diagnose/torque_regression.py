@@ -112,7 +112,9 @@ class TorqueRegression(TorqueBand):
         low = np.array([self._low(n) for n in names] + [-np.inf] * (extra + columns.shape[1]))
         ridge = np.zeros(wide.shape[1])
         ridge[a.shape[1] :] = RIDGE * float(np.mean(np.sum(columns * columns, axis=0)))
-        x, held = self._with_folds(wide, y, low, self._folds(names, extra), ridge)
+        own = np.arange(wide.shape[1])
+        free = (own >= len(names)) & (own < a.shape[1])
+        x, held = self._with_folds(wide, y, low, self._folds(names, extra), free, ridge)
         scale = self.torque_nm / max(rms(y - self._taken(names, x[: a.shape[1]], a)), 1e-300)
         r, held = scale * (y - wide @ x), scale * held
         ends = np.cumsum([len(rows) for rows in self._rows])[:-1]
@@ -127,17 +129,26 @@ class TorqueRegression(TorqueBand):
         return self._by_block if extra or any(len(n) == 3 for n in names) else self._by_run
 
     def _with_folds(
-        self, a: Array, y: Array, low: Array, folds: Sequence[Any], ridge: Any = 0.0
+        self, a: Array, y: Array, low: Array, folds: Sequence[Any], free: Any, ridge: Any = 0.0
     ) -> tuple[Array, Array]:
-        """Least squares, and the residual where every fold was left out of its own fit."""
+        """Least squares, and the residual where every fold was left out of its own fit.
+
+        What is ``free`` in each run, (columns,) boolean, is no part of the model: it is fitted to what is held out, too.
+        """
 
         def solved(rows: Any) -> Array:
             return bounded(a[rows].T @ a[rows] + np.diag(np.broadcast_to(ridge, a.shape[1])), a[rows].T @ y[rows], low)
 
         x = solved(self._fitted)
         held = y - a @ x
+        used = self._used
         for fold in folds:
-            held[fold] = (y - a @ solved(self._used & ~fold))[fold]
+            gains = solved(used & ~fold)
+            left = y - a[:, ~free] @ gains[~free]
+            if np.any(free):
+                own = a[used][:, free]
+                left = left - a[:, free] @ bounded(own.T @ own, own.T @ left[used], np.full(own.shape[1], -np.inf))
+            held[fold] = left[fold]
         return x, held
 
     def left_by(self, structure: Structure, values: Mapping[Name, float]) -> float:
@@ -209,7 +220,7 @@ class TorqueRegression(TorqueBand):
         a, y, names, extra = self._over_all_runs(structure, shapes)
         low = np.array([self._low(n) for n in names] + [-np.inf] * extra)
         used, fitting = self._used, self._fitted
-        x, held = self._with_folds(a, y, low, self._folds(names, extra))
+        x, held = self._with_folds(a, y, low, self._folds(names, extra), np.arange(a.shape[1]) >= len(names))
         r = y - a @ x
         # A drive that passes on little of the torque leaves little of it unexplained: what counts is the share.
         scale = self.torque_nm / max(rms(y - self._taken(names, x, a)), 1e-300)
