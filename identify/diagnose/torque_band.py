@@ -173,7 +173,9 @@ class TorqueBand:
             if len(rows) == 0:
                 continue
             noise = trace.noise * rng.standard_normal(len(trace.measured))
-            only = replace(trace, measured=noise, motion=None, _series={})
+            read = trace.beside
+            of_angle = None if read is None else trace.beside_noise * rng.standard_normal(len(read))
+            only = replace(trace, measured=noise, beside=of_angle, motion=None, _series={})
             angle, rate, acceleration = (x[rows] for x in motion(only, self.cutoff_hz))
             left = (inertia + trace.run.added_inertia_kg_m2) * acceleration + values.get(("damping",), 0.0) * rate
             left = left + values.get(("stiffness",), 0.0) * (angle - np.mean(angle))

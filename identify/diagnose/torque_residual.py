@@ -34,12 +34,16 @@ def motion(trace: Trace, cutoff_hz: float) -> tuple[Array, Array, Array]:
     """Low-passed angle, rate and acceleration at the samples, each of shape (n,).
 
     Quintic splines differentiate and integrate: at 29 Hz and 1 kHz even the second derivative of an encoder's
-    angle is right to 1e-4, where a cubic one is off by 0.3 %.
+    angle is right to 1e-4, where a cubic one is off by 0.3 %. An angle that is integrated from the rate begins at zero;
+    where an encoder reads it, too, that is the angle.
     """
     t = trace.step_s * np.arange(len(trace.measured))
     spline = make_interp_spline(t, low_pass(trace.measured, cutoff_hz, trace.step_s), k=5)
     if trace.channel == "rate":
-        return np.asarray(spline.antiderivative()(t)), np.asarray(spline(t)), np.asarray(spline.derivative()(t))
+        rate, acceleration = np.asarray(spline(t)), np.asarray(spline.derivative()(t))
+        if trace.beside is not None:
+            return low_pass(trace.beside, cutoff_hz, trace.step_s), rate, acceleration
+        return trace.on_the_encoder(np.asarray(spline.antiderivative()(t)), t), rate, acceleration
     return np.asarray(spline(t)), np.asarray(spline.derivative()(t)), np.asarray(spline.derivative(2)(t))
 
 

@@ -139,14 +139,22 @@ class Trace:
         if self.channel == "rate":
             angle, rate = Polynomials(spline.antiderivative())(fine_t), Polynomials(spline)(fine_t)
             left = self.noise * np.sqrt(min(1.0, wn))
-            if self.run.angle_rad is not None:
-                encoder = np.interp(t + self.start_s, self.run.time_s, self.run.angle_rad)
-                angle = angle + np.median(encoder - angle[::UPSAMPLING])
+            angle = angle + self._offset(angle[::UPSAMPLING], t)
         else:
             angle, rate = Polynomials(spline)(fine_t), Polynomials(spline.derivative())(fine_t)
             left = self.noise * 2.0 * np.pi * self.cutoff_hz / np.sqrt(3.0) * np.sqrt(min(1.0, wn))
         torque = np.zeros_like(fine_t) if self.torque is None else self.torque.at(fine_t + self.start_s)
         return angle, rate, fine_t + self.offset_s, torque, float(left)
+
+    def on_the_encoder(self, angle_rad: Array, time_s: Array) -> Array:
+        """An angle integrated from the rate, moved to where the encoder reads it, if there is one."""
+        return angle_rad + self._offset(angle_rad, time_s)
+
+    def _offset(self, angle_rad: Array, time_s: Array) -> float:
+        if self.run.angle_rad is None:
+            return 0.0
+        encoder = np.interp(time_s + self.start_s, self.run.time_s, self.run.angle_rad)
+        return float(np.median(encoder - angle_rad))
 
     @cached_property
     def straight_s(self) -> float:

@@ -40,6 +40,16 @@ def test_at_the_ring_the_differentiators_are_off_by_less_than_a_twentieth_of_a_p
     assert amplitude(angle) == pytest.approx(1.0, rel=5e-4)
 
 
+def test_where_an_encoder_reads_the_angle_too_the_motion_does_not_begin_at_zero() -> None:
+    ok = np.ones(len(TIME), bool)
+    angle = 0.3 + np.sin(RING * TIME)
+    both = Run("ring", TIME, ok, rate_rad_s=RING * np.cos(RING * TIME), angle_rad=angle)
+    for read in ({}, {"beside": angle, "beside_noise": 1e-6}):
+        trace = replace(prepare(both), channel="rate", measured=both.rate_rad_s, **read)
+        found, _, _ = motion(trace, 400.0)
+        np.testing.assert_allclose(found[500:-500], angle[500:-500], atol=2e-3)
+
+
 def test_the_low_pass_is_fourth_order_and_moves_nothing_in_time() -> None:
     for f, gain in ((2.0, 1.0), (15.0, 0.5), (60.0, (15.0 / 60.0) ** 4)):
         x = np.sin(2 * np.pi * f * TIME)
