@@ -168,18 +168,24 @@ class InnovationScores:
         names = names_of(structure, self.problem.runs)
         vector = np.array([fit.values.get(n, push.get(n, 0.0)) for n in names])
         own = {int(n[2]) for n in push if len(n) == 3}
-        out: list[Array] = []
+        moved = list(self.base)
+        spread = 0.0  # of the logarithms of the variance: a lag changes the gains, and what the prediction errs by
         for i, s in enumerate(fit.shots):
             if own and s.number not in own:
-                out.append(np.zeros(len(self.base[i])))
                 continue
             look = self.problem.look(s, structure, names, vector, self.noise, s.bias)
-            moved = (look.innovations[s.weight] / np.sqrt(look.variance[s.weight])).ravel()
-            change = self.base[i] - moved
-            if not np.all(np.isfinite(change)):
+            variance = look.variance[s.weight].ravel()
+            moved[i] = look.innovations[s.weight].ravel() / np.sqrt(variance)
+            spread += float(np.sum(np.log(variance / self.variance[i])))
+            if not np.all(np.isfinite(moved[i])):
                 return None
-            out.append(self._apart(change[:, None], i)[:, 0])
-        return np.concatenate(out)
+        level = np.exp(0.5 * spread / len(self.residual))  # the scale of all variances is free
+        return np.concatenate(
+            [
+                self._apart((b - level * m)[:, None], i)[:, 0]
+                for i, (b, m) in enumerate(zip(self.base, moved, strict=True))
+            ]
+        )
 
 
 def _start(effect: Effect, pushes: Sequence[Push], share: Array) -> dict[Name, float]:

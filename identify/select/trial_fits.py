@@ -85,6 +85,8 @@ class TrialFits:
         starts: dict[str, list[Mapping[Name, float] | TorqueLook]] = {
             v[0].effect: [v[0].start] for v in self.shortlist(now, looks)
         }
+        for name in self.unseen(now, names):
+            starts.setdefault(name, [self.of_a_step(name, now)])
         for look in self.heaviest(now, names):
             starts.setdefault(look.effect, []).append(look)
         fits = self.each_fitted(now, starts)
@@ -94,6 +96,21 @@ class TrialFits:
             if not set(effects.get(name).nests) & set(near):  # a special case that is as good is taken in its place
                 fits[name] = self.further(fits[name])
         return [v[0] for v in looks], fits
+
+    def unseen(self, now: Fit, names: Sequence[str]) -> list[str]:
+        """Lags of the gyro, of a model without one: where a large disturbance follows every reading, their scores are
+        small however long they are, and no torque goes with them.
+        """
+        lags = [n for n in (*now.structure.effects, *names) if effects.get(n).lag is not None]
+        return [] if set(lags) & set(now.structure.effects) else lags
+
+    def of_a_step(self, name: str, now: Fit) -> dict[Name, float]:
+        """An effect without gains, its times about a sample long."""
+        scale = self.scale(now)
+        return {
+            (name, p.name): sorted(p.start(scale), key=lambda t: abs(np.log(t / self.problem.step_s)))[0]
+            for p in effects.get(name).parameters if p.start is not None
+        }  # fmt: skip
 
     def each_fitted(
         self, now: Fit, starts: Mapping[str, Sequence[Mapping[Name, float] | TorqueLook]]
