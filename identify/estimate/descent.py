@@ -37,6 +37,7 @@ DAMPING = 1e-4
 DOWN = (1e-3, 1e-6, 1e-10)  # times the disturbance: how far below a model is looked at with parameters that follow
 FOLLOWED, CLOSING = 20, 0.7  # steps in which they do, and what each of them leaves of the gap at most
 ROUGHLY = 5e-3  # of the difference to the model it is compared with, that the last step of a fit brings
+IDLE = 2  # steps in a row that bring little, after which a fit has arrived: one alone may have been cut short
 EARLY = 3  # steps after which a model that is right is near enough for it
 FAR = 2.0  # times the sensor's variance: less of a disturbance is found step by step
 FURTHER = (  # times white density, slow variance and time constant: where else a noise is looked for
@@ -114,7 +115,7 @@ class Descent:
             return p.torque_nm / per
         parameter = next(q for q in effects.get(name[0]).parameters if q.name == name[1])
         if parameter.linear:
-            return 1e-3 * p.torque_nm if parameter.unit.startswith("N") else 0.0
+            return 1e-3 * p.torque_nm if parameter.unit.startswith("N") else 1e-3
         return p.step_s if parameter.unit == "s" else 1e-3
 
     @property
@@ -128,7 +129,7 @@ class Descent:
         ``against`` is the cost of the model that it is compared with: then it need not arrive closer than to a small
         share of the difference. ``least`` is the cost that it must be below once models that are right are near it.
         """
-        looked = False
+        looked, idle = False, 0
         for left in range(steps, 0, -1):
             before = self.cost
             if steps - left == EARLY:
@@ -136,7 +137,9 @@ class Descent:
                 if self.cost > least:
                     return left
             enough = 0.0 if against is None else ROUGHLY * max(against - self.cost, 0.0)
-            if self.step() and before - self.cost > enough:
+            moved = self.step()
+            idle = 0 if before - self.cost > enough else idle + 1
+            if moved and idle < IDLE:
                 continue
             if left == 1 or not thorough or not self.other_noise(lower=not looked):
                 return left - 1
