@@ -39,6 +39,7 @@ from identify.select.contribution import contributions
 from identify.select.field_search import Found, search_in_torque
 from identify.select.fitter import Fits
 from identify.select.free_decay import FreeDecay
+from identify.select.left_over import dependence_on
 from identify.select.likelihood_search import LikelihoodSearch
 from identify.select.search_state import Search
 from identify.signals.prepare import channels_of, prepare
@@ -143,7 +144,7 @@ class _Identifier:
             at_noise = search.run() or self.colour is not None
             found, fits = search.found, Fits(self.traces, self.split, len(self.structure.effects) + 1)
             both = all(t.beside is not None for t in self.traces)  # output error simulates one channel
-            if (at_noise and not both) or self._other_cause(found, fits):
+            if (at_noise and not both and search.stepwise.left is None) or self._other_cause(found, fits):
                 return self._concluded(found, fits)
             self.say("a torque that was not recorded is left beside the sensor's noise")
             self.more_than_noise = True
@@ -198,6 +199,7 @@ class _Identifier:
         found = search_in_torque(
             self.traces, self.split, self.structure, shapes, self.start, self._allowed(), unit, self.say,
             (search.stepwise.best, found_there), search.stepwise.trusted, search.stepwise.weigher.regression,
+            dependence_on(search.stepwise, search.stepwise.left) if search.stepwise.left else None,
         )  # fmt: skip
         after = found.after
         gyro = all(t.channel == "rate" and t.beside is None for t in self.traces)  # an encoder has no line of its own

@@ -21,6 +21,7 @@ from identify.signals.trace import Trace
 from identify.simulate.all_runs import shots_for
 from identify.simulate.sensitivities import Reduced, at_residual, linearise
 from identify.simulate.shots import RUNAWAY, Shots, moved, predict, residual_at
+from rig import effects
 from rig.dynamics import Equations
 from rig.platform import Platform
 from rig.recording.run import Array
@@ -144,9 +145,15 @@ def refine(
 
 
 def held_still(names: Sequence[Name], traces: Sequence[Trace], use: Sequence[Any] | None, fixed: Sequence[Name]) -> Any:
-    """Which parameters keep their start value, (p,): those asked for, and what belongs to a run without a sample."""
+    """Which parameters keep their start value, (p,).
+
+    Those asked for, shapes that the size of the motion gives, and what belongs to a run without a sample.
+    """
     seen = {str(t.number) for i, t in enumerate(traces) if use is None or np.any(use[i])}
-    return np.array([name in fixed or (len(name) == 3 and name[2] not in seen) for name in names])
+    held = {
+        (e, p.name) for e in {n[0] for n in names if len(n) > 1} for p in effects.get(e).parameters if not p.searched
+    }
+    return np.array([name in fixed or name in held or (len(name) == 3 and name[2] not in seen) for name in names])
 
 
 class _Descent:

@@ -101,10 +101,7 @@ class Weigher:
         """
         shares = [1.0 - self.left(self.in_torque(new)) / self.left(self.in_torque(now))]
         if trusted and disturbed(now) > 1.0 + EVIDENT:
-            cutoff_hz = self.regression.cutoff_hz
-            shares.append(
-                1.0 - in_band(new.noise, cutoff_hz) * new.variance / (in_band(now.noise, cutoff_hz) * now.variance)
-            )
+            shares.append(likely_share(now, new, self.regression.cutoff_hz))
             shares.append(1.0 - new.noise.white * new.variance / (now.noise.white * now.variance))
         return float(max(shares))
 
@@ -146,6 +143,12 @@ def in_band(noise: Noise, cutoff_hz: float) -> float:
     """Variance of a disturbance below a frequency, over the variance of one reading."""
     slow = noise.slow * 2.0 / np.pi * np.arctan(2.0 * np.pi * cutoff_hz * noise.time_constant_s)
     return float(slow + noise.white * cutoff_hz)
+
+
+def likely_share(now: Fit, new: Fit, cutoff_hz: float) -> float:
+    """Share of what the likelihood takes the disturbance below a frequency for, that goes with a model."""
+    before, after = (in_band(f.noise, cutoff_hz) * f.variance for f in (now, new))
+    return 1.0 - after / max(before, 1e-300)
 
 
 def along(regression: TorqueRegression, fit: Fit) -> TorqueFit:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from identify.estimate.initial_guess import Start, scale_of
 from identify.estimate.output_error import Estimate
 from identify.model.parameters import names_of
 from identify.model.structure import Structure
-from identify.results import Candidate, Disturbance
+from identify.results import Candidate, Dependence, Disturbance
 from identify.runs.holdout import Split
 from identify.runs.observability import why_unseen
 from identify.select.evidence import along, in_band
@@ -87,7 +87,7 @@ class TorqueErrors:
 def search_in_torque(
     traces: Sequence[Trace], split: Split, structure: Structure, shapes: dict[str, tuple[float, ...]], start: Start,
     allowed: Sequence[str], unit: str, say: Callable[[str], None], known: tuple[Fit, Search],
-    trusted: bool, along_few: TorqueRegression,
+    trusted: bool, along_few: TorqueRegression, curve: tuple[Dependence, Mapping[str, float]] | None = None,
 ) -> Found:  # fmt: skip
     """Find what the declared model lacks, and fit both models with their disturbance.
 
@@ -109,6 +109,8 @@ def search_in_torque(
         effects cannot be followed along the measured motion (a play, a hysteresis).
     along_few
         The samples that search looked at, in torque.
+    curve
+        What a curve over what that model leaves shows, and how far J, C and K move with it, percent.
     """
     few, parts = along_few.traces, along_few.split
     scale = scale_of(few, start.platform, ())
@@ -131,7 +133,7 @@ def search_in_torque(
     unfollowed = trusted and size_nm < UNFOLLOWED * trial.held_nm
     if not unfollowed:
         say("looking at what is left as a torque")
-        depends = bool(disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on)
+        depends = bool(curve or disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on)
         best = search.run()
         if _better(search, best, trial, depends):
             by_likelihood = None
@@ -159,6 +161,8 @@ def search_in_torque(
     lost = [e for e in final.effects if e not in best.structure.effects and effects.get(e).place is not Place.SENSOR]
     if by_likelihood and (unfollowed or lost):
         disturbance = Disturbance(size_nm, unit, size_nm / regression.torque_nm, (), {})
+    if by_likelihood and curve is not None:
+        disturbance = _with_curve(disturbance, *curve)
 
     def errors(fit: TorqueFit) -> TorqueErrors:
         size = regression.torque_nm
@@ -173,6 +177,19 @@ def search_in_torque(
     return Found(
         told, before, after, disturbance, (errors(base), errors(best)),
         lambda: disturbance_of(regression, base, floor, unit),
+    )  # fmt: skip
+
+
+def _with_curve(left: Disturbance, curve: Dependence, moves: Mapping[str, float]) -> Disturbance:
+    """The same with a curve that the likelihood asks for; of two that go with the same, the larger."""
+    same = [d for d in left.depends_on if d.on == curve.on and d.torque_rms > curve.torque_rms]
+    most = {t: max(left.moves_percent.get(t, 0.0), moves.get(t, 0.0)) for t in {*left.moves_percent, *moves}}
+    depends = (*(d for d in left.depends_on if d.on != curve.on), *(same or [curve]))
+    size = max(left.torque_rms, curve.torque_rms)
+    return replace(
+        left, torque_rms=size, relative=left.relative * size / left.torque_rms if left.torque_rms else curve.relative,
+        depends_on=tuple(sorted(depends, key=lambda d: -d.torque_rms)),
+        moves_percent=most,
     )  # fmt: skip
 
 

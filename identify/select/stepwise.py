@@ -18,6 +18,7 @@ from identify.model.structure import Structure
 from identify.propose.innovation_score import Score
 from identify.runs.measured_channels import simplicity
 from identify.select.evidence import TRUSTED, WEIGHT, Evidence, Weigher, behind, disturbed
+from identify.select.left_over import LeftOver, left_over, needless_beside
 from identify.select.trial_fits import FEW, HOPE, MANY, TrialFits
 from rig import effects
 from rig.platform import TERMS
@@ -78,6 +79,7 @@ class Stepwise:
     dropped: list[tuple[str, str]] = field(default_factory=list)
     best: Fit = None  # type: ignore[assignment]
     inflation: dict[str, float] = field(default_factory=dict)  # of every effect that was added, beside all others
+    left: LeftOver | None = None  # a curve that belongs beside the model, though no effect of that kind is known
     _on_all: dict[_Key, Fit] = field(default_factory=dict)
     _lacking: dict[_Key, Fit] = field(default_factory=dict)  # fits with one effect less than one that was tried
     _needed: dict[str, float] = field(default_factory=dict)  # support of an effect beside all others
@@ -102,7 +104,26 @@ class Stepwise:
             self.best = self.pruned(new.fit, [e for e in self.trials.added(new.fit) if e != chosen])
         self.best = self.judged_again(self.best)
         self.best = self.pruned(self.best, [*self.best.structure.terms, *self.trials.added(self.best)])
+        self.best = self.beside_what_is_left(self.best)
         return self.best
+
+    def beside_what_is_left(self, now: Fit) -> Fit:
+        """Without names that explain nothing beside a curve over what is left."""
+        self.say("looking at what is left")
+        while (left := left_over(self, now)) is not None:
+            self.left = left
+            name = needless_beside(self, left, self.trials.added(now))
+            if name is None:
+                break
+            self.dropped.append((name, "beside a curve over what no effect explains, it explains nothing"))
+            self.say(f"took {name} back: a curve over what is left explains it")
+            kept = {k: v for k, v in now.values.items() if k[0] != name}
+            now = self.problem.fit(
+                now.structure.minus(name), kept, now.noise, MANY, carry=now.shots, thorough=False
+            )  # fmt: skip
+        else:
+            self.left = None
+        return now
 
     @property
     def trusted(self) -> bool:
@@ -119,10 +140,7 @@ class Stepwise:
         good = {n: e for n, e in tried.items() if e.support > HOPE and e.weight > WEIGHT}
         if not good:
             return None
-        best = max(good.values(), key=lambda e: e.support)
-        for e in good.values():
-            if behind(best.fit, e.fit) > APART:
-                best = e
+        best = min(good.values(), key=lambda e: e.fit.penalised)
         special = [n for n in effects.get(best.effect).nests if n in good and prefers_special(good[n], best)]
         if special:
             best = max((good[n] for n in special), key=lambda e: e.support)
@@ -216,8 +234,7 @@ class Stepwise:
     def pruned(self, now: Fit, names: Sequence[str]) -> Fit:
         """Without every term or effect that the data do as well without."""
         for name in names:
-            kept_by = [e for e in now.structure.effects if name in effects.get(e).lower_order]
-            if name == "inertia" or kept_by or len(now.structure.terms) + len(now.structure.effects) <= 1:
+            if name == "inertia" or len(now.structure.terms) + len(now.structure.effects) <= 1:
                 continue
             own = [n for n in now.names if n[0] == name]
             term = len(own) == 1 and own[0][0] in TERMS

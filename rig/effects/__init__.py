@@ -14,6 +14,7 @@ from pathlib import Path
 from rig.channels import Channel
 from rig.effects import _channels, _outside
 from rig.effects.base import Effect, Parameter, Place, Scale, filter_kernel, kernel
+from rig.effects.free_form import FREE_FORMS
 
 _MODULES = {
     "coulomb_friction": "coulomb",
@@ -80,6 +81,8 @@ def get(name: str) -> Effect:
         return _further(name)
     if name in _FORMS:
         return _form(name)
+    if name in FREE_FORMS:
+        return FREE_FORMS[name]
     return _channels.get(name) if name in _channels.names() else _outside.get(name)
 
 

@@ -86,6 +86,7 @@ class Parameter:
     start: Callable[[Scale], tuple[float, ...]] | None = None
     per_run: bool = False  # takes a value of its own in every run (the phase of a disturbance)
     neutral: float = 0.0  # value at which the effect vanishes
+    searched: bool = True  # False: a shape that the size of the motion gives, which no fit moves
 
     @property
     def key(self) -> str:

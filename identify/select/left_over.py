@@ -1,0 +1,152 @@
+"""What a model leaves, as a curve over what it goes with, and which names stand only because that curve was missing.
+
+A torque that no effect of the library describes is taken up by whatever comes near it: a stop by a delay, a gain that
+sinks by a lag. A curve fitted beside the model, by the same likelihood and judged by the same evidence, shows both that
+something is left and which of the names explain nothing once it is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import chi2
+
+from identify.estimate.fit import Fit
+from identify.model.parameters import Name
+from identify.propose.free_forms import fitted, scores, states_of, torque_of
+from identify.results import Dependence
+from identify.select.evidence import WEIGHT, Evidence, likely_share
+from rig import effects
+from rig.arrays import Array
+from rig.effects.free_form import FREE_FORMS
+from rig.platform import TERMS
+
+if TYPE_CHECKING:
+    from identify.select.stepwise import Stepwise
+
+APART = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
+HOPE = 20.0  # of a score, that is worth a fit
+TRIED = 2  # of the curves with the largest scores
+STEPS = 14
+SHOWN = 25  # places at which a curve is shown
+SURE = 2.0  # standard errors by which a parameter moves
+ON = {
+    "free_angle": "angle", "free_rate": "rate", "free_torque": "torque", "free_time": "time",
+    "free_gain_over_time": "time", "free_gain_over_speed": "rate", "free_spring_over_time": "time",
+    "free_friction_over_angle": "angle", "free_friction_over_time": "time", "free_memory": "history",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LeftOver:
+    """A curve that belongs beside a model.
+
+    Attributes
+    ----------
+    now, evidence
+        The model without it, and the evidence for it, whose fit has it.
+    share
+        Of the disturbance that goes with it.
+    """
+
+    now: Fit
+    evidence: Evidence
+    share: float
+
+    @property
+    def form(self) -> str:
+        """Which curve."""
+        return self.evidence.effect
+
+
+def left_over(search: Stepwise, now: Fit) -> LeftOver | None:
+    """The curve that explains most of what a model leaves; None where none explains enough to be believed."""
+    problem, weigher = search.problem, search.weigher
+    best: LeftOver | None = None
+    for form in scores(problem, now, search.trials.scale(now), tuple(FREE_FORMS))[:TRIED]:
+        if form.gain < HOPE:
+            break
+        fit = fitted(problem, now, form, STEPS)
+        if not np.isfinite(fit.cost):
+            continue
+        found = LeftOver(
+            now, weigher.evidence(form.effect, now, fit), likely_share(now, fit, weigher.regression.cutoff_hz)
+        )
+        counts = found.evidence.support > APART and found.share > WEIGHT
+        if counts and (best is None or found.evidence.support > best.evidence.support):
+            best = found
+    return best
+
+
+def needless_beside(search: Stepwise, left: LeftOver, names: Sequence[str]) -> str | None:
+    """The name that explains least once the curve is there, if that is too little; None where all are needed."""
+    weakest: tuple[float, str] | None = None
+    fit = left.evidence.fit
+    for name in names:
+        if name not in fit.structure.effects:  # the curve holds it
+            continue
+        kept = {k: v for k, v in fit.values.items() if k[0] != name}
+        without = search.problem.fit(
+            fit.structure.minus(name), kept, fit.noise, STEPS, carry=fit.shots, thorough=False
+        )  # fmt: skip
+        evidence = search.weigher.evidence(name, without, fit)
+        share = max(evidence.weight, likely_share(without, fit, search.weigher.regression.cutoff_hz))
+        if (evidence.support < APART or share < WEIGHT) and (weakest is None or evidence.support < weakest[0]):
+            weakest = (evidence.support, name)
+    return weakest[1] if weakest else None
+
+
+def dependence_on(search: Stepwise, left: LeftOver) -> tuple[Dependence, dict[str, float]]:
+    """The curve as the report tells it, and by how much J, C and K are others with it, percent."""
+    problem, fit, form = search.problem, left.evidence.fit, left.form
+    states = np.concatenate(states_of(problem, fit))
+    torque = np.concatenate(torque_of(problem, fit, form))
+    acceleration = np.concatenate(
+        [np.gradient(s[:, 1], t.step_s) for s, t in zip(states_of(problem, fit), problem.traces, strict=True)]
+    )
+    terms = np.column_stack([acceleration, states[:, 1], states[:, 0], np.ones(len(states))])
+    size = np.maximum(np.linalg.norm(terms, axis=0), 1e-300)
+    as_terms = np.linalg.lstsq(terms / size, torque, rcond=1e-9)[0] / size
+    rms = float(np.sqrt(np.mean((torque - terms @ as_terms) ** 2)))
+    at, shape = _shape(form, fit)
+    by_chance = float(
+        chi2.sf(max(left.evidence.gain / left.evidence.inflation, 0.0), left.evidence.price / np.log(max(fit.count, 2)))
+    )
+    moves: dict[str, float] = {}
+    for k, term in enumerate(TERMS):
+        here, there = left.now.values.get((term,)), fit.values.get((term,))
+        if not here or there is None:
+            continue
+        moved = there - here + _slope(form, term, at, shape)
+        if ON[form] == "torque" or "gain" in form:  # what passes on another share of the torque is another scale
+            moved = float(as_terms[k])
+        if abs(moved) > SURE * _error(fit, (term,)):
+            moves[term] = 100.0 * abs(moved / here)
+    return Dependence(ON[form], rms, rms / problem.torque_nm, by_chance, tuple(at), tuple(shape)), moves
+
+
+def _error(fit: Fit, name: Name) -> float:
+    error = fit.std_error(name)
+    return error if np.isfinite(error) else 0.0
+
+
+def _slope(form: str, term: str, at: Sequence[float], shape: Sequence[float]) -> float:
+    """What a curve over the angle or the rate adds to the stiffness or the damping at rest."""
+    if (form, term) not in (("free_angle", "stiffness"), ("free_rate", "damping")):
+        return 0.0
+    slopes = np.gradient(np.array(shape), np.array(at))
+    return float(np.interp(0.0, at, slopes))
+
+
+def _shape(form: str, fit: Fit) -> tuple[list[float], list[float]]:
+    """Where a curve is shown and its torque there; nothing of a curve that is the gain of something else."""
+    if form not in ("free_angle", "free_rate", "free_torque", "free_time"):
+        return [], []
+    own: Array = np.array([fit.values[(form, p.name)] for p in effects.get(form).parameters])
+    places = np.linspace(own[0], own[1], len(own) - 1)  # begin, end, constant, inner values
+    values = own[2] + np.concatenate([[0.0], own[3:], [0.0]])
+    at = np.linspace(own[0], own[1], SHOWN)
+    return at.tolist(), np.interp(at, places, values).tolist()

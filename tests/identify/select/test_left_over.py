@@ -1,0 +1,52 @@
+"""What no effect on offer describes is shown as a curve, and no effect is named in its place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identify.pipeline import identify
+from identify.results import Identification
+from rig.config.identify import IdentifyConfig
+from rig.platform import Platform
+from rig.recording.run import Recording
+from tests.identify.simulated import TRUTH, Effects, sine_run, white
+
+SETS = ((67.0, 6.0), (111.0, 1.0), (104.0, 3.0))
+OFFERED = IdentifyConfig.model_validate({"candidates": ["torque_delay", "actuator_lag", "creep", "coulomb_friction"]})
+
+
+def found(effects: Effects) -> Identification:
+    """Sets with an effect and with a small torque that was not recorded."""
+    runs = []
+    for seed, (torque_nm, hertz) in enumerate(SETS):
+        run = sine_run(torque_nm, hertz, seed=seed, effects=effects)
+        assert run.torque_nm is not None
+        runs.append(replace(run, torque_nm=run.torque_nm + white(len(run.torque_nm), 0.003 * torque_nm, 50 + seed)))
+    return identify(Recording(tuple(runs)), Platform(*TRUTH), OFFERED)
+
+
+@pytest.mark.parametrize(
+    ("effects", "on"),
+    [
+        ({"cubic_stiffness": {"factor": 4000.0}}, "angle"),
+        ({"quadratic_damping": {"factor": 0.05}}, "rate"),
+    ],
+)
+def test_what_no_effect_on_offer_describes_is_unexplained_and_not_called_a_delay(effects: Effects, on: str) -> None:
+    identification = found(effects)
+    assert identification.verdict.effects == ()
+    assert identification.verdict.unexplained
+    assert identification.disturbance is not None
+    assert on in [d.on for d in identification.disturbance.depends_on]
+
+
+def test_of_a_right_model_no_curve_is_left() -> None:
+    identification = found({})
+    assert identification.verdict.effects == ()
+    assert identification.disturbance is not None
+    assert identification.disturbance.depends_on == ()
+    assert identification.accepted, identification.reasons
+    assert np.isclose(identification.final.parameters["inertia"].value, TRUTH[0], rtol=5e-3)
