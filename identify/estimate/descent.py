@@ -21,7 +21,7 @@ from identify.simulate.all_runs import shots_for
 from identify.simulate.shots import RUNAWAY, Shots
 from rig import effects
 from rig.arrays import Array
-from rig.dynamics.predictor import RATE, SLOW, Gains, Noise, innovations_with
+from rig.dynamics.gains import RATE, SLOW, Gains, Noise, innovations_with
 from rig.effects.base import Place
 
 if TYPE_CHECKING:

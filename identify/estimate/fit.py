@@ -11,7 +11,7 @@ from identify.model.parameters import Name, platform_of
 from identify.model.structure import Structure
 from identify.simulate.shots import Shots
 from rig.arrays import Array
-from rig.dynamics.predictor import Gains, Noise
+from rig.dynamics.gains import Gains, Noise
 from rig.platform import Platform
 
 SINGULAR = 1e-12  # smallest over largest eigenvalue of the scaled information that still determines a direction

@@ -28,7 +28,8 @@ from identify.simulate.shots import RUNAWAY, Shots
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.equations import Equations
-from rig.dynamics.predictor import Gains, Noise, Sensing, gains_of, predict_ahead
+from rig.dynamics.gains import Gains, Noise, Sensing, gains_of
+from rig.dynamics.predictor import predict_ahead
 
 LONGEST_SHARE = 0.2  # of the longest run: a disturbance slower than that is a constant
 SHORTEST_SAMPLES = 4.0  # time constant of a disturbance, in samples: a faster one is white

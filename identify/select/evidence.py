@@ -25,7 +25,7 @@ from identify.estimate.prediction_error import PredictionError
 from identify.model.parameters import Name
 from rig import effects
 from rig.arrays import Array
-from rig.dynamics.predictor import Noise
+from rig.dynamics.gains import Noise
 from rig.effects.base import Place
 from rig.platform import TERMS
 

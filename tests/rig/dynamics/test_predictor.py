@@ -7,7 +7,8 @@ import pytest
 
 from rig.arrays import Array
 from rig.dynamics import Equations, Grid, TorqueSignal
-from rig.dynamics.predictor import RATE, Noise, Sensing, gains_of, predict_ahead
+from rig.dynamics.gains import RATE, Noise, Sensing, gains_of
+from rig.dynamics.predictor import predict_ahead
 from rig.platform import Platform
 
 STEP = 2e-3

@@ -1,0 +1,299 @@
+"""Kalman gains along a run, of the linear part of a platform, and the innovations that other gains would have left.
+
+The gains come from inertia, damping and stiffness and two noises, by the Riccati recursion (compiled).
+
+States of the linear part: angle, rate, slow disturbance torque, the sensor's output and its slope (what its low-pass
+still holds back), and the gyro's bias, which walks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm
+
+from rig.arrays import Array
+from rig.dynamics.native import jit
+
+STATES = 6  # angle, rate, slow disturbance torque, sensor output, its slope, bias
+ANGLE, RATE, SLOW, SENSED, SLOPE, BIAS = range(STATES)
+SETTLED = 1e-5  # relative change of a gain from sample to sample below which it is taken for constant
+SMALL = 1e-2  # gain of the bias: it settles as slowly as the bias walks, and is small by then
+SETTLED_FOR = 20  # samples in a row
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Torque disturbance and walk of the gyro's bias in relation to the sensor's noise, per unit of its variance.
+
+    Attributes
+    ----------
+    white
+        Density of a white torque, (N m)^2 s over the variance of one reading.
+    slow
+        Variance of a slow torque (first-order coloured) over the variance of one reading, (N m)^2.
+    time_constant_s
+        Of the slow torque.
+    walk
+        Density of the steps of the gyro's bias, (rad/s)^2 / s over the variance of one reading.
+    ahead
+        Density of the gyro's white noise ahead of its low-pass, (rad/s)^2 s over the variance of one reading.
+    """
+
+    white: float = 0.0
+    slow: float = 0.0
+    time_constant_s: float = 1.0
+    walk: float = 0.0
+    ahead: float = 0.0
+
+    @property
+    def none(self) -> bool:
+        """Whether there is no torque disturbance: the prediction is a simulation."""
+        return self.white <= 0.0 and self.slow <= 0.0
+
+
+@dataclass(frozen=True)
+class Sensing:
+    """What is read of the platform at every sample, one after the other.
+
+    Attributes
+    ----------
+    rate
+        Whether a gyro reads the rate.
+    angle_variance
+        Of an encoder's reading: over that of the gyro's beside it, one where the encoder is alone; zero without one.
+    lag
+        Coefficients of s and of s^2 in the denominator of the gyro's low-pass, s and s^2; zeros without one.
+    bias_variance
+        Of the gyro's bias at the start, over the variance of its reading.
+    """
+
+    rate: bool
+    angle_variance: float = 0.0
+    lag: tuple[float, float] = (0.0, 0.0)
+    bias_variance: float = 0.0
+
+    @property
+    def readings(self) -> int:
+        """How many there are at every sample."""
+        return int(self.rate) + int(self.angle_variance > 0.0)
+
+
+@dataclass(frozen=True)
+class Gains:
+    """What an innovation of one adds to the states after every sample, (n, m, 6), and its variance, (n, m)."""
+
+    gain: Array
+    variance: Array
+    slow_decay: float  # of the slow torque, a sample
+    onward: Array  # the linear part over a sample, (6, 6)
+    reads: Array  # what each reading is of the states, (m, 6)
+
+    @property
+    def held(self) -> Array:
+        """What a sample leaves of the sensor's output and slope, (2, 2)."""
+        return np.ascontiguousarray(self.onward[SENSED : SLOPE + 1, SENSED : SLOPE + 1])
+
+
+@jit
+def _onward(phi, q, p, half):  # type: ignore[no-untyped-def]
+    """Covariance a sample later, in place: phi p phi' + q. Loops: a call to a matrix library costs more than this."""
+    n = len(q)
+    for a in range(n):
+        for b in range(n):
+            half[a, b] = 0.0
+            for c in range(n):
+                if phi[a, c] != 0.0:
+                    half[a, b] += phi[a, c] * p[c, b]
+    for a in range(n):
+        for b in range(a + 1):
+            total = q[a, b]
+            for c in range(n):
+                if phi[b, c] != 0.0:
+                    total += half[a, c] * phi[b, c]
+            p[a, b] = p[b, a] = total
+
+
+@jit
+def _riccati(  # type: ignore[no-untyped-def]
+    phi, q, reads, noises, p, keep, first, last, gain, variance, bias, small
+):  # fmt: skip
+    """Gains and innovation variances of samples first..last, for readings of the states ``reads`` (m, n)."""
+    n, m = len(q), len(reads)
+    g, half = np.zeros(n), np.zeros((n, n))
+    calm = 0
+    for i in range(first, last + 1):
+        if calm < SETTLED_FOR:
+            change = 0.0
+            for k in range(m):
+                s = noises[k]
+                for a in range(n):
+                    g[a] = 0.0
+                    for b in range(n):
+                        if reads[k, b] != 0.0:
+                            g[a] += p[a, b] * reads[k, b]
+                for a in range(n):
+                    s += reads[k, a] * g[a]
+                if not s >= noises[k]:
+                    s = np.inf  # the linear part ran away: nothing is predicted from here
+                variance[i, k] = s
+                if keep[i]:
+                    for a in range(n):
+                        gain[i, k, a] = g[a] / s
+                        if i > first:
+                            least = small if a == bias else 0.0
+                            change = max(
+                                change, abs(gain[i, k, a] - gain[i - 1, k, a]) - SETTLED * (abs(gain[i, k, a]) + least)
+                            )
+                    for a in range(n):
+                        for b in range(n):
+                            p[a, b] -= g[a] * g[b] / s
+            calm = calm + 1 if keep[i] and change <= 0.0 and i > first else 0
+            _onward(phi, q, p, half)
+        elif keep[i]:
+            variance[i] = variance[i - 1]
+            gain[i] = gain[i - 1]
+        else:  # a sample was lost: what it would have told is missing for a while
+            variance[i] = variance[i - 1]
+            calm = 0
+            _onward(phi, q, p, half)
+
+
+@lru_cache(maxsize=64)
+def _discrete(
+    j: float, c: float, k: float, noise: Noise, lag: tuple[float, float], step_s: float
+) -> tuple[Array, Array]:  # fmt: skip
+    """Transition and disturbance covariance of the linear part over a sample (van Loan 1978), (6, 6) each.
+
+    States that are not there (a low-pass of first order has no slope) keep nothing and get nothing.
+    """
+    f, density = np.zeros((STATES, STATES)), np.zeros((STATES, STATES))
+    f[ANGLE, RATE] = 1.0
+    f[RATE, :3] = -k / j, -c / j, 1.0 / j
+    f[SLOW, SLOW] = -1.0 / noise.time_constant_s
+    first, second = lag
+    there = [ANGLE, RATE, SLOW, BIAS]
+    if second > 0.0:
+        f[SENSED, SLOPE] = 1.0
+        f[SLOPE, RATE], f[SLOPE, SENSED], f[SLOPE, SLOPE] = 1.0 / second, -1.0 / second, -first / second
+        density[SLOPE, SLOPE] = noise.ahead / second**2
+        there += [SENSED, SLOPE]
+    elif first > 0.0:
+        f[SENSED, RATE], f[SENSED, SENSED] = 1.0 / first, -1.0 / first
+        density[SENSED, SENSED] = noise.ahead / first**2
+        there.append(SENSED)
+    density[RATE, RATE] = noise.white / j**2
+    density[SLOW, SLOW] = 2.0 * noise.slow / noise.time_constant_s
+    density[BIAS, BIAS] = noise.walk
+    at = np.ix_(sorted(there), sorted(there))
+    n = len(there)
+    big = np.zeros((2 * n, 2 * n))
+    big[:n, :n], big[:n, n:], big[n:, n:] = -f[at], density[at], f[at].T
+    van_loan = expm(big * step_s)
+    phi, q = np.zeros((STATES, STATES)), np.zeros((STATES, STATES))
+    phi[at] = van_loan[n:, n:].T
+    q[at] = phi[at] @ van_loan[:n, n:]
+    return np.ascontiguousarray(phi), 0.5 * (q + q.T)
+
+
+def gains_of(
+    jck: Array, noise: Noise, step_s: float, sensing: Sensing, keep: Any, spans: Sequence[tuple[int, int]],
+    start_variance: tuple[float, float] = (0.0, 0.0),
+) -> Gains:  # fmt: skip
+    """Kalman gains along a run.
+
+    Parameters
+    ----------
+    jck
+        Inertia, damping and stiffness of the linear part, (3,).
+    sensing
+        What is read.
+    keep
+        (n,) boolean: samples that were measured.
+    spans
+        First and last sample of every stretch.
+    start_variance
+        Of angle and rate at the start of a stretch, over that of one reading.
+    """
+    phi, q = _discrete(*jck.tolist(), noise, sensing.lag, step_s)
+    lagging = sensing.lag[0] > 0.0
+    reads, noises = [], []
+    if sensing.rate:
+        row = np.zeros(STATES)
+        row[SENSED if lagging else RATE] = row[BIAS] = 1.0
+        reads.append(row)
+        noises.append(1.0)
+    if sensing.angle_variance > 0.0:
+        row = np.zeros(STATES)
+        row[ANGLE] = 1.0
+        reads.append(row)
+        noises.append(sensing.angle_variance)
+    start = np.zeros((STATES, STATES))
+    start[ANGLE, ANGLE], start[RATE, RATE], start[SLOW, SLOW] = start_variance[0], start_variance[1], noise.slow
+    if sensing.rate:
+        start[BIAS, BIAS] = sensing.bias_variance
+    if lagging:
+        start[SENSED, SENSED] = start[RATE, SENSED] = start[SENSED, RATE] = start[RATE, RATE]
+    # A state that is neither read, nor driven, nor unknown at the start needs no arithmetic.
+    there = np.flatnonzero((np.arange(STATES) <= SLOW) | (np.diag(q) > 0.0) | (np.diag(start) > 0.0))
+    at = np.ix_(there, there)
+    few, driven, seen = np.ascontiguousarray(phi[at]), np.ascontiguousarray(q[at]), np.array(reads)[:, there]
+    m, n = len(reads), len(there)
+    bias = n - 1 if there[-1] == BIAS else -1
+    gain, variance = np.zeros((len(keep), m, n)), np.ones((len(keep), m))
+    for begin, last in spans:
+        _riccati(few, driven, seen, np.array(noises), start[at].copy(), keep, begin, last, gain, variance, bias, SMALL)
+    whole = np.zeros((len(keep), m, STATES))
+    whole[:, :, there] = gain
+    return Gains(whole, variance, float(np.exp(-step_s / noise.time_constant_s)), phi, np.array(reads))
+
+
+@jit
+def _follow(spans, e, slow, keep, gain, other, phi, reads, decay, new_decay, bias, out):  # type: ignore[no-untyped-def]
+    states, readings = len(phi), len(reads)
+    d, ahead = np.zeros(states), np.zeros(states)
+    for k in range(len(spans)):
+        d[:] = 0.0
+        for i in range(spans[k, 0], spans[k, 1] + 1):
+            for m in range(readings):
+                moved = e[i, m] - bias * reads[m, states - 1]  # what the last state, the bias, stands for
+                for a in range(states):
+                    moved -= reads[m, a] * d[a]
+                out[i, m] = moved
+                if keep[i]:
+                    for a in range(states):
+                        d[a] += other[i, m, a] * moved - gain[i, m, a] * e[i, m]
+            for a in range(states):
+                ahead[a] = 0.0
+                for b in range(states):
+                    if phi[a, b] != 0.0:
+                        ahead[a] += phi[a, b] * d[b]
+            ahead[2] += (new_decay - decay) * slow[i]
+            d[:] = ahead
+
+
+def innovations_with(
+    gains: Gains, other: Gains, innovations: Array, slow_torque: Array, keep: Any, spans: Sequence[tuple[int, int]],
+    bias: float = 0.0,
+) -> Array:  # fmt: skip
+    """What the innovations would be with other gains, (n, m), the platform taken for linear between the two.
+
+    Parameters
+    ----------
+    gains, innovations, slow_torque
+        Of a prediction: its gains, its innovations (n, m), and its slow disturbance torque after every sample, (n,).
+    other
+        The other gains, of the same platform with another noise.
+    bias
+        By how much the gyro's bias is another.
+    """
+    out = np.empty_like(innovations)
+    _follow(
+        np.array(spans, dtype=np.int64).reshape(-1, 2), innovations, np.ascontiguousarray(slow_torque), keep,
+        gains.gain, other.gain, other.onward, other.reads, gains.slow_decay, other.slow_decay, bias, out,
+    )  # fmt: skip
+    return out
