@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from identify.api.call import identify as identify
     from identify.api.result import Result as Result
-    from identify.results import Disturbance as Disturbance
+    from identify.residual import Disturbance as Disturbance
     from identify.results import ParameterEstimate as ParameterEstimate
     from rig.errors import InputError as InputError
     from rig.errors import MissingPackage as MissingPackage
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["Disturbance", "InputError", "MissingPackage", "ParameterEstimate", "Result", "identify"]
 
 _HOME = {
-    "Disturbance": "identify.results",
+    "Disturbance": "identify.residual",
     "InputError": "rig.errors",
     "MissingPackage": "rig.errors",
     "ParameterEstimate": "identify.results",

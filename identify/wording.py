@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from identify.results import Disturbance, Errors, Identification, NotReported, ParameterEstimate
+from identify.residual import Disturbance
+from identify.results import Errors, Identification, NotReported, ParameterEstimate
 
 SYMBOLS = {
     "inertia": "J",

@@ -15,7 +15,8 @@ from identify.api.notebook import notebook_html
 from identify.api.state_space import state_space_of
 from identify.report.files import final_platform, model_text, result_json, write_results
 from identify.report.summary import summary
-from identify.results import Disturbance, Identification, ParameterEstimate
+from identify.residual import Disturbance
+from identify.results import Identification, ParameterEstimate
 from identify.wording import SYMBOLS, plain, unit, with_interval
 from rig.config.model import ModelConfig
 from rig.dynamics import Equations, Motion, TorqueSignal, simulate

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from identify.results import Disturbance, ModelResult
+from identify.residual import Disturbance
+from identify.results import ModelResult
 from identify.wording import SYMBOLS, depends_on, joined, number
 from rig.config.identify import AcceptConfig
 from rig.platform import TERMS

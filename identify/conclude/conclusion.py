@@ -19,9 +19,9 @@ from identify.diagnose.diagnosis import with_diagnosis
 from identify.estimate.final_fit import Fitted, noise_of_all
 from identify.model.parameters import Name, platform_of
 from identify.model.structure import Structure
+from identify.residual import Disturbance
 from identify.results import (
     UNITS,
-    Disturbance,
     GeneticRun,
     Identification,
     ModelResult,

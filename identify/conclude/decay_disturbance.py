@@ -9,7 +9,7 @@ from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.final_fit import Fitted
 from identify.estimate.initial_guess import Start, scale_of
 from identify.model.structure import shape_values
-from identify.results import Disturbance
+from identify.residual import Disturbance
 from identify.runs.holdout import Split
 from identify.runs.reduced import reduced
 from identify.signals.trace import Trace

@@ -17,8 +17,8 @@ from identify.report.page import report_html
 from identify.report.replaced_file import replace_file
 from identify.report.report_data import FILE as REPORT_DATA
 from identify.report.report_data import image_of, report_data
+from identify.residual import Disturbance
 from identify.results import (
-    Disturbance,
     Errors,
     FollowUp,
     FollowUpPlan,

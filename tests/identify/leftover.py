@@ -12,7 +12,8 @@ from scipy import signal
 from identify.diagnose.diagnosis import Sensor, diagnose
 from identify.diagnose.torque_residual import motion, torque_noise_floor, torque_residual
 from identify.model.structure import Structure
-from identify.results import ResidualDiagnosis, RunTraces
+from identify.residual import ResidualDiagnosis
+from identify.results import RunTraces
 from identify.signals.trace import UPSAMPLING, Trace
 from rig.platform import Platform
 from rig.recording.run import Array

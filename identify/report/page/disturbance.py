@@ -7,7 +7,8 @@ import numpy as np
 from identify.report.page.figure import AFTER, Figure, Panel, grid, lines, points
 from identify.report.page.markup import Markup, Piece, table
 from identify.report.page.quantities import QUANTITIES, axis
-from identify.results import Dependence, Identification
+from identify.residual import Dependence
+from identify.results import Identification
 from identify.wording import depends_on, number
 
 DIRECTIONS = {"tickvals": [-1, 1], "ticktext": ["backward", "forward"], "range": [-1.5, 1.5]}

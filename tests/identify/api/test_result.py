@@ -15,7 +15,7 @@ from identify.api.call import identify
 from identify.api.result import Result
 from identify.report.files import result_json
 from identify.report.summary import summary
-from identify.results import Dependence, Disturbance
+from identify.residual import Dependence, Disturbance
 from rig.config.model import ModelConfig
 from rig.dynamics import TorqueSignal, simulate
 from rig.errors import InputError, MissingPackage

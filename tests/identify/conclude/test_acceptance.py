@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from identify.conclude.acceptance import too_much_left
-from identify.results import Dependence, Disturbance
+from identify.residual import Dependence, Disturbance
 from identify.wording import residual_torque_sentence
 from rig.config.identify import AcceptConfig
 

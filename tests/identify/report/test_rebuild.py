@@ -16,9 +16,8 @@ from identify.report import report_data
 from identify.report.files import write_results
 from identify.report.rebuild import rebuild_report
 from identify.report.report_data import read_report_data
+from identify.residual import Dependence, Disturbance
 from identify.results import (
-    Dependence,
-    Disturbance,
     FollowUp,
     FollowUpPlan,
     FollowUpRound,

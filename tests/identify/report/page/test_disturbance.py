@@ -11,7 +11,8 @@ import pytest
 from identify.report.page.disturbance import disturbance_table, shape_figure
 from identify.report.page.figure import Trace
 from identify.report.page.spectrum import noise_band, spectrum, spectrum_figures, torque_per_reading
-from identify.results import Dependence, Disturbance, Identification
+from identify.residual import Dependence, Disturbance
+from identify.results import Identification
 from rig.arrays import Array
 from rig.platform import Platform
 from tests.identify.sample import SIGMA, TRUTH, sample

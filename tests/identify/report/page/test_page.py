@@ -21,7 +21,8 @@ from identify.report.page.motion import RUNS, motion_figures, stretches
 from identify.report.page.residual import residual_figures
 from identify.report.page.spectrum import spectrum, spectrum_figures
 from identify.report.page.tables import parameter_table
-from identify.results import FreeLine, Identification
+from identify.residual import FreeLine
+from identify.results import Identification
 from identify.wording import MOST_DIGITS
 from rig.recording.run import Array
 from tests.identify.sample import SIGMA, sample, unhappy
