@@ -10,7 +10,7 @@ import numpy as np
 
 from identify.diagnose.torque_residual import TorqueResidual, relative, torque_noise_floor, torque_residual
 from identify.estimate.final_fit import Fitted, noise_of_all
-from identify.genetic.per_set import linear_traces
+from identify.genetic.linear_traces import linear_traces
 from identify.model.structure import Structure
 from identify.results import Errors, NoiseFloor
 from identify.runs.holdout import Split

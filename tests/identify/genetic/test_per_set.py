@@ -10,7 +10,8 @@ import pytest
 from identify.estimate.final_fit import Fitted, by_output_error
 from identify.estimate.initial_guess import Start, first_guess
 from identify.estimate.regression import Regression, fit
-from identify.genetic.per_set import _j_dec, condense, each_set, genetic, linear_traces, search_range
+from identify.genetic.linear_traces import linear_traces
+from identify.genetic.per_set import _j_dec, condense, each_set, genetic, search_range
 from identify.model.structure import Structure
 from identify.runs.holdout import split
 from identify.signals.trace import Trace
