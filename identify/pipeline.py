@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from identify.conclude.conclusion import Case, conclude
+from identify.conclude.case import Case
+from identify.conclude.conclusion import conclude
 from identify.conclude.decay_disturbance import left_of_a_decay
 from identify.conclude.declared_values import declared_values
 from identify.conclude.error_figures import floor_of, in_torque, measure

@@ -1,23 +1,21 @@
-"""From the final fits to the result: parameters with intervals, undetermined parameters, verdict, acceptance."""
+"""From the final fits to the result: both models, verdict, acceptance."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from identify.bounds.damping_or_lag import lag_for_damping
-from identify.bounds.undetermined import of_another_run, open_phases, undetermined
 from identify.conclude.acceptance import grown, of_reported, too_much_left
-from identify.conclude.declared_values import declared_values, kept_as_declared
+from identify.conclude.case import Case, runs_fitted
 from identify.conclude.error_figures import Measured
 from identify.conclude.max_error import with_max_error
+from identify.conclude.model_result import model_of, to_build_on
 from identify.conclude.next_steps import opposite_signs, unexplained_reason
 from identify.conclude.verdict import sentences_of
 from identify.diagnose.diagnosis import with_diagnosis
 from identify.estimate.final_fit import Fitted, noise_of_all
-from identify.model.parameters import Name, platform_of
 from identify.model.structure import Structure
 from identify.residual import Disturbance
 from identify.results import (
@@ -33,40 +31,16 @@ from identify.results import (
     Verdict,
 )
 from identify.rivals import coloured_noise
-from identify.rivals.coloured_noise import Colour
 from identify.runs import clipping
-from identify.runs.holdout import Split
-from identify.runs.measured_channels import Offer
 from identify.runs.sign_convention import SENTENCE
 from identify.select.search_state import Search
 from identify.signals import glitches, resampling
-from identify.signals.trace import UPSAMPLING, Trace, loads_differ
+from identify.signals.trace import UPSAMPLING, loads_differ
 from rig import effects
-from rig.config.identify import IdentifyConfig
 from rig.effects.base import Place
-from rig.platform import Platform
-from rig.recording.run import Recording
 
 STRAYED = 3.0  # times the sensor's noise: a free run with friction may have gone astray
 UNEXPLAINED = 1.1  # times the noise floor in free run: above it, something is left that no effect here explains
-TORQUE_FREE = {"damping": ("damping_over_inertia", "1/s"), "stiffness": ("stiffness_over_inertia", "1/s^2")}
-
-
-@dataclass(frozen=True)
-class Case:
-    """What is identified: the recording, the declared structure, and how it was laid out for the fits."""
-
-    recording: Recording
-    structure: Structure
-    settings: IdentifyConfig
-    traces: Sequence[Trace]
-    split: Split
-    offer: Offer
-    torque_free: bool
-    declared: Platform
-    left_out: tuple[str, ...] = ()  # which runs, and why, in words
-    colour: Colour | None = None  # of the sensor's noise, where it is not white
-    disturbance: Disturbance | None = None  # what is left, where that is a torque and not the sensor's noise
 
 
 def conclude(
@@ -79,12 +53,12 @@ def conclude(
     idle = tuple(NotReported(n, why) for n, why in case.offer.idle)
     declared = {*case.structure.terms, *case.structure.effects}  # what the search itself took up and gave up is no news
     dropped = (*idle, *(NotReported(n, why) for n, why in search.dropped if n in declared))
-    result_before = _model(case, before, measured_before, idle)
-    result_after = _model(case, after, measured_after, dropped) if changed else None
+    result_before = model_of(case, before, measured_before, idle)
+    result_after = model_of(case, after, measured_after, dropped) if changed else None
     if result_after is not None:
-        result_after = _to_build_on(case, after, result_after)
+        result_after = to_build_on(case, after, result_after)
     else:
-        result_before = _to_build_on(case, before, result_before)
+        result_before = to_build_on(case, before, result_before)
     final = result_after or result_before
     ratio = _ratio(case, after, search)
     measured = case.disturbance  # of runs that a torque limits; else the sensor's noise does
@@ -150,7 +124,7 @@ def _about_damping(case: Case, after: Fitted, final: ModelResult) -> tuple[str, 
     name = ("inertia",)
     if final.platform is None or name not in after.names or "damping" not in final.parameters:
         return ()
-    fitted = [t for t in case.traces if t.number in _runs_fitted(case)]
+    fitted = [t for t in case.traces if t.number in runs_fitted(case)]
     told = lag_for_damping(final.platform, after.std_error(name), fitted, case.recording.axis)
     return (told,) if told else ()
 
@@ -186,72 +160,6 @@ def _share_of_white(case: Case) -> float:
     return 1.0 if case.colour is None else case.colour.rms / case.colour.level
 
 
-def _model(case: Case, fitted: Fitted, measured: Measured, dropped: tuple[NotReported, ...]) -> ModelResult:
-    parameters: dict[str, ParameterEstimate] = {}
-    of_effects: dict[str, dict[str, ParameterEstimate]] = {
-        effects.first_of(e): {} for e in fitted.structure.effects
-    }  # fmt: skip
-    lost, open_ = _lost(case, fitted), open_phases(fitted)
-    for name in fitted.names:
-        if name in lost or of_another_run(name, _runs_fitted(case)):
-            continue
-        value, error = fitted.values[name], open_.get(name, fitted.std_error(name))
-        estimate = ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), _unit(case, name))
-        if len(name) == 1:
-            parameters[_label(case, name)] = estimate
-        else:
-            key = name[1] if len(name) == 2 else f"{name[1]}_run_{int(name[2]) + 1}"
-            first = effects.first_of(name[0])
-            of_effects[first][key if first == name[0] else f"{key}_{name[0].removeprefix(first + '_')}"] = estimate
-    missing = tuple(NotReported(_label(case, name), why) for name, why in lost.items())
-    platform = _platform(case, fitted, fitted.values)
-    return ModelResult(parameters, of_effects, measured.errors, dropped, missing, _correlation(fitted), platform)
-
-
-def _platform(case: Case, fitted: Fitted, values: Mapping[Name, float]) -> Platform:
-    """As it stood in the first run that a fit looked at."""
-    run = min(_runs_fitted(case), default=0)
-    return platform_of(fitted.structure, tuple(values), np.array(list(values.values())), run)
-
-
-def _runs_fitted(case: Case) -> set[int]:
-    return {t.number for t, m in zip(case.traces, case.split.final, strict=True) if np.any(m)}
-
-
-def _lost(case: Case, fitted: Fitted) -> dict[Name, str]:
-    alone = len(case.traces) == 1 and case.disturbance is None  # a measured run is no single tone
-    return undetermined(fitted, _runs_fitted(case), alone)
-
-
-def _label(case: Case, name: Name) -> str:
-    """As the tables call a parameter."""
-    if len(name) > 1:
-        return ".".join(name)
-    return TORQUE_FREE[name[0]][0] if case.torque_free else name[0]
-
-
-def _unit(case: Case, name: Name) -> str:
-    if len(name) == 1:
-        return TORQUE_FREE[name[0]][1] if case.torque_free else UNITS[case.recording.axis][name[0]]
-    effect = effects.get(name[0])
-    parameter = next(p for p in effect.parameters if p.name == name[1])
-    unit = parameter.unit + ("/(kg*m^2)" if case.torque_free and effect.per_inertia(parameter) else "")
-    if case.recording.axis == "linear":
-        unit = unit.replace("kg*m^2", "kg").replace("N*m", "N").replace("rad", "m")
-    return unit
-
-
-def _to_build_on(case: Case, fitted: Fitted, model: ModelResult) -> ModelResult:
-    """The final model with declared numbers where the data say nothing, as far as it replays the runs with them."""
-    lost, declared = _lost(case, fitted), declared_values(case.declared, case.torque_free)
-    values = kept_as_declared(case.traces, case.split.final, fitted, lost, declared)
-    missing = tuple(
-        replace(told, as_declared=name in declared and values[name] == declared[name])
-        for name, told in zip(lost, model.not_determined, strict=True)
-    )
-    return replace(model, not_determined=missing, platform=_platform(case, fitted, values))
-
-
 def _series(case: Case, before: Measured, after: Measured) -> tuple[RunTraces, ...]:
     out = []
     for i, trace in enumerate(case.traces):
@@ -267,19 +175,6 @@ def _series(case: Case, before: Measured, after: Measured) -> tuple[RunTraces, .
             )
         )  # fmt: skip
     return tuple(out)
-
-
-def _correlation(fitted: Fitted) -> dict[str, float]:
-    size = np.sqrt(np.maximum(np.diag(fitted.covariance), 1e-300))
-    if not np.all(np.isfinite(fitted.covariance)):
-        return {}
-    out = {}
-    for i in range(len(fitted.names)):
-        for k in range(i):
-            value = float(fitted.covariance[i, k] / (size[i] * size[k]))
-            if abs(value) > 0.9:
-                out[f"{'.'.join(fitted.names[k])}, {'.'.join(fitted.names[i])}"] = value
-    return out
 
 
 def inseparable(structure: Structure, travel_deg: float) -> dict[str, str]:
