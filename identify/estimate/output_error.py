@@ -2,8 +2,7 @@
 
 Each run is simulated in shots. One shot over a whole run is the maximum-likelihood fit for white sensor
 noise; shorter shots, each with a start state of its own, keep a model that is still wrong close to the
-data (multiple shooting). Sensitivities are differences of simulations; start states, gyro bias and
-global parameters are solved together, start states eliminated first (Gauss-Newton with Levenberg's damping).
+data (multiple shooting).
 """
 
 from __future__ import annotations
@@ -11,25 +10,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from identify.model.parameters import Name, bounds_of, names_of, ordered, platform_of
+from identify.estimate.gauss_newton import GaussNewton, Step
+from identify.model.parameters import Name, names_of, platform_of
 from identify.model.structure import Structure
 from identify.signals.trace import Trace
 from identify.simulate.all_runs import shots_for
-from identify.simulate.sensitivities import Reduced, at_residual, linearise
-from identify.simulate.shots import RUNAWAY, Shots, moved, predict, residual_at
+from identify.simulate.sensitivities import linearise
+from identify.simulate.shots import Shots, moved, predict, residual_at
 from rig import effects
 from rig.dynamics import Equations
 from rig.platform import Platform
 from rig.recording.run import Array
 
-ROBUST_FROM = 12  # shots: fewer show no outlier
-OUTLIER = 4.0  # times the median error of a shot
 KEPT = 3  # steps with the same sensitivities
-FORETOLD = 0.1  # of the fall of the squares that sensitivities may miss to be kept
 
 
 @dataclass(frozen=True)
@@ -67,29 +64,6 @@ class Estimate:
     def residuals(self) -> list[Array]:
         """Measured minus simulated, one array a run."""
         return [s.trace.measured - y for s, y in zip(self.shots, self.simulated(), strict=True)]
-
-
-def _total(parts: Sequence[Reduced]) -> tuple[Array, Array, Array, Array]:
-    return (
-        np.sum([q.a for q in parts], axis=0), np.sum([q.b for q in parts], axis=0),
-        np.concatenate([q.losses for q in parts]), np.concatenate([q.counts for q in parts]),
-    )  # fmt: skip
-
-
-def _outlier(losses: Array, counts: Array) -> float:
-    """Root mean square beyond which a shot is mistrusted; none is where there are only a few."""
-    used = counts > 0
-    if np.sum(used) < ROBUST_FROM or not np.all(np.isfinite(losses[used])):
-        return np.inf
-    return float(OUTLIER * np.sqrt(max(np.median(losses[used] / counts[used]), 1e-300)))
-
-
-def _cost(losses: Array, counts: Array, outlier: float) -> float:
-    """Sum of squares, with the shots that are mistrusted growing only as a logarithm."""
-    if not np.isfinite(outlier):
-        return float(np.sum(losses))
-    n = np.maximum(counts, 1.0)
-    return float(np.sum(n * outlier**2 * np.log1p(losses / n / outlier**2)))
 
 
 def refine(
@@ -139,7 +113,9 @@ def refine(
     shots = shots_for(traces, structure, names, x, shot_s, use, carry, coarse, finer, rests)
     workers = ThreadPoolExecutor(2)
     try:
-        return _levenberg(_Descent(workers, shots, structure, names, x, still), iterations, tolerance, hopeless, coarse)
+        return _levenberg(
+            GaussNewton(workers, shots, structure, names, x, still), iterations, tolerance, hopeless, coarse
+        )
     finally:
         workers.shutdown()
 
@@ -156,117 +132,7 @@ def held_still(names: Sequence[Name], traces: Sequence[Trace], use: Sequence[Any
     return np.array([name in fixed or name in held or (len(name) == 3 and name[2] not in seen) for name in names])
 
 
-class _Descent:
-    """Gauss-Newton with Levenberg's damping, sensitivities kept as long as they foretell what a step brings.
-
-    A step costs a simulation of every run; new sensitivities cost one for every parameter besides.
-    """
-
-    def __init__(
-        self, workers: ThreadPoolExecutor, shots: list[Shots], structure: Structure, names: tuple[Name, ...],
-        x: Array, still: Any,
-    ) -> None:  # fmt: skip
-        self.workers, self.shots, self.structure, self.names, self.x = workers, shots, structure, names, x
-        self.still = still
-        self.scale = np.where(np.abs(x) > 0, np.abs(x), 1.0)
-        self.low = np.array([bounds_of(n)[0] for n in names])
-        self.high = np.array([bounds_of(n)[1] for n in names])
-        self.damping = 1e-6
-        self.counts = np.concatenate([s.counts for s in shots])
-        self.count = int(np.sum(self.counts))
-        self.once = float(sum(s.grid.n for s in shots))  # fine steps of one simulation of every run
-        self.work = self.once
-        found = list(workers.map(lambda s: residual_at(s, structure, names, x), shots))
-        self.residuals = [r for r, _ in found]
-        self.outlier = _outlier(np.concatenate([each for _, each in found]), self.counts)
-        self.renew()
-
-    def renew(self) -> None:
-        """Sensitivities where the descent stands."""
-        self.parts = list(
-            self.workers.map(
-                lambda s: linearise(s, self.structure, self.names, self.x, self.scale, self.still, self.outlier),
-                self.shots,
-            )
-        )
-        self.fresh = True
-        self.work += (1 + int(np.sum(~self.still)) + 2) * self.once
-        self._add_up()
-
-    def keep(self) -> None:
-        """The sensitivities at hand, with the residual where the descent stands."""
-        self.parts = [
-            at_residual(q, s, r, self.outlier) for q, s, r in zip(self.parts, self.shots, self.residuals, strict=True)
-        ]
-        self.fresh = False
-        self._add_up()
-
-    def _add_up(self) -> None:
-        self.a, self.b, self.losses, _ = _total(self.parts)
-
-    @property
-    def cost(self) -> float:
-        """Sum of squares, mistrusted shots counting less."""
-        return _cost(self.losses, self.counts, self.outlier)
-
-    @property
-    def lost(self) -> bool:
-        """Whether the simulation ran away."""
-        return not (np.all(np.isfinite(self.losses)) and np.all(np.isfinite(self.a)) and np.all(np.isfinite(self.b)))
-
-    @RUNAWAY
-    def step(self) -> _Step | None:
-        """One step down; None where none leads there."""
-        cost = self.cost
-        size = np.sqrt(np.maximum(np.diag(self.a), 1e-300))
-        free = ~self.still
-        scaled, right = (self.a / np.outer(size, size))[np.ix_(free, free)], (self.b / size)[free]
-        if not (np.all(np.isfinite(scaled)) and np.all(np.isfinite(right))):
-            return None
-        for _ in range(8 if self.fresh else 1):
-            dx = np.zeros(len(self.x))
-            dx[free] = np.linalg.lstsq(scaled + self.damping * np.eye(int(free.sum())), right, rcond=1e-14)[0]
-            new = ordered(self.names, np.clip(self.x + dx / size, self.low, self.high))
-            steps = [q.back(new - self.x) for q in self.parts]
-            trial = [moved(s, m) for s, m in zip(self.shots, steps, strict=True)]
-            self.work += self.once
-            found = list(self.workers.map(lambda s, new=new: residual_at(s, self.structure, self.names, new), trial))
-            losses = np.concatenate([each for _, each in found])
-            after = _cost(losses, self.counts, self.outlier)
-            if after <= cost * (1.0 + 1e-12):
-                residuals = [r for r, _ in found]
-                missed = self._missed(new - self.x, steps, residuals)
-                length = float(np.max(np.abs(new - self.x) * size / np.sqrt(cost / max(self.count, 1)), initial=0.0))
-                self.x, self.shots, self.residuals = new, trial, residuals
-                self.damping = max(self.damping / 30.0, 1e-9)
-                self.outlier = _outlier(losses, self.counts)
-                return _Step(length, cost - after, cost, missed <= FORETOLD * (cost - after))
-            self.damping = max(self.damping * 30.0, 1e-5)
-        return None
-
-    @RUNAWAY
-    def _missed(self, dx: Array, steps: Sequence[tuple[Array, float]], residuals: Sequence[Array]) -> float:
-        """Squares of what the sensitivities did not foretell of a step."""
-        out = 0.0
-        for q, s, (start, bias), old, new in zip(
-            self.parts, self.shots, steps, self.residuals, residuals, strict=True
-        ):  # fmt: skip
-            own = np.repeat(start, [b - a for a, b in s.edges], axis=0)
-            change = q.columns @ dx + np.sum(q.state * own, axis=1) + bias
-            out += float(np.sum((new - old + change)[s.weight] ** 2))
-        return out if np.isfinite(out) else np.inf
-
-
-class _Step(NamedTuple):
-    """A step taken: its largest part in standard errors, what it brought, of what, and whether as foretold."""
-
-    length: float
-    fall: float
-    cost: float
-    foretold: bool
-
-
-def _levenberg(descent: _Descent, iterations: int, tolerance: float, hopeless: float, coarse: bool) -> Estimate:
+def _levenberg(descent: GaussNewton, iterations: int, tolerance: float, hopeless: float, coarse: bool) -> Estimate:
     d, converged, left, age = descent, False, iterations, 0
     while left > 0 and not d.lost:
         if iterations - left >= 3 and d.cost > hopeless**2 * d.count:
@@ -292,7 +158,7 @@ def _levenberg(descent: _Descent, iterations: int, tolerance: float, hopeless: f
     return Estimate(d.structure, d.names, d.x, sigma, d.count, d.a, tuple(d.shots), converged, d.work)
 
 
-def _arrived(step: _Step, tolerance: float) -> bool:
+def _arrived(step: Step, tolerance: float) -> bool:
     return step.length <= 30.0 * tolerance or step.fall < 1e-2 * tolerance * step.cost
 
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from identify.estimate.evaluation import evaluate
-from identify.estimate.output_error import bounds_of, names_of, ordered, refine
+from identify.estimate.output_error import refine
+from identify.model.parameters import bounds_of, names_of, ordered
 from identify.model.structure import Structure
 from identify.signals.prepare import prepare
 from identify.simulate.shots import make_shots
