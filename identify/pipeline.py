@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -43,8 +43,10 @@ from identify.select.free_decay import FreeDecay
 from identify.select.left_over import dependence_on
 from identify.select.likelihood_search import LikelihoodSearch
 from identify.select.search_state import Search
+from identify.select.stepwise import APART
 from identify.signals.prepare import channels_of, prepare
-from identify.signals.trace import loads_differ
+from identify.signals.torque_noise import quieter
+from identify.signals.trace import Trace, loads_differ
 from rig import effects
 from rig.config.identify import IdentifyConfig
 from rig.effects.base import Place
@@ -112,6 +114,7 @@ class _Identifier:
         traces = [prepare(r, i, noise, full_scale=beyond, channels=channels) for i, r in enumerate(runs)]
         self.traces, self.left_out = runs_used(traces, recording.noise is not None, recording.axis, say)
         self.torque_free = free
+        self.torque_noise_above_hz: float | None = None
         self.more_than_noise = False  # is left by all that was found, though nothing else seemed to limit the runs
         refuse_the_idle(self.traces, free)
         if free:
@@ -138,14 +141,15 @@ class _Identifier:
         search: LikelihoodSearch | None = None
         try:
             self.say("fitting the declared model")
-            search = LikelihoodSearch.of(
-                self.traces, self.split, self.structure, declared_values(self.declared, self.torque_free), self.start,
-                self._allowed(), self.say,
-            )  # fmt: skip
+            search = self._begun()
             at_noise = search.run() or self.colour is not None
             found, fits = search.found, Fits(self.traces, self.split, len(self.structure.effects) + 1)
-            both = all(t.beside is not None for t in self.traces)  # output error simulates one channel
-            if (at_noise and not both and search.stepwise.left is None) or self._other_cause(found, fits):
+            both = all(t.beside is not None for t in self.traces)
+            behind_a_lag = any(effects.get(e).lag is not None for e in found.best.structure.effects)
+            noisy = self.torque_noise_above_hz is not None  # some of which is left in the band of the motion
+            white = at_noise and not (both or behind_a_lag or noisy)  # as output error takes the noise of one channel
+            nothing_left = search.stepwise.left is None or self.colour is not None
+            if (white and nothing_left) or self._other_cause(found, fits):
                 return self._concluded(found, fits)
             self.say("a torque that was not recorded is left beside the sensor's noise")
             self.more_than_noise = True
@@ -154,6 +158,32 @@ class _Identifier:
             if search is None:
                 raise
             return self._stopped(search.found)
+
+    def _begun(self) -> LikelihoodSearch:
+        """The search with the torque as it was recorded, or low-passed where the readings follow that better."""
+
+        def begin(traces: Sequence[Trace]) -> LikelihoodSearch:
+            return LikelihoodSearch.of(
+                traces, self.split, self.structure, declared_values(self.declared, self.torque_free), self.start,
+                self._allowed(), self.say,
+            )  # fmt: skip
+
+        search, less = begin(self.traces), quieter(self.traces)
+        if less is None:
+            return search
+        traces, cutoff_hz = less
+        other = begin(traces)
+        if other.stepwise.base.cost > search.stepwise.base.cost - APART:
+            return search
+        self.traces, self.torque_noise_above_hz = traces, cutoff_hz
+        self.start = replace(first_guess(traces, Structure(self.declared.terms)), cutoff_hz=self.start.cutoff_hz)
+        torque = "force" if self.recording.axis == "linear" else "torque"
+        told = (
+            f"the recorded {torque} is filtered: above {cutoff_hz:.3g} Hz it is noise that the platform does not follow"
+        )
+        self.left_out = (*self.left_out, told)
+        self.say(told)
+        return other
 
     def _other_cause(self, found: Search, fits: Fits) -> bool:
         """Whether no effect but a few runs whose torque was another may be what is left."""
