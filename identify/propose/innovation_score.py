@@ -24,6 +24,7 @@ from rig.effects.base import Effect, Place, Scale
 
 LITTLE = 1e-3  # of the torque: how much of a candidate is tried
 SCALED = (0.1, 10.0)  # by how much a score may scale a shape that means "none" at zero
+FOLLOWED = 0.5  # of the inertia: parameters of the model that follow a candidate farther do not
 SHAPES = 3  # of a candidate that are kept to begin a fit from
 SINGULAR = 1e-9  # of the largest eigenvalue
 
@@ -39,7 +40,7 @@ class Score:
     gain
         Expected fall of the cost (minus twice the log-likelihood).
     start
-        Its parameter values for a fit to begin from.
+        Its parameter values for a fit to begin from, and the model's own gains as they follow it.
     """
 
     effect: str
@@ -76,8 +77,10 @@ class InnovationScores:
         if self.lost:
             return
         size = np.sqrt(np.maximum(np.sum(columns**2, axis=0), 1e-300))
-        u, s, _ = np.linalg.svd(columns / size, full_matrices=False)
-        self.basis = u[:, s > 1e-7 * max(float(s[0]) if len(s) else 0.0, 1e-300)]
+        u, s, v = np.linalg.svd(columns / size, full_matrices=False)
+        told = s > 1e-7 * max(float(s[0]) if len(s) else 0.0, 1e-300)
+        self.basis = u[:, told]
+        self.follow = -(v[told].T / s[told]) / size[:, None]  # of the model's parameters, for what is projected out
         self.residual = rest - self.basis @ (self.basis.T @ rest)
         self.square = float(self.residual @ self.residual)
 
@@ -107,7 +110,8 @@ class InnovationScores:
         if not columns or len(columns) != len(pushes):
             return None
         wide = np.stack(columns, axis=1)
-        wide = wide - self.basis @ (self.basis.T @ wide)
+        along_base = self.basis.T @ wide
+        wide = wide - self.basis @ along_base
         size = np.sqrt(np.sum(wide**2, axis=0))
         if not np.all(np.isfinite(size)) or np.any(size <= 0.0):
             return None
@@ -120,7 +124,19 @@ class InnovationScores:
             as_it_is = self._gain(float(2.0 * along[0] * size[0] - size[0] ** 2))
             if as_it_is > 0.5 * gain:  # where it does as well at its own size, that is a better place to begin
                 return Score(effect.name, max(gain, as_it_is), dict(pushes[0][0]), shape)
-        return Score(effect.name, gain, _start(effect, pushes, share / size), shape)
+        moved = self.follow @ (along_base @ (share / size))
+        return Score(effect.name, gain, {**self._followed(moved), **_start(effect, pushes, share / size)}, shape)
+
+    def _followed(self, moved: Array) -> dict[Name, float]:
+        """The model's gains where they follow a candidate; as they are where that takes them far."""
+        there = {}
+        for name, value, change in zip(self.fit.names, self.fit.vector, moved, strict=True):
+            linear = len(name) == 1 or next(p.linear for p in effects.get(name[0]).parameters if p.name == name[1])
+            if linear:
+                there[name] = float(np.clip(value + change, *bounds_of(name)))
+        kept = self.fit.values.get(("inertia",), 0.0)
+        near = abs(there.get(("inertia",), kept) - kept) <= FOLLOWED * abs(kept)
+        return there if near and all(np.isfinite(list(there.values()))) else {}
 
     def _gain(self, fall: float) -> float:
         count = len(self.residual)

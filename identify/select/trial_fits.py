@@ -171,9 +171,9 @@ class TrialFits:
                         )
                     )
                 continue
-            own = {k: v for k, v in start.items() if k[0] == name}
+            own = {k: v for k, v in start.items() if k[0] not in held}
             for special in held:
-                own = {k: v + _gain(now, special) if k[1] in linear else v for k, v in own.items()}
+                own = {k: v + _gain(now, special) if k[0] == name and k[1] in linear else v for k, v in own.items()}
             fits.append(
                 self.problem.fit(
                     structure.plus(name), {**rest, **own}, now.noise, FEW, carry=now.shots, thorough=False,
