@@ -18,10 +18,9 @@ from identify.estimate.fit import Fit
 from identify.model.parameters import Name
 from identify.propose.free_forms import fitted, scores, states_of, torque_of
 from identify.results import Dependence
-from identify.select.evidence import WEIGHT, Evidence, likely_share
+from identify.select.evidence import WEIGHT, Evidence, behind, likely_share
 from rig import effects
 from rig.arrays import Array
-from rig.effects.free_form import FREE_FORMS
 from rig.platform import TERMS
 
 if TYPE_CHECKING:
@@ -61,28 +60,47 @@ class LeftOver:
         """Which curve."""
         return self.evidence.effect
 
+    @property
+    def counts(self) -> bool:
+        """Whether it is believed, and takes enough."""
+        return self.evidence.support > APART and self.share > WEIGHT
+
 
 def left_over(search: Stepwise, now: Fit) -> LeftOver | None:
     """The curve that explains most of what a model leaves; None where none explains enough to be believed."""
-    problem, weigher = search.problem, search.weigher
+    problem = search.problem
     best: LeftOver | None = None
-    for form in scores(problem, now, search.trials.scale(now), tuple(FREE_FORMS))[:TRIED]:
+    for form in scores(problem, now, search.trials.scale(now), tuple(effects.FREE_FORMS))[:TRIED]:
         if form.gain < HOPE:
             break
         fit = fitted(problem, now, form, STEPS)
         if not np.isfinite(fit.cost):
             continue
-        found = LeftOver(
-            now, weigher.evidence(form.effect, now, fit), likely_share(now, fit, weigher.regression.cutoff_hz)
-        )
-        counts = found.evidence.support > APART and found.share > WEIGHT
-        if counts and (best is None or found.evidence.support > best.evidence.support):
+        found = _beside(search, now, fit, form.effect)
+        if found.counts:
+            found = _beside(search, _from_there(search, now, fit), fit, form.effect)
+        if found.counts and (best is None or found.evidence.support > best.evidence.support):
             best = found
     return best
 
 
+def _beside(search: Stepwise, now: Fit, fit: Fit, form: str) -> LeftOver:
+    weigher = search.weigher
+    return LeftOver(now, weigher.evidence(form, now, fit), likely_share(now, fit, weigher.regression.cutoff_hz))
+
+
+def _from_there(search: Stepwise, now: Fit, fit: Fit) -> Fit:
+    """The model without the curve, begun where it stands with it: a curve is not paid for a better place."""
+    again = search.problem.fit(now.structure, {**now.values, **fit.values}, fit.noise, STEPS, carry=fit.shots)
+    return min((now, again), key=lambda f: f.cost)
+
+
 def needless_beside(search: Stepwise, left: LeftOver, names: Sequence[str]) -> str | None:
-    """The name that explains least once the curve is there, if that is too little; None where all are needed."""
+    """The name that explains least once the curve is there, if that is too little; None where all are needed.
+
+    A curve may hold the effect itself (a spring with a bend is a curve over the angle), so the curve in its place must
+    also be clearly likelier, and leave clearly less.
+    """
     weakest: tuple[float, str] | None = None
     fit = left.evidence.fit
     for name in names:
@@ -93,8 +111,11 @@ def needless_beside(search: Stepwise, left: LeftOver, names: Sequence[str]) -> s
             fit.structure.minus(name), kept, fit.noise, STEPS, carry=fit.shots, thorough=False
         )  # fmt: skip
         evidence = search.weigher.evidence(name, without, fit)
-        share = max(evidence.weight, likely_share(without, fit, search.weigher.regression.cutoff_hz))
-        if (evidence.support < APART or share < WEIGHT) and (weakest is None or evidence.support < weakest[0]):
+        cutoff_hz = search.weigher.regression.cutoff_hz
+        share = max(evidence.weight, likely_share(without, fit, cutoff_hz))
+        better = behind(left.now, without) > APART and likely_share(left.now, without, cutoff_hz) > WEIGHT
+        needless = better and (evidence.support < APART or share < WEIGHT)
+        if needless and (weakest is None or evidence.support < weakest[0]):
             weakest = (evidence.support, name)
     return weakest[1] if weakest else None
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from rig.channels import Channel
 from rig.effects import _channels, _outside
+from rig.effects._free_form import FREE_FORMS
 from rig.effects.base import Effect, Parameter, Place, Scale, filter_kernel, kernel
-from rig.effects.free_form import FREE_FORMS
 
 _MODULES = {
     "coulomb_friction": "coulomb",
@@ -153,6 +153,6 @@ def file_of(name: str) -> Path | None:
 
 
 __all__ = [
-    "Effect", "Parameter", "Place", "Scale", "declare_channels", "exists", "file_of", "filter_kernel", "first_of",
-    "forms", "further", "get", "kernel", "known", "names", "of_channel", "read_file",
+    "FREE_FORMS", "Effect", "Parameter", "Place", "Scale", "declare_channels", "exists", "file_of", "filter_kernel",
+    "first_of", "forms", "further", "get", "kernel", "known", "names", "of_channel", "read_file",
 ]  # fmt: skip
