@@ -35,7 +35,7 @@ FEWEST_RUNS = 4  # whose scores show whether runs differ
 ALONE = 1e-3  # of a parameter's influence, that the others leave: of less only rounding is seen
 WEIGHT = 0.20  # share of the disturbance that an effect takes away to be named: below, it is true but small
 TRUSTED = 1.5  # inflation up to which what the likelihood takes the disturbance for is believed
-EVIDENT = 0.1  # of the sensor's variance, that a disturbance adds to the prediction error: a smaller one weighs nothing
+SHOWS = 0.1  # of the disturbance in the band, that its white part is: what becomes of less is chance
 
 
 @dataclass(frozen=True)
@@ -100,9 +100,11 @@ class Weigher:
         the second counts only where the likelihood can be ``trusted``.
         """
         shares = [1.0 - self.left(self.in_torque(new)) / self.left(self.in_torque(now))]
-        if trusted and disturbed(now) > 1.0 + EVIDENT:
+        if trusted:
             shares.append(likely_share(now, new, self.regression.cutoff_hz))
-            shares.append(1.0 - new.noise.white * new.variance / (now.noise.white * now.variance))
+            cutoff_hz = self.regression.cutoff_hz
+            if now.noise.white * cutoff_hz > SHOWS * in_band(now.noise, cutoff_hz):
+                shares.append(1.0 - new.noise.white * new.variance / (now.noise.white * now.variance))
         return float(max(shares))
 
     def left(self, fit: TorqueFit) -> float:

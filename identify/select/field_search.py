@@ -131,11 +131,12 @@ def search_in_torque(
     best = trial
     size_nm = float(np.sqrt(in_band(known[0].noise, search.regression.cutoff_hz) * known[0].variance))
     unfollowed = trusted and size_nm < UNFOLLOWED * trial.held_nm
-    if not unfollowed:
+    filtered = any(effects.get(e).place is Place.SENSOR for e in known[0].structure.effects)  # which no torque shows
+    if not unfollowed and not filtered:
         say("looking at what is left as a torque")
         depends = bool(curve or disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on)
         best = search.run()
-        if _better(search, best, trial, depends):
+        if _better(search, best, trial, depends) and not (trusted and _more_flexible(best, trial)):
             by_likelihood = None
         else:
             best = trial
@@ -161,7 +162,7 @@ def search_in_torque(
     lost = [e for e in final.effects if e not in best.structure.effects and effects.get(e).place is not Place.SENSOR]
     if by_likelihood and (unfollowed or lost):
         disturbance = Disturbance(size_nm, unit, size_nm / regression.torque_nm, (), {})
-    if by_likelihood and curve is not None:
+    if curve is not None and set(final.effects) <= set(known[0].structure.effects):
         disturbance = _with_curve(disturbance, *curve)
 
     def errors(fit: TorqueFit) -> TorqueErrors:
@@ -202,6 +203,15 @@ def _better(search: TorqueSearch, best: TorqueFit, trial: TorqueFit, depends: bo
     ratio, more = search.left(best) / search.left(trial), len(best.values) - len(trial.values)
     enough = (ratio < ABOUT_AS_MUCH and more < 0) or (ratio < 1.0 / ABOUT_AS_MUCH and more == 0)
     return ratio < CLEARLY_LESS or (depends and enough)
+
+
+def _more_flexible(best: TorqueFit, trial: TorqueFit) -> bool:
+    """Whether a model has an effect besides that fits almost anything, or a lag of the drive.
+
+    Where the likelihood can be trusted it knows of both: it has seen how the platform answers, sample by sample.
+    """
+    added = [effects.get(e) for e in best.structure.effects if e not in trial.structure.effects]
+    return any(e.resembles_much or e.place is Place.DRIVE for e in added)
 
 
 def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> Fitted:

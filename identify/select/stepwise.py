@@ -21,6 +21,7 @@ from identify.select.evidence import TRUSTED, WEIGHT, Evidence, Weigher, behind,
 from identify.select.left_over import LeftOver, left_over, needless_beside
 from identify.select.trial_fits import FEW, HOPE, MANY, TrialFits
 from rig import effects
+from rig.effects.base import Place
 from rig.platform import TERMS
 
 # What decides a name. All in units of the cost (minus twice the log-likelihood) or as shares.
@@ -208,11 +209,17 @@ class Stepwise:
         return self.plainest({n: seen[n].fit for n in alike}), alike
 
     def plainest(self, fits: Mapping[str, Fit]) -> str:
-        """Of candidates that do as well: no channel, fewest parameters, least torque left on held-out samples."""
-        return min(
-            fits,
-            key=lambda n: (simplicity(n), len(fits[n].names), self.weigher.left(self.weigher.in_torque(fits[n])), n),
-        )  # fmt: skip
+        """Of candidates that do as well: no channel, fewest parameters, least torque left on held-out samples.
+
+        Torque cannot judge a lag of the sensor, which has none: among such the likelier goes first.
+        """
+        torqueless = any(effects.get(n).place is Place.SENSOR for n in fits)
+
+        def left(name: str) -> float:
+            fit = fits[name]
+            return fit.penalised if torqueless else self.weigher.left(self.weigher.in_torque(fit))
+
+        return min(fits, key=lambda n: (simplicity(n), len(fits[n].names), left(n), n))
 
     @staticmethod
     def _cannot_gain(seen: Mapping[str, Evidence], rich: str, close: Sequence[str], more: float) -> bool:
