@@ -133,7 +133,7 @@ class TorqueRegression(TorqueBand):
     ) -> tuple[Array, Array]:
         """Least squares, and the residual where every fold was left out of its own fit.
 
-        What is ``free`` in each run, (columns,) boolean, is no part of the model: it is fitted to what is held out, too.
+        What is ``free`` in each run, (columns,) boolean, is no part of the model: it is fitted to held-out samples too.
         """
 
         def solved(rows: Any) -> Array:
