@@ -168,6 +168,6 @@ def _shape(form: str, fit: Fit) -> tuple[list[float], list[float]]:
         return [], []
     own: Array = np.array([fit.values[(form, p.name)] for p in effects.get(form).parameters])
     places = np.linspace(own[0], own[1], len(own) - 1)  # begin, end, constant, inner values
-    values = own[2] + np.concatenate([[0.0], own[3:], [0.0]])
+    values = np.concatenate([[0.0], own[3:], [0.0]])
     at = np.linspace(own[0], own[1], SHOWN)
     return at.tolist(), np.interp(at, places, values).tolist()

@@ -50,3 +50,14 @@ def test_of_a_right_model_no_curve_is_left() -> None:
     assert identification.disturbance.depends_on == ()
     assert identification.accepted, identification.reasons
     assert np.isclose(identification.final.parameters["inertia"].value, TRUTH[0], rtol=5e-3)
+
+
+def test_the_shape_of_what_is_left_is_that_of_the_torque_that_nobody_offered() -> None:
+    """Its constant and its straight part are the model's: what is left of a cubic spring is a cubic without them."""
+    left = found({"cubic_stiffness": {"factor": 4000.0}}).disturbance
+    assert left is not None
+    curve = next(d for d in left.depends_on if d.on == "angle")
+    at, shape = np.array(curve.at), np.array(curve.shape_nm)
+    missing = 4000.0 * at**3
+    straight = np.polynomial.Polynomial.fit(at, missing - shape, 1)
+    assert np.std(shape + straight(at) - missing) < 0.1 * np.std(missing)
