@@ -206,12 +206,13 @@ def _better(search: TorqueSearch, best: TorqueFit, trial: TorqueFit, depends: bo
 
 
 def _more_flexible(best: TorqueFit, trial: TorqueFit) -> bool:
-    """Whether a model has an effect besides that fits almost anything, or a lag of the drive.
+    """Whether a model has a lag of the drive besides, or beside what was found an effect that fits almost anything.
 
     Where the likelihood can be trusted it knows of both: it has seen how the platform answers, sample by sample.
     """
-    added = [effects.get(e) for e in best.structure.effects if e not in trial.structure.effects]
-    return any(e.resembles_much or e.place is Place.DRIVE for e in added)
+    found = trial.structure.effects
+    added = [effects.get(e) for e in best.structure.effects if e not in found]
+    return any(e.place is Place.DRIVE or (bool(found) and e.resembles_much) for e in added)
 
 
 def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> Fitted:
