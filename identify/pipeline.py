@@ -37,13 +37,13 @@ from identify.runs.observability import why_unseen
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
 from identify.runs.usable import runs_used
 from identify.select.contribution import contributions
+from identify.select.evidence import APART
 from identify.select.field_search import Found, search_in_torque
 from identify.select.fitter import Fits
 from identify.select.free_decay import FreeDecay
 from identify.select.left_over import dependence_on
 from identify.select.likelihood_search import LikelihoodSearch
 from identify.select.search_state import Search
-from identify.select.stepwise import APART
 from identify.signals.prepare import channels_of, prepare
 from identify.signals.torque_noise import quieter
 from identify.signals.trace import Trace, loads_differ

@@ -33,6 +33,7 @@ BLOCKS = 30  # of all runs together, over which scores scatter: their ratio is t
 CHANCE = 0.95  # quantile of a ratio of variances: what chance alone reaches is no sign of a wrong likelihood
 FEWEST_RUNS = 4  # whose scores show whether runs differ
 ALONE = 1e-3  # of a parameter's influence, that the others leave: of less only rounding is seen
+APART = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
 WEIGHT = 0.20  # share of the disturbance that an effect takes away to be named: below, it is true but small
 TRUSTED = 1.5  # inflation up to which what the likelihood takes the disturbance for is believed
 SHOWS = 0.1  # of the disturbance in the band, that its white part is: what becomes of less is chance

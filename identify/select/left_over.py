@@ -18,7 +18,7 @@ from identify.estimate.fit import Fit
 from identify.model.parameters import Name
 from identify.propose.free_forms import fitted, scores, states_of, torque_of
 from identify.results import Dependence
-from identify.select.evidence import WEIGHT, Evidence, behind, likely_share
+from identify.select.evidence import APART, WEIGHT, Evidence, behind, likely_share
 from rig import effects
 from rig.arrays import Array
 from rig.platform import TERMS
@@ -26,7 +26,6 @@ from rig.platform import TERMS
 if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
 
-APART = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
 HOPE = 20.0  # of a score, that is worth a fit
 TRIED = 2  # of the curves with the largest scores
 STEPS = 14

@@ -17,7 +17,7 @@ from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.propose.innovation_score import Score
 from identify.runs.measured_channels import simplicity
-from identify.select.evidence import TRUSTED, WEIGHT, Evidence, Weigher, behind, disturbed
+from identify.select.evidence import APART, TRUSTED, WEIGHT, Evidence, Weigher, behind, disturbed
 from identify.select.left_over import LeftOver, left_over, needless_beside
 from identify.select.trial_fits import FEW, HOPE, MANY, TrialFits
 from rig import effects
@@ -25,7 +25,6 @@ from rig.effects.base import Place
 from rig.platform import TERMS
 
 # What decides a name. All in units of the cost (minus twice the log-likelihood) or as shares.
-APART = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
 AS_HEAVY = 0.05  # of the disturbance: what a richer effect carries besides, to be preferred where nothing else is sure
 SPECIAL = 0.8  # of the support of a richer effect, with which its special case is preferred
 AT_NOISE = 1.1  # times the sensor's variance: a model that predicts as closely leaves no disturbance
