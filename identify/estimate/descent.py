@@ -1,4 +1,4 @@
-"""The way down of a fit by prediction error: parameters, biases and noise in one step (scoring).
+"""The way down of a fit by prediction error: parameters, what each run has of its own, and noise in one step (scoring).
 
 A parameter moves the innovations. A number of the noise moves them, too, through the gains, and moves their variance,
 which tells as much about it as half a squared unit normal does (Fisher information of a variance). Both stand in one
@@ -18,7 +18,7 @@ from identify.estimate.output_error import held_still
 from identify.model.parameters import Name, bounds_of, names_of, ordered
 from identify.model.structure import Structure
 from identify.simulate.all_runs import shots_for
-from identify.simulate.shots import RUNAWAY, Shots
+from identify.simulate.shots import RUNAWAY, Shots, moved
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.gains import RATE, SLOW, Gains, Noise, innovations_with
@@ -48,11 +48,11 @@ FURTHER = (  # times white density, slow variance and time constant: where else 
 
 @dataclass(frozen=True)
 class _Step:
-    """What a step is solved from: normal matrix and right side, and how each run's bias follows."""
+    """What a step is solved from: normal matrix and right side, and how each run's own unknowns follow."""
 
     matrix: Array
     right: Array
-    biases: Sequence[tuple[Array, float]]
+    own: Sequence[tuple[Array, Array]]  # (k, p) and (k,): what they lose with a change, and take without one
 
 
 class Descent:
@@ -67,7 +67,7 @@ class Descent:
     noise
         To begin from; None looks for the best on a grid.
     carry
-        Runs of an earlier fit, whose biases to begin from.
+        Runs of an earlier fit, whose biases (and start states, where they are fitted) to begin from.
     fixed
         Parameters that stay at their start value.
     """
@@ -86,14 +86,18 @@ class Descent:
         self.still = held_still(self.names, p.traces, p.use, still)
         self.scale = np.maximum(np.abs(self.x), [self._unit(n) for n in self.names])
         self.shots = shots_for(p.traces, structure, self.names, self.x, None, p.use, None, p.coarse)
-        # Start states are not carried over: where a run begins stuck is a matter of the friction that is tried.
-        self.bias: Array = np.array([s.bias for s in (carry or self.shots)])
+        # Start states are carried over only where they are fitted: where a driven run begins stuck is a matter of the
+        # friction that is tried.
+        for s, earlier in zip(self.shots, carry or (), strict=bool(carry)):
+            s.bias = earlier.bias
+            if p.fits_starts and np.array_equal(earlier.first, s.first):
+                s.starts = earlier.starts.copy()
         self.damping = DAMPING
         self.weights = [s.weight for s in self.shots]
         self.count = int(sum(w.sum() for w in self.weights)) * p.readings
         self.kinds = self._kinds_of_noise()
-        self.noise = p.within(noise or p.on_grid(lambda q: self._cost(self._looks(self.x, p.within(q), self.bias))))
-        self.looks = self._looks(self.x, self.noise, self.bias)
+        self.noise = p.within(noise or p.on_grid(lambda q: self._cost(self._looks(self.x, p.within(q), self.shots))))
+        self.looks = self._looks(self.x, self.noise, self.shots)
         self.cost = self._cost(self.looks)
         self.information: Array = np.zeros((len(self.x), len(self.x)))
         self._informed: tuple[Noise, bytes] | None = None
@@ -155,12 +159,9 @@ class Descent:
         """Derivatives of every run, where the descent stands."""
         return [c for c, _, _ in self._all_columns(False)]
 
-    def _looks(self, x: Array, noise: Noise, bias: Array) -> list[Look]:
+    def _looks(self, x: Array, noise: Noise, shots: Sequence[Shots]) -> list[Look]:
         p = self.problem
-        return list(
-            p.workers.map(lambda i: p.look(self.shots[i], self.structure, self.names, x, noise, float(bias[i])),
-                          range(len(self.shots)))
-        )  # fmt: skip
+        return list(p.workers.map(lambda s: p.look(s, self.structure, self.names, x, noise), shots))
 
     @RUNAWAY
     def _cost(self, looks: Sequence[Look]) -> float:
@@ -190,7 +191,7 @@ class Descent:
         there = self.x.copy()
         there[k] += h
         # What a parameter does to the gains matters to no innovation that is white, and gains cost a prediction.
-        other = p.look(s, self.structure, self.names, there, self.noise, self.bias[i], base.gains)
+        other = p.look(s, self.structure, self.names, there, self.noise, base.gains)
         return np.asarray(((base.innovations[w] - other.innovations[w]) / (h * np.sqrt(base.variance[w]))).ravel())
 
     @RUNAWAY
@@ -210,42 +211,58 @@ class Descent:
 
         scaled = (base.innovations[w] / root).ravel()
         kinds = self.kinds if of_noise else []
-        columns, ones = np.zeros((scaled.size, len(self.x))), np.zeros(scaled.size)
+        columns = np.zeros((scaled.size, len(self.x)))
         pulled, spread = np.zeros((scaled.size, len(kinds))), np.zeros((scaled.size, len(kinds)))
         for k in range(len(self.x)):
             if (i, k) in moved:
                 columns[:, k] = moved[(i, k)]
+        own = np.zeros((scaled.size, 0))
         if s.trace.biased:
             h = 1e-4 * p.rate_rad_s
-            ones = followed(base.gains, h, h)
+            own = followed(base.gains, h, h)[:, None]
+        if p.fits_starts:
+            own = np.column_stack([own, self._started(s, base, root)])
         for k, kind in enumerate(kinds):
             changed = replace(self.noise, **{kind: getattr(self.noise, kind) * float(np.exp(NOISE_STEP))})
             gains = p.gains_at(s, self.structure, self.names, self.x, changed)
             pulled[:, k] = followed(gains, NOISE_STEP)
             spread[:, k] = (np.log(gains.variance[w] / base.variance[w]) / NOISE_STEP).ravel()
-        return Columns(columns, ones, scaled, base.variance[w].ravel()), pulled, spread
+        return Columns(columns, own, scaled, base.variance[w].ravel()), pulled, spread
+
+    def _started(self, s: Shots, base: Look, root: Array) -> Array:
+        """What angle and rate at the start of every stretch do to one run's scaled innovations, (n, 2 stretches)."""
+        p, out = self.problem, []
+        stretch = np.searchsorted(s.first, np.arange(len(s.weight)), side="right")[s.weight] - 1
+        of_reading = np.repeat(stretch, p.readings)
+        for which, size in enumerate((p.angle_rad, p.rate_rad_s)):
+            h = np.array([0.0, 0.0])
+            h[which] = STEP * size
+            other = p.look(moved(s, (h, 0.0)), self.structure, self.names, self.x, self.noise, base.gains)
+            change = ((base.innovations - other.innovations)[s.weight] / (h[which] * root)).ravel()
+            out.append([np.where(of_reading == k, change, 0.0) for k in range(len(s.first))])
+        return np.column_stack([column for pair in zip(*out, strict=True) for column in pair])
 
     def _solvable(self, of_noise: bool) -> _Step:
         """The normal equations where the descent stands; the information of the parameters is kept."""
         p, k = len(self.x), len(self.kinds) if of_noise else 0
         matrix, right = np.zeros((p + k, p + k)), np.zeros(p + k)
-        information, biases, parts = np.zeros((p, p)), [], self._all_columns(of_noise)
+        information, own, parts = np.zeros((p, p)), [], self._all_columns(of_noise)
         squares = sum(float(c.scaled @ c.scaled) for c, _, _ in parts)
         variance = squares / max(self.count, 1)
         level = np.sum([v.sum(axis=0) for _, _, v in parts], axis=0) / max(self.count, 1)
         for part, pulled, spread in parts:
-            wide, z, one = np.column_stack([part.columns, pulled]), part.scaled, part.bias
-            pivot = float(one @ one)
-            across, own = (one @ wide / pivot, float(one @ z) / pivot) if pivot > 0.0 else (np.zeros(p + k), 0.0)
-            matrix += (wide.T @ wide - pivot * np.outer(across, across)) / variance
-            right += (wide.T @ z - pivot * across * own) / variance
-            biases.append((across, own))
-            information += part.columns.T @ part.columns - pivot * np.outer(across[:p], across[:p])
+            wide, z = np.column_stack([part.columns, pulled]), part.scaled
+            basis, follow = _spanned(part.own)
+            across, taken = basis.T @ wide, basis.T @ z
+            matrix += (wide.T @ wide - across.T @ across) / variance
+            right += (wide.T @ z - across.T @ taken) / variance
+            own.append((follow @ across, follow @ taken))
+            information += part.columns.T @ part.columns - across[:, :p].T @ across[:, :p]
             apart = spread - level  # the scale of all variances is free: only what differs between samples tells
             matrix[p:, p:] += 0.5 * apart.T @ apart
             right[p:] -= 0.5 * apart.T @ (1.0 - z * z / variance)
         self.information, self._informed = information, (self.noise, self.x.tobytes())
-        return _Step(matrix, right, biases)
+        return _Step(matrix, right, own)
 
     def _down(self, of_noise: bool) -> bool:
         """One step of parameters, biases and, if asked for, the noise; False where none leads down."""
@@ -265,11 +282,13 @@ class Descent:
             x = ordered(self.names, np.clip(self.x + d[:p], self.low, self.high))
             change = np.concatenate([x - self.x, logs_of(d[p:])])
             noise = self._with_logs(change[p:])
-            bias = self.bias + np.array([own - across @ change for across, own in found.biases])
-            looks = self._looks(x, noise, bias)
+            shots = [
+                _changed(s, taken - across @ change) for s, (across, taken) in zip(self.shots, found.own, strict=True)
+            ]
+            looks = self._looks(x, noise, shots)
             cost = self._cost(looks)
             if cost < self.cost:
-                self.x, self.bias, self.looks, self.cost, self.noise = x, bias, looks, cost, noise
+                self.x, self.shots, self.looks, self.cost, self.noise = x, shots, looks, cost, noise
                 self.damping = max(self.damping / 10.0, 1e-9)
                 return True
             self.damping = max(10.0 * self.damping, 1e-3)
@@ -293,7 +312,7 @@ class Descent:
             noise = self.problem.within(
                 replace(q, white=white * q.white, slow=slow * q.slow, time_constant_s=time * q.time_constant_s)
             )
-            looks = self._looks(self.x, noise, self.bias)
+            looks = self._looks(self.x, noise, self.shots)
             cost = self._cost(looks)
             if cost < self.cost - ENOUGH:
                 self.noise, self.looks, self.cost = noise, looks, cost
@@ -314,7 +333,7 @@ class Descent:
         for factor in DOWN:
             q = here[0]
             self.noise = self.problem.within(replace(q, white=factor * q.white, slow=factor * q.slow))
-            self.looks = self._looks(self.x, self.noise, self.bias)
+            self.looks = self._looks(self.x, self.noise, self.shots)
             self.cost, self.damping = self._cost(self.looks), DAMPING
             for _ in range(FOLLOWED):
                 gap = self.cost - here[-1]
@@ -324,11 +343,11 @@ class Descent:
                 return
             self._go(here)
 
-    def _place(self) -> tuple[Noise, Array, Array, list[Look], float]:
-        return self.noise, self.x, self.bias, self.looks, self.cost
+    def _place(self) -> tuple[Noise, Array, list[Shots], list[Look], float]:
+        return self.noise, self.x, self.shots, self.looks, self.cost
 
-    def _go(self, place: tuple[Noise, Array, Array, list[Look], float]) -> None:
-        self.noise, self.x, self.bias, self.looks, self.cost = place
+    def _go(self, place: tuple[Noise, Array, list[Shots], list[Look], float]) -> None:
+        self.noise, self.x, self.shots, self.looks, self.cost = place
 
     def _disturbed(self) -> float:
         """Median over the samples of the prediction's variance over that without a torque disturbance."""
@@ -346,7 +365,6 @@ class Descent:
         squares = sum(
             float(np.sum(q.innovations[w] ** 2 / q.variance[w])) for q, w in zip(self.looks, self.weights, strict=True)
         )
-        shots = tuple(replace_bias(s, float(b)) for s, b in zip(self.shots, self.bias, strict=True))
         inertia = self.x[self.names.index(("inertia",))] if ("inertia",) in self.names else 1.0
         disturbance = [
             q.state[:, 2]
@@ -357,7 +375,7 @@ class Descent:
             [q.innovations[:, 0] for q in self.looks], [q.variance[:, 0] for q in self.looks], disturbance
         )  # fmt: skip
         return Fit(
-            self.structure, self.names, self.x, self.noise, shots, self.cost, self.count,
+            self.structure, self.names, self.x, self.noise, tuple(self.shots), self.cost, self.count,
             squares / max(self.count, 1), self.information, prediction, self._disturbed(),
         )  # fmt: skip
 
@@ -371,6 +389,21 @@ def logs_of(step: Array) -> Array:
     return np.where(step > 0.0, np.log1p(np.minimum(step, RISE)), np.maximum(step, -FARTHEST))
 
 
-def replace_bias(s: Shots, bias: float) -> Shots:
-    """The same run with another bias."""
-    return Shots(s.trace, s.grid, s.first, s.starts, bias, s.weight, s.rests)
+def _spanned(own: Array) -> tuple[Array, Array]:
+    """An orthonormal basis of what a run's own unknowns do, (n, r), and the unknowns for each of it, (k, r)."""
+    size = np.linalg.norm(own, axis=0)
+    told = np.flatnonzero(size > 0.0)
+    follow = np.zeros((own.shape[1], len(told)))
+    if not len(told):
+        return own[:, told], follow
+    basis, upper = np.linalg.qr(own[:, told] / size[told])
+    inverse = np.linalg.pinv(upper, rcond=1e-12)
+    follow[told] = inverse / size[told, None]
+    return basis, follow
+
+
+def _changed(s: Shots, own: Array) -> Shots:
+    """The same run with its own unknowns changed: its bias, if it has one, and its start states, if they are fitted."""
+    biased = int(s.trace.biased)
+    starts = own[biased:].reshape(-1, 2)
+    return moved(s, (starts if len(starts) else np.zeros(2), float(own[0]) if biased else 0.0))

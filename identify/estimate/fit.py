@@ -35,8 +35,8 @@ class Columns:
     ----------
     columns
         What the parameters do to the scaled innovations, (n, p).
-    bias
-        What the run's bias does, (n,); zeros where it has none.
+    own
+        What the run's own unknowns do, (n, k): a gyro's bias, and start states where they are fitted.
     scaled
         Innovations over their standard deviation, (n,).
     variance
@@ -44,9 +44,19 @@ class Columns:
     """
 
     columns: Array
-    bias: Array
+    own: Array
     scaled: Array
     variance: Array
+
+
+def apart(own: Array, values: Array) -> Array:
+    """Columns (n, m) without what a run's own unknowns, (n, k), can follow."""
+    size: Array = np.linalg.norm(own, axis=0)
+    told = size > 0.0
+    if not np.any(told):
+        return values
+    basis = np.linalg.qr(own[:, told] / size[told])[0]
+    return np.asarray(values - basis @ (basis.T @ values))
 
 
 @dataclass(frozen=True)

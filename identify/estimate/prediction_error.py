@@ -78,14 +78,17 @@ class PredictionError:
         self._gains: dict[tuple[object, ...], tuple[dict[tuple[object, ...], Gains], Lock]] = {}
         self._slopes: dict[tuple[object, ...], Array] = {}
         self._slopes_lock = Lock()
-        self.start_variance = self._start_variance()
+        # A decay shows nothing but how it began and how it swings on, far beyond what is linear about its prediction:
+        # where it began is fitted, and not corrected as the readings come in.
+        self.fits_starts = self.torque_free
+        self.start_variance = (0.0, 0.0) if self.fits_starts else self._start_variance()
 
     @RUNAWAY
     def cost_at(self, fit: Fit, noise: Noise) -> float:
         """The cost of a fit with another noise."""
         squares, logs = 0.0, 0.0
         for s in fit.shots:
-            look = self.look(s, fit.structure, fit.names, fit.vector, noise, s.bias)
+            look = self.look(s, fit.structure, fit.names, fit.vector, noise)
             squares += float(np.sum(look.innovations[s.weight] ** 2 / look.variance[s.weight]))
             logs += float(np.sum(np.log(look.variance[s.weight])))
         return fit.count * float(np.log(squares / fit.count)) + logs if np.isfinite(squares) else np.inf
@@ -140,7 +143,7 @@ class PredictionError:
         noise
             To begin from; None looks for the best on a grid.
         carry
-            Runs of an earlier fit, whose biases to begin from.
+            Runs of an earlier fit, whose biases (and start states, where they are fitted) to begin from.
         fixed
             Parameters that stay at their start value.
         thorough
@@ -166,9 +169,8 @@ class PredictionError:
 
     @RUNAWAY
     def look(
-        self, s: Shots, structure: Structure, names: Sequence[Name], x: Array, noise: Noise, bias: float,
-        kept: Gains | None = None,
-    ) -> Look:  # fmt: skip
+        self, s: Shots, structure: Structure, names: Sequence[Name], x: Array, noise: Noise, kept: Gains | None = None
+    ) -> Look:
         """One run predicted at a parameter vector, with its own gains or with ``kept`` ones."""
         equations = equations_of(structure, names, x, s.number, s.added)
         trace = s.trace
@@ -178,7 +180,7 @@ class PredictionError:
         measured = self._readings(trace)
         predicted, state = predict_ahead(
             equations, s.grid.shaft_torque(equations), s.grid.step_s, round(trace.step_s / s.grid.step_s), spans,
-            s.starts, measured, trace.keep, gains, sensing.rate, bias, trace.offset_s, trace,
+            s.starts, measured, trace.keep, gains, sensing.rate, s.bias, trace.offset_s, trace,
         )  # fmt: skip
         return Look(measured - predicted, gains.variance, state, gains)
 

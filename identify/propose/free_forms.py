@@ -28,7 +28,7 @@ Range = tuple[float, float]
 def states_of(problem: PredictionError, fit: Fit) -> list[Array]:
     """Angle, rate and slow torque after every sample, (n, 3), one array a run."""
     return [
-        problem.look(s, fit.structure, fit.names, fit.vector, fit.noise, s.bias).state for s in fit.shots
+        problem.look(s, fit.structure, fit.names, fit.vector, fit.noise).state for s in fit.shots
     ]  # fmt: skip
 
 

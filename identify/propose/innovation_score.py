@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.estimate.fit import Fit
+from identify.estimate.fit import Fit, apart
 from identify.estimate.prediction_error import PredictionError
 from identify.model.parameters import Name, bounds_of, names_of
 from identify.propose.screening import grid_of
@@ -68,11 +68,11 @@ class InnovationScores:
         filtered = any(effects.get(e).lag is not None for e in fit.structure.effects)
         self.noise = fit.noise if filtered else problem.within(replace(fit.noise, ahead=0.0))
         parts = problem.columns_at(fit)
-        self.ones = [p.bias for p in parts]
+        self.own = [p.own for p in parts]
         self.base = [p.scaled for p in parts]
         self.variance = [p.variance for p in parts]
-        columns = np.concatenate([self._apart(p.columns, i) for i, p in enumerate(parts)])
-        rest = np.concatenate([self._apart(p.scaled[:, None], i)[:, 0] for i, p in enumerate(parts)])
+        columns = np.concatenate([apart(p.own, p.columns) for p in parts])
+        rest = np.concatenate([apart(p.own, p.scaled[:, None])[:, 0] for p in parts])
         self.lost = not (np.all(np.isfinite(columns)) and np.all(np.isfinite(rest)))  # the model runs away
         if self.lost:
             return
@@ -83,12 +83,6 @@ class InnovationScores:
         self.follow = -(v[told].T / s[told]) / size[:, None]  # of the model's parameters, for what is projected out
         self.residual = rest - self.basis @ (self.basis.T @ rest)
         self.square = float(self.residual @ self.residual)
-
-    def _apart(self, values: Array, run: int) -> Array:
-        """Without what the run's bias can follow."""
-        one = self.ones[run]
-        power = float(one @ one)
-        return values - np.outer(one, one @ values) / power if power > 0.0 else values
 
     def all(self, names: Sequence[str]) -> list[list[Score]]:
         """Every candidate at its best shapes, the largest gain first; of each a few shapes to begin from."""
@@ -178,7 +172,7 @@ class InnovationScores:
         return 0.0
 
     def _direction(self, effect: Effect, push: dict[Name, float]) -> Array | None:
-        """What the push changes in the scaled innovations of all runs, biases projected out."""
+        """What the push changes in the scaled innovations of all runs, the runs' own unknowns projected out."""
         fit = self.fit
         structure = fit.structure.plus(effect.name)
         names = names_of(structure, self.problem.runs)
@@ -189,7 +183,7 @@ class InnovationScores:
         for i, s in enumerate(fit.shots):
             if own and s.number not in own:
                 continue
-            look = self.problem.look(s, structure, names, vector, self.noise, s.bias)
+            look = self.problem.look(s, structure, names, vector, self.noise)
             variance = look.variance[s.weight].ravel()
             moved[i] = look.innovations[s.weight].ravel() / np.sqrt(variance)
             spread += float(np.sum(np.log(variance / self.variance[i])))
@@ -198,8 +192,8 @@ class InnovationScores:
         level = np.exp(0.5 * spread / len(self.residual))  # the scale of all variances is free
         return np.concatenate(
             [
-                self._apart((b - level * m)[:, None], i)[:, 0]
-                for i, (b, m) in enumerate(zip(self.base, moved, strict=True))
+                apart(own, (b - level * m)[:, None])[:, 0]
+                for own, b, m in zip(self.own, self.base, moved, strict=True)
             ]
         )
 

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
-from identify.estimate.fit import Columns, Fit
+from identify.estimate.fit import Columns, Fit, apart
 from identify.estimate.prediction_error import PredictionError
 from identify.model.parameters import Name
 from rig import effects
@@ -179,10 +179,11 @@ def disturbed(fit: Fit) -> float:
 def inflation(parts: Sequence[Columns], fit: Fit, names: Sequence[Name]) -> float:
     """Variance of the scores of some parameters over what the likelihood takes it for, one at least.
 
-    The other parameters and the runs' biases are projected out. Blocks of the record show what is coloured or comes in
+    The other parameters and the runs' own unknowns are projected out. Blocks of the record show what is coloured or comes in
     bursts; whole runs, where there are several, show what differs between them.
     """
-    columns, scaled = zip(*(_without_bias(p) for p in parts), strict=True)
+    columns = [apart(p.own, p.columns) for p in parts]
+    scaled = [apart(p.own, p.scaled[:, None])[:, 0] for p in parts]
     information = np.sum([x.T @ x for x in columns], axis=0)
     mine = [fit.names.index(n) for n in names if information[(i := fit.names.index(n)), i] > 0.0]
     others = [i for i in range(len(fit.names)) if i not in mine and information[i, i] > 0.0]
@@ -210,16 +211,6 @@ def inflation(parts: Sequence[Columns], fit: Fit, names: Sequence[Name]) -> floa
     if len(parts) >= FEWEST_RUNS:
         found.append(ratio([x.T @ z for x, z in zip(own, scaled, strict=True)]))
     return max(x for x in found if np.isfinite(x))
-
-
-def _without_bias(part: Columns) -> tuple[Array, Array]:
-    one = part.bias
-    power = float(one @ one)
-    if power <= 0.0:
-        return part.columns, part.scaled
-    return part.columns - np.outer(one, one @ part.columns) / power, part.scaled - one * float(
-        one @ part.scaled
-    ) / power
 
 
 @lru_cache(maxsize=32)

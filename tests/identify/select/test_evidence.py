@@ -18,7 +18,7 @@ N = 2000
 def parts(residuals: list[Array], columns: list[Array]) -> tuple[list[Columns], SimpleNamespace]:
     """Runs with two parameters, and the fit that they belong to."""
     runs = [
-        Columns(x, np.zeros(len(z)), z, np.ones(len(z))) for x, z in zip(columns, residuals, strict=True)
+        Columns(x, np.zeros((len(z), 0)), z, np.ones(len(z))) for x, z in zip(columns, residuals, strict=True)
     ]  # fmt: skip
     variance = float(np.mean(np.concatenate(residuals) ** 2))
     return runs, SimpleNamespace(names=(("inertia",), ("coulomb_friction", "level")), variance=variance)
