@@ -21,7 +21,7 @@ from identify.simulate.all_runs import shots_for
 from identify.simulate.shots import RUNAWAY, Shots, moved
 from rig import effects
 from rig.arrays import Array
-from rig.dynamics.gains import RATE, SLOW, Gains, Noise, innovations_with
+from rig.dynamics.gains import RATE, Gains, Noise, innovations_with
 from rig.effects.base import Place
 
 if TYPE_CHECKING:
@@ -109,6 +109,8 @@ class Descent:
             out.append("walk")
             if any(effects.get(e).lag is not None for e in self.structure.effects):
                 out.append("ahead")
+        else:
+            out += ["walk", "walk_s"]
         return out
 
     def _unit(self, name: Name) -> float:
@@ -206,7 +208,7 @@ class Descent:
         spans = [(a, b - 1) for a, b in s.edges]
 
         def followed(gains: Gains, h: float, bias: float = 0.0) -> Array:
-            e = innovations_with(base.gains, gains, base.innovations, base.state[:, SLOW], s.trace.keep, spans, bias)
+            e = innovations_with(base.gains, gains, base.innovations, base.state, s.trace.keep, spans, bias)
             return np.asarray(((base.innovations[w] - e[w]) / (h * root)).ravel())
 
         scaled = (base.innovations[w] / root).ravel()

@@ -113,8 +113,9 @@ class PredictionError:
             float(np.clip(noise.white, self.white(LEAST_TORQUE), self.white(MOST_TORQUE))),
             float(np.clip(noise.slow, self.slow(LEAST_TORQUE), self.slow(MOST_TORQUE))),
             float(np.clip(noise.time_constant_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
-            float(np.clip(noise.walk, self.walk(LEAST_WALK), self.walk(MOST_WALK))) if self.gyro else 0.0,
+            float(np.clip(noise.walk, self.walk(LEAST_WALK), self.walk(MOST_WALK))),
             float(np.clip(noise.ahead, LEAST_AHEAD * self.step_s, MOST_AHEAD * self.step_s)) if self.gyro else 0.0,
+            np.inf if self.gyro else float(np.clip(noise.walk_s, 2.0 * self.step_s, self.slowest_s)),
         )
 
     def noise_of(self, fit: Fit) -> Noise:
@@ -127,7 +128,8 @@ class PredictionError:
 
     def walk(self, share: float) -> float:
         """Density of a walk that takes the gyro's bias so far over a run, of its rate, as ``Noise`` has it."""
-        return (share * self.rate_rad_s) ** 2 / self.longest_s / self.reading_variance
+        moved = self.rate_rad_s if self.gyro else self.angle_rad
+        return (share * moved) ** 2 / self.longest_s / self.reading_variance
 
     def fit(
         self, structure: Structure, start: Mapping[Name, float], noise: Noise | None = None, iterations: int = 25,
@@ -288,7 +290,8 @@ class PredictionError:
     def on_grid(self, cost: Callable[[Noise], float]) -> Noise:
         """The best of a coarse grid of noises: white alone first, then a slow part beside it."""
         tau = np.geomspace(20.0 * self.step_s, 0.3 * self.slowest_s, 3).tolist()
-        little, gyro = self.slow(1e-6), (self.walk(LITTLE_WALK), self.step_s)
+        little = self.slow(1e-6)
+        gyro = (self.walk(LITTLE_WALK), self.step_s if self.gyro else 0.0, np.inf if self.gyro else 30.0 * self.step_s)
         shares = (1.0, 0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)
         best = min((Noise(self.white(share), little, tau[1], *gyro) for share in shares), key=cost)
         slow = [

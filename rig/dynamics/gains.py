@@ -39,7 +39,10 @@ class Noise:
     time_constant_s
         Of the slow torque.
     walk
-        Density of the steps of the gyro's bias, (rad/s)^2 / s over the variance of one reading.
+        Density of the steps of the gyro's bias, (rad/s)^2 / s over the variance of one reading; where an encoder is
+        alone, of the steps of its error, rad^2 / s.
+    walk_s
+        Time constant with which that returns to nothing; infinite: never.
     ahead
         Density of the gyro's white noise ahead of its low-pass, (rad/s)^2 s over the variance of one reading.
     """
@@ -49,6 +52,7 @@ class Noise:
     time_constant_s: float = 1.0
     walk: float = 0.0
     ahead: float = 0.0
+    walk_s: float = float("inf")
 
     @property
     def none(self) -> bool:
@@ -92,6 +96,11 @@ class Gains:
     slow_decay: float  # of the slow torque, a sample
     onward: Array  # the linear part over a sample, (6, 6)
     reads: Array  # what each reading is of the states, (m, 6)
+
+    @property
+    def walk_decay(self) -> float:
+        """Of the reading's slow error, a sample."""
+        return float(self.onward[BIAS, BIAS])
 
     @property
     def held(self) -> Array:
@@ -188,6 +197,7 @@ def _discrete(
         there.append(SENSED)
     density[RATE, RATE] = noise.white / j**2
     density[SLOW, SLOW] = 2.0 * noise.slow / noise.time_constant_s
+    f[BIAS, BIAS] = -1.0 / noise.walk_s
     density[BIAS, BIAS] = noise.walk
     at = np.ix_(sorted(there), sorted(there))
     n = len(there)
@@ -230,12 +240,15 @@ def gains_of(
     if sensing.angle_variance > 0.0:
         row = np.zeros(STATES)
         row[ANGLE] = 1.0
+        row[BIAS] = 0.0 if sensing.rate else 1.0
         reads.append(row)
         noises.append(sensing.angle_variance)
     start = np.zeros((STATES, STATES))
     start[ANGLE, ANGLE], start[RATE, RATE], start[SLOW, SLOW] = start_variance[0], start_variance[1], noise.slow
     if sensing.rate:
         start[BIAS, BIAS] = sensing.bias_variance
+    elif noise.walk > 0.0:
+        start[BIAS, BIAS] = 0.5 * noise.walk * noise.walk_s
     if lagging:
         start[SENSED, SENSED] = start[RATE, SENSED] = start[SENSED, RATE] = start[RATE, RATE]
     # A state that is neither read, nor driven, nor unknown at the start needs no arithmetic.
@@ -253,7 +266,7 @@ def gains_of(
 
 
 @jit
-def _follow(spans, e, slow, keep, gain, other, phi, reads, decay, new_decay, bias, out):  # type: ignore[no-untyped-def]
+def _follow(spans, e, slow, walked, keep, gain, other, phi, reads, decay, walk_decay, bias, out):  # type: ignore[no-untyped-def]
     states, readings = len(phi), len(reads)
     d, ahead = np.zeros(states), np.zeros(states)
     for k in range(len(spans)):
@@ -272,20 +285,21 @@ def _follow(spans, e, slow, keep, gain, other, phi, reads, decay, new_decay, bia
                 for b in range(states):
                     if phi[a, b] != 0.0:
                         ahead[a] += phi[a, b] * d[b]
-            ahead[2] += (new_decay - decay) * slow[i]
+            ahead[2] += (phi[2, 2] - decay) * slow[i]
+            ahead[states - 1] += (phi[states - 1, states - 1] - walk_decay) * walked[i]
             d[:] = ahead
 
 
 def innovations_with(
-    gains: Gains, other: Gains, innovations: Array, slow_torque: Array, keep: Any, spans: Sequence[tuple[int, int]],
+    gains: Gains, other: Gains, innovations: Array, state: Array, keep: Any, spans: Sequence[tuple[int, int]],
     bias: float = 0.0,
 ) -> Array:  # fmt: skip
     """What the innovations would be with other gains, (n, m), the platform taken for linear between the two.
 
     Parameters
     ----------
-    gains, innovations, slow_torque
-        Of a prediction: its gains, its innovations (n, m), and its slow disturbance torque after every sample, (n,).
+    gains, innovations, state
+        Of a prediction: its gains, its innovations (n, m), and its states after every sample, (n, 4).
     other
         The other gains, of the same platform with another noise.
     bias
@@ -293,7 +307,8 @@ def innovations_with(
     """
     out = np.empty_like(innovations)
     _follow(
-        np.array(spans, dtype=np.int64).reshape(-1, 2), innovations, np.ascontiguousarray(slow_torque), keep,
-        gains.gain, other.gain, other.onward, other.reads, gains.slow_decay, other.slow_decay, bias, out,
+        np.array(spans, dtype=np.int64).reshape(-1, 2), innovations, np.ascontiguousarray(state[:, SLOW]),
+        np.ascontiguousarray(state[:, -1]), keep, gains.gain, other.gain, other.onward, other.reads, gains.slow_decay,
+        gains.walk_decay, bias, out,
     )  # fmt: skip
     return out

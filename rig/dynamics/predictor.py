@@ -18,7 +18,7 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.dynamics.equations import Equations, Readings
-from rig.dynamics.gains import Gains
+from rig.dynamics.gains import BIAS, Gains
 from rig.dynamics.integrator import step_over_kinks
 from rig.dynamics.native import call_filter, jit, offset, pointer
 
@@ -26,7 +26,7 @@ from rig.dynamics.native import call_filter, jit, offset, pointer
 @jit
 def _predict(  # type: ignore[no-untyped-def]
     starts, spans, offset_s, z, h, ratio, torque, jck, kernels, loads, z_at, p, p_at, kinks,
-    filters, fs, fs_at, fp, fp_at, measured, keep, gain, slow_decay, decay, rate, bias, out, state,
+    filters, fs, fs_at, fp, fp_at, measured, keep, gain, slow_decay, decay, walks, walk_decay, rate, bias, out, state,
 ):  # fmt: skip
     n_states, readings = len(z), measured.shape[1]
     room = np.zeros((10, max(4, n_states)))
@@ -53,7 +53,8 @@ def _predict(  # type: ignore[no-untyped-def]
         sensed = motion[1]
         for i in range(first, last + 1):
             for m in range(readings):
-                y = sensed + held + bias + walked if rate and m == 0 else motion[0]
+                y = sensed + held + bias if rate and m == 0 else motion[0]
+                y += walks[m] * walked
                 out[i, m] = y
                 if keep[i]:
                     e = measured[i, m] - y
@@ -66,7 +67,7 @@ def _predict(  # type: ignore[no-untyped-def]
                     walked += gain[i, m, 5] * e
                     if frictions and gain[i, m, 1] != 0.0:
                         motion[2] = np.sign(motion[1])
-            state[i, 0], state[i, 1], state[i, 2] = motion[0], motion[1], slow
+            state[i, 0], state[i, 1], state[i, 2], state[i, 3] = motion[0], motion[1], slow, walked
             if i == last:
                 break
             for s in range(i * ratio, (i + 1) * ratio):
@@ -82,6 +83,7 @@ def _predict(  # type: ignore[no-untyped-def]
                     )  # fmt: skip
                 sensed += still
             slow *= slow_decay
+            walked *= walk_decay
             held -= jumps
             held, slope = decay[0, 0] * held + decay[0, 1] * slope, decay[1, 0] * held + decay[1, 1] * slope
             held += jumps
@@ -96,7 +98,9 @@ def predict_ahead(
     measured: Array, keep: Any, gains: Gains, rate: bool, bias: float, offset_s: float = 0.0,
     readings: Readings | None = None,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Every reading predicted from those before it, (n, m), and angle, rate and slow torque after it, (n, 3).
+    """Every reading predicted from those before it, (n, m), and the states after it, (n, 4).
+
+    Those are angle, rate, slow torque, and the slow error of the reading (a gyro's bias beyond ``bias``).
 
     Parameters
     ----------
@@ -111,11 +115,11 @@ def predict_ahead(
     """
     p, _kept = equations.parameters_with(readings)
     filters, fs, fs_at, fp, fp_at = equations.sensor.arrays(step_s)
-    out, state = np.zeros(measured.shape), np.zeros((len(measured), 3))
+    out, state = np.zeros(measured.shape), np.zeros((len(measured), 4))
     _predict(
         np.ascontiguousarray(starts), np.array(spans, dtype=np.int64).reshape(-1, 2), offset_s,
         equations.rest_states(*starts[0]), step_s, ratio, torque, equations.jck, equations.kernels, equations.loads,
         equations.z_at, p, equations.p_at, equations.kinks, filters, fs, fs_at, fp, fp_at, measured, keep, gains.gain,
-        gains.slow_decay, gains.held, rate, bias, out, state,
+        gains.slow_decay, gains.held, np.ascontiguousarray(gains.reads[:, BIAS]), gains.walk_decay, rate, bias, out, state,
     )  # fmt: skip
     return out, state
