@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy import signal
 
 from identify.runs.holdout import Split
 from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace
@@ -18,8 +18,7 @@ SAMPLES_A_PERIOD = 8.0  # of the fastest motion that stands above the noise: bey
 SHORTEST_SPAN = 1_500  # samples: slow effects need a span to show in
 COLUMNS = 5  # acceleration, rate, angle, direction, constant
 PLACES = 12  # where a span may begin
-# The low-pass before a decimation: flat to 1e-5 up to 0.6 of the new Nyquist frequency and 100 dB down above it.
-PASSED, KAISER, REACH = 0.8, 10.0, 16  # cut-off over the new Nyquist frequency, window, samples to either side
+ROLL_OFF, REACH = 0.5, 16  # of the low-pass before a decimation: see there; its length in new samples to either side
 
 
 def reduced(traces: Sequence[Trace], split: Split, enough: int = ENOUGH) -> tuple[list[Trace], Split]:
@@ -82,7 +81,7 @@ def decimated(trace: Trace, factor: int) -> Trace:
     if factor <= 1:
         return trace
     order = REACH * factor
-    weights = signal.firwin(2 * order + 1, PASSED / factor, window=("kaiser", KAISER))
+    weights = _keeps_white(factor)
 
     def passed(values: Array) -> Array:
         padded = np.pad(values, order, mode="reflect", reflect_type="odd")
@@ -101,6 +100,24 @@ def decimated(trace: Trace, factor: int) -> Trace:
         noise=less * trace.noise, beside=None if trace.beside is None else passed(trace.beside),
         beside_noise=less * trace.beside_noise, motion=None, _series={},
     )  # fmt: skip
+
+
+@lru_cache(maxsize=32)
+def _keeps_white(factor: int) -> Array:
+    """A low-pass before a decimation, behind which white noise is white again.
+
+    A sharper one leaves a hole below the new Nyquist frequency, and a likelihood that knows of none takes the noise for
+    coloured. The squares of this one (Meyer's scaling function: Daubechies, Ten Lectures on Wavelets, 5.2) and of its
+    aliases add up to one at every frequency; it is flat up to half the new Nyquist frequency.
+    """
+    count = 64 * REACH * factor
+    of_new_rate = np.abs(np.fft.fftfreq(count)) * factor
+    x = np.clip((of_new_rate - 0.5 * (1.0 - ROLL_OFF)) / ROLL_OFF, 0.0, 1.0)
+    passes = np.cos(0.5 * np.pi * x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3))
+    response = np.fft.fftshift(np.fft.ifft(passes).real)
+    middle, order = count // 2, REACH * factor
+    weights = response[middle - order : middle + order + 1]
+    return np.asarray(weights / np.sum(weights))
 
 
 def _every(mask: Any, factor: int, count: int) -> Any:
