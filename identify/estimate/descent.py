@@ -109,7 +109,7 @@ class Descent:
             out.append("walk")
             if any(effects.get(e).lag is not None for e in self.structure.effects):
                 out.append("ahead")
-        else:
+        elif self.problem.wanders:
             out += ["walk", "walk_s"]
         return out
 

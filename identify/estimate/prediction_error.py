@@ -73,6 +73,9 @@ class PredictionError:
         longest = max(t.step_s * len(t.measured) for t in traces)
         self.longest_s = longest
         self.slowest_s = max(LONGEST_SHARE * longest, 10.0 * SHORTEST_SAMPLES * self.step_s)
+        # A gyro's bias walks. An encoder's error (its eccentricity, stamps that wander) does, too, but matters only
+        # where a small friction is to be seen in how a long decay keeps its phase.
+        self.wanders = self.gyro or self.torque_free
         self.workers = ThreadPoolExecutor(2)
         self.longest = max(len(t.measured) for t in traces)
         self._gains: dict[tuple[object, ...], tuple[dict[tuple[object, ...], Gains], Lock]] = {}
@@ -113,9 +116,9 @@ class PredictionError:
             float(np.clip(noise.white, self.white(LEAST_TORQUE), self.white(MOST_TORQUE))),
             float(np.clip(noise.slow, self.slow(LEAST_TORQUE), self.slow(MOST_TORQUE))),
             float(np.clip(noise.time_constant_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
-            float(np.clip(noise.walk, self.walk(LEAST_WALK), self.walk(MOST_WALK))),
+            float(np.clip(noise.walk, self.walk(LEAST_WALK), self.walk(MOST_WALK))) if self.wanders else 0.0,
             float(np.clip(noise.ahead, LEAST_AHEAD * self.step_s, MOST_AHEAD * self.step_s)) if self.gyro else 0.0,
-            np.inf if self.gyro else float(np.clip(noise.walk_s, 2.0 * self.step_s, self.slowest_s)),
+            np.inf if self.gyro else float(np.clip(noise.walk_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
         )
 
     def noise_of(self, fit: Fit) -> Noise:
@@ -291,7 +294,7 @@ class PredictionError:
         """The best of a coarse grid of noises: white alone first, then a slow part beside it."""
         tau = np.geomspace(20.0 * self.step_s, 0.3 * self.slowest_s, 3).tolist()
         little = self.slow(1e-6)
-        gyro = (self.walk(LITTLE_WALK), self.step_s if self.gyro else 0.0, np.inf if self.gyro else 30.0 * self.step_s)
+        gyro = (self.walk(LITTLE_WALK), self.step_s, np.inf if self.gyro else 30.0 * self.step_s)
         shares = (1.0, 0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)
         best = min((Noise(self.white(share), little, tau[1], *gyro) for share in shares), key=cost)
         slow = [

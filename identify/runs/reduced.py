@@ -15,6 +15,8 @@ from rig.arrays import Array
 
 ENOUGH = 20_000  # samples that a search looks at; the final fit takes all
 SAMPLES_A_PERIOD = 8.0  # of the fastest motion that stands above the noise: beyond, a sample tells nothing new
+HARMONICS = 5.0  # of a decay's swing: it moves no faster, whatever its noise does
+TURNS = 0.02  # of the largest rate, below which a turn may be noise
 SHORTEST_SPAN = 1_500  # samples: slow effects need a span to show in
 COLUMNS = 5  # acceleration, rate, angle, direction, constant
 PLACES = 12  # where a span may begin
@@ -73,7 +75,15 @@ def _decimation(trace: Trace) -> int:
     """How many samples may become one: none that the motion needs, nor one that a known filter of the sensor does."""
     if trace.run.rate_corner_hz:
         return 1
-    return max(1, int(1.0 / (SAMPLES_A_PERIOD * trace.cutoff_hz * trace.step_s)))
+    slowest_hz = 1.0 / (SAMPLES_A_PERIOD * trace.step_s)
+    return max(1, int(slowest_hz / (trace.cutoff_hz if trace.torque is not None else HARMONICS * _swing_hz(trace))))
+
+
+def _swing_hz(trace: Trace) -> float:
+    """How often a decay swings, by its turns."""
+    rate = trace.fine[1][:: UPSAMPLING]
+    rate = rate[np.abs(rate) > TURNS * np.max(np.abs(rate))]
+    return 0.5 * float(np.sum(rate[1:] * rate[:-1] < 0.0)) / (len(trace.measured) * trace.step_s) + 1e-12
 
 
 def decimated(trace: Trace, factor: int) -> Trace:
