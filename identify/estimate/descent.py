@@ -44,6 +44,7 @@ FURTHER = (  # times white density, slow variance and time constant: where else 
     (0.01, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 10.0, 1.0), (1.0, 0.1, 0.1), (1.0, 0.03, 0.01),
     (1.0, 1.0, 10.0),
 )  # fmt: skip
+QUIETER = (1e-4, 1e-3, 1e-2, 0.1)  # times torque and slow error of an encoder together: the rest is read white
 
 
 @dataclass(frozen=True)
@@ -309,11 +310,12 @@ class Descent:
         a disturbance that is slow and another for one that is fast. ``lower``: far below is looked at, too.
         """
         before = self.cost
-        for white, slow, time in FURTHER:
+        wanders = self.problem.wanders and not self.problem.gyro
+        others = [(*f, 1.0) for f in FURTHER] + [(x, x, 1.0, x) for x in QUIETER if wanders]
+        for white, slow, time, walk in others:
             q = self.noise
-            noise = self.problem.within(
-                replace(q, white=white * q.white, slow=slow * q.slow, time_constant_s=time * q.time_constant_s)
-            )
+            noise = replace(q, white=white * q.white, slow=slow * q.slow, time_constant_s=time * q.time_constant_s)
+            noise = self.problem.within(replace(noise, walk=walk * q.walk))
             looks = self._looks(self.x, noise, self.shots)
             cost = self._cost(looks)
             if cost < self.cost - ENOUGH:

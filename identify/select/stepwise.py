@@ -102,6 +102,7 @@ class Stepwise:
                 f"added {chosen}: log-likelihood +{0.5 * new.gain:.3g}, {100.0 * new.weight:.0f} % of the disturbance"
             )
             self.best = self.pruned(new.fit, [e for e in self.trials.added(new.fit) if e != chosen])
+        self.best = self.in_place_of_terms(self.best)
         self.best = self.judged_again(self.best)
         self.best = self.pruned(self.best, [*self.best.structure.terms, *self.trials.added(self.best)])
         self.best = self.beside_what_is_left(self.best)
@@ -141,13 +142,17 @@ class Stepwise:
         if not good:
             return None
         best = min(good.values(), key=lambda e: e.fit.penalised)
-        special = [n for n in effects.get(best.effect).nests if n in good and prefers_special(good[n], best)]
-        if special:
-            best = max((good[n] for n in special), key=lambda e: e.support)
+        best = self._special_of(best, good)
         alike = [n for n, e in good.items() if e is best or behind(e.fit, best.fit) < APART]
         chosen = self.plainest({n: good[n].fit for n in alike})
         lower = [n for n in effects.get(chosen).lower_order if n in good]
         return lower[0] if lower else chosen
+
+    @staticmethod
+    def _special_of(best: Evidence, among: Mapping[str, Evidence]) -> Evidence:
+        """The special case that is preferred to an effect; the effect itself where none is."""
+        special = [n for n in effects.get(best.effect).nests if n in among and prefers_special(among[n], best)]
+        return max((among[n] for n in special), key=lambda e: e.support, default=best)
 
     def judged_again(self, now: Fit) -> Fit:
         """Every named effect against all others in its place, beside the finished rest."""
@@ -170,6 +175,37 @@ class Stepwise:
             self.rivals.pop(name, None)
             self.rivals[chosen] = {n: fits[n] for n in alike if n != chosen}
         return now
+
+    def in_place_of_terms(self, now: Fit) -> Fit:
+        """With an effect instead of damping or stiffness, where that is likelier: a drag is no viscous friction.
+
+        Beside the term such an effect explains little, and the other way round.
+        """
+        for term in ("damping", "stiffness"):
+            if term not in now.structure.terms or abs(now.values[(term,)]) >= CERTAIN * now.std_error((term,)):
+                continue
+            rest = self._without(now, term)
+            fits = self.trials.of_a_round(rest)[1]
+            fits = {
+                n: f for n, f in fits.items() if len(f.names) <= len(now.names) and behind(now, f) > APART
+                and set(now.structure.effects) <= set(f.structure.effects)
+            }  # fmt: skip
+            if not fits:
+                continue
+            best = min(fits.values(), key=lambda f: f.penalised)
+            name = self.plainest({n: f for n, f in fits.items() if behind(f, best) < APART})
+            evidence = self.weigher.evidence(name, rest, fits[name])
+            if evidence.support < APART or evidence.weight < WEIGHT:
+                continue
+            self.dropped.append((term, f"{name} explains more in its place"))
+            self.say(f"replaced {term} by {name}")
+            now, self.inflation[name] = fits[name], evidence.inflation
+        return now
+
+    def _without(self, now: Fit, name: str) -> Fit:
+        """The same without a term or an effect."""
+        start = {n: v for n, v in now.values.items() if n[0] != name}
+        return self.problem.fit(now.structure.minus(name), start, now.noise, FEW, carry=now.shots, thorough=False)
 
     def _others(self, now: Fit, name: str) -> tuple[Fit, dict[str, Fit]]:
         """A model without an effect, and with others in its place; from the round that added it, if that stands."""
@@ -195,10 +231,13 @@ class Stepwise:
         """Of an effect and others in its place, the one that is named, and all that are as likely."""
         best = seen[name]
         for other in seen.values():
-            special = best.effect in effects.get(other.effect).nests and prefers_special(best, other)
-            if other.weight > WEIGHT and behind(best.fit, other.fit) > APART and not special:
+            if other.weight > WEIGHT and behind(best.fit, other.fit) > APART:
                 best = other
-        alike = [n for n, e in seen.items() if e is best or (behind(e.fit, best.fit) < APART and e.weight > WEIGHT)]
+        best = self._special_of(best, {n: e for n, e in seen.items() if e.weight > WEIGHT})
+        alike = [
+            n for n, e in seen.items()
+            if e is best or (e.weight > WEIGHT and max(behind(e.fit, best.fit), behind(best.fit, e.fit)) < APART)
+        ]  # fmt: skip
         more = max(1.0, self.samples / max(best.fit.count, 1))
         close = [n for n in alike if not self._cannot_gain(seen, n, alike, more)]
         if len(close) > 1 and self.whole is not None:
