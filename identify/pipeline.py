@@ -17,11 +17,13 @@ from identify.estimate.by_prediction_error import by_prediction_error
 from identify.estimate.cross_validation import Judged
 from identify.estimate.final_fit import Fitted, by_output_error, by_regression
 from identify.estimate.initial_guess import Start, first_guess
+from identify.estimate.whole_runs import WholeRuns
 from identify.genetic.per_set import each_set
 from identify.model.parameters import Name
 from identify.model.structure import Structure, shape_values
 from identify.results import (
     UNITS,
+    Dependence,
     Identification,
     ParameterEstimate,
     SetResult,
@@ -38,9 +40,7 @@ from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_
 from identify.runs.usable import runs_used
 from identify.select.contribution import contributions
 from identify.select.evidence import APART
-from identify.select.field_search import Found, search_in_torque
-from identify.select.fitter import Fits
-from identify.select.free_decay import FreeDecay
+from identify.select.field_search import Found, search_in_torque, with_curve
 from identify.select.left_over import dependence_on
 from identify.select.likelihood_search import LikelihoodSearch
 from identify.select.search_state import Search
@@ -90,7 +90,7 @@ def identify(
     with threadpool_limits(1):  # small matrices: a second BLAS thread only waits
         first = _Identifier(recording, declared, settings, say)
         found = first.run()
-        if found.aborted or recording.noise is not None or not (found.verdict.unexplained or first.more_than_noise):
+        if found.aborted or first.torque_free or recording.noise is not None or not (found.verdict.unexplained or first.more_than_noise):
             return found
         return with_noise_known(
             found, lambda colour: _Identifier(recording, declared, settings, say, colour).run(), say
@@ -115,6 +115,7 @@ class _Identifier:
         self.traces, self.left_out = runs_used(traces, recording.noise is not None, recording.axis, say)
         self.torque_free = free
         self.torque_noise_above_hz: float | None = None
+        self.curve: tuple[Dependence, dict[str, float]] | None = None  # over what is left of a decay
         self.more_than_noise = False  # is left by all that was found, though nothing else seemed to limit the runs
         refuse_the_idle(self.traces, free)
         if free:
@@ -134,21 +135,21 @@ class _Identifier:
     def run(self) -> Identification:
         """The whole way; where somebody stops it in the middle, what there is so far."""
         shapes = {n: shape_values(n, _plain(self.declared, n)) for n in self.structure.effects}
-        return self._decay(shapes) if self.torque_free else self._driven(shapes)
-
-    def _driven(self, shapes: dict[str, tuple[float, ...]]) -> Identification:
-        """The way for runs with torque: by prediction error, and in torque where that leaves something to be named."""
         search: LikelihoodSearch | None = None
         try:
             self.say("fitting the declared model")
             search = self._begun()
             at_noise = search.run() or self.colour is not None
-            found, fits = search.found, Fits(self.traces, self.split, len(self.structure.effects) + 1)
+            found, fits = search.found, WholeRuns(self.traces, self.split)
             both = all(t.beside is not None for t in self.traces)
             behind_a_lag = any(effects.get(e).lag is not None for e in found.best.structure.effects)
             noisy = self.torque_noise_above_hz is not None  # some of which is left in the band of the motion
             white = at_noise and not (both or behind_a_lag or noisy)  # as output error takes the noise of one channel
             nothing_left = search.stepwise.left is None or self.colour is not None
+            if self.torque_free:
+                left = search.stepwise.left
+                self.curve = dependence_on(search.stepwise, left) if left is not None else None
+                return self._concluded(found, fits)
             if (white and nothing_left) or self._other_cause(found, fits):
                 return self._concluded(found, fits)
             self.say("a torque that was not recorded is left beside the sensor's noise")
@@ -168,7 +169,7 @@ class _Identifier:
                 self._allowed(), self.say,
             )  # fmt: skip
 
-        search, less = begin(self.traces), quieter(self.traces)
+        search, less = begin(self.traces), None if self.torque_free else quieter(self.traces)
         if less is None:
             return search
         traces, cutoff_hz = less
@@ -185,33 +186,18 @@ class _Identifier:
         self.say(told)
         return other
 
-    def _other_cause(self, found: Search, fits: Fits) -> bool:
+    def _other_cause(self, found: Search, fits: WholeRuns) -> bool:
         """Whether no effect but a few runs whose torque was another may be what is left."""
         return self._apart(found, fits, found.best.structure, found.best.values()) is not None
 
-    def _decay(self, shapes: dict[str, tuple[float, ...]]) -> Identification:
-        """The way for runs without torque, which are judged by how they swing on alone."""
-        decay = FreeDecay(
-            self.traces, self.split, self.start, self._allowed(), self.structure, self.recording.noise is not None,
-            self.settings.holdout, self.say,
-        )  # fmt: skip
-        try:
-            self.say("fitting the declared model")
-            found = decay.run(shapes, self.declared, declared_values(self.declared, self.torque_free))
-            return self._concluded(found, decay.on_offer.fits)
-        except (Aborted, KeyboardInterrupt):
-            if decay.so_far is None:
-                raise
-            return self._stopped(decay.so_far)
-
-    def _concluded(self, search: Search, fits: Fits) -> Identification:
+    def _concluded(self, search: Search, fits: WholeRuns) -> Identification:
         """Final fits, what else might pass for what was found, and the report."""
         before = self._before(search)
         after = self._after(search) if search.best.structure != self.structure else before
         after = self._doubted(search, fits, before, after)
         named = [e for e in after.structure.effects if e not in self.structure.effects]
-        fits.horizon, start = search.horizon, search.base.values()
-        search.contribution = contributions(fits, after.structure, after.values, named, start)
+        base = search.base.values()
+        search.contribution = contributions(fits, after.structure, after.values, named, base, search.horizon)
         return self._report(search, before, after)
 
     def _stopped(self, search: Search) -> Identification:
@@ -250,7 +236,7 @@ class _Identifier:
         ]  # fmt: skip
         return [form for n in names for form in (n, *effects.forms(n))]
 
-    def _doubted(self, search: Search, fits: Fits, before: Fitted, after: Fitted) -> Fitted:
+    def _doubted(self, search: Search, fits: WholeRuns, before: Fitted, after: Fitted) -> Fitted:
         """The final fit, or another one where something else may pass for what was found."""
         line = standing_line(after, self.traces) if TONE not in self.structure.effects else None
         named = after.structure, after.values
@@ -270,22 +256,22 @@ class _Identifier:
         return self._after(search) if search.best.structure != self.structure else before
 
     def _apart(
-        self, search: Search, fits: Fits, structure: Structure, values: dict[Name, float]
+        self, search: Search, fits: WholeRuns, structure: Structure, values: dict[Name, float]
     ) -> run_heterogeneity.RunsApart | None:  # fmt: skip
         """What would explain all that the declared model leaves, if it is likelier than what was named."""
         apart = run_heterogeneity.runs_apart(fits, self.structure, search.base.values())
         if apart is None or structure == self.structure:
             return apart
-        named = fits.whole(structure, values)
+        named = fits.fitted(structure, values)
         return apart if named is None or run_heterogeneity.as_likely(apart, named) else None
 
     @staticmethod
-    def _until(search: Search, fits: Fits, name: str) -> Judged:
+    def _until(search: Search, fits: WholeRuns, name: str) -> Judged:
         """The model of what was found before an effect; the declared one where that is nothing."""
         best, base = search.best.structure, search.base.structure
         found = best.effects[: best.effects.index(name)]
         start = {**search.base.values(), **{n: v for n, v in search.best.values().items() if n[0] in (*TERMS, *found)}}
-        fitted = None if set(found) <= set(base.effects) else fits.whole(replace(base, effects=found), start)
+        fitted = None if set(found) <= set(base.effects) else fits.fitted(replace(base, effects=found), start)
         return search.base if fitted is None else fitted.judged()
 
     def _report(
@@ -319,6 +305,8 @@ class _Identifier:
         left = measured.disturbance if measured else None
         if self.torque_free:
             left = left_of_a_decay(self.traces, self.split, after, self.start, self.recording.axis)
+            if self.curve is not None and after.structure != self.structure:
+                left = with_curve(left, *self.curve)
         case = Case(
             self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
             self.declared, self.left_out, self.colour, left,
@@ -360,8 +348,6 @@ class _Identifier:
         )  # fmt: skip
         if fitted.sensor_limited:
             return self._with_dropped_damping(search, fitted)
-        if self.torque_free:
-            return fitted
         return self._predicted(search.best)
 
     def _predicted(self, best: Judged) -> Fitted:

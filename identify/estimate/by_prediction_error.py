@@ -40,9 +40,10 @@ def by_prediction_error(
     fit = problem.fit(structure, start, problem.noise_of(like) if like else None, STEPS)
     values = dict(fit.values)
     held = free_run_of(traces, structure, values, everything) if free_run else None
-    determined = tuple(bool(x > DEAD) for x in np.diag(fit.information))
+    told = [i for i, n in enumerate(fit.names) if n != ("inertia",) or not problem.torque_free]
+    determined = tuple(bool(x > DEAD) for x in np.diag(fit.information)[told])
     fitted = Fitted(
-        structure, values, fit.covariance, fit.names, float(np.sqrt(fit.variance)), held, False, determined,
-        "prediction error",
+        structure, values, fit.covariance[np.ix_(told, told)], tuple(fit.names[i] for i in told),
+        float(np.sqrt(fit.variance)), held, False, determined, "prediction error",
     )  # fmt: skip
     return fitted, fit

@@ -15,11 +15,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from identify.estimate.output_error import Estimate, refine
+from identify.estimate.whole_runs import STEPS, TOLERANCE, WholeFit, WholeRuns
 from identify.model.parameters import Name
 from identify.model.structure import Structure
-from identify.select.criterion import AT_NOISE
-from identify.select.fitter import STEPS, TOLERANCE, Fits
-from identify.select.free_run_fit import AT_FLOOR, Whole
 from identify.signals.trace import Trace
 from identify.simulate.sensitivities import sensitivities
 from identify.wording import joined, number
@@ -30,6 +28,8 @@ from rig.recording.run import Array
 GONE = (
     0.95  # of the excess over the noise: less is foretold of what is no such run, and of a delay that is no small one
 )
+AT_NOISE = 1.05  # mean square over the noise's variance: the noise is known to a percent or two
+AT_FLOOR = 1.1  # the same: what is there has found what there is
 ROUNDS = 3  # the change is small, but not infinitely so
 LARGEST = 0.3  # of the torque; a run that differs by more is another campaign
 LATEST_S = 0.05
@@ -59,7 +59,7 @@ class RunsApart:
     penalised: float
 
 
-def runs_apart(fits: Fits, declared: Structure, start: dict[Name, float]) -> RunsApart | None:
+def runs_apart(fits: WholeRuns, declared: Structure, start: dict[Name, float]) -> RunsApart | None:
     """The few runs whose torque, a little larger or later, would explain all that the declared model leaves.
 
     None where there is nothing to explain, or where that does not do it.
@@ -67,7 +67,7 @@ def runs_apart(fits: Fits, declared: Structure, start: dict[Name, float]) -> Run
     moved = [i for i, t in enumerate(fits.fitting) if t.torque is not None]
     if len(moved) < 2 or not set(TERMS[:1]) <= set(declared.terms):
         return None
-    base = fits.whole(declared, start)
+    base = fits.fitted(declared, start)
     if base is None or base.level < AT_NOISE:
         return None
     chosen = _foretold(fits, base.estimate, base)
@@ -85,7 +85,7 @@ def runs_apart(fits: Fits, declared: Structure, start: dict[Name, float]) -> Run
         before = estimate.sigma
         estimate = refine(
             traces, declared, dict(zip(estimate.names, estimate.values.tolist(), strict=True)), None, STEPS, fits.use,
-            estimate.shots, fits.fixed, TOLERANCE, coarse=True, finer=fits.finer,
+            estimate.shots, fits.fixed, TOLERANCE, coarse=True,
         )  # fmt: skip
         if not estimate.sigma < 0.999 * before:
             break
@@ -97,7 +97,7 @@ def runs_apart(fits: Fits, declared: Structure, start: dict[Name, float]) -> Run
     return RunsApart(named, squares + penalty)
 
 
-def as_likely(apart: RunsApart, named: Whole) -> bool:
+def as_likely(apart: RunsApart, named: WholeFit) -> bool:
     """Whether another torque in some runs is likelier than the effects of a model."""
     return apart.penalised < named.penalised
 
@@ -164,7 +164,7 @@ def _solved(columns: Array, residual: Array) -> tuple[Array, float]:
     return x / size, float(left @ left)
 
 
-def _foretold(fits: Fits, estimate: Estimate, base: Whole) -> list[Change]:
+def _foretold(fits: WholeRuns, estimate: Estimate, base: WholeFit) -> list[Change]:
     """As few changes as are foretold to leave only noise; none where no few do."""
     residual, (columns, own) = _columns(estimate, fits.use)
     basis = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]

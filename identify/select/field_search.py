@@ -163,7 +163,7 @@ def search_in_torque(
     if by_likelihood and (unfollowed or lost):
         disturbance = Disturbance(size_nm, unit, size_nm / regression.torque_nm, (), {})
     if curve is not None and set(final.effects) <= set(known[0].structure.effects):
-        disturbance = _with_curve(disturbance, *curve)
+        disturbance = with_curve(disturbance, *curve)
 
     def errors(fit: TorqueFit) -> TorqueErrors:
         size = regression.torque_nm
@@ -181,7 +181,7 @@ def search_in_torque(
     )  # fmt: skip
 
 
-def _with_curve(left: Disturbance, curve: Dependence, moves: Mapping[str, float]) -> Disturbance:
+def with_curve(left: Disturbance, curve: Dependence, moves: Mapping[str, float]) -> Disturbance:
     """The same with a curve that the likelihood asks for; of two that go with the same, the larger."""
     same = [d for d in left.depends_on if d.on == curve.on and d.torque_rms > curve.torque_rms]
     most = {t: max(left.moves_percent.get(t, 0.0), moves.get(t, 0.0)) for t in {*left.moves_percent, *moves}}

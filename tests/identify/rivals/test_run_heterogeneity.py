@@ -12,7 +12,7 @@ from identify.model.structure import Structure
 from identify.pipeline import identify
 from identify.rivals.run_heterogeneity import as_likely, runs_apart, told
 from identify.runs.holdout import split
-from identify.select.fitter import Fits
+from identify.estimate.whole_runs import WholeRuns
 from rig.config.identify import IdentifyConfig
 from rig.recording.run import Recording, Run
 from tests.identify.simulated import DECLARED, SETS, TRUTH, Effects, sine_run, traces_of
@@ -32,10 +32,10 @@ def recorded(run: Run, gain: float = 1.0, late_s: float = 0.0) -> Run:
     return replace(run, torque_nm=run.torque_nm / gain, torque_time_s=run.torque_time_s + late_s)
 
 
-def fits_of(campaign: list[Run]) -> Fits:
+def fits_of(campaign: list[Run]) -> WholeRuns:
     """To the samples that fit."""
     traces = traces_of(Recording(tuple(campaign)))
-    return Fits(traces, split(traces))
+    return WholeRuns(traces, split(traces))
 
 
 def test_runs_that_agree_need_no_other_torque() -> None:
@@ -79,7 +79,7 @@ def test_no_other_torque_in_a_few_runs_explains_an_effect_of_the_platform_as_wel
     if found is not None:
         (name,) = hidden
         own: dict[Name, float] = {(name, p): v for p, v in hidden[name].items()}
-        named = fits.whole(Structure(effects=(name,)), {**START, **own})
+        named = fits.fitted(Structure(effects=(name,)), {**START, **own})
         assert named is not None
         assert not as_likely(found, named)
 
