@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from identify.estimate.cross_validation import start_values
+from identify.estimate.judged import start_values
 from identify.estimate.initial_guess import best_rho, first_guess
 from identify.estimate.output_error import Estimate, refine
 from identify.model.parameters import Name

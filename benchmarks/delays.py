@@ -15,7 +15,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.campaigns import DELAY, DELAY_NAME, TRUTH, clean_rates, structure_with, traces_from, white
-from identify.estimate.cross_validation import horizon_s, start_values
+from identify.estimate.judged import horizon_s, start_values
 from identify.estimate.final_fit import by_output_error
 from identify.estimate.initial_guess import best_rho, first_guess
 

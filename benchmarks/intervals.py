@@ -27,7 +27,7 @@ from benchmarks.campaigns import (
     traces_from,
     white,
 )
-from identify.estimate.cross_validation import horizon_s
+from identify.estimate.judged import horizon_s
 from identify.estimate.final_fit import by_output_error
 from rig.arrays import Array
 

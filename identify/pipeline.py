@@ -14,9 +14,9 @@ from identify.conclude.decay_disturbance import left_of_a_decay
 from identify.conclude.declared_values import declared_values
 from identify.conclude.error_figures import floor_of, in_torque, measure
 from identify.estimate.by_prediction_error import by_prediction_error
-from identify.estimate.cross_validation import Judged
 from identify.estimate.final_fit import Fitted, by_output_error, by_regression
 from identify.estimate.initial_guess import Start, first_guess
+from identify.estimate.judged import Judged
 from identify.estimate.whole_runs import WholeRuns
 from identify.genetic.per_set import each_set
 from identify.model.parameters import Name
@@ -90,7 +90,12 @@ def identify(
     with threadpool_limits(1):  # small matrices: a second BLAS thread only waits
         first = _Identifier(recording, declared, settings, say)
         found = first.run()
-        if found.aborted or first.torque_free or recording.noise is not None or not (found.verdict.unexplained or first.more_than_noise):
+        if (
+            found.aborted
+            or first.torque_free
+            or recording.noise is not None
+            or not (found.verdict.unexplained or first.more_than_noise)
+        ):
             return found
         return with_noise_known(
             found, lambda colour: _Identifier(recording, declared, settings, say, colour).run(), say

@@ -12,10 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import signal
 from scipy.interpolate import make_interp_spline
 
-from identify.estimate.cross_validation import Judged
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.results import RunTraces
@@ -152,27 +150,6 @@ def _noise_only(trace: Trace, rng: np.random.Generator) -> Trace:
         trace, measured=trace.noise * rng.standard_normal(len(trace.measured)), motion=None, _series={},
         torque=None if trace.torque is None else replace(trace.torque, torque_nm=np.zeros_like(trace.torque.torque_nm)),
     )  # fmt: skip
-
-
-def residual_lines_hz(traces: Sequence[Trace], judged: Judged) -> tuple[float, ...]:
-    """The strongest lines of the torque residual that no harmonic of the excitation explains."""
-    values = judged.values()
-    found: list[tuple[float, float]] = []
-    for trace in traces:
-        cutoff = min(0.2 / trace.step_s, 200.0)
-        if trace.torque is None:
-            continue
-        part = torque_residual(trace, judged.structure, values, cutoff)
-        assert part is not None
-        x = part.residual * signal.windows.hann(len(part.residual))
-        size = np.abs(np.fft.rfft(x, 8 * len(x)))
-        f = np.fft.rfftfreq(8 * len(x), trace.step_s)
-        use = (f > 2.0 / (trace.step_s * len(x))) & (f < cutoff)
-        peaks = signal.find_peaks(size * use)[0]
-        for i in peaks[np.argsort(size[peaks])[-4:]]:
-            found.append((float(size[i] / np.sqrt(len(x))), float(f[i])))
-    found.sort(reverse=True)
-    return tuple(f for _, f in found[:12])
 
 
 def dependence(traces: Sequence[RunTraces], cutoff_hz: float) -> dict[str, float]:

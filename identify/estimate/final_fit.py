@@ -10,11 +10,11 @@ import numpy as np
 from scipy import signal
 from scipy.linalg import block_diag
 
-from identify.estimate.cross_validation import start_values
 from identify.estimate.evaluation import evaluate
 from identify.estimate.grid_refinement import sharpened
 from identify.estimate.initial_guess import Start, best_rho
 from identify.estimate.initial_state_sensitivity import least_std_errors
+from identify.estimate.judged import start_values
 from identify.estimate.output_error import Estimate, refine
 from identify.estimate.profile_likelihood import settled, widened
 from identify.estimate.regression import Regression, Solution, residuals

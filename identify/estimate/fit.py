@@ -10,11 +10,17 @@ import numpy as np
 from identify.model.parameters import Name, platform_of
 from identify.model.structure import Structure
 from identify.simulate.shots import Shots
+from rig import effects
 from rig.arrays import Array
 from rig.dynamics.gains import Gains, Noise
 from rig.platform import Platform
 
+FOLLOWED = 0.5  # of the inertia: farther than that no first order tells how the gains follow
 SINGULAR = 1e-12  # smallest over largest eigenvalue of the scaled information that still determines a direction
+
+
+def _is_gain(name: Name) -> bool:
+    return next(p.linear for p in effects.get(name[0]).parameters if p.name == name[1])
 
 
 @dataclass(frozen=True)
@@ -139,6 +145,22 @@ class Fit:
         """One standard error of a parameter."""
         i = self.names.index(name)
         return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+
+    def without(self, name: str) -> dict[Name, float]:
+        """All other parameters, gains as they follow to first order where those of a term or an effect become zero."""
+        gains = [i for i, n in enumerate(self.names) if len(n) == 1 or _is_gain(n)]
+        gone, rest = ([i for i in gains if (self.names[i][0] == name) is own] for own in (True, False))
+        there = {n: float(v) for n, v in zip(self.names, self.vector, strict=True) if n[0] != name}
+        size = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
+        scaled = self.information / np.outer(size, size)
+        if not (gone and rest and np.all(np.isfinite(scaled))):
+            return there
+        inverse = np.linalg.pinv(scaled[np.ix_(rest, rest)], rcond=SINGULAR, hermitian=True)
+        moved = inverse @ scaled[np.ix_(rest, gone)] @ (self.vector[gone] * size[gone]) / size[rest]
+        new = {self.names[i]: float(self.vector[i] + d) for i, d in zip(rest, moved, strict=True)}
+        inertia = there.get(("inertia",), 0.0)
+        far = abs(new.get(("inertia",), inertia) - inertia) > FOLLOWED * inertia
+        return there if far else there | new
 
     def platform(self, run: int = 0, added: float = 0.0) -> Platform:
         """The fitted platform, as it stood in one run."""

@@ -19,8 +19,7 @@ from identify.model.parameters import Name, names_of, platform_of
 from identify.model.structure import Structure
 from identify.signals.trace import Trace
 from identify.simulate.all_runs import shots_for
-from identify.simulate.sensitivities import linearise
-from identify.simulate.shots import Shots, moved, predict, residual_at
+from identify.simulate.shots import Shots, predict
 from rig import effects
 from rig.dynamics import Equations
 from rig.platform import Platform
@@ -160,20 +159,3 @@ def _levenberg(descent: GaussNewton, iterations: int, tolerance: float, hopeless
 
 def _arrived(step: Step, tolerance: float) -> bool:
     return step.length <= 30.0 * tolerance or step.fall < 1e-2 * tolerance * step.cost
-
-
-def squares_at(
-    traces: Sequence[Trace], structure: Structure, values: Mapping[Name, float], use: Sequence[Any], finer: int = 1
-) -> float:  # fmt: skip
-    """Sum of squares over whole runs at given parameters, start states and biases fitted by one step."""
-    names = names_of(structure, 1 + max(t.number for t in traces))
-    x = np.array([values.get(name, 0.0) if len(name) == 3 else values[name] for name in names])
-    still = np.ones(len(x), dtype=bool)
-
-    def of(s: Shots) -> float:
-        part = linearise(s, structure, names, x, np.ones(len(x)), still, np.inf)
-        found = [part.losses, residual_at(moved(s, part.back(np.zeros(len(x)))), structure, names, x)[1]]
-        return min(float(np.sum(np.where(np.isfinite(each), each, np.inf))) for each in found)
-
-    with ThreadPoolExecutor(2) as workers:
-        return sum(workers.map(of, shots_for(traces, structure, names, x, None, use, None, True, finer)))

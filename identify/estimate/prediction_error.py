@@ -86,16 +86,6 @@ class PredictionError:
         self.fits_starts = self.torque_free
         self.start_variance = (0.0, 0.0) if self.fits_starts else self._start_variance()
 
-    @RUNAWAY
-    def cost_at(self, fit: Fit, noise: Noise) -> float:
-        """The cost of a fit with another noise."""
-        squares, logs = 0.0, 0.0
-        for s in fit.shots:
-            look = self.look(s, fit.structure, fit.names, fit.vector, noise)
-            squares += float(np.sum(look.innovations[s.weight] ** 2 / look.variance[s.weight]))
-            logs += float(np.sum(np.log(look.variance[s.weight])))
-        return fit.count * float(np.log(squares / fit.count)) + logs if np.isfinite(squares) else np.inf
-
     def columns_at(self, fit: Fit) -> list[Columns]:
         """Derivatives of every run's innovations where a fit stands."""
         with np.errstate(all="ignore"):

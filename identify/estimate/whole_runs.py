@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify.estimate.cross_validation import Judged
 from identify.estimate.evaluation import evaluate
+from identify.estimate.judged import Judged
 from identify.estimate.output_error import Estimate, refine
 from identify.model.parameters import Name
 from identify.model.structure import Structure
@@ -45,11 +45,6 @@ class WholeFit:
     def held(self) -> float:
         """Squares on the held-out samples."""
         return float(np.sum(self.losses)) / self.noise**2
-
-    @property
-    def held_count(self) -> int:
-        """Samples held out."""
-        return int(np.sum(self.counts))
 
     @property
     def penalised(self) -> float:

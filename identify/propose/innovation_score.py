@@ -16,7 +16,7 @@ import numpy as np
 from identify.estimate.fit import Fit, apart
 from identify.estimate.prediction_error import PredictionError
 from identify.model.parameters import Name, bounds_of, names_of
-from identify.propose.screening import grid_of
+from identify.propose.shape_grids import grid_of
 from identify.simulate.shots import RUNAWAY
 from rig import effects
 from rig.arrays import Array
@@ -191,10 +191,7 @@ class InnovationScores:
                 return None
         level = np.exp(0.5 * spread / len(self.residual))  # the scale of all variances is free
         return np.concatenate(
-            [
-                apart(own, (b - level * m)[:, None])[:, 0]
-                for own, b, m in zip(self.own, self.base, moved, strict=True)
-            ]
+            [apart(own, (b - level * m)[:, None])[:, 0] for own, b, m in zip(self.own, self.base, moved, strict=True)]
         )
 
 

@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 from identify.diagnose.coloured_residual import bounded
 from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
 from identify.model.parameters import Name, gains_at_zero, in_order
-from identify.propose.screening import grid_of
+from identify.propose.shape_grids import grid_of
 from rig import effects
 from rig.effects.base import Place
 

@@ -15,6 +15,10 @@ def why_unseen(name: str, traces: Sequence[Trace]) -> str:
         return "a bias is always fitted to each run of a gyro, and an encoder has none"
     if name == "torque_offset" and all(t.biased for t in traces):
         return "with a gyro alone, a constant torque only shifts the angle of rest, which is not measured"
+    if effects.get(name).place is Place.SENSOR and all(t.channel == "angle" and t.beside is None for t in traces):
+        return "no gyro was recorded, and an encoder has no low-pass"
+    if effects.get(name).place is Place.SENSOR and all(t.torque is None for t in traces):
+        return "without torque, a late reading only shifts the motion in time"
     if effects.get(name).place is Place.DRIVE and all(t.torque is None for t in traces):
         return "no torque was applied, so effects of the drive do not show"
     return ""

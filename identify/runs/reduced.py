@@ -81,7 +81,7 @@ def _decimation(trace: Trace) -> int:
 
 def _swing_hz(trace: Trace) -> float:
     """How often a decay swings, by its turns."""
-    rate = trace.fine[1][:: UPSAMPLING]
+    rate = trace.fine[1][::UPSAMPLING]
     rate = rate[np.abs(rate) > TURNS * np.max(np.abs(rate))]
     return 0.5 * float(np.sum(rate[1:] * rate[:-1] < 0.0)) / (len(trace.measured) * trace.step_s) + 1e-12
 

@@ -17,20 +17,27 @@ STEPS = 4  # of a fit that begins where the rest stands: the ratio to a few perc
 
 
 def contributions(
-    fits: WholeRuns, structure: Structure, values: Mapping[Name, float], named: Sequence[str], base: Mapping[Name, float],
+    fits: WholeRuns,
+    structure: Structure,
+    values: Mapping[Name, float],
+    named: Sequence[str],
+    base: Mapping[Name, float],
     horizon_s: float = 1.0,
 ) -> dict[str, float]:
     """Held-out free-run error without an effect, the rest fitted anew, over the error with it.
 
     Both on the same samples. ``base`` are the values of the declared model alone: a term of it that the effects made
-    needless comes back; ``horizon_s`` is how far ahead a decay is fitted first. An effect without which the model runs away has no number.
+    needless comes back. ``horizon_s`` is how far ahead a decay is fitted first. An effect without which the model runs
+    away has no number.
     """
     full = fits.fitted(structure, values, steps=_steps(fits)) if named else None
     if full is None or full.held <= 0.0:
         return {}
     out = {}
     for name in named:
-        without = _without(fits, structure.minus(name), {n: v for n, v in values.items() if n[0] != name}, base, horizon_s)
+        without = _without(
+            fits, structure.minus(name), {n: v for n, v in values.items() if n[0] != name}, base, horizon_s
+        )
         if without is not None:
             out[name] = float(np.sqrt(without.held / full.held))
     return out

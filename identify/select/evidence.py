@@ -182,8 +182,8 @@ def disturbed(fit: Fit) -> float:
 def inflation(parts: Sequence[Columns], fit: Fit, names: Sequence[Name]) -> float:
     """Variance of the scores of some parameters over what the likelihood takes it for, one at least.
 
-    The other parameters and the runs' own unknowns are projected out. Blocks of the record show what is coloured or comes in
-    bursts; whole runs, where there are several, show what differs between them.
+    The other parameters and the runs' own unknowns are projected out. Blocks of the record show what is coloured or
+    comes in bursts; whole runs, where there are several, show what differs between them.
     """
     columns = [apart(p.own, p.columns) for p in parts]
     scaled = [apart(p.own, p.scaled[:, None])[:, 0] for p in parts]

@@ -11,10 +11,10 @@ from scipy.linalg import block_diag
 from identify.diagnose.disturbance import disturbance_of
 from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
 from identify.estimate.by_prediction_error import by_prediction_error
-from identify.estimate.cross_validation import Judged
 from identify.estimate.final_fit import Fitted, covariance_of, free_run_of
 from identify.estimate.fit import Fit
 from identify.estimate.initial_guess import Start, scale_of
+from identify.estimate.judged import Judged
 from identify.estimate.output_error import Estimate
 from identify.model.parameters import names_of
 from identify.model.structure import Structure

@@ -105,9 +105,8 @@ def needless_beside(search: Stepwise, left: LeftOver, names: Sequence[str]) -> s
     for name in names:
         if name not in fit.structure.effects:  # the curve holds it
             continue
-        kept = {k: v for k, v in fit.values.items() if k[0] != name}
         without = search.problem.fit(
-            fit.structure.minus(name), kept, fit.noise, STEPS, carry=fit.shots, thorough=False
+            fit.structure.minus(name), fit.without(name), fit.noise, STEPS, carry=fit.shots, thorough=False
         )  # fmt: skip
         evidence = search.weigher.evidence(name, without, fit)
         cutoff_hz = search.weigher.regression.cutoff_hz

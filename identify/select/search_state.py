@@ -4,16 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from identify.estimate.cross_validation import Judged, share_explained
+from identify.estimate.judged import Judged, share_explained
 from identify.results import Candidate
-from rig import effects
 from rig.platform import Platform
-
-MOST_NAMED = 3  # effects; more of them together resemble anything
-LEFT = 1.2  # times the noise floor: below, nothing to speak of is left
-QUIET = 1.03  # times the noise floor, which is known to a percent or two
-MUCH = 0.8  # share of the excess that goes to be believed where hardly more than the noise was there in the first place
-BULK = 0.95  # share of the excess that what is named explains at least, where something is left
 
 
 @dataclass
@@ -55,24 +48,6 @@ class Search:
     def share(self) -> float:
         """Share of the excess over the noise floor that the effects found take away, held-out squares."""
         return share_explained(self.base, self.best, self.floor)
-
-    def drop_a_bad_lot(self) -> None:
-        """Name nothing where all effects together leave much of what they were to explain.
-
-        Something that is not in the library is always resembled by something that is: part of it goes away,
-        and more of it with every further effect. What can bend to follow anything (a waviness of any order, a tone of
-        any frequency, a memory of any length) is believed only where nothing is left.
-        """
-        kept = set(self.base.structure.effects)
-        if set(self.best.structure.effects) <= kept:
-            return  # nothing was added, and what the data have refused stays so
-        few = len(self.best.structure.effects) <= len(kept) + MOST_NAMED
-        explained = self.free_running or self.share > MUCH or self.best.sigma < QUIET * self.floor
-        nothing_left = explained and self.best.sigma < LEFT * self.floor
-        pliant = any(effects.get(e).resembles_much for e in self.best.structure.effects if e not in kept)
-        if few and (nothing_left or (self.share > BULK and not pliant)):
-            return
-        self.take_all_back()
 
     def take_all_back(self) -> None:
         """Name nothing: the declared model is what there is."""

@@ -118,10 +118,7 @@ class Stepwise:
                 break
             self.dropped.append((name, "beside a curve over what no effect explains, it explains nothing"))
             self.say(f"took {name} back: a curve over what is left explains it")
-            kept = {k: v for k, v in now.values.items() if k[0] != name}
-            now = self.problem.fit(
-                now.structure.minus(name), kept, now.noise, MANY, carry=now.shots, thorough=False
-            )  # fmt: skip
+            now = self._without(now, name, MANY)
         else:
             self.left = None
         return now
@@ -202,10 +199,11 @@ class Stepwise:
             now, self.inflation[name] = fits[name], evidence.inflation
         return now
 
-    def _without(self, now: Fit, name: str) -> Fit:
+    def _without(self, now: Fit, name: str, steps: int = FEW) -> Fit:
         """The same without a term or an effect."""
-        start = {n: v for n, v in now.values.items() if n[0] != name}
-        return self.problem.fit(now.structure.minus(name), start, now.noise, FEW, carry=now.shots, thorough=False)
+        return self.problem.fit(
+            now.structure.minus(name), now.without(name), now.noise, steps, carry=now.shots, thorough=False
+        )  # fmt: skip
 
     def _others(self, now: Fit, name: str) -> tuple[Fit, dict[str, Fit]]:
         """A model without an effect, and with others in its place; from the round that added it, if that stands."""
@@ -215,8 +213,7 @@ class Stepwise:
                 return r.now, {n: e.fit for n, e in r.tried.items() if n != name}
         rest = self._lacking.get(_key(without))
         if rest is None:
-            bare = {k: v for k, v in now.values.items() if k[0] != name}
-            rest = self.problem.fit(without, bare, now.noise, MANY, carry=now.shots, thorough=False)
+            rest = self._without(now, name, MANY)
         return rest, self.trials.instead(now, rest, name, self._promising())
 
     def _promising(self) -> set[str]:
@@ -285,10 +282,7 @@ class Stepwise:
             term = len(own) == 1 and own[0][0] in TERMS
             if not self._asked(now, name, own):
                 continue
-            start = {n: v for n, v in now.values.items() if n[0] != name}
-            without = self.problem.fit(
-                now.structure.minus(name), start, now.noise, FEW, carry=now.shots, thorough=False
-            )
+            without = self._without(now, name)
             self._lacking[_key(without.structure)] = without
             evidence = self.weigher.evidence(name, without, now)
             soaks = name == "stiffness" and self._may_soak(now)
@@ -312,10 +306,7 @@ class Stepwise:
         """The same without a spring that only soaks up what is constant: gravity is a spring of its own."""
         if "stiffness" not in now.structure.terms or not self._may_soak(now):
             return now
-        start = {n: v for n, v in now.values.items() if n != ("stiffness",)}
-        without = self.problem.fit(
-            now.structure.minus("stiffness"), start, now.noise, FEW, carry=now.shots, thorough=False
-        )  # fmt: skip
+        without = self._without(now, "stiffness")
         evidence = self.weigher.evidence("stiffness", without, now)
         return without if evidence.support < APART or evidence.weight < WEIGHT else now
 

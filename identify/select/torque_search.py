@@ -16,7 +16,6 @@ from rig import effects
 from rig.effects.base import Place
 
 WEIGHT = 0.20  # share of what is left that an effect has to take away to be named: below, it is true but small
-NEARLY_ALL = 0.9  # of what the declared model leaves: without white torque a missing effect is a function of the motion
 SURE = 4.0  # standard errors, over blocks of the held-out samples, by which the squared residual must fall: 3e-5
 RICHER = 0.6  # share of what its special case leaves that a richer effect has to take away to be named in its place
 AS_HEAVY = 0.05  # of what is left: candidates that differ by less carry the same torque

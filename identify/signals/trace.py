@@ -28,6 +28,7 @@ UPSAMPLING = 4  # nonlinear torques have corners between samples
 SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than it tells
 LEAD_S = 0.1
 STRAIGHT = 0.1  # of the sensor's noise
+RAN_AWAY = 1e100  # torque of an effect along a noisy motion, in any unit: it was integrated beyond all bounds
 MOST_BIAS_RAD_S = 0.05  # of a gyro: what its integral runs away faster with is the motion itself
 STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
 
@@ -236,7 +237,8 @@ class Trace:
         )  # fmt: skip
         if not np.any(out):
             return None
-        return linear_pieces(np.nan_to_num(out, posinf=0.0, neginf=0.0), fine)
+        ran_away = ~(np.abs(out) < RAN_AWAY)
+        return linear_pieces(np.where(ran_away, 0.0, out), fine)
 
 
 def loads_differ(traces: Sequence[Trace]) -> bool:

@@ -111,7 +111,7 @@ def test_a_run_without_torque_has_no_torque_residual() -> None:
 
 
 def test_the_line_of_a_neighbours_pump_is_found_to_a_tenth_of_a_hertz() -> None:
-    from identify.estimate.cross_validation import judge  # noqa: PLC0415
+    from identify.estimate.judged import judge  # noqa: PLC0415
 
     run = sine_run(104, 3, effects={"periodic_disturbance": {"sine": 0.5, "cosine": 0.3, "frequency": 13.37}})
     traces = [prepare(run)]

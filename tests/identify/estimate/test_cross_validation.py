@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.estimate.cross_validation import Judged, advantage, delta_bic, horizon_s, judge, share_explained
+from identify.estimate.judged import Judged, advantage, delta_bic, horizon_s, judge, share_explained
 from identify.estimate.output_error import Estimate, Name, names_of
 from identify.model.structure import Structure
 from identify.select.search_state import Search

@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 
 from identify.conclude.next_steps import next_steps
+from identify.estimate.whole_runs import WholeRuns
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.pipeline import identify
 from identify.rivals.run_heterogeneity import as_likely, runs_apart, told
 from identify.runs.holdout import split
-from identify.estimate.whole_runs import WholeRuns
 from rig.config.identify import IdentifyConfig
 from rig.recording.run import Recording, Run
 from tests.identify.simulated import DECLARED, SETS, TRUTH, Effects, sine_run, traces_of

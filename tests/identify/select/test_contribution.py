@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from identify.estimate.whole_runs import WholeRuns
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.pipeline import identify
@@ -14,7 +15,6 @@ from identify.report.files import result_json
 from identify.report.summary import summary
 from identify.runs.holdout import split
 from identify.select.contribution import contributions
-from identify.estimate.whole_runs import WholeRuns
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
 from rig.recording.run import Recording
