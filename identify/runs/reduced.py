@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from scipy import signal
 
 from identify.runs.holdout import Split
 from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace
@@ -20,7 +21,9 @@ TURNS = 0.02  # of the largest rate, below which a turn may be noise
 SHORTEST_SPAN = 1_500  # samples: slow effects need a span to show in
 COLUMNS = 5  # acceleration, rate, angle, direction, constant
 PLACES = 12  # where a span may begin
-ROLL_OFF, REACH = 0.5, 16  # of the low-pass before a decimation: see there; its length in new samples to either side
+# The low-pass before a decimation: flat to 1e-5 up to 0.6 of the new Nyquist frequency and 100 dB down above it.
+PASSED, KAISER, REACH = 0.8, 10.0, 16  # cut-off over the new Nyquist frequency, window, new samples to either side
+ROLL_OFF = 0.5  # of the one for a decay
 
 
 def reduced(traces: Sequence[Trace], split: Split, enough: int = ENOUGH) -> tuple[list[Trace], Split]:
@@ -91,7 +94,8 @@ def decimated(trace: Trace, factor: int) -> Trace:
     if factor <= 1:
         return trace
     order = REACH * factor
-    weights = _keeps_white(factor)
+    # What a driven platform does close to the new Nyquist frequency has to stay as its torque says.
+    weights = _sharp(factor) if trace.torque is not None else _keeps_white(factor)
 
     def passed(values: Array) -> Array:
         padded = np.pad(values, order, mode="reflect", reflect_type="odd")
@@ -113,10 +117,15 @@ def decimated(trace: Trace, factor: int) -> Trace:
 
 
 @lru_cache(maxsize=32)
+def _sharp(factor: int) -> Array:
+    return np.asarray(signal.firwin(2 * REACH * factor + 1, PASSED / factor, window=("kaiser", KAISER)))
+
+
+@lru_cache(maxsize=32)
 def _keeps_white(factor: int) -> Array:
     """A low-pass before a decimation, behind which white noise is white again.
 
-    A sharper one leaves a hole below the new Nyquist frequency, and a likelihood that knows of none takes the noise for
+    A sharper one leaves a hole below the new Nyquist frequency, and the likelihood of a long decay takes the noise for
     coloured. The squares of this one (Meyer's scaling function: Daubechies, Ten Lectures on Wavelets, 5.2) and of its
     aliases add up to one at every frequency; it is flat up to half the new Nyquist frequency.
     """

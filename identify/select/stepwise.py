@@ -26,7 +26,7 @@ from rig.platform import TERMS
 
 # What decides a name. All in units of the cost (minus twice the log-likelihood) or as shares.
 AS_HEAVY = 0.05  # of the disturbance: what a richer effect carries besides, to be preferred where nothing else is sure
-SPECIAL = 0.8  # of the support of a richer effect, with which its special case is preferred
+SPECIAL = 0.8  # of the fall of the cost with a richer effect, parameters paid for: its special case is preferred
 AT_NOISE = 1.1  # times the sensor's variance: a model that predicts as closely leaves no disturbance
 MOST = 6  # effects that one recording is believed to show
 # What only costs time.
@@ -236,7 +236,8 @@ class Stepwise:
             if e is best or (e.weight > WEIGHT and max(behind(e.fit, best.fit), behind(best.fit, e.fit)) < APART)
         ]  # fmt: skip
         more = max(1.0, self.samples / max(best.fit.count, 1))
-        close = [n for n in alike if not self._cannot_gain(seen, n, alike, more)]
+        richer = {n for n in alike if best.effect in effects.get(n).nests}  # to which it was preferred
+        close = [n for n in alike if n not in richer and not self._cannot_gain(seen, n, alike, more)]
         if len(close) > 1 and self.whole is not None:
             fits = {n: self.on_all(seen[n].fit) for n in close}
             likeliest = min(fits.values(), key=lambda f: f.penalised)
@@ -322,10 +323,11 @@ class Stepwise:
 def prefers_special(special: Evidence, rich: Evidence) -> bool:
     """Whether a special case is taken before the richer effect that holds it.
 
-    It is if it has most of its support; and where the likelihood cannot be trusted, if it carries as much torque.
+    It is if most of the fall of the cost is its own; and where the likelihood cannot be trusted, if it carries as much
+    torque. Inflations are left out: those of two that are nearly alike differ by chance.
     """
     as_heavy = rich.inflation >= TRUSTED and special.weight > rich.weight - AS_HEAVY
-    return special.support > SPECIAL * rich.support or as_heavy
+    return special.gain - special.price > SPECIAL * (rich.gain - rich.price) or as_heavy
 
 
 def _key(structure: Structure) -> _Key:
