@@ -139,17 +139,13 @@ class Stepwise:
         if not good:
             return None
         best = min(good.values(), key=lambda e: e.fit.penalised)
-        best = self._special_of(best, good)
+        special = [n for n in effects.get(best.effect).nests if n in good and prefers_special(good[n], best)]
+        if special:
+            best = max((good[n] for n in special), key=lambda e: e.support)
         alike = [n for n, e in good.items() if e is best or behind(e.fit, best.fit) < APART]
         chosen = self.plainest({n: good[n].fit for n in alike})
         lower = [n for n in effects.get(chosen).lower_order if n in good]
         return lower[0] if lower else chosen
-
-    @staticmethod
-    def _special_of(best: Evidence, among: Mapping[str, Evidence]) -> Evidence:
-        """The special case that is preferred to an effect; the effect itself where none is."""
-        special = [n for n in effects.get(best.effect).nests if n in among and prefers_special(among[n], best)]
-        return max((among[n] for n in special), key=lambda e: e.support, default=best)
 
     def judged_again(self, now: Fit) -> Fit:
         """Every named effect against all others in its place, beside the finished rest."""
@@ -228,9 +224,11 @@ class Stepwise:
         """Of an effect and others in its place, the one that is named, and all that are as likely."""
         best = seen[name]
         for other in seen.values():
-            if other.weight > WEIGHT and behind(best.fit, other.fit) > APART:
+            special = best.effect in effects.get(other.effect).nests and prefers_special(best, other)
+            if other.weight > WEIGHT and behind(best.fit, other.fit) > APART and not special:
                 best = other
-        best = self._special_of(best, {n: e for n, e in seen.items() if e.weight > WEIGHT})
+        while held := [n for n in effects.get(best.effect).nests if n in seen and takes_most(seen[n], best)]:
+            best = max((seen[n] for n in held), key=lambda e: e.support)
         alike = [
             n for n, e in seen.items()
             if e is best or (e.weight > WEIGHT and max(behind(e.fit, best.fit), behind(best.fit, e.fit)) < APART)
@@ -327,7 +325,12 @@ def prefers_special(special: Evidence, rich: Evidence) -> bool:
     torque. Inflations are left out: those of two that are nearly alike differ by chance.
     """
     as_heavy = rich.inflation >= TRUSTED and special.weight > rich.weight - AS_HEAVY
-    return special.gain - special.price > SPECIAL * (rich.gain - rich.price) or as_heavy
+    return takes_most(special, rich) or as_heavy
+
+
+def takes_most(special: Evidence, rich: Evidence) -> bool:
+    """Whether most of the fall of the cost with an effect is that of its special case."""
+    return special.gain - special.price > SPECIAL * (rich.gain - rich.price)
 
 
 def _key(structure: Structure) -> _Key:
