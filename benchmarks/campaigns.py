@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from identify.estimate.judged import start_values
 from identify.estimate.initial_guess import best_rho, first_guess
+from identify.estimate.judged import start_values
 from identify.estimate.output_error import Estimate, refine
 from identify.model.parameters import Name
 from identify.model.structure import Structure

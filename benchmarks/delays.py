@@ -15,9 +15,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.campaigns import DELAY, DELAY_NAME, TRUTH, clean_rates, structure_with, traces_from, white
-from identify.estimate.judged import horizon_s, start_values
 from identify.estimate.final_fit import by_output_error
 from identify.estimate.initial_guess import best_rho, first_guess
+from identify.estimate.judged import horizon_s, start_values
 
 DELAYS_MS = (0.0, 0.137, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 FIRST_LOOKS_S = (1e-4, 3e-4, 1e-3, 3e-3)  # the delay's own starting values at 1 kHz and one below

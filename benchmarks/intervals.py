@@ -27,8 +27,8 @@ from benchmarks.campaigns import (
     traces_from,
     white,
 )
-from identify.estimate.judged import horizon_s
 from identify.estimate.final_fit import by_output_error
+from identify.estimate.judged import horizon_s
 from rig.arrays import Array
 
 GYRO_ARRAY = "gyro_counts"

@@ -10,15 +10,15 @@ from threadpoolctl import threadpool_limits
 
 from identify.conclude.case import Case
 from identify.conclude.conclusion import conclude
+from identify.conclude.contribution import contributions
 from identify.conclude.decay_disturbance import left_of_a_decay
 from identify.conclude.declared_values import declared_values
 from identify.conclude.error_figures import floor_of, in_torque, measure
-from identify.estimate.by_prediction_error import by_prediction_error
 from identify.estimate.final_fit import Fitted, by_output_error, by_regression
 from identify.estimate.initial_guess import Start, first_guess
 from identify.estimate.judged import Judged
-from identify.estimate.whole_runs import WholeRuns
 from identify.genetic.per_set import each_set
+from identify.likelihood.by_prediction_error import by_prediction_error
 from identify.model.parameters import Name
 from identify.model.structure import Structure, shape_values
 from identify.results import (
@@ -32,13 +32,13 @@ from identify.rivals import run_heterogeneity
 from identify.rivals.coloured_noise import Colour, with_noise_known
 from identify.rivals.tone_origin import TONE, standing_line, told
 from identify.rivals.whiteness_test import too_much_for
+from identify.rivals.whole_runs import WholeRuns
 from identify.runs.clipping import full_scale_of
 from identify.runs.holdout import Split, split
 from identify.runs.measured_channels import offer_of, with_causes
 from identify.runs.observability import why_unseen
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
 from identify.runs.usable import runs_used
-from identify.select.contribution import contributions
 from identify.select.evidence import APART
 from identify.select.field_search import Found, search_in_torque, with_curve
 from identify.select.left_over import dependence_on

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from identify.estimate.effect_free import effect_free
 from identify.estimate.final_fit import Fitted
+from identify.genetic.effect_free import effect_free
 from identify.model.parameters import platform_of
 from identify.signals.trace import UPSAMPLING, Trace
 from rig import effects

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.estimate.fit import Fit
-from identify.estimate.prediction_error import PredictionError
+from identify.likelihood.fit import Fit
+from identify.likelihood.prediction_error import PredictionError
 from identify.model.effect_torque import torque_along
 from identify.model.parameters import Name
 from identify.propose.innovation_score import InnovationScores, Score

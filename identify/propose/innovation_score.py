@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.estimate.fit import Fit, apart
-from identify.estimate.prediction_error import PredictionError
+from identify.likelihood.fit import Fit, apart
+from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name, bounds_of, names_of
 from identify.propose.shape_grids import grid_of
 from identify.simulate.shots import RUNAWAY

@@ -15,9 +15,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from identify.estimate.output_error import Estimate, refine
-from identify.estimate.whole_runs import STEPS, TOLERANCE, WholeFit, WholeRuns
 from identify.model.parameters import Name
 from identify.model.structure import Structure
+from identify.rivals.whole_runs import STEPS, TOLERANCE, WholeFit, WholeRuns
 from identify.signals.trace import Trace
 from identify.simulate.sensitivities import sensitivities
 from identify.wording import joined, number

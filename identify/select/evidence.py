@@ -20,8 +20,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
-from identify.estimate.fit import Columns, Fit, apart
-from identify.estimate.prediction_error import PredictionError
+from identify.likelihood.fit import Columns, Fit, apart
+from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from rig import effects
 from rig.arrays import Array

@@ -10,12 +10,12 @@ from scipy.linalg import block_diag
 
 from identify.diagnose.disturbance import disturbance_of
 from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
-from identify.estimate.by_prediction_error import by_prediction_error
 from identify.estimate.final_fit import Fitted, covariance_of, free_run_of
-from identify.estimate.fit import Fit
 from identify.estimate.initial_guess import Start, scale_of
 from identify.estimate.judged import Judged
 from identify.estimate.output_error import Estimate
+from identify.likelihood.by_prediction_error import by_prediction_error
+from identify.likelihood.fit import Fit
 from identify.model.parameters import names_of
 from identify.model.structure import Structure
 from identify.results import Candidate, Dependence, Disturbance

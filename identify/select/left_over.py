@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2
 
-from identify.estimate.fit import Fit
+from identify.likelihood.fit import Fit
 from identify.model.parameters import Name
 from identify.propose.free_forms import fitted, scores, states_of, torque_of
 from identify.results import Dependence

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from identify.diagnose.torque_regression import TorqueRegression
-from identify.estimate.fit import Fit
 from identify.estimate.initial_guess import Start, scale_of
 from identify.estimate.judged import Judged, horizon_s
 from identify.estimate.output_error import Estimate
-from identify.estimate.prediction_error import PredictionError
+from identify.likelihood.fit import Fit
+from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.results import Candidate

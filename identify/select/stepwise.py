@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from identify.estimate.fit import Fit
-from identify.estimate.prediction_error import PredictionError
+from identify.likelihood.fit import Fit
+from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.propose.innovation_score import Score

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.estimate.fit import Fit
 from identify.estimate.initial_guess import scale_of
-from identify.estimate.prediction_error import PredictionError
+from identify.likelihood.fit import Fit
+from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.propose.innovation_score import InnovationScores, Score

@@ -120,6 +120,7 @@ def predict_ahead(
         np.ascontiguousarray(starts), np.array(spans, dtype=np.int64).reshape(-1, 2), offset_s,
         equations.rest_states(*starts[0]), step_s, ratio, torque, equations.jck, equations.kernels, equations.loads,
         equations.z_at, p, equations.p_at, equations.kinks, filters, fs, fs_at, fp, fp_at, measured, keep, gains.gain,
-        gains.slow_decay, gains.held, np.ascontiguousarray(gains.reads[:, BIAS]), gains.walk_decay, rate, bias, out, state,
+        gains.slow_decay, gains.held, np.ascontiguousarray(gains.reads[:, BIAS]), gains.walk_decay, rate, bias,
+        out, state,
     )  # fmt: skip
     return out, state

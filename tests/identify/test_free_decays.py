@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from identify.estimate.prediction_error import PredictionError
+from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
 from identify.pipeline import identify
 from rig.arrays import Array

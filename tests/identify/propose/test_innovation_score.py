@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from identify.estimate.initial_guess import scale_of
-from identify.estimate.prediction_error import PredictionError
+from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
 from identify.propose.innovation_score import InnovationScores
 from identify.signals.prepare import one_noise, prepare

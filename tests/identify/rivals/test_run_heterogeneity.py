@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 
 from identify.conclude.next_steps import next_steps
-from identify.estimate.whole_runs import WholeRuns
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.pipeline import identify
 from identify.rivals.run_heterogeneity import as_likely, runs_apart, told
+from identify.rivals.whole_runs import WholeRuns
 from identify.runs.holdout import split
 from rig.config.identify import IdentifyConfig
 from rig.recording.run import Recording, Run

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from identify.estimate.fit import Columns
+from identify.likelihood.fit import Columns
 from identify.select.evidence import Evidence, inflation
 from rig.arrays import Array
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identify.estimate.initial_guess import first_guess
-from identify.estimate.prediction_error import PredictionError
+from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
 from identify.signals.prepare import one_noise, prepare
 from identify.signals.trace import Trace

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.estimate import whole_runs
-from identify.estimate.whole_runs import WholeFit, WholeRuns
 from identify.model.parameters import Name
 from identify.model.structure import Structure
+from identify.rivals import whole_runs
+from identify.rivals.whole_runs import WholeFit, WholeRuns
 from rig.platform import TERMS
 
 STEPS = 4  # of a fit that begins where the rest stands: the ratio to a few percent is what is asked for

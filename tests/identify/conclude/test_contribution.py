@@ -7,14 +7,14 @@ import json
 import numpy as np
 import pytest
 
-from identify.estimate.whole_runs import WholeRuns
+from identify.conclude.contribution import contributions
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.pipeline import identify
 from identify.report.files import result_json
 from identify.report.summary import summary
+from identify.rivals.whole_runs import WholeRuns
 from identify.runs.holdout import split
-from identify.select.contribution import contributions
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
 from rig.recording.run import Recording

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identify.estimate.fit import Columns, Fit, Look, Prediction
 from identify.estimate.output_error import held_still
+from identify.likelihood.fit import Columns, Fit, Look, Prediction
 from identify.model.parameters import Name, bounds_of, names_of, ordered
 from identify.model.structure import Structure
 from identify.simulate.all_runs import shots_for
@@ -25,7 +25,7 @@ from rig.dynamics.gains import RATE, Gains, Noise, innovations_with
 from rig.effects.base import Place
 
 if TYPE_CHECKING:
-    from identify.estimate.prediction_error import PredictionError
+    from identify.likelihood.prediction_error import PredictionError
 
 STEP = 1e-6  # relative step of the differences
 NOISE_STEP = 0.02  # of a logarithm of the noise, in its differences

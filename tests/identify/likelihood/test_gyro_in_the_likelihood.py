@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from identify.estimate.prediction_error import PredictionError
+from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
 from identify.signals.prepare import channels_of, one_noise, prepare
 from identify.signals.trace import Trace

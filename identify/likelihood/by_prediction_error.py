@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from identify.estimate.final_fit import Fitted, free_run_of
-from identify.estimate.fit import Fit
-from identify.estimate.prediction_error import PredictionError
+from identify.likelihood.fit import Fit
+from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.runs.reduced import thinned
