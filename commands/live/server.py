@@ -26,6 +26,7 @@ from commands.live.state import LiveState
 from rig.recording.following import JournalFollower
 
 LOOK_S = 0.1  # between two looks at the journal
+SWITCH_S = 5e-4  # between threads: the stop button waits for none of the others (Python's default is 5 ms)
 LINGER_S = 3.0  # after the campaign: the page fetches the last state
 HOST = "127.0.0.1"
 
@@ -151,6 +152,7 @@ def handler_of(process: LiveProcess, token: str) -> type[BaseHTTPRequestHandler]
 def main() -> None:
     """Serve until the campaign's process closes its end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the campaign, which this page goes on to show
+    sys.setswitchinterval(SWITCH_S)
     write = threading.Lock()
 
     def say(what: Mapping[str, Any]) -> None:
