@@ -14,6 +14,7 @@ from identify.conclude.contribution import contributions
 from identify.conclude.decay_disturbance import left_of_a_decay
 from identify.conclude.declared_values import declared_values
 from identify.conclude.error_figures import floor_of, in_torque, measure
+from identify.conclude.next_steps import interrupted_reason
 from identify.estimate.final_fit import Fitted, by_output_error, by_regression
 from identify.estimate.initial_guess import Start, first_guess
 from identify.estimate.judged import Judged
@@ -54,7 +55,6 @@ from rig.errors import Aborted
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
-STOPPED = "the search was interrupted; missing effects are not yet determined"
 NOTHING_YET = (
     "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
 )
@@ -211,7 +211,7 @@ class _Identifier:
         found = self._report(search, self._regressed(search.base), self._regressed(search.best), in_full=False)
         if not found.verdict.effects:  # the search may have been about to name what this model lacks
             found = replace(found, verdict=replace(found.verdict, sentences=(NOTHING_YET,)))
-        return replace(found, aborted=True, accepted=False, reasons=(STOPPED,))
+        return replace(found, aborted=True, accepted=False, reasons=(interrupted_reason(found.verdict.effects),))
 
     def _in_torque(
         self, shapes: dict[str, tuple[float, ...]], search: LikelihoodSearch, found_there: Search

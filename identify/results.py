@@ -247,6 +247,7 @@ class Identification:
     plausibility: tuple[Implausible, ...] = ()
     note: str = ""  # why an error in the table grew although the model is better
     scale_shows: bool = False  # whether runs carry one, so that a scale of the torque is no part of J, C and K
+    recorded: bool = False  # the runs were read from files: no `excitation` section whose keys a next step could name
 
     @property
     def set_scatter(self) -> dict[str, float]:

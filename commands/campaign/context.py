@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from commands.live.view import NoLiveView
 from commands.terminal.exit_codes import report, run_to_exit_code, say
 from commands.terminal.stop_requests import StopRequests
 
@@ -32,6 +33,7 @@ class Options:
     seed: int | None = None
     quiet: bool = False
     resume: Path | None = None
+    live: bool = False
 
     def load(self) -> LoadedConfig:
         """The checked configuration, --set and --seed applied; code that it runs is said first. Raises ConfigError."""
@@ -53,6 +55,12 @@ class CommandContext:
     terminal: Terminal
     stops: StopRequests
     folder: ResultsFolder | None = None
+    live: NoLiveView = field(default_factory=NoLiveView)
+
+    def note(self, text: str) -> None:
+        """Say on the terminal and on the live page what is being worked on."""
+        self.terminal.note(text)
+        self.live.note(text)
 
     def choose_folder(self, name: str) -> ResultsFolder:
         """Name the results folder; nothing is made yet. Raises UsageError where --out exists."""

@@ -196,9 +196,18 @@ def _record(
     head = {"axis": "rotary", "noise": stage.rig.noise_rad_s, "planned": [s.name for s in sets]} | info
     head["planned_in_all"] = list(every)
     with context.stops.deferring():
-        recorder.run(Journal.create(path / part.journal, head))
+        journal = Journal.create(path / part.journal, head)
+        _show_live(context, loaded, sets, journal.path)
+        recorder.run(journal)
         played = _saved(context, stage, recorder, info, folder, part)
     return played if played.cause is not None else replace(played, cause=_late_stop(context))
+
+
+def _show_live(context: CommandContext, loaded: LoadedConfig, sets: Sequence[PlannedSet], journal: Path) -> None:
+    limits = loaded.config.limits
+    known = {"travel_deg": limits.travel_deg, "rate_deg_s": limits.rate_deg_s, "torque_nm": limits.torque_nm}
+    planned = [(one.name, one.duration_s) for one in sets]
+    context.live.plays(planned, known, journal, loaded.config.model.platform().terms)
 
 
 def _saved(

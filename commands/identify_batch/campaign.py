@@ -121,6 +121,7 @@ def _identified(config: Config, recording: Recording) -> Identification:
 
     blind = dataclasses.replace(recording, info={})
     found = with_declared(identify(blind, config.model.platform(), config.identify), config.model.declared_numbers)
+    found = dataclasses.replace(found, recorded=config.backend == "recorded")
     cut_short = recording.info.get("aborted")
     if not cut_short:
         return found

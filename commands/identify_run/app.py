@@ -14,6 +14,7 @@ from commands.terminal.options import (
     ConfigFile,
     DryRun,
     Emulate,
+    Live,
     Out,
     Overrides,
     Quiet,
@@ -28,6 +29,13 @@ if TYPE_CHECKING:
     from commands.campaign.results_folder import ResultsFolder
     from rig.config.load import LoadedConfig
 
+RESULTS = {  # by exit code
+    0: "Finished: accepted",
+    1: "Finished: not accepted, the report says why",
+    3: "Device fault: torque is off, what was recorded is kept",
+    4: "Safety trip: torque is off, what was recorded is kept",
+    130: "Stopped: torque is off, what was recorded is kept",
+}
 app = new_app("")
 
 
@@ -42,6 +50,7 @@ def identify_run(
     seed: Seed = None,
     quiet: Quiet = False,
     resume: Resume = None,
+    live: Live = False,
     version: Version = False,
 ) -> None:
     """Play the campaign of CONFIG (or read its recordings), identify J, C and K, name what the model misses.
@@ -49,20 +58,31 @@ def identify_run(
     Exit codes: 0 identified and accepted, 1 not accepted (the results say why), 2 wrong usage, file or forecast,
     3 device fault, 4 safety trip, 70 internal error, 130 Ctrl-C.
     """
-    options = Options(config, out, dry_run, emulate, yes, tuple(overrides or ()), seed, quiet, resume)
+    options = Options(config, out, dry_run, emulate, yes, tuple(overrides or ()), seed, quiet, resume, live)
     raise typer.Exit(run_command(options, run))
 
 
 def run(context: CommandContext) -> int:
     """The main job; returns the exit code."""
     from commands.campaign.backends import RECORDED, backend_name
+    from commands.live.view import live_view
+    from rig.errors import UsageError
 
     options = context.options
     loaded = options.load()
     folder = context.choose_folder(loaded.config.name)
     if backend_name(loaded.config, options.dry_run, options.emulate) == RECORDED and options.resume is None:
+        if options.live:
+            raise UsageError(
+                "--live shows a campaign while it plays, and backend: recorded plays nothing. Leave it out."
+            )
         return _run_recorded(context, loaded, folder)
-    return _run_played(context, loaded, folder)
+    if not options.live:
+        return _run_played(context, loaded, folder)
+    with live_view(context.stops.request, context.terminal.show_always) as context.live:
+        code = _run_played(context, loaded, folder)
+        context.live.finished(RESULTS.get(code, f"Ended with exit code {code}: see the terminal"))
+        return code
 
 
 def _run_recorded(context: CommandContext, loaded: LoadedConfig, folder: ResultsFolder) -> int:

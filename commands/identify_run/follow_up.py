@@ -63,7 +63,7 @@ def with_plan(
     rounds = len(found.follow_up.rounds) if found.follow_up else 0
     prefix = "follow-up" if rounds == 0 else f"follow-up {rounds + 1}"
     if any(found.verdict.confusable_with.values()):
-        context.terminal.note("planning a follow-up that separates the candidate effects")
+        context.note("planning a follow-up that separates the candidate effects")
     try:
         planned = plan_follow_up(
             found, dataclasses.replace(recording, info={}), allowed, rate_hz, loaded.config.excitation.rest_s, prefix

@@ -24,8 +24,9 @@ def identified(context: CommandContext, loaded: LoadedConfig, recording: Recordi
 
     config = loaded.config
     blind = dataclasses.replace(recording, info={})
-    found = identify(blind, config.model.platform(), config.identify, context.terminal.note)
-    return with_declared(found, config.model.declared_numbers)
+    found = identify(blind, config.model.platform(), config.identify, context.note)
+    found = with_declared(found, config.model.declared_numbers)
+    return dataclasses.replace(found, recorded=config.backend == "recorded")
 
 
 def conclude(

@@ -125,6 +125,7 @@ def _of_table(table: Table, file: str, options: InitOptions, ask: Ask | None) ->
     named: dict[Quantity, Column | None] = {q: column_named(columns, q, text) for q, text in options.columns.items()}
     questions = Questions(options.yes, ask)
     roles = {q: questions.column(q, choice, columns) for q, choice in guess_roles(columns, named).items()}
+    _refuse_unread(table, columns, roles, options)
     _require_motion(table, roles)
     axis = options.axis or axis_of(roles)
     factors = guess_factors(roles, axis, {q: list(DEFAULT_NAMES[q]) for q in roles})
@@ -161,6 +162,22 @@ def _listing(table: Table, columns: tuple[Column, ...]) -> list[str]:
         unit = f" {c.known_unit.text if c.known_unit else c.unit_text}".rstrip()
         lines.append(f"  {c.name!r}: {np.nanmin(c.values):.6g} to {np.nanmax(c.values):.6g}{unit}{rising}")
     return lines + ([f"  ... and {len(columns) - LISTED} more"] if len(columns) > LISTED else [])
+
+
+def _refuse_unread(
+    table: Table, columns: tuple[Column, ...], roles: dict[Quantity, Choice], options: InitOptions
+) -> None:  # fmt: skip
+    """A torque that is there and cannot be read must not make a free decay of the recording."""
+    from rig.recording.guessing.roles import unread
+
+    for quantity in ORDER:
+        column = unread(columns, quantity)
+        if roles[quantity].column is None and column is not None and quantity not in options.columns:
+            why = column.why_not.removeprefix(f"column {column.name!r} ")
+            raise RecordingError(
+                f"{table.path}: column {column.name!r} looks like the {quantity} but cannot be used: {why}; or give "
+                f"another column with --{quantity} COL (or none)"
+            )
 
 
 def _require_motion(table: Table, roles: dict[Quantity, Choice]) -> None:

@@ -20,6 +20,9 @@ Resume = Annotated[
 ]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="The same campaign on the simulated backend.")]
 Emulate = Annotated[bool, typer.Option("--emulate", help="The bench against devices emulated at wire level.")]
+Live = Annotated[
+    bool, typer.Option("--live", help="Serve a page on this machine that shows the campaign and has a stop button.")
+]
 Yes = Annotated[
     bool, typer.Option("--yes", help="Apply REAL torque without asking; a follow-up only if the file says auto.")
 ]

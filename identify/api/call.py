@@ -118,7 +118,7 @@ def _found(recording: Recording, asked: Settings, progress: Callable[[str], None
     config = asked.config
     blind = replace(recording, info={})
     found = identified(blind, config.model.platform(), config.identify, progress)
-    found = with_declared(found, config.model.declared_numbers)
+    found = replace(with_declared(found, config.model.declared_numbers), recorded=True)
     if found.aborted:
         return found
     allowed = limits_of(found, config.limits, found.axis == "linear")

@@ -54,5 +54,5 @@ def lag_for_damping(platform: Platform, inertia_std_error: float, traces: Sequen
         "These sets are too slow to separate damping from a delay or lag of the drive or the gyro: each undeclared "
         f"{1e3 * LATE_S:g} ms adds {number(stiffness * LATE_S, 2)} {unit} to the identified C of "
         f"{number(platform.damping_nm_s_rad, 3)} {unit}. Add a set near the resonance at {number(natural_hz, 2)} Hz, "
-        "or one that starts abruptly (soft_start_s: 0)."
+        "or one that starts abruptly."
     )

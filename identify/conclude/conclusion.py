@@ -36,6 +36,7 @@ from identify.runs.sign_convention import SENTENCE
 from identify.select.search_state import Search
 from identify.signals import glitches, resampling
 from identify.signals.trace import UPSAMPLING, loads_differ
+from identify.wording import capital
 from rig import effects
 from rig.effects.base import Place
 
@@ -143,7 +144,7 @@ def _note(case: Case, after: Fitted) -> str:
     uneven = resampling.told([(t.run.name, *t.scatter) for t in case.traces])
     filtered = coloured_noise.told(case.colour, case.recording.axis, case.traces[0].channel)
     return ". ".join(
-        note for note in (case.split.note, resting, filtered, *case.left_out, torn, beyond, uneven) if note
+        capital(note) for note in (case.split.note, resting, filtered, *case.left_out, torn, beyond, uneven) if note
     )
 
 

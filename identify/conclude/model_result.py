@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identify.bounds.jumps import why_of_a_jump
 from identify.bounds.undetermined import of_another_run, open_phases, undetermined
 from identify.conclude.case import Case, runs_fitted
 from identify.conclude.declared_values import declared_values, kept_as_declared
@@ -51,7 +52,8 @@ def _platform(case: Case, fitted: Fitted, values: Mapping[Name, float]) -> Platf
 
 def _lost(case: Case, fitted: Fitted) -> dict[Name, str]:
     alone = len(case.traces) == 1 and case.disturbance is None  # a measured run is no single tone
-    return undetermined(fitted, runs_fitted(case), alone)
+    lost = undetermined(fitted, runs_fitted(case), alone)
+    return {name: why_of_a_jump(fitted, name, case.traces) or why for name, why in lost.items()}
 
 
 def _label(case: Case, name: Name) -> str:

@@ -7,9 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from identify.bounds.jumps import JUMP
 from identify.diagnose import torque_noise
 from identify.diagnose.torque_residual import dependence
-from identify.results import GeneticRun, Identification, RunTraces, follow_up_file_name
+from identify.diagnose.wording import is_significant
+from identify.results import GeneticRun, Identification, ResidualDiagnosis, RunTraces, follow_up_file_name
 from identify.runs.sign_convention import SENTENCE, signs
 from identify.wording import capital, joined, number, percent, plain
 
@@ -17,22 +19,35 @@ MIN_SHARE = 0.1  # share of the residual's power from which it is said to depend
 USUAL_CUTOFF_HZ = 50.0
 RUN = {
     "rate": (
-        "To separate friction from damping, vary the speed: add a slow ramp_hold_release set, and repeat one set at a "
-        "quarter and at half of its torque (repeat_scales: [0.5, 0.25])."
+        "To separate friction from damping, vary the speed: add a slow ramp to a torque that is held and released, and "
+        "repeat one set at a quarter and at half of its torque."
     ),
     "angle": (
-        "To separate spring, backlash, cogging and gravity, vary the travel: add a slow ramp_hold_release set over "
-        "the whole travel, and repeat one set at half of its torque; if gravity may act, repeat it with the base "
-        "turned."
+        "To separate spring, backlash, cogging and gravity, vary the travel: add a slow ramp over the whole travel, "
+        "and repeat one set at half of its torque; if gravity may act, repeat it with the base turned."
     ),
     "torque": (
-        "To find an effect of the drive, vary the torque: repeat the sets at half of their torque (repeat_scales: "
-        "[0.5]), and if the drive reports the measured current, record it instead of the command."
+        "To find an effect of the drive, vary the torque: repeat the sets at half of their torque, and if the drive "
+        "reports the measured current, record it instead of the command."
     ),
     "time": (
         "The platform or a sensor drifts: warm up for ten minutes, play the first set again at the end, and check "
         "temperature and clamping."
     ),
+    "history": (
+        "To separate hysteresis, creep and a second mode, vary how long the torque acts: hold a constant torque for a "
+        "minute and release it, and repeat one set at a quarter of its frequency."
+    ),
+}
+RUN["direction"] = RUN["rate"]
+# What the steps above are called in the `excitation` section: only where a campaign was played is there one.
+RAMP, SCALES, ABRUPT = "kind: ramp_hold_release", "repeat_scales: [0.5, 0.25]", "soft_start_s: 0"
+KEYS = {
+    "rate": (RAMP, SCALES),
+    "direction": (RAMP, SCALES),
+    "angle": (RAMP, SCALES),
+    "torque": (SCALES,),
+    "history": (RAMP,),
 }
 DECAY_RUN = {  # the same without a motor
     "rate": (
@@ -47,7 +62,11 @@ DECAY_RUN = {  # the same without a motor
         "The platform or a sensor drifts: repeat the first release after ten minutes, and check temperature and "
         "clamping."
     ),
+    "history": (
+        "To separate hysteresis and creep, release the platform once at once and once after it was held for a minute."
+    ),
 }
+DECAY_RUN["direction"] = DECAY_RUN["rate"]
 LINEAR = {"rate": "speed", "angle": "position", "torque": "force"}
 INDEPENDENT = (
     "The residual does not depend on rate, angle, torque or time. Look in its spectrum and in the frequency response "
@@ -66,6 +85,9 @@ COLOURED = (
     "recorded.noise to its rms."
 )
 REPEAT = "Play the campaign again and compare the results; `rig check` predicts what each set can determine."
+RECORD_AGAIN = "Record the campaign again and compare the results."
+INTERRUPTED = "the search was interrupted"
+IDENTIFY_AGAIN = "Identify this recording again and let the search come to its end; nothing has to be played for it."
 NEAR_FLOOR = 4.0  # times the noise floor
 FIRST_SAMPLES, MOVING = 3, 0.1  # first samples of a run, and the share of its largest rate that they may have
 
@@ -74,11 +96,13 @@ def next_steps(found: Identification) -> tuple[str, ...]:
     """One sentence a step, the most telling first; where the identification was accepted only what was left open."""
     if found.accepted:
         return (found.verdict.tells_apart,) if found.verdict.tells_apart else ()
+    if any(reason.startswith(INTERRUPTED) for reason in found.reasons):
+        return (IDENTIFY_AGAIN,)  # what half a search leaves says nothing about the platform
     if opposite_signs(found):
         return (f"{capital(SENTENCE)}, then identify again.",)
     steps = []
     if found.final.not_determined:
-        steps.append(to_determine([item.name for item in found.final.not_determined], torque_free(found)))
+        steps.append(_to_determine_all(found))
     if found.verdict.unexplained:
         steps += _to_explain(found)
     failed = [one.genetic for one in found.per_set if one.genetic and not one.accepted]
@@ -93,7 +117,16 @@ def next_steps(found: Identification) -> tuple[str, ...]:
         steps.append(f"Lower torque_nm in {file} before you play it again." if stopped else f"Play {file}.")
     if found.aborted:
         steps.append("The campaign was aborted: play it again in full.")
-    return tuple(steps) or (REPEAT,)
+    return tuple(steps) or (RECORD_AGAIN if found.recorded else REPEAT,)
+
+
+def interrupted_reason(named: Sequence[str]) -> str:
+    """Why the results of a search that somebody stopped are not accepted; ``named`` are the effects proven by then."""
+    if not named:
+        return f"{INTERRUPTED}; missing effects are not yet determined"
+    proven = joined([plain(name) for name in named])
+    verb = "was" if len(named) == 1 else "were"
+    return f"{INTERRUPTED} after {proven} {verb} proven; whether more is missing is not yet determined"
 
 
 def opposite_signs(found: Identification) -> bool:
@@ -134,15 +167,29 @@ def to_determine(several: Sequence[str], decays: bool) -> str:
         return f"To determine {names}: release the platform from a larger angle and record until it rests."
     return (
         f"To determine {names}: add a set at another frequency or a multisine (0.5 Hz to beyond the resonance), let it "
-        "start abruptly (soft_start_s: 0) so that the platform rings, and raise the torque as far as the limits allow; "
-        "`rig check` predicts what each set will determine."
+        "start abruptly so that the platform rings, and raise the torque as far as the limits allow."
     )
+
+
+def _to_determine_all(found: Identification) -> str:
+    """The step for all that is not determined; what a jump in a kernel hides has its cure in its reason."""
+    lost = [item.name for item in found.final.not_determined if JUMP not in item.reason]
+    if not lost:
+        return "Smooth the jump in the effect's kernel as the reason says, then identify this recording again."
+    step, decays = to_determine(lost, torque_free(found)), torque_free(found)
+    if decays or found.recorded:
+        return step
+    return f"{step}{_named_in_yaml((ABRUPT,))} `rig check` predicts what each set will determine."
+
+
+def _named_in_yaml(keys: Sequence[str]) -> str:
+    return f" In rig.yaml: {joined(keys)}." if keys else ""
 
 
 def _to_explain(found: Identification) -> list[str]:
     if found.verdict.tells_apart:
         return [found.verdict.tells_apart]
-    left = found.residual_before if found.after is None else found.residual_after
+    left = _diagnosis(found)
     if left is not None and left.moments:
         places = joined([f"in {m.run} from {m.from_s:.2f} to {m.to_s:.2f} s" for m in left.moments])
         return [f"Most of the residual lies {places}. Exclude it with from_s or to_s, or record the run again."]
@@ -158,8 +205,7 @@ def _coloured(found: Identification) -> list[str]:
 
 
 def _by_dependence(found: Identification) -> list[str]:
-    shares = dependence(found.traces, found.final.error.lowpass_hz or USUAL_CUTOFF_HZ)
-    name, share = next(iter(shares.items()), ("", 0.0))
+    """The run that separates what the residual depends on: what the verdict says of it, else its largest share."""
     late = _begun_in_motion(found.traces)
     if late:
         starts = "starts" if len(late) == 1 else "start"
@@ -169,14 +215,48 @@ def _by_dependence(found: Identification) -> list[str]:
             "before the torque."
         ]
     free = torque_free(found)
-    if share < MIN_SHARE:
-        return [*late, INDEPENDENT_DECAY if free else INDEPENDENT]
-    run = DECAY_RUN[name] if free else RUN[name]
-    advice = f"{number(100.0 * share, 2)} % of the residual's power depends on the {name}. {run}"
+    name, told = _dependence(found)
+    runs = DECAY_RUN if free else RUN
+    if name not in runs:
+        line = _at_a_line(found)
+        return [*late, line or (INDEPENDENT_DECAY if free else INDEPENDENT)]
+    keys = () if free or found.recorded else KEYS.get(name, ())
+    advice = f"{told}{runs[name]}{_named_in_yaml(keys)}"
     if found.axis == "linear":
         for rotary, linear in LINEAR.items():
             advice = advice.replace(f" {rotary}", f" {linear}")
     return [*late, advice]
+
+
+def _dependence(found: Identification) -> tuple[str, str]:
+    """What the residual depends on most, and a sentence that says so where the verdict does not; empty for nothing."""
+    if found.disturbance is not None and found.disturbance.depends_on:
+        return max(found.disturbance.depends_on, key=lambda d: d.relative).on, ""
+    shares = dependence(found.traces, found.final.error.lowpass_hz or USUAL_CUTOFF_HZ)
+    name, share = next(iter(shares.items()), ("", 0.0))
+    if share >= MIN_SHARE:
+        return name, f"{number(100.0 * share, 2)} % of the residual's power depends on the {name}. "
+    left = _diagnosis(found)
+    told = {} if left is None else {"direction": left.direction, "history": left.memory}
+    seen = {on: s.share for on, s in told.items() if s is not None and is_significant(s, MIN_SHARE)}
+    return (max(seen, key=seen.__getitem__), "") if seen else ("", "")
+
+
+def _at_a_line(found: Identification) -> str:
+    """What to do about a spectral line that the diagnosis found; empty where there is none."""
+    left = _diagnosis(found)
+    if left is None or not left.free_lines:
+        return ""
+    line = max(left.free_lines, key=lambda one: one.size)
+    return (
+        f"The residual has a line at {number(line.frequency_hz, 4)} Hz: record once with the drive off and once with "
+        "it enabled at zero torque. A line that stays with the drive off comes from the surroundings or the sensor; "
+        "switch off what rotates or vibrates at that frequency and record again."
+    )
+
+
+def _diagnosis(found: Identification) -> ResidualDiagnosis | None:
+    return found.residual_before if found.after is None else found.residual_after
 
 
 def _begun_in_motion(traces: Sequence[RunTraces]) -> list[str]:

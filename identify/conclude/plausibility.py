@@ -1,8 +1,8 @@
 """Fitted values compared with declared ones: factors that a wrong unit or a wrong sign would make.
 
 A wrong scale of torque or rate multiplies J, C and K alike. A wrong unit of time multiplies K/J by its square. One
-number that is off beside others that agree is a matter of the declared number itself. Anything else is silence: a
-declared number is often a guess.
+number that is off beside others that agree is a matter of the declared number itself. J and K off by the same few
+percent are what a torque constant makes. Anything else is silence: a declared number is often a guess.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from identify.wording import SYMBOLS, half_interval, joined, number
 from rig.platform import TERMS
 
 WITHIN = math.log(1.15)  # of a factor, either way: what a declared number is good for
+SHARED = math.log(1.02)  # of two declared numbers that share a factor: a computed inertia is good for a percent or two
+LEAST_SCALE, MOST_SCALE = math.log(1.05), math.log(2.0)  # a torque constant's tolerance; beyond, it is no calibration
 KNOWN_TO = 0.1  # half the 95 % interval over the value: worse says nothing of a factor
 DEGREES, TURN, RPM, GRAVITY, THOUSAND = 180.0 / math.pi, 2.0 * math.pi, 30.0 / math.pi, 9.80665, 1e3
 FREQUENCY = TURN**2
@@ -136,7 +138,8 @@ def implausible(found: Identification) -> tuple[Implausible, ...]:
     linear = found.axis == "linear"
     scales = OF_POSITION if linear else OF_RATE if channel == "rate" else OF_ANGLE
     shared = _alike(jck, scales) or _in_time(jck, channel) or _only_one(jck, scales)
-    return shared or tuple(_single(jck, OF_ONE_LINEAR if linear else OF_ONE))
+    single = tuple(_single(jck, OF_ONE_LINEAR if linear else OF_ONE))
+    return shared or single or (() if found.scale_shows else _of_torque_scale(jck, linear))
 
 
 def _is(ratio: float, factor: float) -> bool:
@@ -152,6 +155,22 @@ def _alike(jck: Mapping[str, float], causes: tuple[Cause, ...]) -> tuple[Implaus
             names = tuple(n for n in jck if _is(jck[n], cause.factor))
             return (_implausible(names, jck, f"as if {cause.words}: check this unit, then the declared values"),)
     return ()
+
+
+def _of_torque_scale(jck: Mapping[str, float], linear: bool) -> tuple[Implausible, ...]:
+    """A factor of no unit that J and K share, as a torque constant off by some percent makes it."""
+    if "inertia" not in jck or "stiffness" not in jck or min(jck.values()) <= 0.0:
+        return ()
+    apart = abs(math.log(jck["inertia"] / jck["stiffness"]))
+    factor = math.sqrt(jck["inertia"] * jck["stiffness"])
+    if apart > SHARED or not LEAST_SCALE < abs(math.log(factor)) < MOST_SCALE:
+        return ()
+    torque, kind = ("force", "mass") if linear else ("torque", "inertia")
+    words = (
+        f"as a scale error of the {torque} or of the sensor would make it: add runs with a known added {kind} "
+        "(added_inertia_kg_m2), which show the scale, or check the declared values"
+    )
+    return (_implausible(("inertia", "stiffness"), jck, words),)
 
 
 def _only_one(jck: Mapping[str, float], causes: tuple[Cause, ...]) -> tuple[Implausible, ...]:

@@ -9,7 +9,6 @@ from identify.results import Identification
 from identify.runs.measured_channels import REFUSED
 from identify.runs.sign_convention import SENTENCE
 from identify.wording import (
-    SYMBOLS,
     capital,
     half_interval,
     how_to_separate,
@@ -25,7 +24,6 @@ from identify.wording import (
     without,
 )  # fmt: skip
 from rig import effects
-from rig.platform import TERMS
 
 SHOWN = 4  # numbers of an effect in a sentence
 SHOWN_PERCENT = 0.05  # a change below that is not worth a sentence
@@ -56,7 +54,6 @@ def sentences_of(found: Identification, damping_said: bool = False) -> tuple[str
             + ("; J, C and K are larger or smaller by the same factor." if off else ": the torque scale is right.")
         )
     out += _poorly_determined(found, damping_said)
-    out += _unseen_scale(found)
     if found.disturbance is not None and _decided_in_torque(found):
         out.append(residual_torque_sentence(of_reported(found.disturbance, found.final), found.axis))
     elif found.verdict.unexplained:
@@ -94,19 +91,6 @@ def _nothing_named(found: Identification) -> str:
     if found.verdict.unexplained:
         return "no candidate explains the residual."
     return "the declared model already reaches the noise floor."
-
-
-def _unseen_scale(found: Identification) -> list[str]:
-    """That a scale of the torque is part of J, C and K, where no run carries a known inertia that would show it."""
-    given = [SYMBOLS[name] for name in TERMS if name in found.final.parameters]
-    if found.scale_shows or not given:
-        return []
-    torque, kind = ("force", "mass") if found.axis == "linear" else ("torque", "inertia")
-    makes = "by the same factor " if len(given) > 1 else ""
-    return [
-        f"A scale error of the {torque} or of the sensor changes {joined(given)} {makes}and does not show in these "
-        f"runs. To detect it, add runs with a known added {kind} (added_inertia_kg_m2)."
-    ]
 
 
 def _poorly_determined(found: Identification, damping_said: bool) -> list[str]:

@@ -13,12 +13,14 @@ from rich.table import Table
 from rich.text import Text
 
 from identify.conclude.expected_delay import delay_lines
+from identify.conclude.headline import acceptance
 from identify.conclude.next_steps import next_steps
 from identify.follow_up.wording import lines as follow_up_lines
 from identify.results import Identification, ParameterEstimate
 from identify.wording import (
     SYMBOLS,
     bias_percent,
+    capital,
     declared_number,
     errors_by_model,
     not_said_yet,
@@ -92,13 +94,15 @@ def _listed(heading: str, lines: Sequence[str], bullet: str = "- ") -> list[Rend
 
 
 def _outcome(identification: Identification) -> list[RenderableType]:
+    lines = list(identification.reasons)
     if identification.aborted:
         head = Text("ABORTED: these results use only the samples recorded before the stop.", style="bold red")
     elif identification.accepted:
         head = Text("ACCEPTED", style="bold green")
+        lines = [acceptance(identification).removeprefix("Accepted: ")]
     else:
         head = Text("NOT ACCEPTED", style="bold red")
-    why = [Padding(Text(printable(f"- {reason}")), (0, 0, 0, 2)) for reason in identification.reasons]
+    why = [Padding(Text(printable(f"- {capital(line)}")), (0, 0, 0, 2)) for line in lines]
     return [head, *why, *_listed("What to run next", next_steps(identification))]
 
 

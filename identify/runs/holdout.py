@@ -57,7 +57,7 @@ def split(traces: Sequence[Trace], share: float | Literal["auto"] = "auto") -> S
     who = "" if share == "auto" else f" (identify.holdout: {share:g})"
     note = (
         f"Each run is split into {blocks} blocks; {_held_out(chosen)} held out{who} to compare candidates and to "
-        "measure the errors below. Start states are fitted there; the final parameters are refitted on all samples"
+        "measure the errors. Start states are fitted there; the final parameters are refitted on all samples"
     )
     return Split(fit, judge, [t.keep.copy() for t in traces], note)
 

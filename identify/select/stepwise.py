@@ -288,7 +288,7 @@ class Stepwise:
             light = evidence.weight < WEIGHT and (name not in TERMS or soaks)
             if evidence.support > APART and not light:
                 continue
-            why = f"log-likelihood {0.5 * evidence.gain:.3g} lower without it"
+            why = f"the log-likelihood changes by {-0.5 * evidence.gain:+.2g} without it"
             if term and light:
                 why = "it carries no torque that the others do not"
             self.dropped.append((name, why))

@@ -39,6 +39,8 @@ class Prediction:
         The largest factor (at most 1) on the torque with which all limits hold; 0 where none does.
     keys
         Of the configuration: what decides the allowed travel, rate and torque.
+    margin
+        Share of the limits that is allowed (`excitation.margin`), 1 where the set is not scaled.
     starts_deg
         How far from where the campaign began the sets before leave the platform, where no spring pulls it back.
     """
@@ -49,6 +51,7 @@ class Prediction:
     scale: float
     keys: tuple[str, str, str] = LIMIT_KEYS
     starts_deg: float = 0.0
+    margin: float = 1.0
 
     @property
     def passes(self) -> bool:
@@ -104,11 +107,20 @@ class Prediction:
     def _describe_broken(self) -> str:
         units = zip(_UNITS, self.allowed, self.keys, strict=True)
         broken = [
-            f"the {name} limit of {limit:g} {unit} ({key}{'' if key in LIMIT_KEYS else ', full scale of the gyro'})"
+            f"the {name} limit of {limit:g} {unit} ({self._describe_origin(name, limit, key)})"
             for (name, unit), limit, key in units
             if key in self.broken
         ]
         return _joined(broken)
+
+    def _describe_origin(self, name: str, limit: float, key: str) -> str:
+        """Where a limit comes from, with the numbers that the file has: "10 by limits.travel_deg, times ..."."""
+        if name == "travel" and limit == self.planned.excitation.travel_cap_deg:
+            return "travel_cap_deg of the set"
+        of_gyro = "" if key in LIMIT_KEYS else ", full scale of the gyro"
+        if self.margin == 1.0:
+            return f"{key}{of_gyro}"
+        return f"{limit / self.margin:g} by {key}{of_gyro}, times excitation.margin {self.margin:g}"
 
 
 _UNITS = (("travel", "deg"), ("rate", "deg/s"), ("torque", "N m"))
@@ -184,7 +196,8 @@ def predict_all(
     allowed = allowed_peaks(limits, margin, rate_full_scale_rad_s)
     clips = rate_full_scale_rad_s is not None and math.degrees(rate_full_scale_rad_s) < limits.rate_deg_s
     keys = (LIMIT_KEYS[0], full_scale_key if clips else LIMIT_KEYS[1], LIMIT_KEYS[2])
-    alone = tuple(predict(platform, s, allowed, keys) for s in planned(excitation.sets))
+    found = (predict(platform, s, allowed, keys) for s in planned(excitation.sets))
+    alone = tuple(replace(p, margin=margin) for p in found)
     if len(alone) < 2 or not has_no_restoring_spring(platform, excitation.rest_s):
         return alone
     return _predict_together(platform, alone, allowed, excitation.rest_s)

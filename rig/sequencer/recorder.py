@@ -49,7 +49,8 @@ class SetStatistics:
 class SetRecorder:
     """One set while it plays. Times are kept in seconds since ``start_s``.
 
-    With ``keep`` false what the journal has is let go of, and there is no ``run``.
+    With ``keep`` false what the journal has is let go of, and there is no ``run``. ``rest_bias_rad_s`` is what the gyro
+    read at rest before the set, for whoever follows the journal while it is written.
     """
 
     def __init__(
@@ -60,6 +61,7 @@ class SetRecorder:
         journal: Journal | None,
         low_pass: LowPass | None = None,
         keep: bool = True,
+        rest_bias_rad_s: float = 0.0,
     ) -> None:
         self._planned = planned
         self.start_s = start_s
@@ -69,6 +71,7 @@ class SetRecorder:
         self._low_pass: dict[str, float] = (
             {} if low_pass is None else {"rate_corner_hz": low_pass.corner_hz, "rate_delay_s": low_pass.delay_s}
         )
+        self._rest_bias_rad_s = rest_bias_rad_s
         self._open = False
         self._keep = keep or journal is None
         self._late = Lateness()
@@ -126,6 +129,7 @@ class SetRecorder:
                 "frequency_hz": self._planned.frequency_hz,
                 "scale": self._planned.scale,
                 BEGUN_S: self.start_s,
+                "rest_bias_rad_s": self._rest_bias_rad_s,
             } | self._low_pass
             columns = {"ticks": ("time_s", "late_s", *self._channel_names)}
             self._journal.begin_run(self._planned.name, meta, columns)

@@ -201,10 +201,11 @@ class Sequencer:
 
     def _play_set(self, planned: PlannedSet) -> None:
         start_s = self._clock.now_s() + self._period_s
-        self._guard.begin(start_s, self._resting())
-        rig = self._rig
+        rest = self._resting()
+        self._guard.begin(start_s, rest)
+        rig, bias = self._rig, rest.bias_rad_s
         recorder = SetRecorder(
-            planned, start_s, rig.torque_hold, self._journal, rig.rate_low_pass, keep=self._keep_runs
+            planned, start_s, rig.torque_hold, self._journal, rig.rate_low_pass, self._keep_runs, bias
         )
         complete = False
         try:

@@ -10,7 +10,8 @@ from typing import get_type_hints
 import numpy as np
 import pytest
 
-from identify.pipeline import STOPPED, identify
+from identify.conclude.next_steps import interrupted_reason
+from identify.pipeline import identify
 from identify.report.files import result_json
 from identify.results import Identification
 from rig.config.identify import IdentifyConfig
@@ -197,7 +198,7 @@ def test_who_stops_the_search_gets_what_there_is_and_is_told_so(stop: BaseExcept
     found = identify(campaign({"coulomb_friction": {"level": 1.0}}, duration_s=4), LOW, SETTINGS, interrupt)
     assert found.aborted
     assert not found.accepted
-    assert found.reasons == (STOPPED,)
+    assert found.reasons == (interrupted_reason(found.verdict.effects),)
     assert found.per_set == ()
     assert found.before.parameters["stiffness"].value == pytest.approx(TRUTH[2], rel=0.01)
 

@@ -77,6 +77,20 @@ def test_a_refusal_lists_every_set_with_its_travel_and_the_torque_that_passes() 
     assert "scale_to_limits: true" in text
 
 
+def test_the_limit_that_is_said_has_the_number_of_the_file_and_its_margin_by_name() -> None:
+    scaled = ExcitationConfig(scale_to_limits=True, margin=0.95)
+    text = predict_all(PAPER, scaled, LimitsConfig(travel_deg=10))[0].describe_as_played()
+    assert "travel limit of 9.5 deg (10 by limits.travel_deg, times excitation.margin 0.95)" in text
+    unscaled = predict_all(PAPER, ExcitationConfig(), LimitsConfig(travel_deg=10))[0].describe()
+    assert "travel limit of 10 deg (limits.travel_deg)" in unscaled
+
+
+def test_a_travel_cap_of_a_set_is_said_to_be_the_sets() -> None:
+    sets = [{"torque_nm": 50, "frequency_hz": 1, "travel_cap_deg": 2}]
+    capped = ExcitationConfig.model_validate({"sets": sets, "scale_to_limits": True})
+    assert "limit of 2 deg (travel_cap_deg of the set)" in predict_all(PAPER, capped, WIDE)[0].describe_as_played()
+
+
 def test_what_is_said_to_pass_does_pass() -> None:
     sentences = [p.describe() for p in predict_all(PAPER, ExcitationConfig(), LimitsConfig())]
     said = [float(re.search(r"At most ([0-9.]+) N m is allowed$", text)[1]) for text in sentences]  # type: ignore[index]

@@ -9,6 +9,8 @@ import select
 import shutil
 import signal
 import time
+from collections.abc import Sequence
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +36,11 @@ def find_chromium() -> str | None:
     return next((path for name in NAMES if (path := shutil.which(name))), None)
 
 
+def axe_script() -> str:
+    """The source of axe-core, which checks what a screen reader and low contrast would stumble over."""
+    return (files("axe_core_python") / "axe.min.js").read_text(encoding="utf-8")
+
+
 class Browser:
     """One page. ``events`` holds everything the page reported, in order."""
 
@@ -51,12 +58,20 @@ class Browser:
         for fd in (null, theirs_in, theirs_out):
             os.close(fd)
 
-    def open(self, url: str) -> None:
-        """Open ``url`` in a page of its own, watching console, exceptions and requests from the first byte on."""
+    def open(self, url: str, width_px: int | None = None, features: Sequence[dict[str, str]] = ()) -> None:
+        """Open ``url`` in a page of its own, watching console, exceptions and requests from the first byte on.
+
+        ``width_px`` is that of a phone's window; ``features`` are media features, as of the colour scheme.
+        """
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Runtime", "Log", "Network", "Page"):
             self.call(f"{domain}.enable")
+        if width_px is not None:
+            size = {"width": width_px, "height": 844, "deviceScaleFactor": 1}
+            self.call("Emulation.setDeviceMetricsOverride", mobile=True, **size)
+        if features:
+            self.call("Emulation.setEmulatedMedia", features=list(features))
         self.call("Page.navigate", url=url)
         while not self.of_kind("Page.loadEventFired"):
             self.events.append(self._next())

@@ -14,11 +14,21 @@ from tests.identify.sample import sample, unhappy
 if sys.platform == "win32":
     pytest.skip("the DevTools pipe needs POSIX file descriptors", allow_module_level=True)
 
-from tests.system.devtools import Browser, find_chromium
+from tests.system.devtools import Browser, axe_script, find_chromium
 
 CHROMIUM = find_chromium()
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed: apt-get install chromium")
 
+PHONE_PX = 390
+# Pairs of texts of one plot that lie over each other, each as its words.
+OVERLAPS = """[...document.querySelectorAll('.plot')].flatMap(plot => {
+    const texts = [...plot.querySelectorAll('.annotation-text, .xtitle, .ytitle, .legendtext')]
+        .map(e => [e.textContent, e.getBoundingClientRect()]).filter(([, r]) => r.width > 0);
+    return texts.flatMap(([a, r], i) => texts.slice(i + 1)
+        .filter(([, q]) => Math.min(r.right, q.right) - Math.max(r.left, q.left) > 2
+            && Math.min(r.bottom, q.bottom) - Math.max(r.top, q.top) > 3)
+        .map(([b]) => `${plot.id}: ${a} over ${b}`));
+})"""
 DRAWN_PATHS = """[...document.querySelectorAll('.plot')].map(plot => ({
     id: plot.id,
     surfaces: plot.querySelectorAll('.main-svg').length,
@@ -78,6 +88,7 @@ def test_no_request_leaves_the_page(page: Browser) -> None:
 
 
 def test_every_plot_is_drawn_with_every_trace(page: Browser) -> None:
+    page.evaluate("document.querySelectorAll('details').forEach(fold => { fold.open = true })")
     plots = page.evaluate(DRAWN_PATHS)
     assert len(plots) == int(page.evaluate("document.documentElement.dataset.drawn"))
     for plot in plots:
@@ -116,3 +127,48 @@ def test_names_from_outside_are_text_and_nothing_else(hostile: Browser) -> None:
 
 def test_nothing_is_wider_than_the_window(page: Browser) -> None:
     assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+
+
+@pytest.fixture(params=["light", "dark"])
+def phone(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Browser]:
+    """The report in a window of 390 px, all folds open."""
+    (tmp_path / "report.html").write_text(report_html(*sample(), "default"), encoding="utf-8")
+    assert CHROMIUM
+    browser = Browser(CHROMIUM, tmp_path / "profile")
+    scheme = [{"name": "prefers-color-scheme", "value": request.param}]
+    try:
+        browser.open((tmp_path / "report.html").as_uri(), width_px=PHONE_PX, features=scheme)
+        browser.wait_for("document.documentElement.dataset.drawn")
+        browser.evaluate("document.querySelectorAll('details').forEach(fold => { fold.open = true })")
+        yield browser
+    finally:
+        browser.close()
+
+
+def test_on_a_phone_nothing_is_wider_and_tables_scroll_in_their_own_place(phone: Browser) -> None:
+    assert phone.evaluate("document.documentElement.scrollWidth") == PHONE_PX
+    wide = "[...document.querySelectorAll('.scroll')].filter(e => e.scrollWidth > e.clientWidth)"
+    assert phone.evaluate(f"{wide}.length") > 0, "a table that scrolls is what this is about"
+    assert phone.evaluate(f"{wide}.every(e => e.tabIndex === 0 && getComputedStyle(e).overflowX === 'auto')")
+    captions = "[...document.querySelectorAll('caption span')].map(e => e.getBoundingClientRect().width)"
+    assert max(phone.evaluate(captions)) <= PHONE_PX
+
+
+def test_on_a_phone_panels_stand_one_above_the_other_and_titles_do_not_overlap(phone: Browser) -> None:
+    phone.evaluate("new Promise(done => setTimeout(done, 500))")  # folds that opened are drawn anew
+    assert phone.evaluate(OVERLAPS) == []
+
+
+def test_the_first_screen_of_a_desktop_has_sentences_errors_and_the_plot(report: Browser) -> None:
+    bottom = "document.querySelector('#found .plot').getBoundingClientRect().bottom + window.scrollY"
+    assert report.evaluate(bottom) < 900
+    assert report.evaluate("document.querySelectorAll('#found .sentences p').length") == 3
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_serious(page: Browser, scheme: str) -> None:
+    page.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+    page.evaluate(f"{axe_script()}; 0")
+    found = page.evaluate("axe.run(document, {resultTypes: ['violations']}).then(r => r.violations.map(v => "
+                          "[v.impact, v.id, v.nodes.length, v.nodes[0].html.slice(0, 200)]))")  # fmt: skip
+    assert [v for v in found if v[0] in ("serious", "critical")] == []

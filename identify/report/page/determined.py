@@ -36,8 +36,7 @@ def determined_table(comparisons: Sequence[BoundComparison], remarked: Collectio
         "known). Reached: the reported standard error. Rank: number of parameter combinations that the data "
         "determine. Condition: 1 is best; above 100, a small error of the model shifts one parameter against another."
     )
-    made = table([*head, "conclusion"], rows, caption, words=(len(head),))
-    return join([element("h3", "Cramer-Rao bound and standard error reached"), made])
+    return table([*head, "conclusion"], rows, caption, words=(len(head),))
 
 
 def _condition(value: float) -> str:

@@ -36,7 +36,12 @@ class Gallery:
             for text, span in figure.zooms
         ]
         plot = element(
-            "div", class_="plot", id=key, role="img", aria_label=figure.label, style=f"height:{figure.height}px"
+            "div",
+            class_="plot",
+            id=key,
+            role="group",  # and no img: its buttons have to be reached
+            aria_label=figure.label,
+            style=f"height:{figure.height}px",
         )
         heading = element("h3", figure.heading) if figure.heading else Markup("")
         zooms = element("div", *buttons, class_="zooms") if buttons else Markup("")

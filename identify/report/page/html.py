@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from identify.bounds.achieved import compare_with_bound
 from identify.conclude.expected_delay import delay_lines
@@ -16,8 +14,10 @@ from identify.report.page.determined import determined_table
 from identify.report.page.disturbance import disturbance_table, shape_figure
 from identify.report.page.document import Gallery, document
 from identify.report.page.estimates import estimates_figure
-from identify.report.page.markup import Markup, Piece, bullets, element, join, paragraph, section
+from identify.report.page.first import first_screen
+from identify.report.page.markup import Markup, Piece, bullets, element, folded, join, paragraph, section
 from identify.report.page.motion import RUNS, motion_figures
+from identify.report.page.origin import origin
 from identify.report.page.residual import residual_figures
 from identify.report.page.response import response_figure
 from identify.report.page.spectrum import spectrum_figures
@@ -30,18 +30,7 @@ from identify.report.page.tables import (
     set_table,
 )
 from identify.results import Identification
-from identify.wording import (
-    SYMBOLS,
-    bias_percent,
-    half_interval,
-    half_of,
-    not_said_yet,
-    percent,
-    plain,
-    sentence,
-    unit,
-    value_of,
-)
+from identify.wording import capital, not_said_yet, sentence
 from rig.recording.run import Recording
 
 KICKER = {"rotary": "Identification of an inertial stability platform", "linear": "Identification of a linear axis"}
@@ -56,13 +45,14 @@ def report_html(identification: Identification, recording: Recording, name: str)
     body = join(
         [
             _header(identification, name),
+            first_screen(identification, gallery),
             _verdict(identification, recording, gallery),
             _errors(identification, gallery),
             _candidates(identification),
             _response(identification, recording, gallery),
             _sets(identification, recording, gallery),
             _motion(identification, gallery),
-            _origin(recording),
+            origin(recording),
         ]
     )
     return document(f"{name}: identification", body, gallery.figures)
@@ -88,17 +78,16 @@ def _verdict(identification: Identification, recording: Recording, gallery: Gall
         element(
             "div",
             element("h3", "Why it was not accepted"),
-            bullets(identification.reasons),
+            bullets([capital(reason) for reason in identification.reasons]),
             *([element("h3", "Next"), bullets(steps)] if steps else []),
             class_="next",
         )
     ]
     return section(
         "verdict",
-        "What was found",
+        "Findings and parameters",
         element("div", *[paragraph(sentence) for sentence in verdict.sentences], class_="sentences"),
         *(reasons if identification.reasons or steps else []),
-        _tiles(identification),
         parameter_table(identification),
         _titled("Torque delay", delay_lines(identification, recording.info)),
         _titled("Dropped: not supported by the data", not_said_yet(final.dropped, identification)),
@@ -111,24 +100,6 @@ def _verdict(identification: Identification, recording: Recording, gallery: Gall
 
 def _titled(heading: str, lines: Sequence[Piece]) -> Markup:
     return join([element("h3", heading), bullets(lines)]) if lines else Markup("")
-
-
-def _tiles(identification: Identification) -> Markup:
-    bent, tiles = bias_percent(identification), []
-    for name, found in identification.final.parameters.items():
-        half = half_interval(found)
-        before = f"without the missing effects: {percent(bent[name])}" if name in bent else ""
-        tiles.append(
-            element(
-                "div",
-                element("span", SYMBOLS.get(name, plain(name)), class_="symbol"),
-                element("span", value_of(found), element("small", f" {unit(found.unit)}"), class_="value"),
-                element("span", f"± {half_of(found)} (95 %)" if math.isfinite(half) else "", class_="half"),
-                element("span", before, class_="bent"),
-                class_="tile",
-            )
-        )
-    return element("div", *tiles, class_="tiles")
 
 
 def _errors(identification: Identification, gallery: Gallery) -> Markup:
@@ -181,12 +152,19 @@ def _sets(identification: Identification, recording: Recording, gallery: Gallery
         return section("sets", "What the data could determine", determined) if determined.html else determined
     return section(
         "sets",
-        "Set by set, and the genetic algorithm",
+        "Set by set",
         set_table(identification) if identification.per_set else Markup(""),
-        determined,
-        gallery.place(convergence_figure(identification)),
-        convergence_table(identification),
+        folded("Cramer-Rao bound and standard error reached", determined) if determined.html else determined,
+        *_genetic(identification, gallery),
     )
+
+
+def _genetic(identification: Identification, gallery: Gallery) -> list[Markup]:
+    """The search of the paper, folded away: the closed form gives the same numbers."""
+    figure = convergence_figure(identification)
+    if figure is None:
+        return []
+    return [folded("Genetic algorithm", gallery.place(figure), convergence_table(identification))]
 
 
 def _response(identification: Identification, recording: Recording, gallery: Gallery) -> Markup:
@@ -200,29 +178,3 @@ def _motion(identification: Identification, gallery: Gallery) -> Markup:
     note = f"The {RUNS} of {total} runs with the largest error; recording.h5 has all." if total > RUNS else ""
     hint = "Drag to zoom, double-click to see all, click a legend entry to hide or show it."
     return section("motion", "Measured and simulated", paragraph(f"{note} {hint}".strip(), class_="note"), *figures)
-
-
-def _origin(recording: Recording) -> Markup:
-    """Where the recording came from, as it says itself."""
-    rows, long = [], []
-    for key, value in _flat(recording.info).items():
-        if "\n" in value or len(value) > 300:
-            long.append(element("details", element("summary", key), element("pre", value)))
-        else:
-            rows.append(element("tr", element("th", key, scope="row"), element("td", value)))
-    lengths = f"{len(recording.runs)} runs, {sum(len(run.time_s) for run in recording.runs)} samples"
-    rows.insert(0, element("tr", element("th", "recording", scope="row"), element("td", lengths)))
-    return section("origin", "Origin of the data", element("table", element("tbody", *rows), class_="plain"), *long)
-
-
-def _flat(info: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
-    out: dict[str, str] = {}
-    for key, value in info.items():
-        name = f"{prefix}{key}".replace("_", " ")
-        if isinstance(value, Mapping):
-            out |= _flat(value, f"{name}: ")
-        elif isinstance(value, list | tuple):
-            out[name] = ", ".join(str(item) for item in value)
-        elif value is not None:
-            out[name] = str(value)
-    return {name: text for name, text in out.items() if text}

@@ -50,6 +50,11 @@ def section(anchor: str, heading: str, *content: Piece) -> Markup:
     return element("section", element("h2", heading), *content, id=anchor)
 
 
+def folded(summary: str, *content: Piece) -> Markup:
+    """What opens on a click; printing opens it too."""
+    return element("details", element("summary", summary), *content)
+
+
 def table(head: Sequence[Piece], rows: Sequence[Sequence[Piece]], caption: str, words: Sequence[int] = ()) -> Markup:
     """A table of numbers; the first cell of a row names it, columns in ``words`` hold text."""
     header = element("tr", *[element("th", cell, scope="col", **_number(i, words)) for i, cell in enumerate(head)])
@@ -61,8 +66,15 @@ def table(head: Sequence[Piece], rows: Sequence[Sequence[Piece]], caption: str, 
         )
         for row in rows
     ]
-    inner = element("table", element("caption", caption), element("thead", header), element("tbody", *body))
-    return element("div", inner, class_="scroll")
+    said = element("caption", element("span", caption))
+    inner = element("table", said, element("thead", header), element("tbody", *body))
+    # Reached by the keyboard, or nobody without a mouse sees the columns to the right.
+    return element("div", inner, class_="scroll", tabindex="0", role="region", aria_label=_short(caption))
+
+
+def _short(caption: str) -> str:
+    """Its first sentence."""
+    return f"Table: {caption.partition('. ')[0].rstrip('.')}"
 
 
 def _number(column: int, words: Sequence[int]) -> dict[str, str]:

@@ -139,13 +139,14 @@ def candidate_table(candidates: Sequence[Candidate], floor: float) -> Markup:
         for c in order[:ROWS]
     ]
     more = f" The best {ROWS} of {len(order)}; result.json has all." if len(order) > ROWS else ""
-    caption = (
-        "Candidates tried, each added to the model of that round. Delta BIC: negative is better. Held-out error in "
-        f"units of the measured channel; the noise floor is {number(floor)}.{more}"
-    )
-    tried = table(
-        ["effect", "round", "delta BIC", "held-out error", "times the floor", "outcome"], rows, caption, words=(4, 5)
-    )
+    head = ["effect", "round", "delta BIC", "held-out error", "times the floor", "outcome"]
+    caption = "Candidates tried, each added to the model of that round. Delta BIC: negative is better."
+    if all(c.holdout_rate_rms is None for c in order):  # a search by likelihood has no error of its own a candidate
+        head, rows = [*head[:3], head[-1]], [[*row[:3], row[-1]] for row in rows]
+        tried = table(head, rows, f"{caption}{more}", words=(3,))
+    else:
+        caption += f" Held-out error in units of the measured channel; the noise floor is {number(floor)}."
+        tried = table(head, rows, f"{caption}{more}", words=(4, 5))
     return join([tried, _screened_out([c for c in candidates if c.status == SCREENED])])
 
 
@@ -239,7 +240,7 @@ def _card(identification: Identification, name: str) -> Markup:
         "article",
         element("h3", capital(plain(name))),
         paragraph(effect.meaning),
-        element("pre", effect.equation),
+        element("pre", effect.equation, tabindex="0", role="region", aria_label=f"Equation of {plain(name)}"),
         bullets([*numbers, effect.sign, f"Source: {effect.source}."]),
         class_="card",
     )

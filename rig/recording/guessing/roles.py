@@ -25,7 +25,7 @@ def _words(text: str) -> frozenset[str]:
 
 WORDS: dict[Quantity, frozenset[str]] = {
     "time": _words("time t zeit timestamp clock sec seconds elapsed second temps tiempo x"),
-    "torque": _words("torque torq trq moment drehmoment couple tau m mot force f kraft load τ"),
+    "torque": _words("torque torq trq moment drehmoment couple tau effort m mot force f kraft load τ"),
     "rate": _words(
         "rate speed velocity vel omega w gyro gyr gz drehrate drehzahl geschwindigkeit geschw qd dq dtheta thetadot "
         "rpm spd ω"
@@ -83,6 +83,12 @@ def _score(column: Column, quantity: Quantity) -> float:
     if quantity == "angle" and _has_word(column, WORDS["rate"]):
         score -= 1.5  # angular velocity, angle rate
     return score - (1.0 if score > 0 and set(column.words) & NOT_MEASURED else 0.0)
+
+
+def unread(columns: Sequence[Column], quantity: Quantity) -> Column | None:
+    """A column whose name or unit says that it is the quantity, but whose values cannot be read; None for none."""
+    lost = [(score, c) for c in columns if c.values is None and (score := _score(c, quantity)) > 0.0]
+    return max(lost, key=lambda one: one[0])[1] if lost else None
 
 
 def _has_word(column: Column, words: frozenset[str]) -> bool:

@@ -25,6 +25,13 @@ _BY_SUFFIX = {
     ".hdf5": "h5",
     ".h5": "h5",
     ".journal": "raw_journal",
+    ".parquet": "parquet",
+    ".mf4": "mf4",
+    ".mdf": "mf4",
+    ".tdms": "tdms",
+    ".bag": "rosbag",
+    ".mcap": "rosbag",
+    ".db3": "rosbag",
 }
 
 
@@ -39,9 +46,9 @@ def read_file(path: Path) -> Sequence[Table | Run]:
     Raises RecordingError with cause and cure.
     """
     if _is_folder(path):
-        from rig.recording.readers import folder  # noqa: PLC0415  only where one is named
+        from rig.recording.readers import folder, rosbag  # noqa: PLC0415  only where one is named
 
-        return folder.read(path)
+        return rosbag.read(path) if rosbag.is_bag(path) else folder.read(path)
     _check_is_file(path)
     suffix = next((s for s in _BY_SUFFIX if path.name.lower().endswith(s)), None)
     if suffix is None:

@@ -9,6 +9,8 @@ _DAY_S = 86_400.0
 _HALF_A_DAY_S = 43_200.0
 _DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?=[ T])")
 _YEAR_FIRST = re.compile(r"(\d{4})/(\d{1,2})/(\d{1,2})(?=[ T])")
+_MONTH_BY_NAME = re.compile(r"(\d{1,2})-([A-Za-z]{3})-(\d{4})(?=[ T])")  # of MATLAB's datetime
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2})?([.,]\d+)?$")
 
 
@@ -46,7 +48,7 @@ def _of_day(clock: time) -> float:
 
 
 def moment_of(text: str) -> datetime:
-    """ISO 8601, or a date as 31.12.2024 or 2024/12/31 before the time. Raises ValueError for anything else.
+    """ISO 8601, or a date as 31.12.2024, 31-Dec-2024 or 2024/12/31 before the time. Raises ValueError for others.
 
     05/06/2024 is none: it is the fifth of June here and the sixth of May there.
     """
@@ -54,6 +56,9 @@ def moment_of(text: str) -> datetime:
         raise ValueError(text)
     text = _DAY_FIRST.sub(lambda m: f"{m[3]}-{int(m[2]):02}-{int(m[1]):02}", text, count=1)
     text = _YEAR_FIRST.sub(lambda m: f"{m[1]}-{int(m[2]):02}-{int(m[3]):02}", text, count=1)
+    if (named := _MONTH_BY_NAME.match(text)) and named[2].lower() in _MONTHS:
+        month = _MONTHS.index(named[2].lower()) + 1
+        text = f"{named[3]}-{month:02}-{int(named[1]):02}{text[named.end() :]}"
     return datetime.fromisoformat(text)
 
 

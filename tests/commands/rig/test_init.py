@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
-from datetime import datetime, timedelta
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -16,91 +15,12 @@ from commands.identify_run.app import app as identify_run
 from commands.rig.app import app
 from commands.rig.init import InitOptions, init
 from rig.config.load import load_config
-from rig.dynamics import TorqueSignal, simulate
 from rig.errors import UsageError
-from rig.platform import Platform
 from rig.recording.hdf5 import write_recording_h5
 from rig.recording.load import read_recording
 from rig.recording.run import Recording, Run
+from tests.commands.rig.exported_text import ANGLE, FILES, RATE, TIME, TORQUE, german, rows, stamped
 from tests.commands.support import command
-
-TIME = np.arange(400) * 2e-3
-TORQUE = 2.0 * np.sin(11.0 * TIME) + 0.7 * np.sin(31.0 * TIME)
-MOTION = simulate(Platform(0.02, 0.05, 6.0), TIME, TorqueSignal(TIME, TORQUE))
-RATE, ANGLE = MOTION.rate_rad_s, MOTION.angle_rad
-STAMPS = [datetime(2024, 5, 1, 12, 0, 0) + timedelta(seconds=float(t)) for t in TIME]
-Columns = Sequence[np.ndarray]
-
-
-def rows(*columns: np.ndarray, by: str = ",", form: str = "{:.12g}") -> str:
-    return "".join(by.join(form.format(v) for v in row) + "\n" for row in zip(*columns, strict=True))
-
-
-def german(text: str) -> str:
-    return text.replace(".", ",")
-
-
-def stamped(form: str, numbers: str, by: str) -> str:
-    return "".join(f"{s.strftime(form)}{by}{line}\n" for s, line in zip(STAMPS, numbers.splitlines(), strict=True))
-
-
-LVM = (
-    "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\nDecimal_Separator\t.\n"
-    "Multi_Headings\tNo\nX_Columns\tOne\nTime_Pref\tRelative\nOperator\tlab\nDate\t2024/05/01\nTime\t12:00:00.0\n***End_of_Header***\t\n\t\n"
-    "Channels\t2\t\t\nSamples\t400\t400\t\nDate\t2024/05/01\t2024/05/01\t\nY_Unit_Label\tN m\tdeg/s\t\nX0\t0\t0\t\n"
-    "Delta_X\t0.002\t0.002\t\n***End_of_Header***\t\t\t\n"
-)
-# File name -> text and further options; all are read at the first try, without a terminal.
-FILES: dict[str, tuple[str, tuple[str, ...]]] = {
-    "labview.lvm": (
-        LVM + "X_Value\tMotor torque (N m)\tGyro (deg/s)\tComment\n" + rows(TIME, TORQUE, np.degrees(RATE), by="\t"),
-        (),
-    ),
-    "labview_text.txt": ("Time (s)\tTorque (N·m)\tAngle (°)\n" + rows(TIME, TORQUE, np.degrees(ANGLE), by="\t"), ()),
-    "matlab_writetable.csv": ("t,M,w,phi\n" + rows(TIME, TORQUE, RATE, ANGLE), ("--yes",)),
-    "oscilloscope.csv": (
-        "Model,MSO-X 3024\nSerial,MY1234\nSample interval,2.0E-3,s\n\nTime,Torque,Rate\nsecond,N·m,deg/s\n"
-        + rows(TIME, TORQUE, np.degrees(RATE), form="{:+.9E}"),
-        (),
-    ),
-    "picoscope.csv": ("Time,Torque,Position\n(ms),(mN m),(mrad)\n\n" + rows(1e3 * TIME, 1e3 * TORQUE, 1e3 * ANGLE), ()),
-    "logger_german.csv": (
-        "Zeit [ms];Drehmoment [Nm];Drehzahl [1/min]\n" + german(rows(1e3 * TIME, TORQUE, RATE * 30 / np.pi, by=";")),
-        (),
-    ),
-    "spreadsheet.csv": (
-        "sep=;\nZeit/s;Motormoment/Nm;Winkel/°\n" + german(rows(TIME, TORQUE, np.degrees(ANGLE), by=";")),
-        (),
-    ),
-    "stamps.csv": (
-        "Timestamp;Drehmoment [Nm];Winkelgeschwindigkeit [°/s]\n"
-        + stamped("%d.%m.%Y %H:%M:%S,%f", german(rows(TORQUE, np.degrees(RATE), by=";")), ";"),
-        (),
-    ),
-    "iso.csv": (
-        "timestamp,torque_mNm,rate_dps\n" + stamped("%Y-%m-%dT%H:%M:%S.%f", rows(1e3 * TORQUE, np.degrees(RATE)), ","),
-        (),
-    ),
-    "drive_trace.csv": (
-        "time_us,torque_cmd_Nm,torque_actual_Nm,velocity_rpm,position_deg\n"
-        + rows(1e6 * TIME, TORQUE + 0.01, TORQUE, RATE * 30 / np.pi, np.degrees(ANGLE)),
-        (),
-    ),
-    "pandas.csv": (",time_s,torque_nm,rate_rad_s\n" + rows(np.arange(400.0), TIME, TORQUE, RATE), ()),
-    "numpy_savetxt.csv": ("# time_s,torque_nm,angle_deg\n" + rows(TIME, TORQUE, np.degrees(ANGLE), form="{:.18e}"), ()),
-    "current.csv": (
-        "time (s),current (A),speed (rpm)\n" + rows(TIME, TORQUE / 0.5, RATE * 30 / np.pi),
-        ("--torque-scale", "0.5"),
-    ),
-    "counter.csv": (
-        "sample,torque_nm,rate_deg_s\n" + rows(np.arange(400.0), TORQUE, np.degrees(RATE)),
-        ("--time-scale", "0.002"),
-    ),
-    "no_names.csv": ("a,b,c,d\n" + rows(TIME, ANGLE, TORQUE, RATE), ("--yes",)),
-    "windows.csv": ("Time (ms),Torque (N·m),Rate (°/s)\n" + rows(1e3 * TIME, TORQUE, np.degrees(RATE)), ()),
-    "linear.csv": ("t [s];Kraft [N];Weg [mm]\n" + german(rows(TIME, TORQUE, 1e3 * ANGLE, by=";")), ()),
-}
-
 
 GOOD = "time_s,torque_nm,rate_rad_s\n" + rows(TIME, TORQUE, RATE)
 
@@ -258,6 +178,17 @@ def test_what_is_written_is_identified_as_it_stands(tmp_path: Path) -> None:
             "probably the angle is in degrees: set --angle-scale 0.0174533",
         ),
         ("name,text\na,b\nc,d\n", [], "fewer than two columns of numbers"),
+        (rows(TIME, TORQUE, RATE), [], "add a first line that names the columns"),
+        (
+            "Time,Torque (Nm),Rate (rad/s)\n" + stamped("%d/%m/%Y %H:%M:%S.%f", rows(TORQUE, RATE), ","),
+            [],
+            "write the date as 2024-12-31",
+        ),
+        (
+            "t (s);M (Nm);w (rad/s)\n" + german(rows(TIME, 1e3 + TORQUE, RATE, by=";")).replace(";1000", ";1.000"),
+            [],
+            "no sign between thousands",
+        ),
     ],
 )
 def test_what_cannot_be_used_is_refused_with_the_option(

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.conclude.next_steps import next_steps, unexplained_reason
+from identify.conclude.next_steps import interrupted_reason, next_steps, unexplained_reason
 from identify.diagnose.torque_residual import dependence
 from identify.report.files import result_json
 from identify.report.page import report_html
 from identify.report.summary import summary
+from identify.residual import Dependence, Disturbance, FreeLine, ResidualDiagnosis, Share
 from identify.results import Identification, NotReported, RunTraces
 from tests.identify.sample import sample, unhappy
 from tests.identify.simulated import white
@@ -47,6 +48,50 @@ def test_an_accepted_campaign_needs_no_next_step() -> None:
 def test_the_step_follows_from_what_the_rest_goes_with(rest: str, words: str) -> None:
     (step,) = next_steps(with_rest(LOST, rest))
     assert words in step
+
+
+@pytest.mark.parametrize("rest", ["rate", "angle", "torque", "time", ""])
+def test_a_recorded_file_is_not_told_of_keys_that_it_does_not_have(rest: str) -> None:
+    keys = ("ramp_hold_release", "repeat_scales", "soft_start_s", "rig check")
+    lost = with_rest(LOST, rest)
+    assert not any(key in step for step in next_steps(replace(lost, recorded=True)) for key in keys)
+    assert FOUND.after is not None
+    open_ = replace(FOUND, accepted=False, recorded=True, after=replace(
+        FOUND.after, not_determined=(NotReported("damping", "no information"),)))  # fmt: skip
+    (step,) = next_steps(open_)
+    assert "starts abruptly" in step or "start abruptly" in step
+    assert not any(key in step for key in keys)
+
+
+def test_the_step_follows_the_dependence_that_the_verdict_speaks_of() -> None:
+    on_angle = Disturbance(
+        1.0, "N*m", 0.07, (Dependence("rate", 0.3, 0.02, 1e-6), Dependence("angle", 0.9, 0.06, 1e-6))
+    )
+    (step,) = next_steps(replace(with_rest(LOST, "torque"), disturbance=on_angle))
+    assert step.startswith("To separate spring, backlash, cogging and gravity")
+    past = Disturbance(1.0, "N*m", 0.07, (Dependence("history", 0.9, 0.06, 1e-6),))
+    (step,) = next_steps(replace(with_rest(LOST, "torque"), disturbance=past))
+    assert step.startswith("To separate hysteresis, creep")
+
+
+def test_a_line_that_the_diagnosis_found_is_what_the_step_goes_after() -> None:
+    line = ResidualDiagnosis("torque", "N*m", 9.0, None, (FreeLine(49.98, 0.3, 3),), None, None)
+    lost = with_rest(LOST, "")
+    (step,) = next_steps(replace(lost, residual_after=line))
+    assert "49.98 Hz" in step and "drive off" in step
+    of_memory = replace(line, free_lines=(), memory=Share(0.4, 0.01))
+    (step,) = next_steps(replace(lost, residual_after=of_memory))
+    assert step.startswith("To separate hysteresis, creep")
+
+
+def test_who_stopped_the_search_is_told_what_was_proven_and_to_identify_again() -> None:
+    reason = interrupted_reason(("coulomb_friction", "torque_delay"))
+    assert "after Coulomb friction and torque delay was proven" not in reason
+    assert "Coulomb friction and torque delay were proven" in reason
+    assert "missing effects are not yet determined" in interrupted_reason(())
+    stopped = replace(LOST, aborted=True, reasons=(reason,))
+    (step,) = next_steps(stopped)
+    assert step.startswith("Identify this recording again") and "play it again" not in step
 
 
 def test_a_run_that_begins_in_motion_is_said_to_hide_what_remembers() -> None:

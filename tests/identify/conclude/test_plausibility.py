@@ -90,13 +90,20 @@ def test_the_only_number_that_was_declared_is_compared_with_the_commonest_factor
 
 @pytest.mark.parametrize(
     "times",
-    [{}, alike(1.1), alike(3.0), {"inertia": DEGREES}, {"inertia": DEGREES, "stiffness": 1e3}, {"damping": 12.0},
+    [{}, alike(1.04), alike(3.0), {"inertia": DEGREES}, {"inertia": DEGREES, "stiffness": 1e3}, {"damping": 12.0},
      {"stiffness": 400.0}, alike(75.0)],
 )  # fmt: skip
 def test_whatever_fits_no_cause_is_silence(times: dict[str, float]) -> None:
     found = fitted(**times)
     assert said(found) == ()
     assert said(found, {}) == ()
+
+
+@pytest.mark.parametrize("factor", [1.1, 0.8])
+def test_a_scale_of_the_torque_is_spoken_of_where_a_known_inertia_would_show_it(factor: float) -> None:
+    (sentence,) = said(fitted(**alike(factor)))
+    assert "a scale error of the torque" in sentence and "added_inertia_kg_m2" in sentence
+    assert said(replace(fitted(**alike(factor)), scale_shows=True)) == ()
 
 
 def test_a_number_that_the_data_hardly_determine_is_no_evidence() -> None:

@@ -55,6 +55,10 @@ def test_opposite_signs_are_the_first_thing_said() -> None:
     assert not any("sign conventions" in s for s in sentences_of(replace(FOUND, accepted=False)))
 
 
+def test_a_scale_of_the_torque_that_nothing_speaks_for_is_not_spoken_of() -> None:
+    assert not any("scale error" in s or "added_inertia" in s for s in sentences_of(FOUND))
+
+
 def test_nothing_found_is_said_as_plainly_whether_the_floor_is_reached_or_not() -> None:
     empty = replace(FOUND.verdict, effects=(), unexplained=False)
     assert "reaches the noise floor" in sentences_of(replace(FOUND, verdict=empty, after=None))[0]
@@ -62,13 +66,6 @@ def test_nothing_found_is_said_as_plainly_whether_the_floor_is_reached_or_not() 
     said = sentences_of(replace(FOUND, verdict=lost, after=None))
     assert "no candidate explains" in said[0]
     assert any("42 %" in s for s in said)
-
-
-def test_a_scale_that_nothing_shows_is_said_once_where_no_known_inertia_was_added() -> None:
-    (said,) = [s for s in sentences_of(FOUND) if "scale" in s]
-    assert "J, C and K by the same factor" in said
-    assert "added_inertia_kg_m2" in said
-    assert not any("scale" in s for s in sentences_of(replace(FOUND, scale_shows=True)))
 
 
 def test_a_scale_that_was_found_is_said_with_what_it_means() -> None:

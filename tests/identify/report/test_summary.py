@@ -22,7 +22,8 @@ def test_a_person_hears_verdict_parameters_errors_sets_and_outcome() -> None:
         "Max_Error",
     ):
         assert words in said, words
-    assert said.rstrip().endswith("ACCEPTED")
+    outcome = said.rstrip().splitlines()[-2:]
+    assert outcome == ["ACCEPTED", "  - J, C and K are determined, and what is left is at the noise floor."]
     assert "NOT ACCEPTED" not in said
 
 

@@ -1,0 +1,1 @@
+"""The live view: a page on this machine that shows a campaign while it plays, served by a process of its own."""

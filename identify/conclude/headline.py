@@ -1,0 +1,111 @@
+"""An identification in three sentences: what was found, what it changes, and whether it is accepted and why."""
+
+from __future__ import annotations
+
+from identify.conclude.next_steps import opposite_signs
+from identify.results import Identification
+from identify.runs.sign_convention import SENTENCE
+from identify.wording import (
+    SYMBOLS,
+    bias_percent,
+    capital,
+    depends_on,
+    joined,
+    number,
+    off_by,
+    plain,
+    readable,
+    sentence,
+    unit,
+    value_of,
+)
+
+REASONS = 2  # of a result that is not accepted; the list below has all
+AT_FLOOR = 1.05  # times the noise floor, which is known to a few percent
+WORTH_PERCENT = 1.0  # of a parameter: less is in the table
+UNITS = {("rotary", "rate"): "rad/s", ("rotary", "angle"): "rad", ("linear", "rate"): "m/s", ("linear", "angle"): "m"}
+
+
+def headline(found: Identification) -> tuple[str, str, str]:
+    """Three sentences for the first screen of the report."""
+    return _found(found), _error(found), acceptance(found)
+
+
+def _found(found: Identification) -> str:
+    if opposite_signs(found):
+        return sentence(capital(SENTENCE))
+    named = [_with_first_number(found, name) for name in found.verdict.effects]
+    if named:
+        return f"The declared model lacks {joined(named)}."
+    if found.verdict.left_open:
+        return "Something is missing from the declared model, and these data do not determine what."
+    if found.verdict.unexplained:
+        return "The declared model lacks something that no effect here describes."
+    return "The declared model describes these runs: no effect is missing."
+
+
+def _with_first_number(found: Identification, name: str) -> str:
+    values = found.final.effect_parameters.get(name, {})
+    if not values:
+        return plain(name)
+    what, value = next(iter(values.items()))
+    shown = readable(value)
+    return f"{plain(name)} ({what.replace('_', ' ')} {value_of(shown)} {unit(shown.unit)})".replace(" 1)", ")")
+
+
+def error_before_and_after(found: Identification) -> tuple[float | None, float | None, float | None, str]:
+    """The held-out error that decided: of the declared and of the final model, its floor, and its unit."""
+    before, after, floor = found.before.error, found.final.error, found.noise_floor
+    if after.holdout_measure == "holdout_torque_relative":
+        pair = [
+            None if x is None else 100.0 * x for x in (before.holdout_torque_relative, after.holdout_torque_relative)
+        ]
+        return pair[0], pair[1], None, "% of the force" if found.axis == "linear" else "% of the torque"
+    channel = found.traces[0].channel if found.traces else "rate"
+    return before.holdout_rate_rms, after.holdout_rate_rms, floor.holdout_rate_rms, UNITS[found.axis, channel]
+
+
+def _error(found: Identification) -> str:
+    old, new, floor, its_unit = error_before_and_after(found)
+    if new is None:
+        return "No error could be measured on held-out data."
+    at_floor = floor and new < AT_FLOOR * floor
+    times = ", the noise floor" if at_floor else f", {number(new / floor, 2)} times the noise floor" if floor else ""
+    if found.after is None or old is None:
+        return f"Its error on held-out data is {number(new, 3)} {its_unit}{times}."
+    change = "falls" if new < old else "changes"
+    text = (
+        f"With the final model the error on held-out data {change} from {number(old, 3)} to {number(new, 3)} {its_unit}"
+    )
+    final = found.final.parameters
+    moved = [
+        f"{SYMBOLS.get(name, plain(name))} would be {off_by(1.0 + percent / 100.0)}"
+        for name, percent in bias_percent(found).items()
+        if abs(percent) >= WORTH_PERCENT and name in final
+    ]
+    return f"{text}{times}{'; without it, ' + joined(moved) if moved else ''}."
+
+
+def acceptance(found: Identification) -> str:
+    """Accepted or not, and why, in one sentence."""
+    if not found.accepted:
+        shown, more = list(found.reasons[:REASONS]), len(found.reasons) - REASONS
+        rest = f" ({more} more reason{'s' if more > 1 else ''} below)" if more > 0 else ""
+        why = f"{'; '.join(shown).rstrip(' .')}{rest}." if shown else ""
+        return f"{'Aborted' if found.aborted else 'Not accepted'}: {why}" if why else "Not accepted."
+    names = [SYMBOLS.get(name, plain(name)) for name in found.final.parameters]
+    determined = f"{joined(names)} {'are' if len(names) > 1 else 'is'} determined" if names else "nothing is left open"
+    return f"Accepted: {determined}, and {_left(found)}."
+
+
+def _left(found: Identification) -> str:
+    left, torque = found.disturbance, "force" if found.axis == "linear" else "torque"
+    if left is None:
+        return "what is left is at the noise floor"
+    if not left.depends_on:
+        share = number(100.0 * left.relative, 2)
+        return f"the {torque} that is left ({share} % of the {torque}) depends on nothing that was tested"
+    on = joined(list(dict.fromkeys(depends_on(d.on, found.axis) for d in left.depends_on)))
+    moved = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in left.moves_percent.items()])
+    size = f"what is left and depends on the {on} is {number(left.material_percent, 2)} % of the {torque}"
+    return f"{size} and moves {moved}, which is allowed" if moved else f"{size}, which is allowed"

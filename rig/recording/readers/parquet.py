@@ -1,0 +1,60 @@
+"""Apache Parquet, by pyarrow: one column a quantity, with a unit in the field's metadata where one is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rig.errors import RecordingError
+from rig.recording.readers.base import MAX_SAMPLES, Table, read_each, too_long
+from rig.recording.readers.rasters import require
+
+UNIT_KEYS = (b"unit", b"units", b"Unit")
+NS = 1e-9
+
+
+def read(path: Path) -> Sequence[Table]:
+    """One table. Raises RecordingError where pyarrow is missing or the file is damaged."""
+    require("pyarrow", path, "parquet")
+    import pyarrow as pa  # noqa: PLC0415  an extra, and slow to import
+    import pyarrow.parquet as pq  # noqa: PLC0415
+
+    try:
+        file = pq.ParquetFile(path)
+        if file.metadata.num_rows > MAX_SAMPLES:
+            raise too_long(path, file.metadata.num_rows)
+        table = file.read().flatten()
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise RecordingError(f"{path}: is no sound Parquet file ({error}): export the recording again") from error
+
+    def column(name: str) -> Any:
+        return _values(path, name, table.column(name).combine_chunks())
+
+    names = [name for name in table.column_names if name]
+    units = {f.name: unit for f in table.schema if (unit := _unit(f.metadata or {}))}
+    return [Table(path, tuple(names), read_each(path, column), lambda index: f"row {index + 1}", units)]
+
+
+def _unit(metadata: Any) -> str:
+    return next((metadata[key].decode("utf-8", "replace") for key in UNIT_KEYS if key in metadata), "")
+
+
+def _values(path: Path, name: str, column: Any) -> Any:
+    """Values as NumPy has them: times of day as seconds since the first, what is missing as NaN."""
+    import pyarrow as pa  # noqa: PLC0415
+
+    if pa.types.is_timestamp(column.type) or pa.types.is_duration(column.type):
+        whole = column.cast(pa.duration("ns") if pa.types.is_duration(column.type) else pa.timestamp("ns"))
+        ns = whole.cast(pa.int64())
+        if ns.null_count:
+            raise RecordingError(f"{path}: column {name!r} has rows without a time: leave them out")
+        counts = ns.to_numpy(zero_copy_only=False)
+        return NS * (counts - counts[0])
+    if pa.types.is_decimal(column.type):
+        column = column.cast(pa.float64())
+    if column.null_count and (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):
+        column = column.cast(pa.float64())
+    return np.asarray(column.to_numpy(zero_copy_only=False))

@@ -1,0 +1,103 @@
+"""Channels that a file samples at several rates, as the columns of one table.
+
+The table has the times of the slowest group that is a measurement: one that is at least a tenth as fast as the fastest.
+Other groups are read between their samples by straight lines: a faster one loses readings, and a slower one (a
+thermometer) is joined. No group of a measurement is filled up: readings that were never taken would pass for evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rig.arrays import Array
+from rig.errors import RecordingError
+from rig.recording.readers.base import MAX_SAMPLES, Table, read_each, too_long
+
+SLOW = 0.1  # of the fastest group's samples: below, a group is a thermometer or a state
+FEWEST = 10  # samples that make a group
+
+
+@dataclass(frozen=True)
+class Group:
+    """Channels that are sampled together.
+
+    Attributes
+    ----------
+    name
+        Of the group, in front of a channel's where two groups have one of the same name.
+    time_s
+        Shape (n,), increasing; None where the file says nothing of the time.
+    columns
+        Channel -> values, each of shape (n,).
+    units
+        Channel -> unit, where the file states one.
+    """
+
+    name: str
+    time_s: Array | None
+    columns: Mapping[str, Any]
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+def require(package: str, path: Path, extra: str) -> None:
+    """Raise RecordingError, with the line that installs it, where the package that reads a format is missing."""
+    if find_spec(package) is None:
+        raise RecordingError(
+            f"{path}: reading this format needs the package {package}: pip install 'isp-rig[{extra}]', or export the "
+            "recording as CSV"
+        )
+
+
+def one_table(path: Path, groups: Sequence[Group]) -> Table:
+    """All channels of a file as one table; with a time, its column is called ``time_s`` (see the module).
+
+    Raises RecordingError where no group has samples.
+    """
+    timed = [g for g in groups if g.time_s is not None and len(g.time_s) >= FEWEST and _lasts_s(g) > 0.0]
+    used = timed or [g for g in groups if g.columns]
+    if not used:
+        raise RecordingError(
+            f"{path}: holds no group of channels with {FEWEST} samples: export the recording again, or as CSV"
+        )
+    base = _base(timed) if timed else max(used, key=lambda g: max(len(v) for v in g.columns.values()))
+    if base.time_s is not None and len(base.time_s) > MAX_SAMPLES:
+        raise too_long(path, len(base.time_s))
+    columns: dict[str, Any] = {}
+    units: dict[str, str] = {}
+    if base.time_s is not None:
+        columns["time_s"] = base.time_s - base.time_s[0]
+    names = [name for g in used for name in g.columns]
+    for group in used:
+        for name, values in group.columns.items():
+            free = name not in columns and names.count(name) == 1
+            column = name if free else f"{group.name}.{name}"
+            columns[column] = _at(base, group, np.asarray(values))
+            if name in group.units:
+                units[column] = group.units[name]
+    return Table(path, tuple(columns), read_each(path, columns.__getitem__), units=units)
+
+
+def _lasts_s(group: Group) -> float:
+    assert group.time_s is not None
+    return float(group.time_s[-1] - group.time_s[0])
+
+
+def _base(timed: Sequence[Group]) -> Group:
+    rates = [len(g.time_s) / _lasts_s(g) for g in timed if g.time_s is not None]
+    measured = [(rate, i) for i, rate in enumerate(rates) if rate >= SLOW * max(rates)]
+    return timed[min(measured)[1]]
+
+
+def _at(base: Group, group: Group, values: Any) -> Any:
+    """A channel at the times of ``base``, NaN outside of its own; what is no plain column is left to the check."""
+    if group is base or group.time_s is None or base.time_s is None:
+        return values
+    if np.array_equal(group.time_s, base.time_s) or values.ndim != 1 or values.dtype.kind not in "fiub":
+        return values
+    return np.interp(base.time_s, group.time_s, values.astype(float), left=np.nan, right=np.nan)

@@ -1,0 +1,55 @@
+"""TDMS of LabVIEW and DIAdem, by nptdms: groups of channels, the time a channel or the increment of a waveform."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rig.errors import RecordingError
+from rig.recording.readers.base import Table
+from rig.recording.readers.rasters import Group, one_table, require
+
+NS = 1e-9
+
+
+def read(path: Path) -> Sequence[Table]:
+    """One table. Raises RecordingError where nptdms is missing or the file is damaged."""
+    require("nptdms", path, "tdms")
+    from nptdms import TdmsFile  # noqa: PLC0415  an extra, and slow to import
+
+    try:
+        file = TdmsFile.read(path)
+        groups = [one for group in file.groups() for one in _groups(group)]
+    except Exception as error:
+        raise RecordingError(f"{path}: is no sound TDMS file ({error}): export the recording again") from error
+    return [one_table(path, groups)]
+
+
+def _groups(group: Any) -> list[Group]:
+    """The channels of one TDMS group, by their sampling: waveforms of several rates may stand in one."""
+    by_sampling: dict[tuple[float, float, int], list[Any]] = {}
+    for channel in group.channels():
+        properties = channel.properties
+        step = float(properties.get("wf_increment", 0.0) or 0.0)
+        offset = float(properties.get("wf_start_offset", 0.0) or 0.0)
+        by_sampling.setdefault((step, offset, len(channel)), []).append(channel)
+    out = []
+    for (step, offset, count), channels in by_sampling.items():
+        if count == 0:
+            continue
+        time_s = offset + step * np.arange(count) if step > 0.0 else None
+        columns = {c.name: _values(c) for c in channels}
+        units = {c.name: str(u) for c in channels if (u := c.properties.get("unit_string", ""))}
+        out.append(Group(group.name, time_s, columns, units))
+    return out
+
+
+def _values(channel: Any) -> Any:
+    """The scaled values; time stamps as seconds since the first."""
+    values = np.asarray(channel[:])
+    if values.dtype.kind == "M":
+        return NS * (values.astype("datetime64[ns]") - values.astype("datetime64[ns]")[0]).astype(np.int64)
+    return values

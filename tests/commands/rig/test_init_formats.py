@@ -1,0 +1,95 @@
+"""`rig init` on recordings in the formats of other tools: read at the first try, or refused with the cure."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commands.rig.app import app
+from rig.config.load import load_config
+from rig.recording.load import read_recording
+from rig.recording.readers import rasters, read_file, suffixes
+from rig.recording.run import Run
+from tests.commands.rig import exported
+from tests.commands.rig.exported import READ
+from tests.commands.rig.exported_text import ANGLE, RATE, TIME, TORQUE
+from tests.commands.support import command
+
+
+def read(folder: Path, file: str) -> Run:
+    """The run that the configuration written for ``file`` reads."""
+    make, options = READ[file]
+    make(folder / file)
+    done = command(app, "init", folder / file, "--out", folder / "rig.yaml", *options)
+    assert done.exit_code == 0, done.stderr
+    return read_recording(load_config(folder / "rig.yaml")).runs[0]
+
+
+@pytest.mark.parametrize("file", READ)
+def test_a_file_of_another_tool_is_read_at_the_first_try(file: str, tmp_path: Path) -> None:
+    run = read(tmp_path, file)
+    np.testing.assert_allclose(run.time_s - run.time_s[0], TIME, atol=1e-6)
+    assert run.torque_nm is not None
+    np.testing.assert_allclose(run.torque_nm, TORQUE, atol=1e-6)
+    for values, expected in ((run.rate_rad_s, RATE), (run.angle_rad, ANGLE)):
+        if values is not None:
+            np.testing.assert_allclose(values, expected, atol=1e-6)
+    assert run.rate_rad_s is not None or run.angle_rad is not None
+
+
+def test_a_file_of_a_ros_2_bag_stands_for_the_bag_and_alone_is_refused_with_the_cure(tmp_path: Path) -> None:
+    exported.ros2(tmp_path / "bag")
+    (inside,) = (tmp_path / "bag").glob("*.db3")
+    (table,) = read_file(inside)
+    assert not isinstance(table, Run) and "joint_states.effort[axis1]" in table.names
+    shutil.copy(inside, tmp_path / "alone.db3")
+    done = command(app, "init", tmp_path / "alone.db3", "--out", tmp_path / "rig.yaml")
+    assert done.exit_code == 2
+    assert "metadata.yaml of the bag is missing" in done.stderr and "ros2 bag reindex" in done.stderr
+
+
+def test_a_log_of_raw_can_frames_is_refused_with_what_decodes_it(tmp_path: Path) -> None:
+    exported.mf4_can(tmp_path / "bus.mf4")
+    done = command(app, "init", tmp_path / "bus.mf4", "--out", tmp_path / "rig.yaml")
+    assert done.exit_code == 2
+    assert "raw CAN frames" in done.stderr and "extract_bus_logging" in done.stderr
+
+
+@pytest.mark.parametrize("file", ["x.parquet", "x.mf4", "x.tdms", "x.bag"])
+def test_a_damaged_file_is_refused_without_a_traceback(file: str, tmp_path: Path) -> None:
+    (tmp_path / file).write_bytes(b"\x00not what it says" * 40)
+    done = command(app, "init", tmp_path / file, "--out", tmp_path / "rig.yaml")
+    assert done.exit_code == 2, done.output
+    assert "again" in done.stderr and "Traceback" not in done.output
+    assert [p.name for p in tmp_path.iterdir()] == [file]
+
+
+@pytest.mark.parametrize(
+    ("file", "extra"), [("x.parquet", "parquet"), ("x.mf4", "mf4"), ("x.tdms", "tdms"), ("x.bag", "rosbag")]
+)
+def test_where_a_format_needs_a_package_its_extra_is_named(
+    file: str, extra: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rasters, "find_spec", lambda name: None)
+    (tmp_path / file).write_bytes(b"x")
+    done = command(app, "init", tmp_path / file, "--out", tmp_path / "rig.yaml")
+    assert done.exit_code == 2
+    assert f"pip install 'isp-rig[{extra}]'" in done.stderr
+
+
+def test_channels_of_a_faster_group_lose_readings_and_none_are_made_up(tmp_path: Path) -> None:
+    exported.mf4_rasters(tmp_path / "two.mf4")
+    (table,) = read_file(tmp_path / "two.mf4")
+    assert not isinstance(table, Run)
+    assert table.names == ("time_s", "Torque", "Rate", "T_winding")
+    values = table.read(table.names)
+    assert {len(v) for v in values.values()} == {len(TIME)}
+    np.testing.assert_allclose(values["T_winding"][:50], 20.0 + TIME[:50], atol=1e-9)
+
+
+def test_every_suffix_that_is_read_is_in_the_docs() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "recordings.md").read_text(encoding="utf-8")
+    assert [s for s in suffixes() if f"`{s}`" not in page and f"{s}`" not in page] == []

@@ -1,0 +1,51 @@
+"""The first screen in three sentences."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from identify.conclude.headline import acceptance, headline
+from identify.residual import Dependence, Disturbance
+from tests.identify.sample import sample, unhappy
+
+FOUND, _ = sample(1.0)
+
+
+def test_what_was_found_what_it_changes_and_why_it_is_accepted_are_three_sentences() -> None:
+    found, error, accepted = headline(FOUND)
+    assert found.startswith("The declared model lacks Coulomb friction (level 1.")
+    assert "and torque delay (delay 0.6003 ms)." in found
+    assert "falls from" in error and "rad/s" in error and "C would be about 9.2 times too high" in error
+    assert accepted == "Accepted: J, C and K are determined, and what is left is at the noise floor."
+
+
+def test_without_a_change_the_model_that_stands_is_spoken_of_alone() -> None:
+    plain = replace(FOUND, after=None, verdict=replace(FOUND.verdict, effects=()))
+    found, error, _ = headline(plain)
+    assert found == "The declared model describes these runs: no effect is missing."
+    assert error.startswith("Its error on held-out data is") and "falls" not in error
+    lost = replace(plain, verdict=replace(plain.verdict, unexplained=True))
+    assert headline(lost)[0] == "The declared model lacks something that no effect here describes."
+
+
+def test_what_is_left_is_said_with_its_size_and_what_it_moves() -> None:
+    left = Disturbance(0.2, "N*m", 0.02, (Dependence("angle", 0.1, 0.015, 1e-6),), {"inertia": 0.4, "stiffness": 1.2})
+    said = acceptance(replace(FOUND, disturbance=left))
+    assert "depends on the angle is 1.5 % of the torque and moves J by 0.40 % and K by 1.2 %, which is allowed" in said
+    noise = replace(left, depends_on=(), moves_percent={})
+    assert "(2.0 % of the torque) depends on nothing that was tested" in acceptance(replace(FOUND, disturbance=noise))
+
+
+def test_a_refusal_gives_its_first_reasons_and_counts_the_rest() -> None:
+    refused = replace(FOUND, accepted=False, reasons=("one is wrong", "two is wrong", "three is wrong"))
+    assert acceptance(refused) == "Not accepted: one is wrong; two is wrong (1 more reason below)."
+    assert acceptance(replace(refused, aborted=True)).startswith("Aborted: ")
+    assert len(headline(unhappy())) == 3
+
+
+def test_where_the_torque_decided_the_error_is_a_share_of_the_torque() -> None:
+    assert FOUND.after is not None
+    error = replace(FOUND.after.error, holdout_measure="holdout_torque_relative", holdout_torque_relative=0.021)
+    before = replace(FOUND.before.error, holdout_torque_relative=0.4)
+    by_torque = replace(FOUND, after=replace(FOUND.after, error=error), before=replace(FOUND.before, error=before))
+    assert "from 40.0 to 2.10 % of the torque" in headline(by_torque)[1]
