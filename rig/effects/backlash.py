@@ -26,5 +26,6 @@ EFFECT = Effect(
     kernel=_torque,
     kinks=lambda values: (-values[0], values[0]),
     leans_on=("stiffness",),
+    stays="where in its gap the platform rests nobody knows before the run",
     separated_by="from cubic stiffness and cogging: excite at a small and at a large amplitude",
 )

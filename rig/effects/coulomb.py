@@ -29,5 +29,6 @@ EFFECT = Effect(
     parameters=(Parameter("level", "N*m", "friction level", linear=True, suffix="nm"),),
     kernel=_level,
     other_minima=_others,
+    stays="at standstill friction holds the platform within a band, and where in it nobody knows before the run",
     separated_by="from Stribeck and presliding friction: ramp slowly, hold and release; excite at several amplitudes",
 )

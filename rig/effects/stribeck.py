@@ -32,5 +32,6 @@ EFFECT = Effect(
     kernel=_level,
     ordered=(("coulomb", "static"),),
     nests=("coulomb_friction",),
+    stays="at standstill friction holds the platform within a band, and where in it nobody knows before the run",
     separated_by="from Coulomb friction: spend more time at low speed; ramp slowly, hold and release",
 )
