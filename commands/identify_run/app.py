@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import typer
 
 from commands.campaign.context import CommandContext, Options, run_command
+from commands.identification.results import conclude, conclude_aborted, identified
 from commands.identify_run.follow_up import followed_up, with_plan
-from commands.identify_run.results import conclude, conclude_aborted, identified
+from commands.identify_run.prove import proved_if_asked
 from commands.terminal.options import (
     ConfigFile,
     DryRun,
@@ -102,7 +103,9 @@ def _run_played(context: CommandContext, loaded: LoadedConfig, folder: ResultsFo
             return NOT_ACCEPTED
         if not found.aborted:
             played, found = followed_up(context, loaded, folder, played, found)
-        code = conclude(context, loaded, folder, played.recording, found)
+        proved = proved_if_asked(context, loaded, folder, played, found)
+        played = proved.played
+        code = conclude(context, proved.loaded, folder, proved.recording, proved.found)
         return code if played.cause is None else exit_code_of(played.cause)
     try:
         conclude_aborted(context, loaded, folder, played)

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from identify.model.effect_torque import feeds_on_torque, torque_along
+from identify.signals.noise import rounding_of
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics import Equations, Motion, TorqueSignal, simulate
@@ -23,11 +24,12 @@ from rig.dynamics.equations import STEP_PHASE_RAD
 from rig.effects.base import Effect, Place
 from rig.excitation import CompensatedSet, HeldCommands, PlannedSet, TorqueTable
 from rig.platform import Platform
+from rig.recording.run import Recording
 from rig.signals import TorqueHold
 
 PARTS = 8  # of a tick: a torque that jumps is placed to an eighth of one, and its area exactly
 # Of a torque that is read between the ticks by a spline: a jump of it is spread so far that the spline follows.
-ROUNDED_TICKS = 1.5  # standard deviation, in ticks: -3 dB at 0.088 of the tick rate
+ROUNDED_TICKS = 0.75  # standard deviation, in ticks: -3 dB at 0.18 of the tick rate
 REACH = 4.0  # standard deviations over which that reaches
 ROUNDS = 4  # for friction that grows with the torque it is compensated by; each is smaller by its factor (at most 0.5)
 SOFT = 2e-3  # of the largest rate: below it the sign of the rate is not foreseen
@@ -216,7 +218,7 @@ def _as_played(of_set: Array, of_effects: Array, set_nm: Array, drive: Drive, ap
     line between two ticks lacks there (apart (1 - apart) / 2 of the second difference); of the effects 1/12 of it.
 
     One that is read off a smooth curve is rounded by a Gaussian and what that takes away is given back once (twicing,
-    Tukey 1977): 0.1 % are left at 3 % of the ticks' rate, and a jump is a spline's to follow.
+    Tukey 1977): 0.01 % are left at 3 % of the ticks' rate, and a jump is a spline's to follow.
     """
     if drive.hold == "zero_order":
         played = _unbent(_held(of_set), 0.5 * apart * (1.0 - apart)) + _unbent(_held(of_effects), 1.0 / 12.0)
@@ -243,3 +245,11 @@ def _unbent(torque_nm: Array, factor: float) -> Array:
 def _rounded(torque_nm: Array) -> Array:
     out: Array = gaussian_filter1d(torque_nm, ROUNDED_TICKS * PARTS, truncate=REACH, mode="constant")
     return out
+
+
+def resolution_of(recording: Recording) -> float | None:
+    """The step to which a drive rounds its torque, in N m, as far as held torques of a recording show one."""
+    held = [r.torque_nm for r in recording.runs if r.torque_nm is not None and r.torque_hold == "zero_order"]
+    lost = [rounding_of(values) for values in held]
+    steps = [math.sqrt(12.0) * std for std in lost if std]
+    return min(steps) if steps else None

@@ -161,6 +161,9 @@ class Effect:
     # Of a DRIVE effect: torque wanted behind it, (n,) at even steps of so many s, and its values -> torque to ask for.
     inverse: Callable[[Array, float, tuple[float, ...]], Array] | None = None
     ahead_s: Callable[[tuple[float, ...]], float] | None = None  # by how much earlier the inverse asks for a torque
+    # Its torque (of dry friction its level) in the syntax that C and Python share, of angle_rad, rate_rad_s, torque_nm,
+    # stiffness_nm_rad and its own parameters by their key; empty where it has memory.
+    formula: str = ""
     foreseen: bool = True  # False: nobody knows before a run what it will do in it (its phase, say)
     stays: str = ""  # what of it no torque that is computed before a run takes away, and why: one clause
 

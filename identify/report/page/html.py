@@ -18,6 +18,7 @@ from identify.report.page.document import Gallery, document
 from identify.report.page.estimates import estimates_figure
 from identify.report.page.markup import Markup, Piece, bullets, element, join, paragraph, section
 from identify.report.page.motion import RUNS, motion_figures
+from identify.report.page.proof import proof_section
 from identify.report.page.residual import residual_figures
 from identify.report.page.response import response_figure
 from identify.report.page.spectrum import spectrum_figures
@@ -59,6 +60,7 @@ def report_html(identification: Identification, recording: Recording, name: str)
             _verdict(identification, recording, gallery),
             _errors(identification, gallery),
             _candidates(identification),
+            proof_section(identification, gallery),
             _response(identification, recording, gallery),
             _sets(identification, recording, gallery),
             _motion(identification, gallery),
