@@ -43,8 +43,9 @@ class ProofSet:
         Standard deviation of the sensor's noise, which both errors contain.
     share
         Of the error, noise apart; None where there was none beyond the noise to begin with.
-    announced_left
-        The share that the model itself said would be left, before anything was played.
+    announced_left, announced_error
+        The share that the model itself said would be left, and the error without compensation, before anything was
+        played.
     """
 
     set: str
@@ -55,6 +56,7 @@ class ProofSet:
     noise: float
     share: Share | None
     announced_left: float
+    announced_error: float
 
 
 @dataclass(frozen=True)

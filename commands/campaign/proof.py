@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ from rig.excitation import PlannedSet
 from rig.interface import Rig
 from rig.platform import Platform
 from rig.preflight import allowed_peaks
+from rig.recording.run import Run
 
 if TYPE_CHECKING:
     from identify.proof.plan import ProofPlan
@@ -40,6 +41,8 @@ class ProofPart:
         Step of the drive's torque, as far as the recording shows one.
     number
         Which proof of the campaign it is, from 1.
+    recorded
+        The runs of the campaign, which tell how the platform moves whatever the model says.
     plan
         Made once the rig is there; None before.
     """
@@ -49,6 +52,7 @@ class ProofPart:
     angle: bool = False
     resolution_nm: float | None = None
     number: int = 1
+    recorded: Sequence[Run] = ()
     plan: ProofPlan | None = None
 
     @property
@@ -82,7 +86,7 @@ def play_proof(
         context.terminal.note("computing the torque that cancels the named effects")
         part.plan = plan_proof(
             part.model, planned_sets(rig, loaded), allowed, drive,
-            angle=part.angle, rivals=part.rivals, prefix=part.prefix,
+            angle=part.angle, rivals=part.rivals, prefix=part.prefix, recorded=part.recorded,
         )  # fmt: skip
         for line in plan_lines(part.plan, part.model):
             context.terminal.show(line)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identify.bounds.identifiability import vector_of
+from identify.estimate.output_error import refine
 from identify.follow_up.pairs import free_run
 from identify.proof.compensation import linear_part
 from identify.proven import Share
@@ -56,6 +59,34 @@ class Deviation:
         return squares - self.noise**2 * counts, counts
 
 
+def explained_left(
+    runs: Sequence[Run], model: Platform, without: Platform, noise: float | None, iterations: int = 8
+) -> float:
+    """What a model leaves of the error that another leaves in runs without compensation, both fitted anew (rms ratio).
+
+    All numbers are fitted, so that a name is not blamed for wrong ones. Infinite where the other leaves only noise.
+    """
+    traces = [prepare(run, i, noise) for i, run in enumerate(runs)]
+    level = float(np.mean([t.noise**2 for t in traces]))
+    squares = []
+    for platform in (model, without):
+        structure, names, values = vector_of(platform, len(traces))
+        start = dict(zip(names, values.tolist(), strict=True))
+        squares.append(refine(traces, structure, start, None, iterations, coarse=True).sigma ** 2 - level)
+    return _root(squares[0] / squares[1]) if squares[1] > 0.0 and np.isfinite(squares[0]) else np.inf
+
+
+def _as_set(run: Run, planned: PlannedSet) -> tuple[Run, float]:
+    """A run with the set alone as its torque, and how long after the run the set begins. Raises ValueError."""
+    if run.torque_nm is None or run.torque_time_s is None:
+        raise ValueError(f"{run.name}: has no torque")
+    made = planned.excitation
+    if not isinstance(made, CompensatedSet):
+        return run, 0.0
+    time_s, set_nm = made.set_torque(run.torque_time_s, run.torque_nm)
+    return replace(run, torque_time_s=time_s, torque_nm=set_nm), made.lead_s
+
+
 def deviation(run: Run, planned: PlannedSet, platform: Platform, noise: float | None) -> Deviation:
     """How far a run strays from the linear part of a platform.
 
@@ -67,13 +98,7 @@ def deviation(run: Run, planned: PlannedSet, platform: Platform, noise: float | 
     ValueError
         Where the run has no torque.
     """
-    if run.torque_nm is None or run.torque_time_s is None:
-        raise ValueError(f"{run.name}: has no torque")
-    lead_s, made = 0.0, planned.excitation
-    if isinstance(made, CompensatedSet):
-        lead_s = made.lead_s
-        time_s, set_nm = made.set_torque(run.torque_time_s, run.torque_nm)
-        run = replace(run, torque_time_s=time_s, torque_nm=set_nm)
+    run, lead_s = _as_set(run, planned)
     trace = prepare(run, 0, noise)
     linear = linear_part(platform)
     fitted = free_run(linear, [trace])

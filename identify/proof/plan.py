@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from identify.proof.compensation import Drive, cancelled, compensated
 from identify.proof.deviation import deviation, share_left, simulated_run
+from identify.proof.seen import expected_peaks
 from rig import effects
 from rig.errors import PreflightRefusal
 from rig.excitation import PlannedSet
 from rig.platform import Platform
 from rig.preflight import Peaks, predict
+from rig.recording.run import Run
 
 ALL, PLAIN = "all", "plain"
 SMALLEST = 0.02  # share of a set's torque below which it is not worth playing
@@ -36,6 +39,13 @@ class PlannedRun:
     planned: PlannedSet
 
 
+class Announced(NamedTuple):
+    """By a model's own account: the share of the error that stays, and the error without compensation (rms)."""
+
+    left: float
+    error: float
+
+
 @dataclass(frozen=True)
 class ProofPlan:
     """What a proof plays, and what its model says will come of it.
@@ -46,15 +56,15 @@ class ProofPlan:
         In the order in which they are played.
     models
         The model behind each variant.
-    announced_left
-        Variant -> set -> share of the error that stays by the model's own account (see ``pair_of``).
+    announced
+        Variant -> set -> what its model says of it (see ``pair_of``).
     torque_scale
         Set -> the factor on its torque, where it had to be reduced.
     """
 
     runs: tuple[PlannedRun, ...]
     models: Mapping[str, Platform]
-    announced_left: Mapping[str, Mapping[str, float]]
+    announced: Mapping[str, Mapping[str, Announced]]
     torque_scale: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -84,14 +94,18 @@ def variants_of(model: Platform, rivals: Mapping[str, Platform]) -> dict[str, tu
     return {ALL: (model, ()), **single, **{name: (rival, ()) for name, rival in rivals.items()}}
 
 
+Models = Mapping[str, tuple[Platform, tuple[str, ...]]]
+
+
 def plan_proof(
     model: Platform, sets: Sequence[PlannedSet], allowed: Peaks, drive: Drive, *, angle: bool = False,
-    rivals: Mapping[str, Platform] | None = None, prefix: str = "proof",
+    rivals: Mapping[str, Platform] | None = None, prefix: str = "proof", recorded: Sequence[Run] = (),
 ) -> ProofPlan:  # fmt: skip
     """Every set without and with compensation, and with each effect left out once where there are several.
 
     The order turns round from set to set, so that what drifts falls on all variants. Every run is held against the
-    limits, that of a rival on both models; where one breaks them the torque of the whole set is reduced.
+    limits on its model, that of a rival on both, and by the recorded run of its set; where one breaks them the torque
+    of the whole set is reduced.
 
     Parameters
     ----------
@@ -103,6 +117,8 @@ def plan_proof(
         Whether an encoder reads the motion.
     rivals
         "effect / rival" -> the model with the rival in the place of the effect.
+    recorded
+        The campaign: a run of the name of a set tells how the platform moves in that set, whatever the model says.
 
     Raises
     ------
@@ -113,17 +129,18 @@ def plan_proof(
     allowed = allowed._replace(travel_deg=RESERVE * allowed.travel_deg, rate_deg_s=RESERVE * allowed.rate_deg_s)
     runs: list[PlannedRun] = []
     scales: dict[str, float] = {}
-    left: dict[str, dict[str, float]] = {variant: {} for variant in models}
+    told: dict[str, dict[str, Announced]] = {variant: {} for variant in models}
     for number, asked in enumerate(sets):
-        made, factor = _within(asked, models, allowed, drive, prefix)
+        run = next((r for r in recorded if r.name == asked.name), None)
+        made, factor = _within(asked, models, allowed, drive, prefix, run)
         if factor < 1.0:
             scales[asked.name] = factor
         order = list(made) if number % 2 == 0 else list(reversed(made))
         runs += [PlannedRun(asked.name, variant, made[variant]) for variant in order]
         for variant, (of, _) in models.items():
             without, better = pair_of(variant)
-            left[variant][asked.name] = announced(of, made[without], made[better], drive, angle)
-    return ProofPlan(tuple(runs), {v: of for v, (of, _) in models.items()}, left, scales)
+            told[variant][asked.name] = announced(of, made[without], made[better], drive, angle)
+    return ProofPlan(tuple(runs), {v: of for v, (of, _) in models.items()}, told, scales)
 
 
 def pair_of(variant: str) -> tuple[str, str]:
@@ -132,13 +149,21 @@ def pair_of(variant: str) -> tuple[str, str]:
 
 
 def _within(
-    asked: PlannedSet, models: Mapping[str, tuple[Platform, tuple[str, ...]]], allowed: Peaks, drive: Drive, prefix: str
+    asked: PlannedSet,
+    models: Mapping[str, tuple[Platform, tuple[str, ...]]],
+    allowed: Peaks,
+    drive: Drive,
+    prefix: str,
+    run: Run | None,
 ) -> tuple[dict[str, PlannedSet], float]:
     """All variants of a set with the largest torque, of those tried, that passes on all; and the factor on it."""
     factor = 1.0
     for _ in range(ATTEMPTS):
         made = _made(asked.scaled(factor), models, drive, prefix)
         worst = min(_allowed_share(s, variant, models, allowed) for variant, s in made.items())
+        if run is not None:
+            seen = [expected_peaks(run, asked.scaled(factor), s, models[ALL][0]) for s in made.values()]
+            worst = min(worst, *(_share_within(peaks, allowed) for peaks in seen if peaks is not None), 1.0)
         if worst >= 1.0:
             return made, factor
         factor *= BACK_OFF * worst
@@ -151,9 +176,11 @@ def _within(
     )
 
 
-def _made(
-    plain: PlannedSet, models: Mapping[str, tuple[Platform, tuple[str, ...]]], drive: Drive, prefix: str
-) -> dict[str, PlannedSet]:
+def _share_within(peaks: Peaks, allowed: Peaks) -> float:
+    return min(limit / value for value, limit in zip(peaks, allowed, strict=True) if value > 0.0)
+
+
+def _made(plain: PlannedSet, models: Models, drive: Drive, prefix: str) -> dict[str, PlannedSet]:
     made = {PLAIN: replace(plain, name=f"{prefix}: {plain.name}")}
     for variant, (model, left_out) in models.items():
         made[variant] = compensated(model, plain, f"{prefix}: {plain.name}, {_words(variant)}", drive, left_out)
@@ -166,20 +193,18 @@ def _words(variant: str) -> str:
     return f"{variant.split(' / ')[1]} compensated" if " / " in variant else f"all but {variant}"
 
 
-def _allowed_share(
-    planned: PlannedSet, variant: str, models: Mapping[str, tuple[Platform, tuple[str, ...]]], allowed: Peaks
-) -> float:
+def _allowed_share(planned: PlannedSet, variant: str, models: Models, allowed: Peaks) -> float:
     """The factor on a run with which it stays within the limits, on its own model and on the identified one."""
     own = {id(model): model for model, _ in (models[ALL if variant == PLAIN else variant], models[ALL])}
     return min(predict(on, planned, allowed).scale for on in own.values())
 
 
-def announced(model: Platform, plain: PlannedSet, better: PlannedSet, drive: Drive, angle: bool) -> float:
-    """The share of the error against the linear model that stays by the model's own account; 0 where none was."""
+def announced(model: Platform, plain: PlannedSet, better: PlannedSet, drive: Drive, angle: bool) -> Announced:
+    """What stays of the error against the linear model by the model's own account; nothing where there was none."""
     rate_hz = 1.0 / drive.tick_s
     several = [deviation(simulated_run(s, model, rate_hz, drive.hold, angle), s, model, QUIET) for s in (plain, better)]
     share = share_left([(several[0], several[1], plain.duration_s)])
-    return share.left if share is not None else 0.0
+    return Announced(share.left if share is not None else 0.0, several[0].rms)
 
 
 QUIET = 1e-9  # noise of a simulated sensor in the unit of its channel: far below what any effect does

@@ -22,7 +22,7 @@ def plan_lines(plan: ProofPlan, model: Platform) -> list[str]:
         f"that cancels {names} by the identified model."
     ]
     for variant in plan.variants:
-        for name, left in plan.announced_left[variant].items():
+        for name, (left, _) in plan.announced[variant].items():
             if left > NOTABLE:
                 lines.append(f"  {name}: about {percent(left)} of the error {_of(variant)} will stay")
     for name in model.effects:

@@ -33,7 +33,7 @@ def _effect(one: EffectProof) -> dict[str, Any]:
             {
                 "set": s.set, "without": s.without, "compensated": s.compensated, "error_without": s.error_without,
                 "error_compensated": s.error_compensated, "noise": s.noise, **_share(s.share),
-                "announced_gone": 1.0 - s.announced_left,
+                "announced_gone": 1.0 - s.announced_left, "announced_error_without": s.announced_error,
             }
             for s in one.sets
         ],

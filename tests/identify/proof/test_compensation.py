@@ -56,7 +56,7 @@ def with_effects(**given: dict[str, float]) -> Platform:
 
 def left_of(platform: Platform, hold: TorqueHold, resolution_nm: float | None = None) -> float:
     drive = Drive(1e-3, hold, resolution_nm)
-    return announced(platform, SET, compensated(platform, SET, "c", drive), drive, angle=False)
+    return announced(platform, SET, compensated(platform, SET, "c", drive), drive, angle=False).left
 
 
 @pytest.mark.parametrize("hold", HOLDS)
