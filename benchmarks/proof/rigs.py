@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from identify.pipeline import identify
-from identify.proof.compensation import Drive, along, linear_part, resolution_of
+from identify.proof.compensation import along, linear_part
+from identify.proof.drive import Drive, resolution_of
 from identify.proof.plan import ProofPlan, plan_proof
 from identify.proof.verdict import judge
 from identify.proven import Proof

@@ -17,7 +17,7 @@ from rig.excitation import PlannedSet
 from rig.interface import Rig
 from rig.platform import Platform
 from rig.preflight import allowed_peaks
-from rig.recording.run import Run
+from rig.recording.run import Recording, Run
 
 if TYPE_CHECKING:
     from identify.proof.plan import ProofPlan
@@ -76,16 +76,19 @@ def play_proof(
     """
 
     def sets(rig: Rig, loaded: LoadedConfig) -> tuple[PlannedSet, ...]:
-        from identify.proof.compensation import Drive
+        from identify.proof.drive import Drive, latency_of
         from identify.proof.plan import plan_proof
         from identify.proof.wording import plan_lines
 
         config = loaded.config
         allowed = allowed_peaks(config.limits, config.excitation.margin, rig.rate_full_scale_rad_s)
-        drive = Drive(1.0 / config.excitation.sample_rate_hz, rig.torque_hold, part.resolution_nm)
+        asked = planned_sets(rig, loaded)
+        tick_s = 1.0 / config.excitation.sample_rate_hz
+        latency_s = latency_of(Recording(tuple(part.recorded)), asked, tick_s)
+        drive = Drive(tick_s, rig.torque_hold, part.resolution_nm, latency_s)
         context.terminal.note("computing the torque that cancels the named effects")
         part.plan = plan_proof(
-            part.model, planned_sets(rig, loaded), allowed, drive,
+            part.model, asked, allowed, drive,
             angle=part.angle, rivals=part.rivals, prefix=part.prefix, recorded=part.recorded,
         )  # fmt: skip
         for line in plan_lines(part.plan, part.model):

@@ -88,7 +88,7 @@ def prove(
 
 
 def _part(now: Proved, rival: str | None, number: int) -> ProofPart:
-    from identify.proof.compensation import resolution_of
+    from identify.proof.drive import resolution_of
     from identify.proof.rivals import rival_models
 
     model = now.found.final.platform

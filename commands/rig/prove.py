@@ -122,7 +122,7 @@ def _rehearsed(
 ) -> int:  # fmt: skip
     """Play the proof on another backend than the recording's: into a folder of its own, for the two do not mix."""
     from commands.campaign.proof import play_proof
-    from identify.proof.compensation import resolution_of
+    from identify.proof.drive import resolution_of
     from identify.proof.rivals import rival_models
     from identify.proof.verdict import judge
     from identify.proof.wording import lines

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from identify.model.effect_torque import feeds_on_torque, torque_along
-from identify.signals.noise import rounding_of
+from identify.proof.drive import PARTS, Drive
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics import Equations, Motion, TorqueSignal, simulate
@@ -24,32 +24,12 @@ from rig.dynamics.equations import STEP_PHASE_RAD
 from rig.effects.base import Effect, Place
 from rig.excitation import CompensatedSet, HeldCommands, PlannedSet, TorqueTable
 from rig.platform import Platform
-from rig.recording.run import Recording
-from rig.signals import TorqueHold
 
-PARTS = 8  # of a tick: a torque that jumps is placed to an eighth of one, and its area exactly
 # Of a torque that is read between the ticks by a spline: a jump of it is spread so far that the spline follows.
 ROUNDED_TICKS = 0.75  # standard deviation, in ticks: -3 dB at 0.18 of the tick rate
 REACH = 4.0  # standard deviations over which that reaches
 ROUNDS = 4  # for friction that grows with the torque it is compensated by; each is smaller by its factor (at most 0.5)
 SOFT = 2e-3  # of the largest rate: below it the sign of the rate is not foreseen
-
-
-@dataclass(frozen=True)
-class Drive:
-    """How a rig takes its torque: a command a tick, held until the next or read off a smooth curve.
-
-    ``resolution_nm`` is the step to which it rounds a held command; None where it does not, or nobody knows.
-    """
-
-    tick_s: float
-    hold: TorqueHold
-    resolution_nm: float | None = None
-
-    @property
-    def step_s(self) -> float:
-        """Of the table of a compensating torque."""
-        return self.tick_s / PARTS
 
 
 def linear_part(platform: Platform) -> Platform:
@@ -86,15 +66,17 @@ def compensated(
     resisting = _resistance(platform, active, middles_s, _motion(platform, set_nm, middles_s), wanted)
     of_set = _through_drive(platform, active, wanted, drive.step_s)
     of_effects = _through_drive(platform, active, wanted + resisting, drive.step_s) - of_set
-    apart = math.modf(_early_s(platform, active) / drive.tick_s)[0]
-    table = TorqueTable(drive.step_s, _as_played(of_set, of_effects, wanted, drive, apart))
+    apart = math.modf((drive.latency_s + _early_s(platform, active)) / drive.tick_s)[0]
+    table = TorqueTable(
+        drive.step_s, _as_played(_sooner(of_set, drive), _sooner(of_effects, drive), wanted, drive, apart)
+    )
     commands = None
     if drive.hold == "zero_order" and drive.resolution_nm is not None:
         ticks_s = drive.tick_s * np.arange(round((planned.duration_s + lead_s) / drive.tick_s))
         exact = np.asarray(planned.torque(ticks_s - lead_s), dtype=float) + table.at(ticks_s)
         natural_rad_s = math.sqrt(max(platform.stiffness_nm_rad, 0.0) / platform.inertia_kg_m2)
         commands = HeldCommands(drive.tick_s, rounded(exact, drive.resolution_nm, natural_rad_s * drive.tick_s))
-    return CompensatedSet.of(planned, name, lead_s, table, _early_s(platform, active), commands)
+    return CompensatedSet.of(planned, name, lead_s, table, _early_s(platform, active), drive.latency_s, commands)
 
 
 def rounded(torque_nm: Array, resolution_nm: float, natural_rad: float) -> Array:
@@ -134,7 +116,7 @@ def _early_s(platform: Platform, active: list[str]) -> float:
 
 def _lead_s(platform: Platform, active: list[str], drive: Drive) -> float:
     """By how much earlier than the set its run begins, in whole ticks; a slope is known one tick ahead."""
-    early = _early_s(platform, active) / drive.tick_s
+    early = (drive.latency_s + _early_s(platform, active)) / drive.tick_s
     slope = 1.0 if any(effects.get(n).inverse is not None for n in active) else 0.0
     spread = 2.0 * REACH * ROUNDED_TICKS if drive.hold == "band_limited" else 0.0
     return math.ceil(early + slope + spread - 1e-9) * drive.tick_s
@@ -210,6 +192,14 @@ def _through_drive(platform: Platform, active: list[str], torque_nm: Array, step
     return torque_nm
 
 
+def _sooner(torque_nm: Array, drive: Drive) -> Array:
+    """The same, asked for earlier by what the drive takes to give it."""
+    if drive.latency_s == 0.0:
+        return torque_nm
+    time_s = drive.step_s * np.arange(len(torque_nm))
+    return np.interp(time_s + drive.latency_s, time_s, torque_nm, right=0.0)
+
+
 def _as_played(of_set: Array, of_effects: Array, set_nm: Array, drive: Drive, apart: float) -> Array:
     """What is asked for less the set, (n,), all as means over even steps, as the drive can play it from each step on.
 
@@ -245,11 +235,3 @@ def _unbent(torque_nm: Array, factor: float) -> Array:
 def _rounded(torque_nm: Array) -> Array:
     out: Array = gaussian_filter1d(torque_nm, ROUNDED_TICKS * PARTS, truncate=REACH, mode="constant")
     return out
-
-
-def resolution_of(recording: Recording) -> float | None:
-    """The step to which a drive rounds its torque, in N m, as far as held torques of a recording show one."""
-    held = [r.torque_nm for r in recording.runs if r.torque_nm is not None and r.torque_hold == "zero_order"]
-    lost = [rounding_of(values) for values in held]
-    steps = [math.sqrt(12.0) * std for std in lost if std]
-    return min(steps) if steps else None

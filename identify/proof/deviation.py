@@ -11,6 +11,7 @@ from identify.bounds.identifiability import vector_of
 from identify.estimate.output_error import refine
 from identify.follow_up.pairs import free_run
 from identify.proof.compensation import linear_part
+from identify.proof.drive import Drive
 from identify.proven import Share
 from identify.signals.prepare import prepare
 from rig.arrays import Array, Mask
@@ -18,7 +19,6 @@ from rig.dynamics import Equations, TorqueSignal, simulate
 from rig.excitation import CompensatedSet, PlannedSet
 from rig.platform import Platform
 from rig.recording.run import Run
-from rig.signals import TorqueHold
 
 BLOCKS = 20  # of a set, each left out once for the interval (Quenouille 1956): far longer than what the noise remembers
 Z95 = 1.96
@@ -108,17 +108,18 @@ def deviation(run: Run, planned: PlannedSet, platform: Platform, noise: float | 
     return Deviation(time_s, np.asarray(error), keep, trace.noise)
 
 
-def simulated_run(planned: PlannedSet, platform: Platform, rate_hz: float, hold: TorqueHold, angle: bool) -> Run:
-    """What a platform would show of a planned set without noise, its torque held as a rig holds it."""
-    time_s = np.arange(round(planned.duration_s * rate_hz) + 1) / rate_hz
+def simulated_run(planned: PlannedSet, platform: Platform, drive: Drive, angle: bool) -> Run:
+    """What a platform would show of a planned set without noise, its torque as late and held as the drive's."""
+    time_s = drive.tick_s * np.arange(round(planned.duration_s / drive.tick_s) + 1)
+    late_s = time_s + drive.latency_s
     torque_nm = np.asarray(planned.torque(time_s), dtype=float)
     start = (Equations(platform).rest_angle_rad(), 0.0)
     with np.errstate(all="ignore"):
-        motion = simulate(platform, time_s, TorqueSignal(time_s, torque_nm, hold), start)
+        motion = simulate(platform, time_s, TorqueSignal(late_s, torque_nm, drive.hold), start)
     return Run(
         planned.name, time_s, np.ones(len(time_s), dtype=bool),
         rate_rad_s=None if angle else motion.sensed_rate_rad_s, angle_rad=motion.angle_rad if angle else None,
-        torque_time_s=time_s, torque_nm=torque_nm, torque_hold=hold, frequency_hz=planned.frequency_hz,
+        torque_time_s=late_s, torque_nm=torque_nm, torque_hold=drive.hold, frequency_hz=planned.frequency_hz,
     )  # fmt: skip
 
 

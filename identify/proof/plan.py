@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from identify.proof.compensation import Drive, cancelled, compensated
+from identify.proof.compensation import cancelled, compensated
 from identify.proof.deviation import deviation, share_left, simulated_run
+from identify.proof.drive import Drive
 from identify.proof.seen import expected_peaks
 from rig import effects
 from rig.errors import PreflightRefusal
@@ -201,8 +202,7 @@ def _allowed_share(planned: PlannedSet, variant: str, models: Models, allowed: P
 
 def announced(model: Platform, plain: PlannedSet, better: PlannedSet, drive: Drive, angle: bool) -> Announced:
     """What stays of the error against the linear model by the model's own account; nothing where there was none."""
-    rate_hz = 1.0 / drive.tick_s
-    several = [deviation(simulated_run(s, model, rate_hz, drive.hold, angle), s, model, QUIET) for s in (plain, better)]
+    several = [deviation(simulated_run(s, model, drive, angle), s, model, QUIET) for s in (plain, better)]
     share = share_left([(several[0], several[1], plain.duration_s)])
     return Announced(share.left if share is not None else 0.0, several[0].rms)
 

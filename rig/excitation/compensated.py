@@ -11,6 +11,7 @@ from rig.arrays import Array
 from rig.excitation.base import ExcitationSet
 from rig.excitation.planned import PlannedSet
 
+NEAR = np.array([0, -1, 1, -2, 2])  # ticks, the likeliest first
 ON_TIME = 1e-3  # of a tick: rounding of its instant
 
 
@@ -60,6 +61,17 @@ class HeldCommands:
         inside = (tick >= 0) & (tick < len(self.torque_nm))
         return self.torque_nm[np.clip(tick, 0, len(self.torque_nm) - 1)] * inside
 
+    def asked_at(self, time_s: Array, recorded_nm: Array) -> Array:
+        """The tick of the command behind each recorded torque, in s, (n,): of those around it the one of that value.
+
+        A late tick sends the command of its instant, and a drive stamps what it applied by its own clock.
+        """
+        nearest = np.rint(time_s / self.tick_s).astype(np.int64)
+        around = np.clip(nearest[:, None] + NEAR, 0, len(self.torque_nm) - 1)
+        off = np.abs(self.torque_nm[around] - recorded_nm[:, None])
+        ticks: Array = np.take_along_axis(around, np.argmin(off, axis=1)[:, None], axis=1)[:, 0] * self.tick_s
+        return ticks
+
 
 class CompensatedSet(ExcitationSet):
     """A set as planned, begun ``lead_s`` after its run does, and a compensating torque over the whole run.
@@ -74,7 +86,9 @@ class CompensatedSet(ExcitationSet):
     compensation: Any
     """The further torque, a TorqueTable from the start of the run."""
     early_s: float = 0.0
-    """By how much later than it is asked for a torque reaches the shaft, s."""
+    """By how much later than it is recorded a torque reaches the shaft, s."""
+    latency_s: float = 0.0
+    """By how much later than it is asked for a torque is recorded, s."""
     commands: Any = None
     """The whole torque as held commands, where a drive rounds what it is asked for; or None."""
 
@@ -99,18 +113,24 @@ class CompensatedSet(ExcitationSet):
 
         All by which the recorded torque differs from the planned one (rounding, late ticks) stays in it.
         """
-        planned = self.plain.torque(time_s - self.lead_s) + self.compensation.at(time_s)
+        asked_s = time_s - self.latency_s
+        if self.commands is not None:
+            asked_s = self.commands.asked_at(asked_s, recorded_nm)
+            wanted = self.plain.torque(asked_s + self.latency_s + self.early_s - self.lead_s)
+            exact = self.plain.torque(asked_s - self.lead_s) + self.compensation.at(asked_s)
+            return time_s + self.early_s, wanted + recorded_nm - exact
+        planned = self.plain.torque(asked_s - self.lead_s) + self.compensation.at(asked_s)
         at_shaft_s = time_s + self.early_s
         return at_shaft_s, self.plain.torque(at_shaft_s - self.lead_s) + recorded_nm - planned
 
     @classmethod
     def of(
         cls, plain: PlannedSet, name: str, lead_s: float, compensation: TorqueTable, early_s: float = 0.0,
-        commands: HeldCommands | None = None,
+        latency_s: float = 0.0, commands: HeldCommands | None = None,
     ) -> PlannedSet:  # fmt: skip
         """The planned set of that name that plays ``plain`` with its compensation."""
         made = cls(
             name=name, duration_s=plain.duration_s + lead_s, use=plain.use, plain=plain, lead_s=lead_s,
-            compensation=compensation, early_s=early_s, commands=commands,
+            compensation=compensation, early_s=early_s, latency_s=latency_s, commands=commands,
         )  # fmt: skip
         return PlannedSet(made.title, made)

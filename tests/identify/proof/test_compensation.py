@@ -8,13 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.proof.compensation import Drive, cancelled, compensated, linear_part, rounded
+from identify.proof.compensation import cancelled, compensated, linear_part, rounded
+from identify.proof.drive import Drive, latency_of
 from identify.proof.plan import ALL, PLAIN, announced, not_cancelled, plan_proof
 from rig import effects
 from rig.errors import PreflightRefusal
 from rig.excitation import CompensatedSet, PlannedSet, Sine
 from rig.platform import Platform
 from rig.preflight import Peaks, peaks
+from rig.recording.run import Recording, Run
 from rig.signals import TorqueHold
 
 LINEAR = Platform(0.0203, 0.0447, 681.2)
@@ -123,6 +125,27 @@ def test_commands_of_a_drive_that_rounds_are_its_steps_and_do_not_excite_the_pla
 
 def test_a_drive_that_rounds_leaves_no_more_of_a_smooth_effect() -> None:
     assert left_of(with_effects(cubic_stiffness={"factor": 1000.0}), "zero_order", 0.12) < 0.02
+
+
+@pytest.mark.parametrize("name", ["coulomb_friction", "cubic_stiffness", "torque_delay"])
+def test_a_torque_that_comes_late_is_asked_for_earlier(name: str) -> None:
+    platform, drive = with_effects(**{name: {**SMOOTH, **ROUGH}[name]}), Drive(1e-3, "zero_order", None, 0.0017)
+    assert announced(platform, SET, compensated(platform, SET, "c", drive), drive, angle=False).left < 0.10
+    on_time = compensated(platform, SET, "c", Drive(1e-3, "zero_order"))
+    assert announced(platform, SET, on_time, drive, angle=False).left > 0.10
+
+
+def test_how_late_a_torque_comes_shows_in_the_recording() -> None:
+    time_s = np.arange(0.0, 3.0, 1e-3)
+    for late_s in (0.0, 0.0017, 0.004):
+        commands = np.asarray(SET.torque(time_s), dtype=float)
+        run = Run(
+            SET.name, time_s, np.ones(len(time_s), dtype=bool), rate_rad_s=commands, torque_time_s=time_s + late_s,
+            torque_nm=0.12 * np.rint(commands / 0.12), torque_hold="zero_order",
+        )  # fmt: skip
+        assert latency_of(Recording((run,)), [SET], 1e-3) == pytest.approx(late_s, abs=2e-5)
+    other = PlannedSet("3 Hz", Sine(torque_nm=60.0, frequency_hz=11.0, duration_s=3.0))
+    assert latency_of(Recording((run,)), [other], 1e-3) == 0.0
 
 
 def test_the_sets_alternate_and_stay_within_the_limits() -> None:

@@ -10,8 +10,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from identify.proof.compensation import Drive
 from identify.proof.deviation import Deviation, share_left
+from identify.proof.drive import Drive
 from identify.proof.plan import ALL, PLAIN, RESERVE, ProofPlan, plan_proof
 from identify.proof.seen import expected_peaks
 from identify.proof.verdict import judge, status_of
