@@ -10,7 +10,6 @@ import typer
 from commands.campaign.context import CommandContext, Options, run_command
 from commands.identification.results import conclude, conclude_aborted, identified
 from commands.identify_run.follow_up import followed_up, with_plan
-from commands.identify_run.prove import proved_if_asked
 from commands.terminal.options import (
     ConfigFile,
     DryRun,
@@ -87,6 +86,7 @@ def _run_recorded(context: CommandContext, loaded: LoadedConfig, folder: Results
 
 def _run_played(context: CommandContext, loaded: LoadedConfig, folder: ResultsFolder) -> int:
     from commands.campaign.resume import play_campaign
+    from commands.identify_run.prove import proved_if_asked
     from commands.terminal.exit_codes import NOT_ACCEPTED, exit_code_of
     from rig.errors import Aborted, UsageError
 
