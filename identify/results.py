@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from identify.proven import Proof
 from identify.residual import (  # noqa: F401  whoever reads a result finds all of it here
     Dependence,
     Disturbance,
@@ -246,6 +247,7 @@ class Identification:
     declared: Mapping[str, float] = field(default_factory=dict)  # numbers that somebody gave, by name, in SI units
     plausibility: tuple[Implausible, ...] = ()
     note: str = ""  # why an error in the table grew although the model is better
+    proof: Proof | None = None  # where the named effects were cancelled on the rig
     scale_shows: bool = False  # whether runs carry one, so that a scale of the torque is no part of J, C and K
     recorded: bool = False  # the runs were read from files: no `excitation` section whose keys a next step could name
 

@@ -10,7 +10,9 @@ from pathlib import Path
 
 from commands.campaign.consent import ask_consent
 from commands.campaign.results_folder import JOURNAL_FILE, RAW_FOLDER
-from rig.interface import Statement
+from rig.config.load import LoadedConfig
+from rig.excitation import PlannedSet
+from rig.interface import Rig, Statement
 from rig.recording.run import Recording
 from rig.recording.tail_file import tail_of
 
@@ -55,6 +57,9 @@ class CampaignPart:
 
     ``earlier`` is what was played before: into the same folder, where its recording is kept and added to, or into
     the one that this part ``resumes``; then its journals are ``copied_journals``, each under its new name.
+
+    ``plan`` makes the sets to play, where they are not those of the configuration; it may refuse with UsageError.
+    ``listed`` is where in the information of a recording stands what is said of this part.
     """
 
     journal: str = JOURNAL_FILE
@@ -63,6 +68,8 @@ class CampaignPart:
     consent: Callable[[Statement, bool, bool, Callable[[str], str]], None] = ask_consent
     copied_journals: tuple[tuple[Path, str], ...] = ()
     resumes: Path | None = None
+    plan: Callable[[Rig, LoadedConfig], tuple[PlannedSet, ...]] | None = None
+    listed: str = "follow_ups"
 
     @property
     def done(self) -> frozenset[str]:

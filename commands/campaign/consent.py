@@ -10,6 +10,31 @@ from rig.interface import Statement, Torque
 QUESTION = "REAL torque will be applied. Is everybody clear of the machine? Type yes to start: "
 
 
+Consent = Callable[[Statement, bool, bool, Callable[[str], str]], None]
+
+
+def consent_of(mode: str, question: str, not_confirmed: str) -> Consent:
+    """The question before a further part of a campaign: --yes answers it only where the file says auto.
+
+    ``question`` is asked where torque is not real, ``not_confirmed`` said where the answer is not yes.
+    """
+    if mode == "auto":
+        return ask_consent
+
+    def ask_each_time(statement: Statement, yes: bool, is_terminal: bool, ask: Callable[[str], str]) -> None:
+        if statement.torque is Torque.REAL:
+            ask_consent(statement, False, is_terminal, ask)
+            return
+        try:
+            answer = ask(question)
+        except EOFError:
+            answer = ""
+        if answer.strip().lower() not in ("yes", "y"):
+            raise UsageError(not_confirmed)
+
+    return ask_each_time
+
+
 def ask_consent(statement: Statement, yes: bool, is_terminal: bool, ask: Callable[[str], str]) -> None:
     """Return where torque may be applied.
 

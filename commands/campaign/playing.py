@@ -73,7 +73,7 @@ def play(
     if backend == EMULATED:
         context.terminal.show("Starting the emulated devices ...")
     with BACKENDS[backend](loaded, folder.path / part.raw) as stage:
-        every = planned_sets(stage.rig, loaded)
+        every = (part.plan or planned_sets)(stage.rig, loaded)
         sets = tuple(planned for planned in every if planned.name not in part.done)
         _open(context, stage, loaded, sets, folder.path, part)
         return _record(context, stage, loaded, sets, folder, part, [planned.name for planned in every])

@@ -40,7 +40,10 @@ def save(
     if earlier is not None:
         before = [_read_back(context, path / name) for name in earlier.journals]
         contents = joined([c for c in (*before, contents) if c is not None])
-        recording = (_added if part.resumes is None else _resumed)(earlier.recording, recording)
+        if part.resumes is None:
+            recording = _added(earlier.recording, recording, part.listed)
+        else:
+            recording = _resumed(earlier.recording, recording)
         played = dataclasses.replace(
             played, completed=played.completed | earlier.completed, journals=(*earlier.journals, *played.journals)
         )
@@ -89,10 +92,10 @@ def _read_back(context: CommandContext, path: Path) -> JournalContents | None:
         return None
 
 
-def _added(earlier: Recording, new: Recording) -> Recording:
+def _added(earlier: Recording, new: Recording, listed: str) -> Recording:
     """All runs of a campaign; what is said of the new part stands behind what was said of the first."""
     info = dict(earlier.info)
-    info["follow_ups"] = [*info.get("follow_ups", ()), dict(new.info)]
+    info[listed] = [*info.get(listed, ()), dict(new.info)]
     return dataclasses.replace(earlier, runs=(*earlier.runs, *new.runs), info=info)
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from commands.campaign.context import CommandContext, Options, run_command
+from commands.identification.results import conclude, conclude_aborted, identified
 from commands.identify_run.follow_up import followed_up, with_plan
-from commands.identify_run.results import conclude, conclude_aborted, identified
 from commands.terminal.options import (
     ConfigFile,
     DryRun,
@@ -106,6 +106,7 @@ def _run_recorded(context: CommandContext, loaded: LoadedConfig, folder: Results
 
 def _run_played(context: CommandContext, loaded: LoadedConfig, folder: ResultsFolder) -> int:
     from commands.campaign.resume import play_campaign
+    from commands.identify_run.prove import proved_if_asked
     from commands.terminal.exit_codes import NOT_ACCEPTED, exit_code_of
     from rig.errors import Aborted, UsageError
 
@@ -122,7 +123,9 @@ def _run_played(context: CommandContext, loaded: LoadedConfig, folder: ResultsFo
             return NOT_ACCEPTED
         if not found.aborted:
             played, found = followed_up(context, loaded, folder, played, found)
-        code = conclude(context, loaded, folder, played.recording, found)
+        proved = proved_if_asked(context, loaded, folder, played, found)
+        played = proved.played
+        code = conclude(context, proved.loaded, folder, proved.recording, proved.found)
         return code if played.cause is None else exit_code_of(played.cause)
     try:
         conclude_aborted(context, loaded, folder, played)

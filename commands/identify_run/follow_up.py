@@ -6,7 +6,7 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 from commands.campaign.context import CommandContext
-from commands.identify_run.results import identified, write
+from commands.identification.results import identified, write
 
 if TYPE_CHECKING:
     from commands.campaign.campaign_part import PlayedCampaign

@@ -92,6 +92,33 @@ def play(
 
 
 @app.command()
+def prove(
+    folder: ResultsDir,
+    dry_run: DryRun = False,
+    emulate: Emulate = False,
+    yes: Yes = False,
+    rival: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Compensate this rival of a name, too: which leaves less?")
+    ] = None,
+    seed: Seed = None,
+    quiet: Quiet = False,
+) -> None:
+    """Cancel the named effects on the rig and measure what is left; refuted names are left out and searched anew.
+
+    Exit codes: 0 all names confirmed, 1 not all, 2 wrong usage or forecast, 3 device fault, 4 safety trip, 70 internal
+    error, 130 Ctrl-C.
+    """
+
+    def command(context: CommandContext) -> int:
+        from commands.rig.prove import prove_folder
+
+        return prove_folder(context, folder, rival)
+
+    options = Options(folder, None, dry_run, emulate, yes, (), seed, quiet)
+    raise typer.Exit(run_command(options, command))
+
+
+@app.command()
 def recover(
     folder: ResultsDir,
 ) -> None:
@@ -110,7 +137,12 @@ def export(
     source: Annotated[
         Path, typer.Argument(metavar="FROM", help="A results folder, recording.h5 or journal.", show_default=False)
     ],
-    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, npz; of the CAN log: blf, asc, mf4.")],
+    to: Annotated[
+        str,
+        typer.Option(
+            metavar="FORMAT", help="csv, mat, npz; of the CAN log: blf, asc, mf4; compensation: C, Python, a table."
+        ),
+    ],
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="A folder that does not exist yet. Default: FROM/export_FORMAT/")
     ] = None,

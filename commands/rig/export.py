@@ -1,9 +1,9 @@
-"""`rig export`: a recording for other programs and a rig.yaml that reads it back; the CAN log as BLF, ASC or MF4."""
+"""`rig export`: a recording for other programs with a rig.yaml that reads it; the CAN log; the compensation as code."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,8 @@ from rig.recording import writers
 from rig.recording.run import Run
 
 CAN_FORMATS = ("blf", "asc", "mf4")
-FORMATS = (*writers.names(), *CAN_FORMATS)
+COMPENSATION = "compensation"
+FORMATS = (*writers.names(), *CAN_FORMATS, COMPENSATION)
 CONFIG_FILE = "rig.yaml"
 
 
@@ -32,7 +33,10 @@ def export_recording(source: Path, wanted: str, out: Path | None) -> int:
     folder = out if out is not None else home / f"export_{wanted}"
     if folder.exists() or folder.is_symlink():
         raise UsageError(f"{folder} exists and is never overwritten: choose another --out")
-    lines = list(_can_logs(home, wanted, folder) if wanted in CAN_FORMATS else _runs(source, wanted, folder))
+    if wanted == COMPENSATION:
+        lines = list(_compensation(home, folder))
+    else:
+        lines = list(_can_logs(home, wanted, folder) if wanted in CAN_FORMATS else _runs(source, wanted, folder))
     sys.stdout.writelines(f"{plain(line)}\n" for line in lines)
     return OK
 
@@ -56,6 +60,40 @@ def _can_logs(home: Path, wanted: str, folder: Path) -> Iterator[str]:
         part = capture.parent.name if capture.parent != home / "raw" else "can"
         target = folder / f"{part}.{wanted}"
         yield f"{target}: {write_can_log(capture, target)} frames of {capture}; the first frame is at time 0"
+
+
+def _compensation(home: Path, folder: Path) -> Iterator[str]:
+    """The torque that cancels the effects of the final model, as a function of angle, rate and torque."""
+    from identify.proof.controller import controller_of
+    from identify.proof.controller_code import files
+    from identify.report.report_data import FILE, read_report_data
+    from rig.recording.hdf5 import read_recording_h5
+    from rig.recording.results import RECORDING_FILE
+
+    for name in (FILE, RECORDING_FILE):
+        if not (home / name).is_file():
+            raise RecordingError(f"{home}: has no {name}: give the results folder of an identify-run")
+    found = read_report_data(home / FILE).identification
+    model = found.final.platform
+    if model is None or found.torque_free:
+        raise UsageError(f"{home}: no model came out from which a torque can be computed")
+    recording = read_recording_h5(home / RECORDING_FILE)
+    most_nm = _most_torque_nm(recording.info)
+    made = files(controller_of(model, recording, most_nm))
+    _made(folder)
+    for name, text in made.items():
+        (folder / name).write_text(text, encoding="ascii")
+        yield f"{folder / name}: written"
+
+
+def _most_torque_nm(info: Mapping[str, Any]) -> float:
+    """The torque limit of the rig that was recorded; the default of a rig.yaml where the recording quotes none."""
+    from rig.config.limits import LimitsConfig
+
+    config = info.get("config")
+    limits = config.get("limits") if isinstance(config, dict) else None
+    given = limits.get("torque_nm") if isinstance(limits, dict) else None
+    return float(given) if isinstance(given, int | float) else LimitsConfig().torque_nm
 
 
 def _runs(source: Path, wanted: str, folder: Path) -> Iterator[str]:

@@ -14,6 +14,7 @@ from identify.follow_up.wording import follow_up_yaml
 from identify.model.parameters import with_inertia
 from identify.report.json_values import finite
 from identify.report.page import report_html
+from identify.report.proof import proof_json
 from identify.report.replaced_file import replace_file
 from identify.report.report_data import FILE as REPORT_DATA
 from identify.report.report_data import image_of, report_data
@@ -70,6 +71,7 @@ def result_json(identification: Identification) -> dict[str, Any]:
         "genetic": _genetic(identification.joint) if identification.joint else None,
         "holdout": identification.holdout_note,
         "follow_up": _follow_up(identification) if identification.follow_up else None,
+        "proof": proof_json(identification.proof) if identification.proof else None,
     }
     if identification.max_error_percent is None:
         del content["max_error_percent"]

@@ -16,6 +16,7 @@ from identify.conclude.expected_delay import delay_lines
 from identify.conclude.headline import acceptance
 from identify.conclude.next_steps import next_steps
 from identify.follow_up.wording import lines as follow_up_lines
+from identify.proof.wording import lines as proof_lines
 from identify.results import Identification, ParameterEstimate
 from identify.wording import (
     SYMBOLS,
@@ -80,6 +81,7 @@ def _whole(identification: Identification, info: Mapping[str, Any]) -> Group:
         *_listed("Dropped: not supported by the data", not_said_yet(final.dropped, identification)),
         *_listed("Not determined by these data", not_said_yet(final.not_determined, identification)),
         *_listed("Follow-up", follow_up_lines(identification.follow_up) if identification.follow_up else ()),
+        *_listed("Proof", proof_lines(identification.proof) if identification.proof else ()),
     ]
     if identification.per_set:
         parts += [Text(), _sets(identification)]

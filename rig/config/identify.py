@@ -76,6 +76,8 @@ class IdentifyConfig(Section):
     """Effects to try, by name; all known effects if left out."""
     follow_up: Literal["auto", "ask", "never"] = "ask"
     """Whether the excitation that separates effects which the data do not is played."""
+    prove: Literal["auto", "ask", "never"] = "never"
+    """Whether every set is played again with and without the torque that cancels the named effects (see rig prove)."""
     holdout: Literal["auto"] | Annotated[float, Field(ge=0.05, le=0.5)] = "auto"
     """Share of the samples held out, or auto."""
     lowpass_hz: Annotated[float, Field(ge=1e-3, le=1e6)] | None = None

@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from rig.arrays import Array
 from rig.effects._first_order import lag, remembers, times
 from rig.effects.base import Alike, Effect, Parameter, Place
+
+
+def _led(torque_nm: Array, step_s: float, values: tuple[float, ...]) -> Array:
+    """The equation of the lag, read from the right: torque + time * its slope."""
+    return torque_nm + values[0] * np.gradient(torque_nm, step_s)
+
 
 EFFECT = Effect(
     name="actuator_lag",
@@ -32,5 +41,6 @@ EFFECT = Effect(
             cure="measure the motor current, or add a second sensor",
         )
     },
+    inverse=_led,
     separated_by="from a delay: excite at higher frequencies",
 )

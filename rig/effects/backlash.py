@@ -24,7 +24,9 @@ EFFECT = Effect(
     sign="The gap is symmetric about the zero of the encoder; with a gyro alone, about the rest angle before the run.",
     parameters=(Parameter("half_gap", "rad", "half of the play", low=0.0, high=10.0, suffix="rad", start=_gaps),),
     kernel=_torque,
+    formula="-stiffness_nm_rad * fmin(fmax(angle_rad, -half_gap_rad), half_gap_rad)",
     kinks=lambda values: (-values[0], values[0]),
     leans_on=("stiffness",),
+    stays="where in its gap the platform rests nobody knows before the run",
     separated_by="from cubic stiffness and cogging: excite at a small and at a large amplitude",
 )

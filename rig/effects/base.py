@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numba
 from numba import types
 
+from rig.arrays import Array
 from rig.channels import Channel
 
 KERNEL_SIGNATURE = types.float64(
@@ -157,6 +158,20 @@ class Effect:
     sought_alone: bool = False  # never proposed in a pair: with some shape it fits what any other effect leaves
     separated_by: str = ""  # "from RIVAL: experiment, as an imperative; from ..."
     reads: Channel | None = None  # the measured channel that it is an effect of
+    # Of a DRIVE effect: torque wanted behind it, (n,) at even steps of so many s, and its values -> torque to ask for.
+    inverse: Callable[[Array, float, tuple[float, ...]], Array] | None = None
+    ahead_s: Callable[[tuple[float, ...]], float] | None = None  # by how much earlier the inverse asks for a torque
+    # Its torque (of dry friction its level) in the syntax that C and Python share, of angle_rad, rate_rad_s, torque_nm,
+    # stiffness_nm_rad and its own parameters by their key; empty where it has memory.
+    formula: str = ""
+    foreseen: bool = True  # False: nobody knows before a run what it will do in it (its phase, say)
+    stays: str = ""  # what of it no torque that is computed before a run takes away, and why: one clause
+
+    @property
+    def cancelled_by_torque(self) -> bool:
+        """Whether a torque that is computed before a run can take its part in the motion away, if not all of it."""
+        in_motion = self.place in (Place.LOAD, Place.FRICTION) or self.inverse is not None
+        return in_motion and self.foreseen and self.reads is None
 
     def per_inertia(self, parameter: Parameter) -> bool:
         """Whether a free decay determines only the ratio of a parameter to the inertia, as of every torque."""

@@ -29,6 +29,7 @@ EFFECT = Effect(
         ),
     ),
     kernel=_torque,
+    formula="step_nm_rad * fmax(angle_rad, 0.0)",
     kinks=lambda values: (0.0,),
     separated_by="from quadratic stiffness: excite at a small and at a large amplitude",
 )

@@ -28,6 +28,8 @@ EFFECT = Effect(
     sign="Resisting: it opposes the rate.",
     parameters=(Parameter("level", "N*m", "friction level", linear=True, suffix="nm"),),
     kernel=_level,
+    formula="level_nm",
     other_minima=_others,
+    stays="at standstill friction holds the platform within a band, and where in it nobody knows before the run",
     separated_by="from Stribeck and presliding friction: ramp slowly, hold and release; excite at several amplitudes",
 )

@@ -23,6 +23,7 @@ EFFECT = Effect(
         Parameter("factor", "N*m/rad^3", "torque per angle^3", linear=True, low=-float("inf"), suffix="nm_rad3"),
     ),
     kernel=_torque,
+    formula="factor_nm_rad3 * angle_rad * angle_rad * angle_rad",
     never_separable={"unbalance": SINE},
     separated_by=(
         "from unbalance: turn the base of the platform, or swing farther; "

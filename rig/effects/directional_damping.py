@@ -29,6 +29,7 @@ EFFECT = Effect(
         ),
     ),
     kernel=_torque,
+    formula="step_nm_s_rad * fmax(rate_rad_s, 0.0)",
     lower_order=("torque_offset",),
     separated_by="from damping: move in both directions at several speeds",
 )

@@ -41,6 +41,8 @@ EFFECT = Effect(
     fastest_rad_s=lambda values: 2.0 * math.pi * values[5],
     large_starts=_large,
     resembles_much=True,
+    foreseen=False,
+    stays="its phase in a run is not known before it",
     separated_by=(
         "from harmonics of friction or stiffness: excite at other frequencies; from a spectral line of the sensor "
         "itself (an aliased vibration, pickup): switch the source on with the run, at rest, or add a known inertia in "

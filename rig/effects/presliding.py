@@ -47,5 +47,6 @@ EFFECT = Effect(
     fastest_rad_s=_fastest,
     follows_within_rad=lambda values: values[4],
     nests=("coulomb_friction",),
+    stays="how far the contact is bent when the run begins nobody knows before it",
     separated_by="from Coulomb friction and hysteresis: repeat at a small amplitude",
 )

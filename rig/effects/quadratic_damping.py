@@ -20,5 +20,6 @@ EFFECT = Effect(
     sign="Resisting: it opposes the rate.",
     parameters=(Parameter("factor", "N*m*s^2/rad^2", "drag factor", linear=True, suffix="nm_s2_rad2"),),
     kernel=_torque,
+    formula="factor_nm_s2_rad2 * fabs(rate_rad_s) * rate_rad_s",
     separated_by="from damping: repeat at another amplitude, or record a free decay",
 )

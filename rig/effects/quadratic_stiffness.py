@@ -24,6 +24,7 @@ EFFECT = Effect(
         Parameter("factor", "N*m/rad^2", "torque per angle^2", linear=True, low=-float("inf"), suffix="nm_rad2"),
     ),
     kernel=_torque,
+    formula="factor_nm_rad2 * angle_rad * angle_rad",
     lower_order=("torque_offset",),
     never_separable={"unbalance": COSINE},
     separated_by="from unbalance: turn the base of the platform, or swing farther",

@@ -29,5 +29,7 @@ EFFECT = Effect(
         ),
     ),
     kernel=_torque,
+    foreseen=False,
+    stays="K at the start of a further run is not that of the runs before it",
     separated_by="from cubic stiffness: record longer at constant amplitude",
 )

@@ -30,7 +30,9 @@ EFFECT = Effect(
         Parameter("speed", "rad/s", "Stribeck speed (w_s)", low=1e-4, suffix="rad_s", start=_speeds),
     ),
     kernel=_level,
+    formula="coulomb_nm + (static_nm - coulomb_nm) * exp(-(rate_rad_s / speed_rad_s) * (rate_rad_s / speed_rad_s))",
     ordered=(("coulomb", "static"),),
     nests=("coulomb_friction",),
+    stays="at standstill friction holds the platform within a band, and where in it nobody knows before the run",
     separated_by="from Coulomb friction: spend more time at low speed; ramp slowly, hold and release",
 )

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from rig.arrays import Array
 from rig.effects.base import Effect, Parameter, Place, filter_kernel
 
 
 @filter_kernel
 def _dead(x, step, state, p):  # type: ignore[no-untyped-def]
     return x - min(max(x, -p[0]), p[0])
+
+
+def _beyond(torque_nm: Array, step_s: float, values: tuple[float, ...]) -> Array:
+    """The width added in the direction of the torque; no torque asks for none."""
+    return torque_nm + values[0] * np.sign(torque_nm)
 
 
 EFFECT = Effect(
@@ -30,5 +38,6 @@ EFFECT = Effect(
     ),
     kernel=_dead,
     bends_torque=True,
+    inverse=_beyond,
     separated_by="from backlash and Coulomb friction: excite at several frequencies",
 )

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from rig.arrays import Array
 from rig.effects.base import Effect, Parameter, Place, filter_kernel
 
 
@@ -27,6 +30,12 @@ def _delay(x, step, state, p):  # type: ignore[no-untyped-def]
     )
 
 
+def _earlier(torque_nm: Array, step_s: float, values: tuple[float, ...]) -> Array:
+    """The torque asked for by the delay earlier; nothing is wanted behind the last value."""
+    time_s = step_s * np.arange(len(torque_nm))
+    return np.interp(time_s + values[0], time_s, torque_nm, right=0.0)
+
+
 EFFECT = Effect(
     name="torque_delay",
     family="drive",
@@ -49,5 +58,7 @@ EFFECT = Effect(
     ),
     kernel=_delay,
     filter_states=lambda step_s, values: int(values[0] / step_s) + 6,
+    inverse=_earlier,
+    ahead_s=lambda values: values[0],
     separated_by="from damping: excite at several frequencies; from a lag: excite at higher frequencies",
 )

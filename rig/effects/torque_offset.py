@@ -21,5 +21,6 @@ EFFECT = Effect(
     sign="Resisting: a positive level pushes towards negative angles.",
     parameters=(Parameter("level", "N*m", "constant torque", linear=True, low=-float("inf"), suffix="nm"),),
     kernel=_torque,
+    formula="level_nm",
     separated_by="from asymmetric friction: move in both directions; use an encoder, or a platform without a spring",
 )

@@ -34,5 +34,6 @@ EFFECT = Effect(
     ),
     kernel=_clip,
     bends_torque=True,
+    stays="above its limit the drive gives no more torque",
     separated_by="from cubic stiffness: excite at several frequencies with the same torque amplitude",
 )

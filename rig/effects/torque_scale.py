@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from rig.arrays import Array
 from rig.effects.base import Effect, Parameter, Place, filter_kernel
 
 
 @filter_kernel
 def _scaled(x, step, state, p):  # type: ignore[no-untyped-def]
     return x * p[0]
+
+
+def _divided(torque_nm: Array, step_s: float, values: tuple[float, ...]) -> Array:
+    return torque_nm / values[0]
 
 
 EFFECT = Effect(
@@ -31,5 +36,6 @@ EFFECT = Effect(
     ),
     kernel=_scaled,
     needs_added_inertia=True,
+    inverse=_divided,
     separated_by="from J, C and K: add a known inertia in some runs (added_inertia_kg_m2)",
 )

@@ -18,6 +18,7 @@ from identify.report.page.first import first_screen
 from identify.report.page.markup import Markup, Piece, bullets, element, folded, join, paragraph, section
 from identify.report.page.motion import RUNS, motion_figures
 from identify.report.page.origin import origin
+from identify.report.page.proof import proof_section
 from identify.report.page.residual import residual_figures
 from identify.report.page.response import response_figure
 from identify.report.page.spectrum import spectrum_figures
@@ -49,6 +50,7 @@ def report_html(identification: Identification, recording: Recording, name: str)
             _verdict(identification, recording, gallery),
             _errors(identification, gallery),
             _candidates(identification),
+            proof_section(identification, gallery),
             _response(identification, recording, gallery),
             _sets(identification, recording, gallery),
             _motion(identification, gallery),

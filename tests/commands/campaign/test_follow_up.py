@@ -17,7 +17,7 @@ REPLAY = ("bench.replay=somewhere",)
 
 
 def refused(monkeypatch: pytest.MonkeyPatch, terminal: bool, *overrides: str, emulate: bool = False) -> str:
-    monkeypatch.setattr("commands.campaign.follow_up._on_terminal", lambda: terminal)
+    monkeypatch.setattr("commands.campaign.follow_up.on_terminal", lambda: terminal)
     nothing = cast(Any, None)
     context = CommandContext(Options(BENCH, emulate=emulate), nothing, nothing)
     with pytest.raises(UsageError) as caught:

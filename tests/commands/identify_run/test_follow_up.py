@@ -82,7 +82,7 @@ def test_at_a_terminal_the_question_decides(
     tmp_path: Path, stub: Stub, monkeypatch: pytest.MonkeyPatch, answer: str, runs: int
 ) -> None:
     stub(doubtful(), sure())
-    monkeypatch.setattr("commands.campaign.follow_up._on_terminal", lambda: True)
+    monkeypatch.setattr("commands.campaign.follow_up.on_terminal", lambda: True)
     monkeypatch.setattr("commands.campaign.playing._ask", lambda question: answer)
     out = tmp_path / "out"
     done = command(app, write_config(tmp_path), "--yes", "--out", out)
@@ -119,8 +119,8 @@ def test_without_yes_real_torque_is_asked_for_each_time(
     def consent(statement: Statement, yes: bool, is_terminal: bool, ask: Callable[[str], str]) -> None:
         asked.append(f"{statement.torque.value}, yes {yes}")
 
-    monkeypatch.setattr("commands.campaign.follow_up.ask_consent", consent)
-    monkeypatch.setattr("commands.campaign.follow_up._on_terminal", lambda: True)
+    monkeypatch.setattr("commands.campaign.consent.ask_consent", consent)
+    monkeypatch.setattr("commands.campaign.follow_up.on_terminal", lambda: True)
     out = tmp_path / "out"
     assert command(app, write_config(tmp_path), "--yes", "--out", out).exit_code == 0
     assert asked == ["REAL, yes False"]  # --yes is no answer where the file says ask

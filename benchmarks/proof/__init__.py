@@ -1,0 +1,1 @@
+"""The proof on rigs whose truth is known: what stays of every effect, and what becomes of wrong names."""

@@ -1,0 +1,223 @@
+"""The runs of a proof: every set without and with compensation, drift shared, within the limits of the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+from identify.proof.compensation import cancelled, compensated
+from identify.proof.deviation import deviation, share_left, simulated_run
+from identify.proof.drive import Drive
+from identify.proof.seen import expected_peaks
+from rig import effects
+from rig.errors import PreflightRefusal
+from rig.excitation import PlannedSet
+from rig.platform import Platform
+from rig.preflight import Peaks, predict
+from rig.recording.run import Run
+
+ALL, PLAIN = "all", "plain"
+SMALLEST = 0.02  # share of a set's torque below which it is not worth playing
+ATTEMPTS = 12
+# Of the travel and the rate that a campaign may use. A compensated platform is damped less than before, so that it
+# rings on from wherever friction or a gap held it when the set began: with 1 N m on 681 N m/rad that took 0.25 deg of a
+# travel of 10 deg (`rig prove` on the default campaign), and the guard adds what the gyro may have drifted.
+RESERVE = 0.92
+BACK_OFF = 0.98  # below what the pre-flight allows, for a compensation that does not shrink in proportion
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One run of a proof.
+
+    ``variant`` is "plain", "all" (all effects compensated), the name of the effect that alone is not, or
+    "effect / rival" where a rival is compensated in the place of a name.
+    """
+
+    set: str
+    variant: str
+    planned: PlannedSet
+
+
+class Announced(NamedTuple):
+    """By a model's own account: the share of the error that stays, and the error without compensation (rms)."""
+
+    left: float
+    error: float
+
+
+@dataclass(frozen=True)
+class ProofPlan:
+    """What a proof plays, and what its model says will come of it.
+
+    Parameters
+    ----------
+    runs
+        In the order in which they are played.
+    models
+        The model behind each variant.
+    announced
+        Variant -> set -> what its model says of it (see ``pair_of``).
+    torque_scale
+        Set -> the factor on its torque, where it had to be reduced.
+    """
+
+    runs: tuple[PlannedRun, ...]
+    models: Mapping[str, Platform]
+    announced: Mapping[str, Mapping[str, Announced]]
+    torque_scale: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def sets(self) -> tuple[PlannedSet, ...]:
+        """What the sequencer plays."""
+        return tuple(run.planned for run in self.runs)
+
+    def of(self, name: str, variant: str) -> PlannedSet:
+        """The planned set of a variant of a set."""
+        return next(run.planned for run in self.runs if run.set == name and run.variant == variant)
+
+    @property
+    def set_names(self) -> tuple[str, ...]:
+        """The sets, in the order of the campaign."""
+        return tuple(dict.fromkeys(run.set for run in self.runs))
+
+    @property
+    def variants(self) -> tuple[str, ...]:
+        """All but the plain one."""
+        return tuple(self.models)
+
+
+def variants_of(model: Platform, rivals: Mapping[str, Platform]) -> dict[str, tuple[Platform, tuple[str, ...]]]:
+    """Variant -> the model that compensates, and the effects that it leaves out."""
+    names = cancelled(model)
+    single = {name: (model, (name,)) for name in names} if len(names) > 1 else {}
+    return {ALL: (model, ()), **single, **{name: (rival, ()) for name, rival in rivals.items()}}
+
+
+Models = Mapping[str, tuple[Platform, tuple[str, ...]]]
+
+
+def plan_proof(
+    model: Platform, sets: Sequence[PlannedSet], allowed: Peaks, drive: Drive, *, angle: bool = False,
+    rivals: Mapping[str, Platform] | None = None, prefix: str = "proof", recorded: Sequence[Run] = (),
+) -> ProofPlan:  # fmt: skip
+    """Every set without and with compensation, and with each effect left out once where there are several.
+
+    The order turns round from set to set, so that what drifts falls on all variants. Every run is held against the
+    limits on its model, that of a rival on both, and by the recorded run of its set; where one breaks them the torque
+    of the whole set is reduced.
+
+    Parameters
+    ----------
+    model
+        The identified platform: what is compensated.
+    allowed
+        Travel, rate and torque that a campaign may use; a proof leaves some of it (``RESERVE``).
+    angle
+        Whether an encoder reads the motion.
+    rivals
+        "effect / rival" -> the model with the rival in the place of the effect.
+    recorded
+        The campaign: a run of the name of a set tells how the platform moves in that set, whatever the model says.
+
+    Raises
+    ------
+    PreflightRefusal
+        Where a set breaks a limit at any torque worth playing.
+    """
+    models = variants_of(model, rivals or {})
+    allowed = allowed._replace(travel_deg=RESERVE * allowed.travel_deg, rate_deg_s=RESERVE * allowed.rate_deg_s)
+    runs: list[PlannedRun] = []
+    scales: dict[str, float] = {}
+    told: dict[str, dict[str, Announced]] = {variant: {} for variant in models}
+    for number, asked in enumerate(sets):
+        run = next((r for r in recorded if r.name == asked.name), None)
+        made, factor = _within(asked, models, allowed, drive, prefix, run)
+        if factor < 1.0:
+            scales[asked.name] = factor
+        order = list(made) if number % 2 == 0 else list(reversed(made))
+        runs += [PlannedRun(asked.name, variant, made[variant]) for variant in order]
+        for variant, (of, _) in models.items():
+            without, better = pair_of(variant)
+            told[variant][asked.name] = announced(of, made[without], made[better], drive, angle)
+    return ProofPlan(tuple(runs), {v: of for v, (of, _) in models.items()}, told, scales)
+
+
+def pair_of(variant: str) -> tuple[str, str]:
+    """The two variants whose errors say what one is worth: all effects and a rival against none, a name left out."""
+    return (PLAIN, variant) if variant == ALL or " / " in variant else (variant, ALL)
+
+
+def _within(
+    asked: PlannedSet,
+    models: Mapping[str, tuple[Platform, tuple[str, ...]]],
+    allowed: Peaks,
+    drive: Drive,
+    prefix: str,
+    run: Run | None,
+) -> tuple[dict[str, PlannedSet], float]:
+    """All variants of a set with the largest torque, of those tried, that passes on all; and the factor on it."""
+    factor = 1.0
+    for _ in range(ATTEMPTS):
+        made = _made(asked.scaled(factor), models, drive, prefix)
+        worst = min(_allowed_share(s, variant, models, allowed) for variant, s in made.items())
+        if run is not None:
+            seen = [expected_peaks(run, asked.scaled(factor), s, models[ALL][0]) for s in made.values()]
+            worst = min(worst, *(_share_within(peaks, allowed) for peaks in seen if peaks is not None), 1.0)
+        if worst >= 1.0:
+            return made, factor
+        factor *= BACK_OFF * worst
+        if not factor > SMALLEST:
+            break
+    raise PreflightRefusal(
+        f"{asked.name}: no torque above {100 * SMALLEST:g} % of the set stays within the limits once it is "
+        f"compensated (travel {allowed.travel_deg:g} deg, rate {allowed.rate_deg_s:g} deg/s, torque "
+        f"{allowed.torque_nm:g} N m); nothing was moved. Raise the limit under limits: if the machine allows it."
+    )
+
+
+def _share_within(peaks: Peaks, allowed: Peaks) -> float:
+    return min(limit / value for value, limit in zip(peaks, allowed, strict=True) if value > 0.0)
+
+
+def _made(plain: PlannedSet, models: Models, drive: Drive, prefix: str) -> dict[str, PlannedSet]:
+    made = {PLAIN: replace(plain, name=f"{prefix}: {plain.name}")}
+    for variant, (model, left_out) in models.items():
+        made[variant] = compensated(model, plain, f"{prefix}: {plain.name}, {_words(variant)}", drive, left_out)
+    return made
+
+
+def _words(variant: str) -> str:
+    if variant == ALL:
+        return "compensated"
+    return f"{variant.split(' / ')[1]} compensated" if " / " in variant else f"all but {variant}"
+
+
+def _allowed_share(planned: PlannedSet, variant: str, models: Models, allowed: Peaks) -> float:
+    """The factor on a run with which it stays within the limits, on its own model and on the identified one."""
+    own = {id(model): model for model, _ in (models[ALL if variant == PLAIN else variant], models[ALL])}
+    return min(predict(on, planned, allowed).scale for on in own.values())
+
+
+def announced(model: Platform, plain: PlannedSet, better: PlannedSet, drive: Drive, angle: bool) -> Announced:
+    """What stays of the error against the linear model by the model's own account; nothing where there was none."""
+    several = [deviation(simulated_run(s, model, drive, angle), s, model, QUIET) for s in (plain, better)]
+    share = share_left([(several[0], several[1], plain.duration_s)])
+    return Announced(share.left if share is not None else 0.0, several[0].rms)
+
+
+QUIET = 1e-9  # noise of a simulated sensor in the unit of its channel: far below what any effect does
+
+
+def not_cancelled(model: Platform) -> dict[str, str]:
+    """Effects of a model that a proof does not touch, and why."""
+    return {
+        name: effects.get(name).stays or _no_torque(name) for name in model.effects
+        if not effects.get(name).cancelled_by_torque
+    }  # fmt: skip
+
+
+def _no_torque(name: str) -> str:
+    read = effects.get(name).reads
+    return f"what {read.name} reads is not known before the run" if read is not None else "no torque takes it away"

@@ -1,0 +1,136 @@
+"""A set with a compensating torque on top, which a model gave as a table over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rig.arrays import Array
+from rig.excitation.base import ExcitationSet
+from rig.excitation.planned import PlannedSet
+
+NEAR = np.array([0, -1, 1, -2, 2])  # ticks, the likeliest first
+ON_TIME = 1e-3  # of a tick: rounding of its instant
+
+
+@dataclass(frozen=True)
+class TorqueTable:
+    """A torque at even steps from the start of a run, straight in between, zero before and behind.
+
+    Parameters
+    ----------
+    step_s
+        Between two values.
+    torque_nm
+        Shape (n,).
+    """
+
+    step_s: float
+    torque_nm: Array
+
+    def at(self, time_s: Any) -> Any:
+        """Torque in N m at seconds since the start of the run; a float or an array of any shape."""
+        place = np.asarray(time_s, dtype=float) / self.step_s
+        last = len(self.torque_nm) - 1
+        first = np.clip(place.astype(np.int64), 0, last - 1)
+        share = place - first
+        between = self.torque_nm[first] + share * (self.torque_nm[first + 1] - self.torque_nm[first])
+        return between * ((place >= 0.0) & (place <= last))
+
+
+@dataclass(frozen=True)
+class HeldCommands:
+    """A torque for every tick from the start of a run, held until the next one; zero before and behind.
+
+    Parameters
+    ----------
+    tick_s
+        Between two commands.
+    torque_nm
+        Shape (n,).
+    """
+
+    tick_s: float
+    torque_nm: Array
+
+    def at(self, time_s: Any) -> Any:
+        """Torque in N m at seconds since the start of the run; a float or an array of any shape."""
+        tick = np.floor(np.asarray(time_s, dtype=float) / self.tick_s + ON_TIME).astype(np.int64)
+        inside = (tick >= 0) & (tick < len(self.torque_nm))
+        return self.torque_nm[np.clip(tick, 0, len(self.torque_nm) - 1)] * inside
+
+    def asked_at(self, time_s: Array, recorded_nm: Array) -> Array:
+        """The tick of the command behind each recorded torque, in s, (n,): of those around it the one of that value.
+
+        A late tick sends the command of its instant, and a drive stamps what it applied by its own clock.
+        """
+        nearest = np.rint(time_s / self.tick_s).astype(np.int64)
+        around = np.clip(nearest[:, None] + NEAR, 0, len(self.torque_nm) - 1)
+        off = np.abs(self.torque_nm[around] - recorded_nm[:, None])
+        ticks: Array = np.take_along_axis(around, np.argmin(off, axis=1)[:, None], axis=1)[:, 0] * self.tick_s
+        return ticks
+
+
+class CompensatedSet(ExcitationSet):
+    """A set as planned, begun ``lead_s`` after its run does, and a compensating torque over the whole run.
+
+    No rig.yaml declares one: what compensates a set comes from an identified model.
+    """
+
+    plain: Any
+    """The set without compensation, a PlannedSet."""
+    lead_s: float
+    """By how much later than the run the set begins, s: a delay of the drive asks for torque before it is wanted."""
+    compensation: Any
+    """The further torque, a TorqueTable from the start of the run."""
+    early_s: float = 0.0
+    """By how much later than it is recorded a torque reaches the shaft, s."""
+    latency_s: float = 0.0
+    """By how much later than it is asked for a torque is recorded, s."""
+    commands: Any = None
+    """The whole torque as held commands, where a drive rounds what it is asked for; or None."""
+
+    @property
+    def sine_hz(self) -> float | None:
+        """The frequency of the set without compensation, where that is a single sine."""
+        planned: PlannedSet = self.plain
+        return planned.frequency_hz
+
+    def describe(self) -> str:
+        """ "0.5 Hz, compensated"."""
+        return f"{self.plain.name}, compensated"
+
+    def shape(self, time_s: Any) -> Any:
+        """Torque in N m."""
+        if self.commands is not None:
+            return self.commands.at(time_s)
+        return self.plain.torque(time_s - self.lead_s) + self.compensation.at(time_s)
+
+    def set_torque(self, time_s: Array, recorded_nm: Array) -> tuple[Array, Array]:
+        """What of a recorded torque is the set, as it reaches the shaft: instants in s since the start, and N m, (n,).
+
+        All by which the recorded torque differs from the planned one (rounding, late ticks) stays in it.
+        """
+        asked_s = time_s - self.latency_s
+        if self.commands is not None:
+            asked_s = self.commands.asked_at(asked_s, recorded_nm)
+            wanted = self.plain.torque(asked_s + self.latency_s + self.early_s - self.lead_s)
+            exact = self.plain.torque(asked_s - self.lead_s) + self.compensation.at(asked_s)
+            return time_s + self.early_s, wanted + recorded_nm - exact
+        planned = self.plain.torque(asked_s - self.lead_s) + self.compensation.at(asked_s)
+        at_shaft_s = time_s + self.early_s
+        return at_shaft_s, self.plain.torque(at_shaft_s - self.lead_s) + recorded_nm - planned
+
+    @classmethod
+    def of(
+        cls, plain: PlannedSet, name: str, lead_s: float, compensation: TorqueTable, early_s: float = 0.0,
+        latency_s: float = 0.0, commands: HeldCommands | None = None,
+    ) -> PlannedSet:  # fmt: skip
+        """The planned set of that name that plays ``plain`` with its compensation."""
+        made = cls(
+            name=name, duration_s=plain.duration_s + lead_s, use=plain.use, plain=plain, lead_s=lead_s,
+            compensation=compensation, early_s=early_s, latency_s=latency_s, commands=commands,
+        )  # fmt: skip
+        return PlannedSet(made.title, made)
