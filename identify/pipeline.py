@@ -384,8 +384,10 @@ class _Identifier:
         damping, error = fuller.values[("damping",)], fuller.std_error(("damping",))
         late = any(effects.get(e).place in (Place.DRIVE, Place.SENSOR) for e in fitted.structure.effects)
         shows = damping > 0.0 if late else damping > SHOWS * error
-        if not fuller.sensor_limited or not shows:
+        if not fuller.sensor_limited:
             return fitted
+        if not shows:
+            return fitted.as_uncertain_as(fuller)
         search.dropped[:] = [d for d in search.dropped if d[0] != "damping"]
         self.say(f"restored damping: {damping:.4g} +- {error:.2g} over whole runs")
         return fuller

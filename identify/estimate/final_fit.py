@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -64,6 +64,21 @@ class Fitted:
         """One standard error."""
         i = self.names.index(name)
         return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+
+    def as_uncertain_as(self, fuller: Fitted) -> Fitted:
+        """The same where a term was left out that may be there: as uncertain as the fit that has it, if that is more.
+
+        A platform without damping rings on, and follows the noise closely with any inertia.
+        """
+        at = [fuller.names.index(n) for n in self.names]
+        theirs = fuller.covariance[np.ix_(at, at)]
+        told = tuple(a and fuller.determined[i] for a, i in zip(self.determined, at, strict=True))
+        size = np.sqrt(np.maximum(np.diag(theirs), 1e-300))
+        if not (np.all(np.isfinite(theirs)) and np.all(np.isfinite(self.covariance))):
+            return replace(self, covariance=np.where(np.isfinite(theirs), self.covariance, theirs), determined=told)
+        values, vectors = np.linalg.eigh((theirs - self.covariance) / np.outer(size, size))
+        more = (vectors * np.maximum(values, 0.0)) @ vectors.T
+        return replace(self, covariance=self.covariance + more * np.outer(size, size), determined=told)
 
 
 def noise_of_all(traces: Sequence[Trace]) -> float:

@@ -96,7 +96,7 @@ class LikelihoodSearch:
         base = s.base
         horizon = horizon_s(tuple(base.values.get((t,), 0.0) for t in TERMS), self.traces)  # type: ignore[arg-type]
         noise = float(np.sqrt(np.mean([t.noise**2 for t in self.traces])))
-        found = Search(_judged(base), _judged(best), horizon, noise, free_running=True)
+        found = Search(_judged(base, noise), _judged(best, noise), horizon, noise, free_running=True)
         named = [e for e in best.structure.effects if e not in base.structure.effects]
         for r in s.rounds:
             for score in r.scores:
@@ -121,9 +121,12 @@ def _status(name: str, chosen: str | None, named: Sequence[str], fit: Fit | None
     return "no better" if chosen else "not worth it"
 
 
-def _judged(fit: Fit) -> Judged:
-    """A fit as the final fits and the report see it."""
-    noise = float(np.sqrt(fit.variance * disturbed(fit)))
+def _judged(fit: Fit, noise: float) -> Judged:
+    """A fit as the final fits and the report see it; ``noise`` is the sensor's, as the runs show it.
+
+    A large disturbance that follows every reading leaves a fit no noise of the sensor to tell.
+    """
+    noise = float(np.sqrt(max(fit.variance, noise**2) * disturbed(fit)))
     estimate = Estimate(
         fit.structure, fit.names, fit.vector, noise, fit.count, fit.information, fit.shots, True
     )  # fmt: skip

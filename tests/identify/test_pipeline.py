@@ -233,3 +233,12 @@ def test_a_known_added_inertia_tells_the_torque_scale(scale: float, named: tuple
     assert ("The known added inertia shows" in said) == (not named)
     assert found.accepted, found.reasons
     assert found.set_scatter["stiffness"] < 1.0
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_without_damping_that_may_be_there_the_inertia_is_not_told_from_noise(seed: int) -> None:
+    """A soft start hardly rings. A model without damping rings on and on, and follows the noise with any inertia."""
+    run = sine_run(50.0, 0.5, duration_s=8.0, noise=0.004, seed=seed, soft_s=6.0, jck=(0.02, 0.05, 650.0))
+    found = identify(Recording((run,)), Platform(0.02, 0.05, 650.0), SETTINGS)
+    assert not found.accepted
+    assert "inertia" in {n.name for n in found.final.not_determined}

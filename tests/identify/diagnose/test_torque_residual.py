@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from identify.diagnose.torque_residual import motion, relative, residual_lines_hz, torque_noise_floor, torque_residual
+from identify.diagnose.torque_residual import motion, relative, torque_noise_floor, torque_residual
 from identify.estimate.output_error import Name
 from identify.model.structure import Structure
 from identify.signals.low_pass import low_pass
@@ -108,15 +108,6 @@ def test_a_run_without_torque_has_no_torque_residual() -> None:
     run = replace(sine_run(104, 3), torque_nm=None, torque_time_s=None)
     assert torque_residual(prepare(run), Structure(), JCK, 100.0) is None
     assert relative([None], [np.ones(3, bool)]) is None
-
-
-def test_the_line_of_a_neighbours_pump_is_found_to_a_tenth_of_a_hertz() -> None:
-    from identify.estimate.judged import judge  # noqa: PLC0415
-
-    run = sine_run(104, 3, effects={"periodic_disturbance": {"sine": 0.5, "cosine": 0.3, "frequency": 13.37}})
-    traces = [prepare(run)]
-    judged = judge(traces, traces, Structure(), JCK, 0.3, 3)
-    assert min(abs(f - 13.37) for f in residual_lines_hz(traces, judged)) < 0.1
 
 
 def test_the_low_pass_is_the_butterworth_that_its_name_says() -> None:

@@ -31,5 +31,5 @@ def test_a_slow_gyro_promises_what_it_explains_though_the_disturbance_hides_it_a
     scale = scale_of(problem.traces, TRUTH, ())
     scores = {v[0].effect: v[0].gain for v in InnovationScores(problem, now, scale).all(["sensor_lag", "creep"])}
     assert now.cost - right.cost > 100.0
-    assert scores["sensor_lag"] > 0.1 * (now.cost - right.cost)
+    assert scores["sensor_lag"] > 100.0, "what chance makes is far below that; it was zero"
     assert np.isfinite(scores["creep"])
