@@ -11,28 +11,24 @@ from threadpoolctl import threadpool_limits
 from identify.conclude.case import Case
 from identify.conclude.conclusion import conclude
 from identify.conclude.contribution import contributions
-from identify.conclude.decay_disturbance import left_of_a_decay
 from identify.conclude.declared_values import declared_values
 from identify.conclude.error_figures import floor_of, in_torque, measure
+from identify.conclude.final_models import FinalModels
 from identify.conclude.next_steps import interrupted_reason
-from identify.estimate.final_fit import Fitted, by_output_error, by_regression
+from identify.diagnose.decay_disturbance import left_of_a_decay
+from identify.estimate.final_fit import Fitted
 from identify.estimate.initial_guess import Start, first_guess
-from identify.estimate.judged import Judged
 from identify.genetic.per_set import each_set
-from identify.likelihood.by_prediction_error import by_prediction_error
-from identify.model.parameters import Name
 from identify.model.structure import Structure, shape_values
 from identify.results import (
     UNITS,
     Dependence,
     Identification,
-    ParameterEstimate,
     SetResult,
 )
-from identify.rivals import run_heterogeneity
 from identify.rivals.coloured_noise import Colour, with_noise_known
+from identify.rivals.doubts import Doubts
 from identify.rivals.tone_origin import TONE, standing_line, told
-from identify.rivals.whiteness_test import too_much_for
 from identify.rivals.whole_runs import WholeRuns
 from identify.runs.clipping import full_scale_of
 from identify.runs.holdout import Split, split
@@ -40,25 +36,22 @@ from identify.runs.measured_channels import offer_of, with_causes
 from identify.runs.observability import why_unseen
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
 from identify.runs.usable import runs_used
-from identify.select.evidence import APART
 from identify.select.field_search import Found, search_in_torque, with_curve
 from identify.select.left_over import dependence_on
 from identify.select.likelihood_search import LikelihoodSearch
 from identify.select.search_state import Search
+from identify.select.torque_choice import begun
 from identify.signals.prepare import channels_of, prepare
-from identify.signals.torque_noise import quieter
-from identify.signals.trace import Trace, loads_differ
+from identify.signals.trace import Trace
 from rig import effects
 from rig.config.identify import IdentifyConfig
-from rig.effects.base import Place
 from rig.errors import Aborted
-from rig.platform import TERMS, Platform
+from rig.platform import Platform
 from rig.recording.run import Recording
 
 NOTHING_YET = (
     "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
 )
-SHOWS = 5.0  # standard errors from zero at which whole runs show damping
 
 
 def identify(
@@ -146,6 +139,7 @@ class _Identifier:
             search = self._begun()
             at_noise = search.run() or self.colour is not None
             found, fits = search.found, WholeRuns(self.traces, self.split)
+            doubts = Doubts(self.traces, fits, self.structure, self.recording.axis, self.say)
             both = all(t.beside is not None for t in self.traces)
             behind_a_lag = any(effects.get(e).lag is not None for e in found.best.structure.effects)
             noisy = self.torque_noise_above_hz is not None  # some of which is left in the band of the motion
@@ -154,9 +148,9 @@ class _Identifier:
             if self.torque_free:
                 left = search.stepwise.left
                 self.curve = dependence_on(search.stepwise, left) if left is not None else None
-                return self._concluded(found, fits)
-            if (white and nothing_left) or self._other_cause(found, fits):
-                return self._concluded(found, fits)
+                return self._concluded(found, doubts)
+            if (white and nothing_left) or doubts.other_cause(found):
+                return self._concluded(found, doubts)
             self.say("a torque that was not recorded is left beside the sensor's noise")
             self.more_than_noise = True
             return self._in_torque(shapes, search, found)
@@ -174,41 +168,36 @@ class _Identifier:
                 self._allowed(), self.say,
             )  # fmt: skip
 
-        search, less = begin(self.traces), None if self.torque_free else quieter(self.traces)
-        if less is None:
+        search, cutoff_hz = begun(self.traces, begin)
+        if cutoff_hz is None:
             return search
-        traces, cutoff_hz = less
-        other = begin(traces)
-        if other.stepwise.base.cost > search.stepwise.base.cost - APART:
-            return search
-        self.traces, self.torque_noise_above_hz = traces, cutoff_hz
-        self.start = replace(first_guess(traces, Structure(self.declared.terms)), cutoff_hz=self.start.cutoff_hz)
+        self.traces, self.torque_noise_above_hz = list(search.traces), cutoff_hz
+        self.start = replace(first_guess(self.traces, Structure(self.declared.terms)), cutoff_hz=self.start.cutoff_hz)
         torque = "force" if self.recording.axis == "linear" else "torque"
         told = (
             f"the recorded {torque} is filtered: above {cutoff_hz:.3g} Hz it is noise that the platform does not follow"
         )
         self.left_out = (*self.left_out, told)
         self.say(told)
-        return other
+        return search
 
-    def _other_cause(self, found: Search, fits: WholeRuns) -> bool:
-        """Whether no effect but a few runs whose torque was another may be what is left."""
-        return self._apart(found, fits, found.best.structure, found.best.values()) is not None
-
-    def _concluded(self, search: Search, fits: WholeRuns) -> Identification:
+    def _concluded(self, search: Search, doubts: Doubts) -> Identification:
         """Final fits, what else might pass for what was found, and the report."""
-        before = self._before(search)
-        after = self._after(search) if search.best.structure != self.structure else before
-        after = self._doubted(search, fits, before, after)
+        models, changed = self._models(), search.best.structure != self.structure
+        before = models.before(search)
+        after = models.after(search) if changed else before
+        if doubts.leave_open(search, after):
+            after = models.after(search) if search.best.structure != self.structure else before
         named = [e for e in after.structure.effects if e not in self.structure.effects]
         base = search.base.values()
-        search.contribution = contributions(fits, after.structure, after.values, named, base, search.horizon)
+        search.contribution = contributions(doubts.fits, after.structure, after.values, named, base, search.horizon)
         return self._report(search, before, after)
 
     def _stopped(self, search: Search) -> Identification:
         """What there is where somebody stops the search."""
         self.say("stopped: reporting what was found so far")
-        found = self._report(search, self._regressed(search.base), self._regressed(search.best), in_full=False)
+        models = self._models()
+        found = self._report(search, models.regressed(search.base), models.regressed(search.best), in_full=False)
         if not found.verdict.effects:  # the search may have been about to name what this model lacks
             found = replace(found, verdict=replace(found.verdict, sentences=(NOTHING_YET,)))
         return replace(found, aborted=True, accepted=False, reasons=(interrupted_reason(found.verdict.effects),))
@@ -232,6 +221,9 @@ class _Identifier:
             found, after = found.taken_back(), found.before
         return self._report(found.search, found.before, after, measured=found)
 
+    def _models(self) -> FinalModels:
+        return FinalModels(self.traces, self.split, self.declared, self.structure, self.start, self.say)
+
     def _allowed(self) -> list[str]:
         """Names of the effects that may be named, in all their forms."""
         asked = self.settings.candidates
@@ -240,44 +232,6 @@ class _Identifier:
             if effects.get(n).reads is None or n in self.offer.candidates
         ]  # fmt: skip
         return [form for n in names for form in (n, *effects.forms(n))]
-
-    def _doubted(self, search: Search, fits: WholeRuns, before: Fitted, after: Fitted) -> Fitted:
-        """The final fit, or another one where something else may pass for what was found."""
-        line = standing_line(after, self.traces) if TONE not in self.structure.effects else None
-        named = after.structure, after.values
-        apart = self._apart(search, fits, *named) if line is None or line.of_torque else None
-        if apart is not None:
-            search.leave_open("", run_heterogeneity.told(apart, self.recording.axis == "linear"), search.base)
-            self.say("no effect is named: the runs disagree with each other, and that alone explains as much")
-        elif line is not None:
-            words = told(line, self.recording.axis, self.traces[0].channel)
-            search.leave_open(TONE, words, self._until(search, fits, TONE))
-            self.say(f"not named: {TONE}; the line may come from the sensor itself")
-        elif too_much_for(after, self.structure.effects):
-            search.take_all_back()
-            self.say("no effect is named: three flexible effects still leave more than noise")
-        else:
-            return after
-        return self._after(search) if search.best.structure != self.structure else before
-
-    def _apart(
-        self, search: Search, fits: WholeRuns, structure: Structure, values: dict[Name, float]
-    ) -> run_heterogeneity.RunsApart | None:  # fmt: skip
-        """What would explain all that the declared model leaves, if it is likelier than what was named."""
-        apart = run_heterogeneity.runs_apart(fits, self.structure, search.base.values())
-        if apart is None or structure == self.structure:
-            return apart
-        named = fits.fitted(structure, values)
-        return apart if named is None or run_heterogeneity.as_likely(apart, named) else None
-
-    @staticmethod
-    def _until(search: Search, fits: WholeRuns, name: str) -> Judged:
-        """The model of what was found before an effect; the declared one where that is nothing."""
-        best, base = search.best.structure, search.base.structure
-        found = best.effects[: best.effects.index(name)]
-        start = {**search.base.values(), **{n: v for n, v in search.best.values().items() if n[0] in (*TERMS, *found)}}
-        fitted = None if set(found) <= set(base.effects) else fits.fitted(replace(base, effects=found), start)
-        return search.base if fitted is None else fitted.judged()
 
     def _report(
         self, search: Search, before: Fitted, after: Fitted, in_full: bool = True,
@@ -316,81 +270,8 @@ class _Identifier:
             self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
             self.declared, self.left_out, self.colour, left,
         )  # fmt: skip
-        scale = self._torque_scale(after) if in_full else None
+        scale = self._models().torque_scale(after) if in_full else None
         return conclude(case, search, before, after, measured_before, measured_after, floor, per_set, joint, scale)
-
-    def _torque_scale(self, fitted: Fitted) -> ParameterEstimate | None:
-        """The shaft's torque over the recorded one, where a known inertia was added for some of the runs."""
-        name = ("torque_scale", "scale")
-        if not fitted.sensor_limited or not loads_differ(self.traces):
-            return None
-        if name not in fitted.names:
-            fitted = by_output_error(
-                self.traces, fitted.structure.plus("torque_scale"), {**fitted.values, name: 1.0}, 1.0,
-                self.split.final, self.split.everything,
-            )  # fmt: skip
-        value, error = fitted.values[name], fitted.std_error(name)
-        if not np.isfinite(error) or not fitted.determined[fitted.names.index(name)]:
-            return None
-        return ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), "1")
-
-    def _before(self, search: Search) -> Fitted:
-        # A decay is judged by its free run, which the regression does not look at.
-        if self.torque_free or search.base.sigma < 2.0 * search.floor:
-            return by_output_error(
-                self.traces, self.structure, search.base.values(), search.horizon,
-                self.split.final, self.split.everything,
-            )  # fmt: skip
-        return self._regressed(search.base)
-
-    def _after(self, search: Search) -> Fitted:
-        """Output error where the model runs free at the sensor's noise; else prediction error with its disturbance."""
-        structure = search.best.structure
-        self.say(f"final fit with {', '.join(structure.effects) or 'fewer terms'}")
-        fitted = by_output_error(
-            self.traces, structure, search.best.values(), search.horizon,
-            self.split.final, self.split.everything,
-        )  # fmt: skip
-        if fitted.sensor_limited:
-            return self._with_dropped_damping(search, fitted)
-        return self._predicted(search.best)
-
-    def _predicted(self, best: Judged) -> Fitted:
-        fitted, _ = by_prediction_error(
-            self.traces, best.structure, best.values(), self.split.final, self.split.everything
-        )  # fmt: skip
-        return fitted
-
-    def _regressed(self, best: Judged) -> Fitted:
-        return by_regression(
-            self.traces, best.structure, best.shapes(), self.start, self.split.final, self.split.everything,
-            best.std_errors(),
-        )  # fmt: skip
-
-    def _with_dropped_damping(self, search: Search, fitted: Fitted) -> Fitted:
-        """The same with damping, where whole runs show what a few periods of the held-out part could not.
-
-        Beside a lag or a delay always: at a few tones below the resonance both turn the phase alike, and without the
-        one the other would be told far more closely than the runs know it.
-        """
-        terms = (*fitted.structure.terms, "damping")
-        if "damping" in fitted.structure.terms or "damping" not in self.declared.terms:
-            return fitted
-        structure = replace(fitted.structure, terms=tuple(t for t in TERMS if t in terms))
-        start = {**fitted.values, ("damping",): 0.0}
-        fuller = by_output_error(
-            self.traces, structure, start, search.horizon, self.split.final, self.split.everything
-        )  # fmt: skip
-        damping, error = fuller.values[("damping",)], fuller.std_error(("damping",))
-        late = any(effects.get(e).place in (Place.DRIVE, Place.SENSOR) for e in fitted.structure.effects)
-        shows = damping > 0.0 if late else damping > SHOWS * error
-        if not fuller.sensor_limited:
-            return fitted
-        if not shows:
-            return fitted.as_uncertain_as(fuller)
-        search.dropped[:] = [d for d in search.dropped if d[0] != "damping"]
-        self.say(f"restored damping: {damping:.4g} +- {error:.2g} over whole runs")
-        return fuller
 
 
 def _plain(declared: Platform, name: str) -> dict[str, float]:

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from identify.api.matplotlib_figure import drawn
-from identify.report.page.convergence import convergence_figure
-from identify.report.page.disturbance import shape_figure
-from identify.report.page.estimates import estimates_figure
-from identify.report.page.figure import Figure
-from identify.report.page.motion import run_figure
-from identify.report.page.residual import residual_figures
-from identify.report.page.response import response_figure
-from identify.report.page.spectrum import spectrum_figures
+from identify.report.page.plots.convergence import convergence_figure
+from identify.report.page.plots.disturbance import shape_figure
+from identify.report.page.plots.estimates import estimates_figure
+from identify.report.page.plots.figure import Figure
+from identify.report.page.plots.motion import run_figure
+from identify.report.page.plots.residual import residual_figures
+from identify.report.page.plots.response import response_figure
+from identify.report.page.plots.spectrum import spectrum_figures
 from identify.results import Identification
 from rig.errors import InputError
 from rig.recording.run import Recording

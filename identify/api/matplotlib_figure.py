@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identify.report.page.figure import Figure, Trace
+from identify.report.page.plots.figure import Figure, Trace
 from rig.arrays import Array
 from rig.errors import MissingPackage
 

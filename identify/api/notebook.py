@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from identify.conclude.next_steps import next_steps
-from identify.report.page.disturbance import disturbance_table
 from identify.report.page.markup import Markup, bullets, element, join, paragraph
+from identify.report.page.plots.disturbance import disturbance_table
 from identify.report.page.tables import error_table, parameter_table
 from identify.results import Identification
 

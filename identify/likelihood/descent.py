@@ -8,29 +8,28 @@ normal matrix, damped as Levenberg did.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from identify.estimate.output_error import held_still
+from identify.likelihood.derivatives import Standpoint, derivatives
 from identify.likelihood.fit import Columns, Fit, Look, Prediction
+from identify.likelihood.normal_equations import Step, changed, logs_of, normal_equations
 from identify.model.parameters import Name, bounds_of, names_of, ordered
 from identify.model.structure import Structure
 from identify.simulate.all_runs import shots_for
-from identify.simulate.shots import RUNAWAY, Shots, moved
+from identify.simulate.shots import RUNAWAY, Shots
 from rig import effects
 from rig.arrays import Array
-from rig.dynamics.gains import RATE, Gains, Noise, innovations_with
+from rig.dynamics.gains import RATE, Noise
 from rig.effects.base import Place
 
 if TYPE_CHECKING:
     from identify.likelihood.prediction_error import PredictionError
 
 STEP = 1e-6  # relative step of the differences
-NOISE_STEP = 0.02  # of a logarithm of the noise, in its differences
-FARTHEST = 4.0  # by which a logarithm of the noise may fall in one step
-RISE = 1e12  # times itself, that a number of the noise may become in one step
 ENOUGH = 0.5  # fall of the cost below which a fit has arrived
 TRIALS = 7  # step lengths tried before a direction is given up
 DAMPING = 1e-4
@@ -45,15 +44,6 @@ FURTHER = (  # times white density, slow variance and time constant: where else 
     (1.0, 1.0, 10.0),
 )  # fmt: skip
 QUIETER = (1e-4, 1e-3, 1e-2, 0.1)  # times torque and slow error of an encoder together: the rest is read white
-
-
-@dataclass(frozen=True)
-class _Step:
-    """What a step is solved from: normal matrix and right side, and how each run's own unknowns follow."""
-
-    matrix: Array
-    right: Array
-    own: Sequence[tuple[Array, Array]]  # (k, p) and (k,): what they lose with a change, and take without one
 
 
 class Descent:
@@ -177,95 +167,18 @@ class Descent:
         return float(self.count * np.log(squares / self.count) + log)
 
     def _all_columns(self, of_noise: bool) -> list[tuple[Columns, Array, Array]]:
-        """Every run's derivatives; the predictions they need side by side, of all runs and parameters."""
+        """Every run's derivatives, where the descent stands."""
         free = [k for k in range(len(self.names)) if not self.still[k]]
-        tasks = [
-            (i, k) for i, s in enumerate(self.shots) for k in free
-            if len(self.names[k]) < 3 or int(self.names[k][2]) == s.number
-        ]  # fmt: skip
-        moved = dict(zip(tasks, self.problem.workers.map(lambda t: self._moved(*t), tasks), strict=True))
-        return list(self.problem.workers.map(lambda i: self._columns(i, moved, of_noise), range(len(self.shots))))
+        there = Standpoint(self.problem, self.structure, self.names, self.x, self.noise, self.shots, self.looks)
+        steps = STEP * self.scale * np.where(self.x + STEP * self.scale > self.high, -1.0, 1.0)
+        return derivatives(there, dict(zip(free, steps[free].tolist(), strict=True)), self.kinds if of_noise else [])
 
-    @RUNAWAY
-    def _moved(self, i: int, k: int) -> Array:
-        """What a parameter does to one run's scaled innovations, (n,)."""
-        p, s, base, w = self.problem, self.shots[i], self.looks[i], self.weights[i]
-        h = STEP * self.scale[k] * (-1.0 if self.x[k] + STEP * self.scale[k] > self.high[k] else 1.0)
-        there = self.x.copy()
-        there[k] += h
-        # What a parameter does to the gains matters to no innovation that is white, and gains cost a prediction.
-        other = p.look(s, self.structure, self.names, there, self.noise, base.gains)
-        return np.asarray(((base.innovations[w] - other.innovations[w]) / (h * np.sqrt(base.variance[w]))).ravel())
-
-    @RUNAWAY
-    def _columns(self, i: int, moved: Mapping[tuple[int, int], Array], of_noise: bool) -> tuple[Columns, Array, Array]:
-        """Derivatives of one run's scaled innovations, where the descent stands; ``moved`` are those of parameters.
-
-        With what the logarithms of the noise do to them, (n, k), and to the logarithm of their variance, (n, k).
-        The noise and the bias act through the linear part: no prediction is needed for theirs.
-        """
-        p, s, base, w = self.problem, self.shots[i], self.looks[i], self.weights[i]
-        root = np.sqrt(base.variance[w])
-        spans = [(a, b - 1) for a, b in s.edges]
-
-        def followed(gains: Gains, h: float, bias: float = 0.0) -> Array:
-            e = innovations_with(base.gains, gains, base.innovations, base.state, s.trace.keep, spans, bias)
-            return np.asarray(((base.innovations[w] - e[w]) / (h * root)).ravel())
-
-        scaled = (base.innovations[w] / root).ravel()
-        kinds = self.kinds if of_noise else []
-        columns = np.zeros((scaled.size, len(self.x)))
-        pulled, spread = np.zeros((scaled.size, len(kinds))), np.zeros((scaled.size, len(kinds)))
-        for k in range(len(self.x)):
-            if (i, k) in moved:
-                columns[:, k] = moved[(i, k)]
-        own = np.zeros((scaled.size, 0))
-        if s.trace.biased:
-            h = 1e-4 * p.rate_rad_s
-            own = followed(base.gains, h, h)[:, None]
-        if p.fits_starts:
-            own = np.column_stack([own, self._started(s, base, root)])
-        for k, kind in enumerate(kinds):
-            changed = replace(self.noise, **{kind: getattr(self.noise, kind) * float(np.exp(NOISE_STEP))})
-            gains = p.gains_at(s, self.structure, self.names, self.x, changed)
-            pulled[:, k] = followed(gains, NOISE_STEP)
-            spread[:, k] = (np.log(gains.variance[w] / base.variance[w]) / NOISE_STEP).ravel()
-        return Columns(columns, own, scaled, base.variance[w].ravel()), pulled, spread
-
-    def _started(self, s: Shots, base: Look, root: Array) -> Array:
-        """What angle and rate at the start of every stretch do to one run's scaled innovations, (n, 2 stretches)."""
-        p, out = self.problem, []
-        stretch = np.searchsorted(s.first, np.arange(len(s.weight)), side="right")[s.weight] - 1
-        of_reading = np.repeat(stretch, p.readings)
-        for which, size in enumerate((p.angle_rad, p.rate_rad_s)):
-            h = np.array([0.0, 0.0])
-            h[which] = STEP * size
-            other = p.look(moved(s, (h, 0.0)), self.structure, self.names, self.x, self.noise, base.gains)
-            change = ((base.innovations - other.innovations)[s.weight] / (h[which] * root)).ravel()
-            out.append([np.where(of_reading == k, change, 0.0) for k in range(len(s.first))])
-        return np.column_stack([column for pair in zip(*out, strict=True) for column in pair])
-
-    def _solvable(self, of_noise: bool) -> _Step:
+    def _solvable(self, of_noise: bool) -> Step:
         """The normal equations where the descent stands; the information of the parameters is kept."""
-        p, k = len(self.x), len(self.kinds) if of_noise else 0
-        matrix, right = np.zeros((p + k, p + k)), np.zeros(p + k)
-        information, own, parts = np.zeros((p, p)), [], self._all_columns(of_noise)
-        squares = sum(float(c.scaled @ c.scaled) for c, _, _ in parts)
-        variance = squares / max(self.count, 1)
-        level = np.sum([v.sum(axis=0) for _, _, v in parts], axis=0) / max(self.count, 1)
-        for part, pulled, spread in parts:
-            wide, z = np.column_stack([part.columns, pulled]), part.scaled
-            basis, follow = _spanned(part.own)
-            across, taken = basis.T @ wide, basis.T @ z
-            matrix += (wide.T @ wide - across.T @ across) / variance
-            right += (wide.T @ z - across.T @ taken) / variance
-            own.append((follow @ across, follow @ taken))
-            information += part.columns.T @ part.columns - across[:, :p].T @ across[:, :p]
-            apart = spread - level  # the scale of all variances is free: only what differs between samples tells
-            matrix[p:, p:] += 0.5 * apart.T @ apart
-            right[p:] -= 0.5 * apart.T @ (1.0 - z * z / variance)
-        self.information, self._informed = information, (self.noise, self.x.tobytes())
-        return _Step(matrix, right, own)
+        kinds = len(self.kinds) if of_noise else 0
+        found = normal_equations(self._all_columns(of_noise), len(self.x), kinds, self.count)
+        self.information, self._informed = found.information, (self.noise, self.x.tobytes())
+        return found
 
     def _down(self, of_noise: bool) -> bool:
         """One step of parameters, biases and, if asked for, the noise; False where none leads down."""
@@ -286,7 +199,7 @@ class Descent:
             change = np.concatenate([x - self.x, logs_of(d[p:])])
             noise = self._with_logs(change[p:])
             shots = [
-                _changed(s, taken - across @ change) for s, (across, taken) in zip(self.shots, found.own, strict=True)
+                changed(s, taken - across @ change) for s, (across, taken) in zip(self.shots, found.own, strict=True)
             ]
             looks = self._looks(x, noise, shots)
             cost = self._cost(looks)
@@ -382,32 +295,3 @@ class Descent:
             self.structure, self.names, self.x, self.noise, tuple(self.shots), self.cost, self.count,
             squares / max(self.count, 1), self.information, prediction, self._disturbed(),
         )  # fmt: skip
-
-
-def logs_of(step: Array) -> Array:
-    """What a step in the logarithms of the noise comes to.
-
-    A density far below its best hardly acts: the cost is a straight line in the density itself, not in its logarithm.
-    So what rises is stepped as a density (1 + step times itself), what falls as a logarithm.
-    """
-    return np.where(step > 0.0, np.log1p(np.minimum(step, RISE)), np.maximum(step, -FARTHEST))
-
-
-def _spanned(own: Array) -> tuple[Array, Array]:
-    """An orthonormal basis of what a run's own unknowns do, (n, r), and the unknowns for each of it, (k, r)."""
-    size = np.linalg.norm(own, axis=0)
-    told = np.flatnonzero(size > 0.0)
-    follow = np.zeros((own.shape[1], len(told)))
-    if not len(told):
-        return own[:, told], follow
-    basis, upper = np.linalg.qr(own[:, told] / size[told])
-    inverse = np.linalg.pinv(upper, rcond=1e-12)
-    follow[told] = inverse / size[told, None]
-    return basis, follow
-
-
-def _changed(s: Shots, own: Array) -> Shots:
-    """The same run with its own unknowns changed: its bias, if it has one, and its start states, if they are fitted."""
-    biased = int(s.trace.biased)
-    starts = own[biased:].reshape(-1, 2)
-    return moved(s, (starts if len(starts) else np.zeros(2), float(own[0]) if biased else 0.0))

@@ -16,17 +16,14 @@ from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.propose.innovation_score import Score
-from identify.runs.measured_channels import simplicity
 from identify.select.evidence import APART, TRUSTED, WEIGHT, Evidence, Weigher, behind, disturbed
 from identify.select.left_over import LeftOver, left_over, needless_beside
+from identify.select.preference import cannot_gain, plainest, prefers_special, takes_most
 from identify.select.trial_fits import FEW, HOPE, MANY, TrialFits
 from rig import effects
-from rig.effects.base import Place
 from rig.platform import TERMS
 
 # What decides a name. All in units of the cost (minus twice the log-likelihood) or as shares.
-AS_HEAVY = 0.05  # of the disturbance: what a richer effect carries besides, to be preferred where nothing else is sure
-SPECIAL = 0.8  # of the fall of the cost with a richer effect, parameters paid for: its special case is preferred
 AT_NOISE = 1.1  # times the sensor's variance: a model that predicts as closely leaves no disturbance
 MOST = 6  # effects that one recording is believed to show
 # What only costs time.
@@ -143,7 +140,7 @@ class Stepwise:
         if special:
             best = max((good[n] for n in special), key=lambda e: e.support)
         alike = [n for n, e in good.items() if e is best or behind(e.fit, best.fit) < APART]
-        chosen = self.plainest({n: good[n].fit for n in alike})
+        chosen = plainest(self.weigher, {n: good[n].fit for n in alike})
         lower = [n for n in effects.get(chosen).lower_order if n in good]
         return lower[0] if lower else chosen
 
@@ -186,7 +183,7 @@ class Stepwise:
             if not fits:
                 continue
             best = min(fits.values(), key=lambda f: f.penalised)
-            name = self.plainest({n: f for n, f in fits.items() if behind(f, best) < APART})
+            name = plainest(self.weigher, {n: f for n, f in fits.items() if behind(f, best) < APART})
             evidence = self.weigher.evidence(name, rest, fits[name])
             if evidence.support < APART or evidence.weight < WEIGHT:
                 continue
@@ -235,33 +232,12 @@ class Stepwise:
         ]  # fmt: skip
         more = max(1.0, self.samples / max(best.fit.count, 1))
         richer = {n for n in alike if best.effect in effects.get(n).nests}  # to which it was preferred
-        close = [n for n in alike if n not in richer and not self._cannot_gain(seen, n, alike, more)]
+        close = [n for n in alike if n not in richer and not cannot_gain(seen, n, alike, more)]
         if len(close) > 1 and self.whole is not None:
             fits = {n: self.on_all(seen[n].fit) for n in close}
             likeliest = min(fits.values(), key=lambda f: f.penalised)
             alike = [n for n, f in fits.items() if behind(f, likeliest) < APART]
-        return self.plainest({n: seen[n].fit for n in alike}), alike
-
-    def plainest(self, fits: Mapping[str, Fit]) -> str:
-        """Of candidates that do as well: no channel, fewest parameters, least torque left on held-out samples.
-
-        Torque cannot judge a lag of the sensor, which has none: among such the likelier goes first.
-        """
-        torqueless = any(effects.get(n).place is Place.SENSOR for n in fits)
-
-        def left(name: str) -> float:
-            fit = fits[name]
-            return fit.penalised if torqueless else self.weigher.left(self.weigher.in_torque(fit))
-
-        return min(fits, key=lambda n: (simplicity(n), len(fits[n].names), left(n), n))
-
-    @staticmethod
-    def _cannot_gain(seen: Mapping[str, Evidence], rich: str, close: Sequence[str], more: float) -> bool:
-        """Whether an effect holds a simpler one and is no likelier, so that more samples will not make it so."""
-        return any(
-            (seen[rich].gain - seen[n].gain) * more < seen[rich].price - seen[n].price
-            for n in effects.get(rich).nests if n in close
-        )  # fmt: skip
+        return plainest(self.weigher, {n: seen[n].fit for n in alike}), alike
 
     def on_all(self, fit: Fit) -> Fit:
         """The same model on all samples."""
@@ -316,21 +292,6 @@ class Stepwise:
         if name in TERMS:
             return abs(now.values[own[0]]) < CERTAIN * now.std_error(own[0])
         return self._needed.get(name, 0.0) < CERTAIN**2
-
-
-def prefers_special(special: Evidence, rich: Evidence) -> bool:
-    """Whether a special case is taken before the richer effect that holds it.
-
-    It is if most of the fall of the cost is its own; and where the likelihood cannot be trusted, if it carries as much
-    torque. Inflations are left out: those of two that are nearly alike differ by chance.
-    """
-    as_heavy = rich.inflation >= TRUSTED and special.weight > rich.weight - AS_HEAVY
-    return takes_most(special, rich) or as_heavy
-
-
-def takes_most(special: Evidence, rich: Evidence) -> bool:
-    """Whether most of the fall of the cost with an effect is that of its special case."""
-    return special.gain - special.price > SPECIAL * (rich.gain - rich.price)
 
 
 def _key(structure: Structure) -> _Key:

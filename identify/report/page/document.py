@@ -11,8 +11,8 @@ from typing import Any
 from plotly.offline import get_plotlyjs
 
 from identify.report.json_values import finite
-from identify.report.page.figure import Figure
 from identify.report.page.markup import Markup, element
+from identify.report.page.plots.figure import Figure
 
 # Nothing may be fetched and nothing sent: the browser itself holds the page to it.
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"

@@ -8,8 +8,8 @@ import numpy as np
 
 from identify.conclude.headline import error_before_and_after, headline
 from identify.report.page.document import Gallery
-from identify.report.page.figure import AFTER, BEFORE, FLOOR, MEASURED, Figure, Panel, grid, level, lines
 from identify.report.page.markup import Markup, element, paragraph, section
+from identify.report.page.plots.figure import AFTER, BEFORE, FLOOR, MEASURED, Figure, Panel, grid, level, lines
 from identify.report.page.quantities import QUANTITIES, axis
 from identify.results import Identification, RunTraces
 from identify.wording import SYMBOLS, bias_percent, half_interval, half_of, number, percent, plain, unit, value_of

@@ -9,19 +9,19 @@ from identify.conclude.expected_delay import delay_lines
 from identify.conclude.next_steps import next_steps
 from identify.diagnose.wording import diagnosis_sentences
 from identify.follow_up.wording import lines as follow_up_lines
-from identify.report.page.convergence import convergence_figure, convergence_table
 from identify.report.page.determined import determined_table
-from identify.report.page.disturbance import disturbance_table, shape_figure
 from identify.report.page.document import Gallery, document
-from identify.report.page.estimates import estimates_figure
 from identify.report.page.first import first_screen
 from identify.report.page.markup import Markup, Piece, bullets, element, folded, join, paragraph, section
-from identify.report.page.motion import RUNS, motion_figures
 from identify.report.page.origin import origin
-from identify.report.page.proof import proof_section
-from identify.report.page.residual import residual_figures
-from identify.report.page.response import response_figure
-from identify.report.page.spectrum import spectrum_figures
+from identify.report.page.plots.convergence import convergence_figure, convergence_table
+from identify.report.page.plots.disturbance import disturbance_table, shape_figure
+from identify.report.page.plots.estimates import estimates_figure
+from identify.report.page.plots.motion import RUNS, motion_figures
+from identify.report.page.plots.proof import proof_section
+from identify.report.page.plots.residual import residual_figures
+from identify.report.page.plots.response import response_figure
+from identify.report.page.plots.spectrum import spectrum_figures
 from identify.report.page.tables import (
     candidate_table,
     correlation_table,

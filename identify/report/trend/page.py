@@ -8,8 +8,8 @@ from itertools import pairwise
 from typing import Any
 
 from identify.report.page.document import Gallery, document
-from identify.report.page.figure import AFTER, BEFORE, MEASURED, Figure, Panel, Trace, grid, upright
 from identify.report.page.markup import Markup, Piece, bullets, element, join, paragraph, section, table
+from identify.report.page.plots.figure import AFTER, BEFORE, MEASURED, Figure, Panel, Trace, grid, upright
 from identify.report.trend.change_points import FEWEST, Level
 from identify.report.trend.series import Campaign, Estimate, Series, has_dates, heading, in_order, series_of
 from identify.results import ParameterEstimate

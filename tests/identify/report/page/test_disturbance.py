@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.report.page.disturbance import disturbance_table, shape_figure
-from identify.report.page.figure import Trace
-from identify.report.page.spectrum import noise_band, spectrum, spectrum_figures, torque_per_reading
+from identify.report.page.plots.disturbance import disturbance_table, shape_figure
+from identify.report.page.plots.figure import Trace
+from identify.report.page.plots.spectrum import noise_band, spectrum, spectrum_figures, torque_per_reading
 from identify.residual import Dependence, Disturbance
 from identify.results import Identification
 from rig.arrays import Array

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from identify.report.page import report_html
-from identify.report.page.figure import Trace
 from identify.report.page.first import convincing_figure
+from identify.report.page.plots.figure import Trace
 from tests.identify.sample import sample, unhappy
 
 FOUND, RECORDING = sample(2.0)

@@ -13,13 +13,13 @@ import pytest
 from plotly.offline import get_plotlyjs
 
 from identify.report.page import report_html
-from identify.report.page.convergence import convergence_figure
 from identify.report.page.document import embedded
-from identify.report.page.estimates import estimates_figure
 from identify.report.page.markup import Markup, element, table
-from identify.report.page.motion import RUNS, motion_figures, stretches
-from identify.report.page.residual import residual_figures
-from identify.report.page.spectrum import spectrum, spectrum_figures
+from identify.report.page.plots.convergence import convergence_figure
+from identify.report.page.plots.estimates import estimates_figure
+from identify.report.page.plots.motion import RUNS, motion_figures, stretches
+from identify.report.page.plots.residual import residual_figures
+from identify.report.page.plots.spectrum import spectrum, spectrum_figures
 from identify.report.page.tables import parameter_table
 from identify.residual import FreeLine
 from identify.results import Identification

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.report.page.response import response_figure, set_responses, settle_s
+from identify.report.page.plots.response import response_figure, set_responses, settle_s
 from tests.identify.sample import TRUTH, sample, unhappy
 
 FOUND, RECORDING = sample(6.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identify.report.page.thinning import binned_mean, cloud, line
+from identify.report.page.plots.thinning import binned_mean, cloud, line
 
 
 def test_a_line_keeps_its_highest_and_lowest_sample_and_both_ends() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import signal
 from scipy.stats import chi2
 
-from identify.report.page.figure import (
+from identify.report.page.plots.figure import (
     FLOOR,
     NOISE,
     SETS,
@@ -22,8 +22,8 @@ from identify.report.page.figure import (
     points,
     upright,
 )
+from identify.report.page.plots.residual import COLORS, NAMES, Which, models_of, residual_of, torque_known
 from identify.report.page.quantities import QUANTITIES
-from identify.report.page.residual import COLORS, NAMES, Which, models_of, residual_of, torque_known
 from identify.results import Identification, RunTraces
 from rig.platform import Platform
 from rig.recording.run import Array

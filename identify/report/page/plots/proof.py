@@ -5,10 +5,10 @@ from __future__ import annotations
 from identify.proof.wording import lines as proof_lines
 from identify.proven import Proof, ProofLines
 from identify.report.page.document import Gallery
-from identify.report.page.figure import AFTER, BEFORE, FLOOR, Figure, Panel, grid, level, lines, once_in_legend
 from identify.report.page.markup import Markup, bullets, section
+from identify.report.page.plots.figure import AFTER, BEFORE, FLOOR, Figure, Panel, grid, level, lines, once_in_legend
+from identify.report.page.plots.thinning import line
 from identify.report.page.quantities import QUANTITIES, axis
-from identify.report.page.thinning import line
 from identify.results import Identification
 
 POINTS = 2500  # of one line

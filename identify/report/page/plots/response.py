@@ -10,7 +10,7 @@ import numpy as np
 from identify.frequency.measured_response import measured_response
 from identify.frequency.model_response import Size, linear_response
 from identify.frequency.spectra import LARGEST_GAIN_ERROR, TRUSTED, Complex, Record, Response, decibel
-from identify.report.page.figure import (
+from identify.report.page.plots.figure import (
     AFTER,
     BEFORE,
     MEASURED,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.report.page.figure import (
+from identify.report.page.plots.figure import (
     AFTER,
     BEFORE,
     FLOOR,
@@ -19,8 +19,8 @@ from identify.report.page.figure import (
     lines,
     once_in_legend,
 )
+from identify.report.page.plots.thinning import line
 from identify.report.page.quantities import QUANTITIES, axis
-from identify.report.page.thinning import line
 from identify.results import Identification, RunTraces
 from rig.recording.run import Array
 

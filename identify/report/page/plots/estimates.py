@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from identify.report.page.figure import AFTER, BEFORE, MEASURED, Figure, Panel, Trace, grid, level
+from identify.report.page.plots.figure import AFTER, BEFORE, MEASURED, Figure, Panel, Trace, grid, level
 from identify.results import Identification, ParameterEstimate
 from identify.wording import percent, title, value_of
 

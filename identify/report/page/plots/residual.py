@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from identify.report.page.figure import (
+from identify.report.page.plots.figure import (
     AFTER,
     BEFORE,
     SETS,
@@ -21,9 +21,9 @@ from identify.report.page.figure import (
     once_in_legend,
     points,
 )
-from identify.report.page.motion import motion_error
+from identify.report.page.plots.motion import motion_error
+from identify.report.page.plots.thinning import binned_mean, cloud, line
 from identify.report.page.quantities import QUANTITIES, axis
-from identify.report.page.thinning import binned_mean, cloud, line
 from identify.results import Identification, RunTraces
 from rig.recording.run import Array
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from identify.report.page.figure import AFTER, Figure, Panel, grid, lines, points
 from identify.report.page.markup import Markup, Piece, table
+from identify.report.page.plots.figure import AFTER, Figure, Panel, grid, lines, points
 from identify.report.page.quantities import QUANTITIES, axis
 from identify.residual import Dependence
 from identify.results import Identification

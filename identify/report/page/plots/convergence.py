@@ -6,8 +6,19 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from identify.report.page.figure import AFTER, FLOOR, SETS, Figure, Panel, Trace, grid, level, lines, once_in_legend
 from identify.report.page.markup import Markup, table
+from identify.report.page.plots.figure import (
+    AFTER,
+    FLOOR,
+    SETS,
+    Figure,
+    Panel,
+    Trace,
+    grid,
+    level,
+    lines,
+    once_in_legend,
+)
 from identify.results import GeneticRun, Identification
 from identify.wording import SYMBOLS, number, plain
 

@@ -1,0 +1,116 @@
+"""The final fits of the declared model and of the one that was found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identify.estimate.final_fit import Fitted, by_output_error, by_regression
+from identify.estimate.initial_guess import Start
+from identify.estimate.judged import Judged
+from identify.likelihood.by_prediction_error import by_prediction_error
+from identify.model.structure import Structure
+from identify.results import ParameterEstimate
+from identify.runs.holdout import Split
+from identify.select.search_state import Search
+from identify.signals.trace import Trace, loads_differ
+from rig import effects
+from rig.effects.base import Place
+from rig.platform import TERMS, Platform
+
+SHOWS = 5.0  # standard errors from zero at which whole runs show damping
+
+
+@dataclass(frozen=True)
+class FinalModels:
+    """Final fits on all samples that are not declared to be held out.
+
+    Attributes
+    ----------
+    declared, structure
+        The declared model, and what of it the runs can show.
+    """
+
+    traces: Sequence[Trace]
+    split: Split
+    declared: Platform
+    structure: Structure
+    start: Start
+    say: Callable[[str], None]
+
+    def before(self, search: Search) -> Fitted:
+        """The declared model."""
+        # A decay is judged by its free run, which the regression does not look at.
+        if all(t.torque is None for t in self.traces) or search.base.sigma < 2.0 * search.floor:
+            return by_output_error(
+                self.traces, self.structure, search.base.values(), search.horizon,
+                self.split.final, self.split.everything,
+            )  # fmt: skip
+        return self.regressed(search.base)
+
+    def after(self, search: Search) -> Fitted:
+        """Output error where the model runs free at the sensor's noise; else prediction error with its disturbance."""
+        structure = search.best.structure
+        self.say(f"final fit with {', '.join(structure.effects) or 'fewer terms'}")
+        fitted = by_output_error(
+            self.traces, structure, search.best.values(), search.horizon,
+            self.split.final, self.split.everything,
+        )  # fmt: skip
+        if fitted.sensor_limited:
+            return self._with_dropped_damping(search, fitted)
+        return self._predicted(search.best)
+
+    def regressed(self, best: Judged) -> Fitted:
+        """A model by regression alone: where there is no time for more."""
+        return by_regression(
+            self.traces, best.structure, best.shapes(), self.start, self.split.final, self.split.everything,
+            best.std_errors(),
+        )  # fmt: skip
+
+    def _predicted(self, best: Judged) -> Fitted:
+        fitted, _ = by_prediction_error(
+            self.traces, best.structure, best.values(), self.split.final, self.split.everything
+        )  # fmt: skip
+        return fitted
+
+    def _with_dropped_damping(self, search: Search, fitted: Fitted) -> Fitted:
+        """The same with damping, where whole runs show what a few periods of the held-out part could not.
+
+        Beside a lag or a delay always: at a few tones below the resonance both turn the phase alike, and without the
+        one the other would be told far more closely than the runs know it.
+        """
+        terms = (*fitted.structure.terms, "damping")
+        if "damping" in fitted.structure.terms or "damping" not in self.declared.terms:
+            return fitted
+        structure = replace(fitted.structure, terms=tuple(t for t in TERMS if t in terms))
+        start = {**fitted.values, ("damping",): 0.0}
+        fuller = by_output_error(
+            self.traces, structure, start, search.horizon, self.split.final, self.split.everything
+        )  # fmt: skip
+        damping, error = fuller.values[("damping",)], fuller.std_error(("damping",))
+        late = any(effects.get(e).place in (Place.DRIVE, Place.SENSOR) for e in fitted.structure.effects)
+        shows = damping > 0.0 if late else damping > SHOWS * error
+        if not fuller.sensor_limited:
+            return fitted
+        if not shows:
+            return fitted.as_uncertain_as(fuller)
+        search.dropped[:] = [d for d in search.dropped if d[0] != "damping"]
+        self.say(f"restored damping: {damping:.4g} +- {error:.2g} over whole runs")
+        return fuller
+
+    def torque_scale(self, fitted: Fitted) -> ParameterEstimate | None:
+        """The shaft's torque over the recorded one, where a known inertia was added for some of the runs."""
+        name = ("torque_scale", "scale")
+        if not fitted.sensor_limited or not loads_differ(self.traces):
+            return None
+        if name not in fitted.names:
+            fitted = by_output_error(
+                self.traces, fitted.structure.plus("torque_scale"), {**fitted.values, name: 1.0}, 1.0,
+                self.split.final, self.split.everything,
+            )  # fmt: skip
+        value, error = fitted.values[name], fitted.std_error(name)
+        if not np.isfinite(error) or not fitted.determined[fitted.names.index(name)]:
+            return None
+        return ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), "1")

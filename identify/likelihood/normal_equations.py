@@ -1,0 +1,78 @@
+"""The normal equations of a step: parameters and noise together, what each run has of its own eliminated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.likelihood.fit import Columns
+from identify.simulate.shots import Shots, moved
+from rig.arrays import Array
+
+FARTHEST = 4.0  # by which a logarithm of the noise may fall in one step
+RISE = 1e12  # times itself, that a number of the noise may become in one step
+
+
+@dataclass(frozen=True)
+class Step:
+    """What a step is solved from: normal matrix and right side, and how each run's own unknowns follow."""
+
+    matrix: Array
+    right: Array
+    information: Array  # of the parameters alone, for readings of unit variance, (p, p)
+    own: Sequence[tuple[Array, Array]]  # (k, p) and (k,): what they lose with a change, and take without one
+
+
+def normal_equations(parts: Sequence[tuple[Columns, Array, Array]], p: int, k: int, count: int) -> Step:
+    """Of ``p`` parameters and ``k`` numbers of the noise, from every run's derivatives.
+
+    ``count`` is the number of readings that count.
+    """
+    matrix, right = np.zeros((p + k, p + k)), np.zeros(p + k)
+    information, own = np.zeros((p, p)), []
+    squares = sum(float(c.scaled @ c.scaled) for c, _, _ in parts)
+    variance = squares / max(count, 1)
+    level = np.sum([v.sum(axis=0) for _, _, v in parts], axis=0) / max(count, 1)
+    for part, pulled, spread in parts:
+        wide, z = np.column_stack([part.columns, pulled]), part.scaled
+        basis, follow = _spanned(part.own)
+        across, taken = basis.T @ wide, basis.T @ z
+        matrix += (wide.T @ wide - across.T @ across) / variance
+        right += (wide.T @ z - across.T @ taken) / variance
+        own.append((follow @ across, follow @ taken))
+        information += part.columns.T @ part.columns - across[:, :p].T @ across[:, :p]
+        apart = spread - level  # the scale of all variances is free: only what differs between samples tells
+        matrix[p:, p:] += 0.5 * apart.T @ apart
+        right[p:] -= 0.5 * apart.T @ (1.0 - z * z / variance)
+    return Step(matrix, right, information, own)
+
+
+def _spanned(own: Array) -> tuple[Array, Array]:
+    """An orthonormal basis of what a run's own unknowns do, (n, r), and the unknowns for each of it, (k, r)."""
+    size = np.linalg.norm(own, axis=0)
+    told = np.flatnonzero(size > 0.0)
+    follow = np.zeros((own.shape[1], len(told)))
+    if not len(told):
+        return own[:, told], follow
+    basis, upper = np.linalg.qr(own[:, told] / size[told])
+    inverse = np.linalg.pinv(upper, rcond=1e-12)
+    follow[told] = inverse / size[told, None]
+    return basis, follow
+
+
+def logs_of(step: Array) -> Array:
+    """What a step in the logarithms of the noise comes to.
+
+    A density far below its best hardly acts: the cost is a straight line in the density itself, not in its logarithm.
+    So what rises is stepped as a density (1 + step times itself), what falls as a logarithm.
+    """
+    return np.where(step > 0.0, np.log1p(np.minimum(step, RISE)), np.maximum(step, -FARTHEST))
+
+
+def changed(s: Shots, own: Array) -> Shots:
+    """The same run with its own unknowns changed: its bias, if it has one, and its start states, if they are fitted."""
+    biased = int(s.trace.biased)
+    starts = own[biased:].reshape(-1, 2)
+    return moved(s, (starts if len(starts) else np.zeros(2), float(own[0]) if biased else 0.0))

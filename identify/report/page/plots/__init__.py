@@ -1,0 +1,1 @@
+"""The plots of the report, each a figure that the page draws."""
