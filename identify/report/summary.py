@@ -67,13 +67,16 @@ def summary(
     return "\n".join(line.rstrip() for line in captured.get().splitlines()) + "\n"
 
 
+NONE_DETERMINED = "These runs determine none of the parameters."
+
+
 def _whole(identification: Identification, info: Mapping[str, Any]) -> Group:
     final, verdict, floor = identification.final, identification.verdict, identification.noise_floor
     note = printable(sentence(identification.holdout_note))
     parts: list[RenderableType] = [
         *_listed("Verdict", verdict.sentences, bullet=""),
         Text(),
-        _parameters(identification),
+        table if (table := _parameters(identification)).row_count else Text(NONE_DETERMINED),
         Text(),
         _errors(identification),
         Padding(Text(f"The noise floor is {floor.source}. {note}"), (0, 0, 0, 2)),

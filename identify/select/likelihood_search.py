@@ -124,8 +124,8 @@ def _status(name: str, chosen: str | None, named: Sequence[str], fit: Fit | None
 def _judged(fit: Fit, noise: float) -> Judged:
     """A fit as the final fits and the report see it; ``noise`` is the sensor's, as the runs show it.
 
-    A large disturbance that follows every reading leaves a fit no noise of the sensor to tell. Where the sensor's noise is
-    known to be more than all that is predicted wrongly, nothing disturbs.
+    A large disturbance that follows every reading leaves a fit no noise of the sensor to tell. Where the sensor's noise
+    is known to be more than all that is predicted wrongly, nothing disturbs.
     """
     wrong = np.concatenate([e[s.weight] for e, s in zip(fit.prediction.innovations, fit.shots, strict=True)])
     rms = float(np.sqrt(np.mean(wrong**2)))
