@@ -110,7 +110,7 @@ def bench_yaml(gyro: str | None, can: Mapping[str, str] | None, seen: Sequence[s
             "",
             "excitation:",
             "  scale_to_limits: true         # sets that would break a limit are reduced",
-            "  margin: 0.8                   # of travel and rate",
+            "  margin: 0.8                   # of the limits",
             "  sets:                         # FILL IN: below, near and above the expected resonance",
             "    - {torque_nm: 10, frequency_hz: 0.5, duration_s: 10}",
             "    - {torque_nm: 10, frequency_hz: 3.0, duration_s: 10}",

@@ -27,6 +27,7 @@ POLL_INTERVAL_S = 0.0005  # half a tick of 1 kHz
 MOST_FRAMES_A_POLL = 10_000  # frames: a babbling node must not hold the loop
 SEND_TIMEOUT_S = 0.005  # five ticks of 1 kHz: an adapter that takes longer has stalled
 MOST_ERRORS, ERRORS_WITHIN_S = 20, 0.1  # error frames, s: more is a fault of the bus; chosen, not derived
+BUS_OFF = 0x40  # error class in the identifier of an error frame (linux/can/error.h: CAN_ERR_BUSOFF)
 OWN_INTERFACE = "slcan_bulk"
 OWN_URLS = {"etas": "ETAS://"}  # what an interface calls its own channels; pyserial has no part in it
 CODE_OPTIONS = {"usb2can": ("dll",)}  # they name a library that python-can would load and run
@@ -58,6 +59,8 @@ class CanLink:
 
     def __init__(self, bus: can.BusABC, clock: Callable[[], float] = time.monotonic) -> None:
         self._bus = bus
+        # Elsewhere the identifier of an error frame means something else, or nothing.
+        self._tells_error_class = type(bus).__module__.startswith("can.interfaces.socketcan")
         self.clock = clock
         # Our own bus sends a tick in one write and hands frames over without a message object each.
         own = bus if isinstance(bus, SlcanBulkBus) else None
@@ -117,13 +120,18 @@ class CanLink:
             if message is None:
                 break
             if message.is_error_frame:
-                self._count_error(self.clock())
+                self._count_error(self.clock(), message.arbitration_id)
             else:
                 heard.append(ReceivedFrame(self.clock(), _frame(message)))
         return heard
 
-    def _count_error(self, now_s: float) -> None:
+    def _count_error(self, now_s: float, error_class: int) -> None:
         """Error frames come one by one on a bus that is disturbed, and in hundreds on one that is about to go off."""
+        if self._tells_error_class and error_class & BUS_OFF:
+            raise DeviceFault(
+                f"CAN on {self.name}: the adapter is off the bus (bus-off: 256 transmit errors, limit 255), nothing that "
+                "is sent arrives: check termination, bit rate and that another node acknowledges what is sent"
+            )
         errors = self._errors
         errors.append(now_s)
         while errors[0] < now_s - ERRORS_WITHIN_S:

@@ -1,4 +1,4 @@
-"""When a model is accepted: the residual torque that depends on something must be small; larger errors are noted."""
+"""What of the residual torque speaks against acceptance, one of the reasons in ``conclusion``; an error that grew."""
 
 from __future__ import annotations
 

@@ -8,6 +8,7 @@ from identify.conclude.next_steps import opposite_signs, to_determine, torque_fr
 from identify.results import Identification
 from identify.runs.measured_channels import REFUSED
 from identify.runs.sign_convention import SENTENCE
+from identify.select.evidence import WEIGHT
 from identify.wording import (
     capital,
     half_interval,
@@ -87,7 +88,7 @@ def _decided_in_torque(found: Identification) -> bool:
 def _nothing_named(found: Identification) -> str:
     """Why no effect is named."""
     if _decided_in_torque(found):
-        return "no candidate explains 20 % of the residual torque throughout the record."
+        return f"no candidate explains {100.0 * WEIGHT:.0f} % of the residual torque throughout the record."
     if found.verdict.unexplained:
         return "no candidate explains the residual."
     return "the declared model already reaches the noise floor."

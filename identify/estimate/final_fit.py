@@ -1,4 +1,4 @@
-"""The final fit of one model on all samples, with uncertainties that hold for coloured residuals too."""
+"""The final fit where the sensor alone limits, or by regression; its uncertainties hold for coloured residuals too."""
 
 from __future__ import annotations
 

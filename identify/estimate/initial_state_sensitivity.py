@@ -1,4 +1,4 @@
-"""Information that does not lean on a ring which may be none.
+"""Standard errors of a single run that do not lean on a ring which its fitted start state may only seem to have.
 
 A platform with a spring rings from any start state that is not part of its steady motion, and a ring tells inertia
 and stiffness apart. The fitted start state carries the sensor's noise: where the true motion has no ring, the fitted

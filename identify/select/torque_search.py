@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 
 from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
 from identify.propose.torque_looks import torque_looks
+from identify.select.evidence import WEIGHT
 from rig import effects
 from rig.effects.base import Place
 
-WEIGHT = 0.20  # share of what is left that an effect has to take away to be named: below, it is true but small
 SURE = 4.0  # standard errors, over blocks of the held-out samples, by which the squared residual must fall: 3e-5
 RICHER = 0.6  # share of what its special case leaves that a richer effect has to take away to be named in its place
 AS_HEAVY = 0.05  # of what is left: candidates that differ by less carry the same torque

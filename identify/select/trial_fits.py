@@ -1,4 +1,4 @@
-"""The candidates of a round, fitted on top of a model: where fits begin, and in whose place.
+"""The candidates of a round, fitted on top of a model or in the place of another effect: which, and from where.
 
 Which of them are fitted only costs time; what is believed of them is decided elsewhere (``stepwise``, ``evidence``).
 """

@@ -51,7 +51,7 @@ class ExcitationConfig(Section):
     scale_to_limits: bool = False
     """true: reduce a set that exceeds a limit; false: refuse it and say which torque passes."""
     margin: Annotated[float, Field(gt=0, le=1)] = 0.95
-    """Share of the travel and rate limits that the forecast may use."""
+    """Share of the limits of travel, rate and torque up to which `scale_to_limits` scales a set."""
 
     @field_validator("sets")
     @classmethod

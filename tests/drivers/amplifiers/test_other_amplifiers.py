@@ -204,3 +204,18 @@ def test_a_bus_full_of_errors_is_a_fault_and_a_few_are_not():
     errors += [can.Message(is_error_frame=True)] * 15
     with pytest.raises(DeviceFault, match=r"error frames within 0\.1 s \(limit 20\): check termination"):
         link.poll()
+
+
+def test_an_adapter_that_went_off_the_bus_is_a_fault_at_its_first_word_where_it_says_so():
+    socketcan = type("SocketcanBus", (EmulatedBus,), {"__module__": "can.interfaces.socketcan.socketcan"})
+    for made, faulty in ((socketcan, True), (EmulatedBus, False)):
+        time = FakeTime()
+        bus = made(OdriveAxis(3, 20.0), time)
+        link = CanLink(bus, time)
+        frames = [can.Message(is_error_frame=True, arbitration_id=0x40)]
+        bus._recv_internal = lambda timeout, frames=frames: (frames.pop() if frames else None, False)
+        if faulty:
+            with pytest.raises(DeviceFault, match="off the bus"):
+                link.poll()
+        else:
+            assert link.poll() == []
