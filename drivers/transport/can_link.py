@@ -129,8 +129,8 @@ class CanLink:
         """Error frames come one by one on a bus that is disturbed, and in hundreds on one that is about to go off."""
         if self._tells_error_class and error_class & BUS_OFF:
             raise DeviceFault(
-                f"CAN on {self.name}: the adapter is off the bus (bus-off: 256 transmit errors, limit 255), nothing that "
-                "is sent arrives: check termination, bit rate and that another node acknowledges what is sent"
+                f"CAN on {self.name}: the adapter is off the bus (bus-off, after 256 transmit errors; limit 255) and "
+                "sends nothing: check termination, bit rate and that another node acknowledges what is sent"
             )
         errors = self._errors
         errors.append(now_s)
