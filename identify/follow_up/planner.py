@@ -1,7 +1,7 @@
 """The follow-up: for a name that has a rival, the excitation that parts the two best within the limits.
 
 Every shape at every amplitude is simulated on both models; what the loser could still take up is projected off
-(``follow_up_separation``), and the sets that part all pairs in the shortest time make the plan. Nothing here plays.
+(``separation``), and the sets that part all pairs in the shortest time make the plan. Nothing here plays.
 """
 
 from __future__ import annotations

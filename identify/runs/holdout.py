@@ -8,12 +8,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from identify.signals.trace import SHORTEST_STRETCH, Trace
+from identify.signals.trace import Trace
 
 BLOCKS, JUDGING = 10, (3, 6, 9)  # of a run that is split; which judge, where nobody says how many
 FINE_BLOCKS = 20  # of a run of which a share that somebody asked for judges
-PIECES = 2  # of each of five runs while searching, where a run has more usable spans; more of fewer runs
-ENOUGH = 8_000  # samples that a search fits to; the final fit always takes all
 
 
 @dataclass(frozen=True)
@@ -74,45 +72,3 @@ def _held_out(blocks: Sequence[int]) -> str:
     if len(blocks) == 1:
         return f"block {blocks[0]} is"
     return f"blocks {', '.join(str(b) for b in blocks[:-1])} and {blocks[-1]} are"
-
-
-def pieces(traces: Sequence[Trace], masks: Sequence[Any], shortest_s: float, enough: int = ENOUGH) -> list[Trace]:
-    """Traces cut down to the samples of the masks, thinned to about ``enough`` samples.
-
-    Each run keeps its first stretch, for the start transient, and equally spaced pieces behind it, each at
-    least ``shortest_s`` long, so that the slowest motion of interest fits in.
-    """
-    total = sum(int(np.sum(m)) for m in masks)
-    few = max(PIECES, round(PIECES * 5 / max(len(traces), 1)))
-    out = []
-    for trace, mask in zip(traces, masks, strict=True):
-        spans = _runs_of(mask, trace.stretches)
-        if total > enough and len(spans) > few:  # few long pieces: each start state costs two unknowns
-            spans = [spans[i] for i in np.unique(np.linspace(0, len(spans) - 1, few).astype(int))]
-        share = int(np.sum(mask)) if total <= enough else int(enough * np.sum(mask) / total)
-        for k, (a, b) in enumerate(spans):
-            length = b - a + 1
-            wanted = length if total <= enough else max(
-                round(share * length / max(int(np.sum(mask)), 1)), round(shortest_s / trace.step_s), SHORTEST_STRETCH
-            )  # fmt: skip
-            if k == 0 and total > enough:
-                wanted *= 2
-            if share <= 0 and k > 0:
-                break
-            last = min(b, a + wanted - 1)
-            out.append(trace.piece(a, last))
-    return [t for t in out if t.stretches]
-
-
-def _runs_of(mask: Any, stretches: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Spans of samples that count, lost single samples bridged, no longer than a stretch."""
-    out = []
-    for a, b in stretches:
-        index = np.nonzero(mask[a : b + 1])[0]
-        if len(index) == 0:
-            continue
-        cuts = np.nonzero(np.diff(index) > SHORTEST_STRETCH)[0]
-        begins = index[np.concatenate([[0], cuts + 1])]
-        ends = index[np.concatenate([cuts, [len(index) - 1]])]
-        out += [(a + int(i), a + int(k)) for i, k in zip(begins, ends, strict=True) if k - i + 1 >= SHORTEST_STRETCH]
-    return out

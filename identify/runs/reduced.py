@@ -14,7 +14,7 @@ from identify.runs.holdout import Split
 from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace
 from rig.arrays import Array
 
-ENOUGH = 20_000  # samples that a search looks at; the final fit takes all
+ENOUGH = 20_000  # samples, where nothing else is asked for
 SAMPLES_A_PERIOD = 8.0  # of the fastest motion that stands above the noise: beyond, a sample tells nothing new
 HARMONICS = 5.0  # of a decay's swing: it moves no faster, whatever its noise does
 TURNS = 0.02  # of the largest rate, below which a turn may be noise

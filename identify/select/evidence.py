@@ -35,6 +35,7 @@ FEWEST_RUNS = 4  # whose scores show whether runs differ
 ALONE = 1e-3  # of a parameter's influence, that the others leave: of less only rounding is seen
 APART = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
 WEIGHT = 0.20  # share of the disturbance that an effect takes away to be named: below, it is true but small
+MOST = 0.5  # of what a prediction errs by beyond the sensor's noise
 TRUSTED = 1.5  # inflation up to which what the likelihood takes the disturbance for is believed
 SHOWS = 0.1  # of the disturbance in the band, that its white part is: what becomes of less is chance
 
@@ -98,7 +99,8 @@ class Weigher:
 
         The power in the band is what the residual in torque has on held-out samples, and what the likelihood takes the
         disturbance for. The first knows no model of it but sees the sensor's noise as well, the second the reverse, so
-        the second counts only where the likelihood can be ``trusted``.
+        the second counts only where the likelihood can be ``trusted``. Most of what predictions err by beyond the
+        sensor's noise counts in any case: a dead zone acts at every crossing of zero, far above the band of the motion.
         """
         shares = [1.0 - self.left(self.in_torque(new)) / self.left(self.in_torque(now))]
         if trusted:
@@ -106,6 +108,9 @@ class Weigher:
             cutoff_hz = self.regression.cutoff_hz
             if now.noise.white * cutoff_hz > SHOWS * in_band(now.noise, cutoff_hz):
                 shares.append(1.0 - new.noise.white * new.variance / (now.noise.white * now.variance))
+        beyond = 1.0 - (disturbed(new) - 1.0) / max(disturbed(now) - 1.0, 1e-300)
+        if beyond > MOST:
+            shares.append(beyond)
         return float(max(shares))
 
     def left(self, fit: TorqueFit) -> float:

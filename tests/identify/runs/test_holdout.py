@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from identify.pipeline import identify
-from identify.runs.holdout import pieces, split
+from identify.runs.holdout import split
 from identify.signals.prepare import prepare
-from identify.signals.trace import SHORTEST_STRETCH, Trace
+from identify.signals.trace import Trace
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
 from rig.recording.run import Recording, Use
@@ -55,24 +55,6 @@ def test_samples_that_do_not_count_neither_fit_nor_judge() -> None:
     trace.keep[1000:1100] = False
     found = split([trace])
     assert not (found.fit[0] | found.judge[0] | found.final[0])[1000:1100].any()
-
-
-def test_a_long_recording_is_thinned_to_pieces_that_keep_each_start_transient() -> None:
-    long = traces("auto", "auto", duration_s=20.0)
-    found = split(long)
-    cut = pieces(long, found.fit, 0.3, 8000)
-    assert 4000 < sum(t.count for t in cut) < 14_000
-    assert {t.number for t in cut} == {0, 1}
-    assert {t.number for t in cut if t.offset_s < 0.02} == {0, 1}
-    assert all(len(t.measured) >= SHORTEST_STRETCH for t in cut)
-
-
-def test_no_piece_that_fits_holds_a_sample_that_judges() -> None:
-    (trace,) = traces("auto")
-    found = split([trace])
-    for piece in pieces([trace], found.fit, 0.3):
-        first = round(piece.offset_s / piece.step_s)
-        assert not found.judge[0][first : first + len(piece.measured)].any()
 
 
 @pytest.mark.parametrize("share", [0.05, 0.1, 0.25, 0.5])
