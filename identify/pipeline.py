@@ -34,6 +34,7 @@ from identify.runs.clipping import full_scale_of
 from identify.runs.holdout import Split, split
 from identify.runs.measured_channels import offer_of, with_causes
 from identify.runs.observability import why_unseen
+from identify.runs.reduced import reduced
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
 from identify.runs.usable import runs_used
 from identify.select.field_search import Found, search_in_torque, with_curve
@@ -138,7 +139,10 @@ class _Identifier:
             self.say("fitting the declared model")
             search = self._begun()
             at_noise = search.run() or self.colour is not None
-            found, fits = search.found, WholeRuns(self.traces, self.split)
+            found, fits = (
+                search.found,
+                WholeRuns(*(reduced(self.traces, self.split) if self.torque_free else (self.traces, self.split))),
+            )
             doubts = Doubts(self.traces, fits, self.structure, self.recording.axis, self.say)
             both = all(t.beside is not None for t in self.traces)
             behind_a_lag = any(effects.get(e).lag is not None for e in found.best.structure.effects)
@@ -148,7 +152,7 @@ class _Identifier:
             if self.torque_free:
                 left = search.stepwise.left
                 self.curve = dependence_on(search.stepwise, left) if left is not None else None
-                return self._concluded(found, doubts)
+                return self._concluded(found, doubts, at_noise)
             if (white and nothing_left) or doubts.other_cause(found):
                 return self._concluded(found, doubts)
             self.say("a torque that was not recorded is left beside the sensor's noise")
@@ -181,13 +185,13 @@ class _Identifier:
         self.say(told)
         return search
 
-    def _concluded(self, search: Search, doubts: Doubts) -> Identification:
+    def _concluded(self, search: Search, doubts: Doubts, at_noise: bool = True) -> Identification:
         """Final fits, what else might pass for what was found, and the report."""
         models, changed = self._models(), search.best.structure != self.structure
         before = models.before(search)
-        after = models.after(search) if changed else before
+        after = models.after(search, at_noise) if changed else before
         if doubts.leave_open(search, after):
-            after = models.after(search) if search.best.structure != self.structure else before
+            after = models.after(search, at_noise) if search.best.structure != self.structure else before
         named = [e for e in after.structure.effects if e not in self.structure.effects]
         base = search.base.values()
         search.contribution = contributions(doubts.fits, after.structure, after.values, named, base, search.horizon)

@@ -50,10 +50,15 @@ class FinalModels:
             )  # fmt: skip
         return self.regressed(search.base)
 
-    def after(self, search: Search) -> Fitted:
-        """Output error where the model runs free at the sensor's noise; else prediction error with its disturbance."""
+    def after(self, search: Search, free: bool = True) -> Fitted:
+        """Output error where the model runs free at the sensor's noise; else prediction error with its disturbance.
+
+        ``free``: whether it may; a search that saw a disturbance beside the noise knows better.
+        """
         structure = search.best.structure
         self.say(f"final fit with {', '.join(structure.effects) or 'fewer terms'}")
+        if not free:
+            return self._predicted(search.best)
         fitted = by_output_error(
             self.traces, structure, search.best.values(), search.horizon,
             self.split.final, self.split.everything,
