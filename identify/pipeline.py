@@ -50,6 +50,8 @@ from rig.errors import Aborted
 from rig.platform import Platform
 from rig.recording.run import Recording
 
+TAKEN_BACK = "effects were found that together leave too much and were taken back; the declared model does not suffice"
+
 NOTHING_YET = (
     "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
 )
@@ -152,7 +154,7 @@ class _Identifier:
             if self.torque_free:
                 left = search.stepwise.left
                 self.curve = dependence_on(search.stepwise, left) if left is not None else None
-                return self._concluded(found, doubts, at_noise)
+                return self._concluded(found, doubts)
             if (white and nothing_left) or doubts.other_cause(found):
                 return self._concluded(found, doubts)
             self.say("a torque that was not recorded is left beside the sensor's noise")
@@ -185,17 +187,21 @@ class _Identifier:
         self.say(told)
         return search
 
-    def _concluded(self, search: Search, doubts: Doubts, at_noise: bool = True) -> Identification:
+    def _concluded(self, search: Search, doubts: Doubts) -> Identification:
         """Final fits, what else might pass for what was found, and the report."""
         models, changed = self._models(), search.best.structure != self.structure
         before = models.before(search)
-        after = models.after(search, at_noise) if changed else before
-        if doubts.leave_open(search, after):
-            after = models.after(search, at_noise) if search.best.structure != self.structure else before
+        after = models.after(search) if changed else before
+        if taken_back := doubts.leave_open(search, after):
+            after = models.after(search) if search.best.structure != self.structure else before
         named = [e for e in after.structure.effects if e not in self.structure.effects]
         base = search.base.values()
         search.contribution = contributions(doubts.fits, after.structure, after.values, named, base, search.horizon)
-        return self._report(search, before, after)
+        found = self._report(search, before, after)
+        if taken_back and self.torque_free:  # how little torque is left says nothing about a swing that goes astray
+            verdict = replace(found.verdict, unexplained=True)
+            found = replace(found, accepted=False, reasons=(*found.reasons, TAKEN_BACK), verdict=verdict)
+        return found
 
     def _stopped(self, search: Search) -> Identification:
         """What there is where somebody stops the search."""

@@ -50,21 +50,21 @@ class FinalModels:
             )  # fmt: skip
         return self.regressed(search.base)
 
-    def after(self, search: Search, free: bool = True) -> Fitted:
+    def after(self, search: Search) -> Fitted:
         """Output error where the model runs free at the sensor's noise; else prediction error with its disturbance.
 
-        ``free``: whether it may; a search that saw a disturbance beside the noise knows better.
+        A decay is told by how it swings on, whatever disturbs it.
         """
         structure = search.best.structure
         self.say(f"final fit with {', '.join(structure.effects) or 'fewer terms'}")
-        if not free:
-            return self._predicted(search.best)
         fitted = by_output_error(
             self.traces, structure, search.best.values(), search.horizon,
             self.split.final, self.split.everything,
         )  # fmt: skip
         if fitted.sensor_limited:
             return self._with_dropped_damping(search, fitted)
+        if all(t.torque is None for t in self.traces):
+            return fitted
         return self._predicted(search.best)
 
     def regressed(self, best: Judged) -> Fitted:
