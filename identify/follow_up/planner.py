@@ -33,9 +33,9 @@ BEST = 1e4  # from which more of it proves nothing more
 ALIKE = 0.5  # of the best score: the shorter of two such sets is played
 MOST_SETS = 4
 FAINT = 0.005  # of the largest torque played so far: drives take torque in steps of about a thousandth
-PROOFS = 5  # sets that are put to the proof in a round
+PROOFS = 3  # sets that are put to the proof in a round
 LOOKED_AT = 14  # candidates of a pair whose sensitivities are taken
-LOOK_HZ = 2000.0  # sample rate that is fine enough for a first look
+LOOKS = 30.0  # samples a period of the platform's own oscillation: no shape goes beyond three times its frequency
 USUAL_HZ = 5.0  # where nothing swings
 LEAST_DAMPING = 0.05  # of the identified one, where the runs hardly tell it
 IN_DOUBT = 3.0  # times its interval
@@ -114,8 +114,9 @@ def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table, least
     models += [m for p in pairs for m in p.models if m not in models]
     lighter = [replace(m, damping_nm_s_rad=least_damping * m.damping_nm_s_rad) for m in models]
     bearing = [*models, *(lighter if least_damping < WELL_KNOWN else [])]
-    look, weight = coarser(table.sensor, LOOK_HZ)
-    several = shapes(natural_hz(models[0]), table.sensor.sample_rate_hz)
+    own_hz = natural_hz(models[0])
+    look, weight = coarser(table.sensor, LOOKS * own_hz)
+    several = shapes(own_hz, table.sensor.sample_rate_hz)
     choice = candidates(several, bearing, table.allowed, look, table.least_torque_nm)
     if not choice:
         why = f"no set of any kind stays within the limits with {number(table.least_torque_nm, 2)} N m or more"
@@ -208,12 +209,23 @@ class _Looks:
         plans = [s.planned for s in sets]
         key = (*(id(p) for p in plans), id(pair))
         if key not in self._checked:
-            self._checked[key] = min(settled(way, plans, self._sensor, self._weight) for way in pair.ways)
+            self._checked[key] = self._settled(plans, pair)
         return self._checked[key]
 
-    def proved(self, chosen: Sequence[int]) -> list[float]:
-        """The same for every pair."""
-        return [self.checked([self.choice[i] for i in chosen], pair) for pair in self.pairs]
+    def _settled(self, plans: Sequence[PlannedSet], pair: Pair) -> float:
+        """In the worse of both directions; too little in one is too little."""
+        least = np.inf
+        for way in pair.ways:
+            least = min(least, settled(way, plans, self._sensor, self._weight, LEAST))
+            if least < LEAST:
+                break
+        return float(least)
+
+    def proved(self, chosen: Sequence[int], before: Sequence[float] | None = None) -> list[float]:
+        """The same for every pair; of pairs that fewer sets part well enough ``before``, what these promised."""
+        sets = [self.choice[i] for i in chosen]
+        known = before or [0.0] * len(self.pairs)
+        return [b if b >= GOOD else self.checked(sets, pair) for pair, b in zip(self.pairs, known, strict=True)]
 
     def duration(self, i: int) -> float:
         """Length of a candidate in seconds."""
@@ -230,7 +242,7 @@ def _choose(looks: _Looks) -> list[int]:
     What looks best to first order is put to the proof, one after the other, until one stands.
     """
     chosen: list[int] = []
-    reached = 0.0
+    reached, stands = 0.0, [0.0] * len(looks.pairs)
     while looks.shortlist and len(chosen) < MOST_SETS:
         gains = {i: looks.score([*chosen, i]) for i in looks.shortlist}
         best = max(gains.values())
@@ -241,15 +253,16 @@ def _choose(looks: _Looks) -> list[int]:
         order = _varied(looks, [*alike, *others])
         proofs: dict[int, list[float]] = {}
         for i in order[:PROOFS]:
-            proofs[i] = looks.proved([*chosen, i])
+            proofs[i] = looks.proved([*chosen, i], stands)
             if min(proofs[i]) >= GOOD:
                 break
         winner = max(proofs, key=lambda i: _worth(proofs[i]))
         if chosen and _worth(proofs[winner]) < reached + 0.1:  # of the logarithm: nothing that would be seen
             break
         chosen.append(winner)
-        reached = _worth(proofs[winner])
-        if min(proofs[winner]) >= GOOD:
+        stands = proofs[winner]
+        reached = _worth(stands)
+        if min(stands) >= GOOD:
             break
     return chosen
 

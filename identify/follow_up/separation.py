@@ -27,7 +27,7 @@ from rig.recording.run import Array
 
 SETTLE = 8  # rounds in which a model is fitted to what the other would have shown
 TRIES = 5  # of a step, each shorter than the one before
-ENOUGH = 1e-2  # of chi square by which a round has to gain
+ENOUGH = 0.05  # of chi square by which a round has to gain
 STARTS = (1.0, 0.1, 0.0)  # of the gains of the model's own effects
 
 
@@ -135,19 +135,25 @@ def share_of(model: Platform, shots: Shots) -> Share:
     return Share(float(gram[-1, -1]), gram[:-1, -1], gram[:-1, :-1])
 
 
-def settled(way: Way, several: Sequence[PlannedSet], sensor: Sensor, weight: float = 1.0) -> float:
+def settled(
+    way: Way, several: Sequence[PlannedSet], sensor: Sensor, weight: float = 1.0, least: float = 0.0
+) -> float:  # fmt: skip
     """Chi square that several sets leave when the model is fitted to what the truth would have shown.
 
     Each sample counts ``weight`` times. The fit follows the bend (Levenberg-Marquardt, sensitivities anew after each
     move), and begins once more with little of the model's own effects: a gain that the data so far hardly know may
-    be far off, and the way back from there leads over hills.
+    be far off, and the way back from there leads over hills. Below ``least`` it does not look any further.
     """
     sensor = replace(sensor, noise=sensor.noise / np.sqrt(weight))
     shots = [shots_of(way.model, measured(way.truth, s, sensor)) for s in several]
     _, names, origin = vector_of(way.model, 1)
     own = np.array([len(n) > 1 and n[0] not in way.truth.effects and _is_gain(n) for n in names])
-    found = [_descend(way, shots, np.where(own, share * origin, origin)) for share in STARTS[: 1 + 2 * bool(own.any())]]
-    return min(found)
+    found = np.inf
+    for share in STARTS[: 1 + 2 * bool(own.any())]:
+        found = min(found, _descend(way, shots, np.where(own, share * origin, origin)))
+        if found < least:
+            break
+    return found
 
 
 def _is_gain(name: tuple[str, ...]) -> bool:

@@ -77,7 +77,7 @@ def runs_apart(fits: WholeRuns, declared: Structure, start: dict[Name, float]) -
     for _ in range(ROUNDS):
         rests, columns = _columns(estimate, fits.use)
         wanted = [_items(len(fits.fitting)).index(key) for key in total]
-        step = _solved(np.column_stack([columns[0], columns[1][:, wanted]]), rests)[0][columns[0].shape[1] :]
+        step = _solved(np.column_stack([columns[0], columns[1][:, wanted]]), rests)[columns[0].shape[1] :]
         total = {key: value + float(d) for (key, value), d in zip(total.items(), step, strict=True)}
         if any(abs(v) > (LARGEST if kind == "gain" else LATEST_S) for (_, kind), v in total.items()):
             return None
@@ -157,11 +157,9 @@ def _columns(estimate: Estimate, use: Sequence[Array]) -> tuple[Array, tuple[Arr
     return np.concatenate(rests), (np.concatenate(rows), np.concatenate(own))
 
 
-def _solved(columns: Array, residual: Array) -> tuple[Array, float]:
+def _solved(columns: Array, residual: Array) -> Array:
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    x = np.linalg.lstsq(columns / size, residual, rcond=1e-12)[0]
-    left = residual - columns / size @ x
-    return x / size, float(left @ left)
+    return np.asarray(np.linalg.lstsq(columns / size, residual, rcond=1e-12)[0] / size)
 
 
 def _foretold(fits: WholeRuns, estimate: Estimate, base: WholeFit) -> list[Change]:
@@ -170,15 +168,23 @@ def _foretold(fits: WholeRuns, estimate: Estimate, base: WholeFit) -> list[Chang
     basis = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]
     residual, own = residual - basis @ (basis.T @ residual), own - basis @ (basis.T @ own)
     items, chosen = _items(len(estimate.shots)), list[int]()
-    total = float(residual @ residual)
+    size = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
+    scaled = own / size
+    # A campaign of fifty runs asks for thousands of these small fits: from the normal equations, made once.
+    gram, right, total = scaled.T @ scaled, scaled.T @ residual, float(residual @ residual)
+
+    def fitted(several: Sequence[int]) -> tuple[Array, float]:
+        x = np.linalg.lstsq(gram[np.ix_(several, several)], right[several], rcond=1e-12)[0]
+        return x / size[several], total - float(right[several] @ x)
+
     aim = base.count * fits.noise**2
     enough = aim + (1.0 - GONE) * max(total - aim, 0.0)
     while len({items[k][0] for k in chosen}) < len(estimate.shots) - 1 or len(chosen) < 1:
-        left = {k: _solved(own[:, [*chosen, k]], residual)[1] for k in range(len(items)) if k not in chosen}
+        left = {k: fitted([*chosen, k])[1] for k in range(len(items)) if k not in chosen}
         best = min(left, key=lambda k: left[k])
         chosen.append(best)
         if left[best] < enough:
-            sizes = _solved(own[:, chosen], residual)[0]
+            sizes = fitted(chosen)[0]
             return [Change(*items[k], float(v)) for k, v in zip(chosen, sizes, strict=True)]
     return []
 
