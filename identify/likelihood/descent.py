@@ -76,7 +76,7 @@ class Descent:
         still = [*fixed, *([("inertia",)] if p.torque_free else [])]
         self.still = held_still(self.names, p.traces, p.use, still)
         self.scale = np.maximum(np.abs(self.x), [self._unit(n) for n in self.names])
-        self.shots = shots_for(p.traces, structure, self.names, self.x, None, p.use, None, p.coarse)
+        self.shots = shots_for(p.traces, structure, self.names, self.x, None, p.use, None, p.coarse, ahead=True)
         # Start states are carried over only where they are fitted: where a driven run begins stuck is a matter of the
         # friction that is tried.
         for s, earlier in zip(self.shots, carry or (), strict=bool(carry)):

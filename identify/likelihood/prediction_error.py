@@ -175,7 +175,7 @@ class PredictionError:
         measured = self._readings(trace)
         predicted, state = predict_ahead(
             equations, s.grid.shaft_torque(equations), s.grid.step_s, round(trace.step_s / s.grid.step_s), spans,
-            s.starts, measured, trace.keep, gains, sensing.rate, s.bias, trace.offset_s, trace,
+            s.starts, measured, trace.keep, gains, sensing.rate, s.bias, trace.offset_s, trace, s.reads,
         )  # fmt: skip
         return Look(measured - predicted, gains.variance, state, gains)
 

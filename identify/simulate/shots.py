@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -33,6 +33,7 @@ class Shots:
     bias: float = 0.0
     weight: Any = field(default=None)  # (n,) boolean: samples that count
     rests: bool = False  # the first shot begins at rest, for certain: its start state is not fitted
+    reads: int = 1  # how often in a fine step a sensor's filter is fed, where the motion is predicted sample by sample
 
     @property
     def number(self) -> int:
@@ -216,4 +217,4 @@ def residual_at(s: Shots, structure: Structure, names: Sequence[Name], x: Array)
 
 def moved(s: Shots, by: tuple[Array, float]) -> Shots:
     """The same shots with other start states and bias."""
-    return Shots(s.trace, s.grid, s.first, s.starts + by[0], s.bias + by[1], s.weight, s.rests)
+    return replace(s, starts=s.starts + by[0], bias=s.bias + by[1])

@@ -63,7 +63,7 @@ def slowed(dz, n, w, h, count, p, p_at):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _acceleration(th, w, t, m, slip, z, dz, jck, body):  # type: ignore[no-untyped-def]
+def acceleration(th, w, t, m, slip, z, dz, jck, body):  # type: ignore[no-untyped-def]
     loads, count = body[0], body[1]
     net = m - jck[1] * w - jck[2] * th
     if loads > 0:
@@ -85,25 +85,25 @@ def _rk4(motion, x0, x1, h, m0, m1, m2, n, z, z0, k1, k2, k3, k4, jck, body):  #
     end = _quadratic(m0, m1, m2, x1)
     for i in range(n):
         z0[i] = z[i]
-    a1 = _acceleration(th, w, t, begin, slip, z, k1, jck, body)
+    a1 = acceleration(th, w, t, begin, slip, z, k1, jck, body)
     if abs(w) > most:
         slowed(k1, n, w, dt, count, p, p_at)
     w2, th2 = w + 0.5 * dt * a1, th + 0.5 * dt * w
     for i in range(n):
         z[i] = z0[i] + 0.5 * dt * k1[i]
-    a2 = _acceleration(th2, w2, t + 0.5 * dt, middle, slip, z, k2, jck, body)
+    a2 = acceleration(th2, w2, t + 0.5 * dt, middle, slip, z, k2, jck, body)
     if abs(w2) > most:
         slowed(k2, n, w2, dt, count, p, p_at)
     w3, th3 = w + 0.5 * dt * a2, th + 0.5 * dt * w2
     for i in range(n):
         z[i] = z0[i] + 0.5 * dt * k2[i]
-    a3 = _acceleration(th3, w3, t + 0.5 * dt, middle, slip, z, k3, jck, body)
+    a3 = acceleration(th3, w3, t + 0.5 * dt, middle, slip, z, k3, jck, body)
     if abs(w3) > most:
         slowed(k3, n, w3, dt, count, p, p_at)
     w4, th4 = w + dt * a3, th + dt * w3
     for i in range(n):
         z[i] = z0[i] + dt * k3[i]
-    a4 = _acceleration(th4, w4, t + dt, end, slip, z, k4, jck, body)
+    a4 = acceleration(th4, w4, t + dt, end, slip, z, k4, jck, body)
     if abs(w4) > most:
         slowed(k4, n, w4, dt, count, p, p_at)
     motion[0] = th + dt * (w + 2.0 * w2 + 2.0 * w3 + w4) / 6.0
@@ -279,7 +279,7 @@ def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, kinks, o
     t0 = motion[3]
     for i in range(n + 1):
         m = torque[i, 0] if i < n else torque[n - 1, 2]
-        a = _acceleration(mo[0], mo[1], mo[3], m, mo[2], zp, dz, jck, body)
+        a = acceleration(mo[0], mo[1], mo[3], m, mo[2], zp, dz, jck, body)
         if mo[2] == 0.0 and len(kernels) > loads:
             a = 0.0
         out[i, 0], out[i, 1], out[i, 2] = mo[0], mo[1], a

@@ -19,14 +19,27 @@ import numpy as np
 from rig.arrays import Array
 from rig.dynamics.equations import Equations, Readings
 from rig.dynamics.gains import BIAS, Gains
-from rig.dynamics.integrator import step_over_kinks
+from rig.dynamics.integrator import acceleration, step_over_kinks
 from rig.dynamics.native import call_filter, jit, offset, pointer
+
+
+@jit
+def _between(w0, a0, w1, a1, h, x, same):  # type: ignore[no-untyped-def]
+    """Rate at fraction x of a step, from rate and acceleration at both ends; ``same``: it never stuck or turned."""
+    u = 1.0 - x
+    if same:
+        return u * u * (1.0 + 2.0 * x) * w0 + x * x * (1.0 + 2.0 * u) * w1 + h * x * u * (u * a0 - x * a1)
+    w = w0 + a0 * x * h  # straight to a standstill, and straight on from where it left it
+    if w * w0 > 0.0:
+        return w
+    w = w1 - a1 * u * h
+    return w if w * w1 > 0.0 else 0.0
 
 
 @jit
 def _predict(  # type: ignore[no-untyped-def]
     starts, spans, offset_s, z, h, ratio, torque, jck, kernels, loads, z_at, p, p_at, kinks,
-    filters, fs, fs_at, fp, fp_at, measured, keep, gain, slow_decay, decay, walks, walk_decay, rate, bias, out, state,
+    filters, fs, fs_at, fp, fp_at, measured, keep, gain, slow_decay, decay, walks, walk_decay, rate, bias, reads, out, state,
 ):  # fmt: skip
     n_states, readings = len(z), measured.shape[1]
     room = np.zeros((10, max(4, n_states)))
@@ -34,12 +47,12 @@ def _predict(  # type: ignore[no-untyped-def]
         pointer(room[0]), pointer(room[1]), pointer(room[2]),
         pointer(room[3]), pointer(room[4]), pointer(room[5]),
     )  # fmt: skip
-    saved, before, bends = pointer(room[6]), pointer(room[8:]), pointer(kinks)
+    saved, spare, before, bends = pointer(room[6]), pointer(room[7]), pointer(room[8:]), pointer(kinks)
     motion = np.empty(4)
     mo, zp = pointer(motion), pointer(z)
     jck3 = (jck[0], jck[1], jck[2])
     body = (loads, len(kernels), pointer(kernels), pointer(z_at), pointer(p), pointer(p_at))
-    frictions = len(kernels) > loads
+    frictions, filtered = len(kernels) > loads, len(filters) > 0
     for k in range(len(spans)):
         first, last = spans[k, 0], spans[k, 1]
         motion[0], motion[1], motion[2] = starts[k, 0], starts[k, 1], np.sign(starts[k, 1])
@@ -71,16 +84,30 @@ def _predict(  # type: ignore[no-untyped-def]
             if i == last:
                 break
             for s in range(i * ratio, (i + 1) * ratio):
+                w0, slip, a0 = motion[1], motion[2], 0.0
+                if filtered and (slip != 0.0 or not frictions):
+                    a0 = acceleration(
+                        mo[0], mo[1], mo[3], torque[s, 0] + slow, slip, zp, spare, jck3, body
+                    )  # fmt: skip
                 step_over_kinks(
                     mo, n_states, zp, work, saved, h, torque[s, 0] + slow, torque[s, 1] + slow, torque[s, 2] + slow,
                     jck3, body, bends, len(kinks), before,
                 )  # fmt: skip
                 motion[3] = offset_s + (s + 1) * h
-                sensed = motion[1] - jumps - still
-                for f in range(len(filters)):
-                    sensed = call_filter(
-                        filters[f], sensed, h, offset(pointer(fs), fs_at[f]), offset(pointer(fp), fp_at[f])
-                    )  # fmt: skip
+                if not filtered:
+                    sensed = motion[1] - jumps
+                    continue
+                a1 = 0.0
+                if motion[2] != 0.0 or not frictions:
+                    a1 = acceleration(mo[0], mo[1], mo[3], torque[s, 2] + slow, mo[2], zp, spare, jck3, body)
+                for r in range(1, reads + 1):
+                    same = slip == motion[2]
+                    sensed = motion[1] if r == reads else _between(w0, a0, motion[1], a1, h, r / reads, same)
+                    sensed -= jumps + still
+                    for f in range(len(filters)):
+                        sensed = call_filter(
+                            filters[f], sensed, h / reads, offset(pointer(fs), fs_at[f]), offset(pointer(fp), fp_at[f])
+                        )  # fmt: skip
                 sensed += still
             slow *= slow_decay
             walked *= walk_decay
@@ -96,7 +123,7 @@ def _predict(  # type: ignore[no-untyped-def]
 def predict_ahead(
     equations: Equations, torque: Array, step_s: float, ratio: int, spans: Sequence[tuple[int, int]], starts: Array,
     measured: Array, keep: Any, gains: Gains, rate: bool, bias: float, offset_s: float = 0.0,
-    readings: Readings | None = None,
+    readings: Readings | None = None, reads: int = 1,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Every reading predicted from those before it, (n, m), and the states after it, (n, 4).
 
@@ -112,6 +139,8 @@ def predict_ahead(
         First and last sample of every stretch; each begins from its row of ``starts`` (angle, rate).
     measured, keep
         The readings, (n, m), and which samples were measured, (n,). A gyro's reading stands before an encoder's.
+    reads
+        How often in a fine step the sensor's filters are fed.
     """
     p, _kept = equations.parameters_with(readings)
     filters, fs, fs_at, fp, fp_at = equations.sensor.arrays(step_s)
@@ -121,6 +150,6 @@ def predict_ahead(
         equations.rest_states(*starts[0]), step_s, ratio, torque, equations.jck, equations.kernels, equations.loads,
         equations.z_at, p, equations.p_at, equations.kinks, filters, fs, fs_at, fp, fp_at, measured, keep, gains.gain,
         gains.slow_decay, gains.held, np.ascontiguousarray(gains.reads[:, BIAS]), gains.walk_decay, rate, bias,
-        out, state,
+        reads, out, state,
     )  # fmt: skip
     return out, state
