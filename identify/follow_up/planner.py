@@ -23,6 +23,7 @@ from identify.results import FollowUp, FollowUpPlan, Identification, Parting, Un
 from identify.wording import number
 from rig import effects
 from rig.config.excitation import ExcitationConfig
+from rig.excitation import PlannedSet
 from rig.platform import Platform
 from rig.preflight import Peaks
 from rig.recording.run import Recording

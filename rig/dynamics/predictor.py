@@ -39,7 +39,8 @@ def _between(w0, a0, w1, a1, h, x, same):  # type: ignore[no-untyped-def]
 @jit
 def _predict(  # type: ignore[no-untyped-def]
     starts, spans, offset_s, z, h, ratio, torque, jck, kernels, loads, z_at, p, p_at, kinks,
-    filters, fs, fs_at, fp, fp_at, measured, keep, gain, slow_decay, decay, walks, walk_decay, rate, bias, reads, out, state,
+    filters, fs, fs_at, fp, fp_at, measured, keep, gain, slow_decay, decay, walks, walk_decay, rate, bias, reads,
+    out, state,
 ):  # fmt: skip
     n_states, readings = len(z), measured.shape[1]
     room = np.zeros((10, max(4, n_states)))
