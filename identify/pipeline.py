@@ -38,16 +38,17 @@ from identify.runs.reduced import reduced
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
 from identify.runs.usable import runs_used
 from identify.select.field_search import Found, search_in_torque, with_curve
-from identify.select.left_over import dependence_on
+from identify.select.left_over import dependence_on, most_moving
 from identify.select.likelihood_search import LikelihoodSearch
 from identify.select.search_state import Search
+from identify.select.stepwise import Stepwise
 from identify.select.torque_choice import begun
 from identify.signals.prepare import channels_of, prepare
 from identify.signals.trace import Trace
 from rig import effects
 from rig.config.identify import IdentifyConfig
 from rig.errors import Aborted
-from rig.platform import Platform
+from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
 TAKEN_BACK = "effects were found that together leave too much and were taken back; the declared model does not suffice"
@@ -220,7 +221,7 @@ class _Identifier:
         found = search_in_torque(
             self.traces, self.split, self.structure, shapes, self.start, self._allowed(), unit, self.say,
             (search.stepwise.best, found_there), search.stepwise.trusted, search.stepwise.weigher.regression,
-            dependence_on(search.stepwise, search.stepwise.left) if search.stepwise.left else None,
+            self._curves(search.stepwise),
         )  # fmt: skip
         after = found.after
         gyro = all(t.channel == "rate" and t.beside is None for t in self.traces)  # an encoder has no line of its own
@@ -230,6 +231,13 @@ class _Identifier:
             self.say(f"not named: {TONE}; the line may come from the sensor itself")
             found, after = found.taken_back(), found.before
         return self._report(found.search, found.before, after, measured=found)
+
+    def _curves(self, search: Stepwise) -> list[tuple[Dependence, dict[str, float]]]:
+        """What curves over the torque that is left show; of those hardly believed, the one J, C or K hang on."""
+        most = {term: getattr(self.settings.accept, f"{term}_percent") for term in TERMS}
+        moving = most_moving(search, search.doubtful, most)
+        believed = [] if search.left is None else [dependence_on(search, search.left)]
+        return believed if moving is None else [*believed, moving]
 
     def _models(self) -> FinalModels:
         return FinalModels(self.traces, self.split, self.declared, self.structure, self.start, self.say)

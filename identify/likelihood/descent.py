@@ -16,6 +16,7 @@ import numpy as np
 from identify.estimate.output_error import held_still
 from identify.likelihood.derivatives import Standpoint, derivatives
 from identify.likelihood.fit import Columns, Fit, Look, Prediction
+from identify.likelihood.noise_search import likeliest_noise
 from identify.likelihood.normal_equations import Step, changed, logs_of, normal_equations
 from identify.model.parameters import Name, bounds_of, names_of, ordered
 from identify.model.structure import Structure
@@ -43,6 +44,7 @@ FURTHER = (  # times white density, slow variance and time constant: where else 
     (0.01, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 10.0, 1.0), (1.0, 0.1, 0.1), (1.0, 0.03, 0.01),
     (1.0, 1.0, 10.0),
 )  # fmt: skip
+WALKS = (1e-6, 1e-5, 1e-4, 1e-3)  # of the rate, that a gyro's bias walks over a run: where else it is looked for
 QUIETER = (1e-4, 1e-3, 1e-2, 0.1)  # times torque and slow error of an encoder together: the rest is read white
 
 
@@ -90,6 +92,9 @@ class Descent:
         self.noise = p.within(noise or p.on_grid(lambda q: self._cost(self._looks(self.x, p.within(q), self.shots))))
         self.looks = self._looks(self.x, self.noise, self.shots)
         self.cost = self._cost(self.looks)
+        self.alone = noise is None  # nobody has looked for the noise yet
+        if self.alone:
+            self._noise_alone()
         self.information: Array = np.zeros((len(self.x), len(self.x)))
         self._informed: tuple[Noise, bytes] | None = None
 
@@ -184,6 +189,7 @@ class Descent:
         """One step of parameters, biases and, if asked for, the noise; False where none leads down."""
         found = self._solvable(of_noise)
         p = len(self.x)
+        ratios = [not kind.endswith("_s") for kind in self.kinds] if of_noise else []
         if not (np.all(np.isfinite(found.matrix)) and np.all(np.isfinite(found.right))):
             return False
         size: Array = np.sqrt(np.maximum(np.diag(found.matrix), 1e-300))
@@ -196,7 +202,7 @@ class Descent:
             d[free] = np.linalg.lstsq(scaled + self.damping * np.eye(len(right)), right, rcond=1e-14)[0]
             d = d / size
             x = ordered(self.names, np.clip(self.x + d[:p], self.low, self.high))
-            change = np.concatenate([x - self.x, logs_of(d[p:])])
+            change = np.concatenate([x - self.x, logs_of(d[p:], found.level, ratios)])
             noise = self._with_logs(change[p:])
             shots = [
                 changed(s, taken - across @ change) for s, (across, taken) in zip(self.shots, found.own, strict=True)
@@ -224,19 +230,36 @@ class Descent:
         """
         before = self.cost
         wanders = self.problem.wanders and not self.problem.gyro
-        others = [(*f, 1.0) for f in FURTHER] + [(x, x, 1.0, x) for x in QUIETER if wanders]
-        for white, slow, time, walk in others:
+        others: list[dict[str, float]] = [
+            {"white": white, "slow": slow, "time_constant_s": time} for white, slow, time in FURTHER
+        ]  # fmt: skip
+        others += [{"white": x, "slow": x, "walk": x} for x in QUIETER if wanders]
+        if "walk" in self.kinds and not wanders:
+            others += [{"walk": self.problem.walk(share) / self.noise.walk} for share in WALKS]
+        for times in others:
             q = self.noise
-            noise = replace(q, white=white * q.white, slow=slow * q.slow, time_constant_s=time * q.time_constant_s)
-            noise = self.problem.within(replace(noise, walk=walk * q.walk))
+            noise = self.problem.within(replace(q, **{k: x * getattr(q, k) for k, x in times.items()}))
             looks = self._looks(self.x, noise, self.shots)
             cost = self._cost(looks)
             if cost < self.cost - ENOUGH:
                 self.noise, self.looks, self.cost = noise, looks, cost
+        if self.alone:
+            self._noise_alone()
         if lower:
             self._without_disturbance()
         self.damping = DAMPING
         return self.cost < before - ENOUGH
+
+    def _noise_alone(self) -> None:
+        """The likeliest noise near this one, if it is likelier with the model as it stands."""
+        noise = likeliest_noise(
+            self.problem, self.structure, self.names, self.x, self.shots, self.looks, self.weights, self.noise,
+            self.kinds,
+        )  # fmt: skip
+        looks = self._looks(self.x, noise, self.shots)
+        cost = self._cost(looks)
+        if cost < self.cost - ENOUGH:
+            self.noise, self.looks, self.cost = noise, looks, cost
 
     def _without_disturbance(self) -> None:
         """Far less of a disturbance, if that is likelier once the parameters have followed.

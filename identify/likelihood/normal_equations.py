@@ -23,6 +23,7 @@ class Step:
     right: Array
     information: Array  # of the parameters alone, for readings of unit variance, (p, p)
     own: Sequence[tuple[Array, Array]]  # (k, p) and (k,): what they lose with a change, and take without one
+    level: Array  # by how much the variance of one reading falls with the logarithms of the noise, (k,)
 
 
 def normal_equations(parts: Sequence[tuple[Columns, Array, Array]], p: int, k: int, count: int) -> Step:
@@ -46,7 +47,7 @@ def normal_equations(parts: Sequence[tuple[Columns, Array, Array]], p: int, k: i
         apart = spread - level  # the scale of all variances is free: only what differs between samples tells
         matrix[p:, p:] += 0.5 * apart.T @ apart
         right[p:] -= 0.5 * apart.T @ (1.0 - z * z / variance)
-    return Step(matrix, right, information, own)
+    return Step(matrix, right, information, own, level)
 
 
 def _spanned(own: Array) -> tuple[Array, Array]:
@@ -62,13 +63,22 @@ def _spanned(own: Array) -> tuple[Array, Array]:
     return basis, follow
 
 
-def logs_of(step: Array) -> Array:
-    """What a step in the logarithms of the noise comes to.
+def logs_of(step: Array, level: Array, ratios: Sequence[bool]) -> Array:
+    """What a step in the logarithms of the noise comes to, (k,).
 
     A density far below its best hardly acts: the cost is a straight line in the density itself, not in its logarithm.
-    So what rises is stepped as a density (1 + step times itself), what falls as a logarithm.
+    So what rises is stepped as a density (1 + step times itself), what falls as a logarithm. That holds for what each
+    density is; as ``ratios`` to the variance of a reading, which falls by ``level`` a unit, they may all rise together
+    where only that variance falls.
     """
-    return np.where(step > 0.0, np.log1p(np.minimum(step, RISE)), np.maximum(step, -FARTHEST))
+    with_variance = np.asarray(ratios, dtype=bool)
+    variance = -float(level @ step)
+    bare = step + np.where(with_variance, variance, 0.0)
+    return _stepped(bare) - np.where(with_variance, _stepped(np.array(variance)), 0.0)
+
+
+def _stepped(step: Array) -> Array:
+    return np.where(step > 0.0, np.log1p(np.clip(step, 0.0, RISE)), np.maximum(step, -FARTHEST))
 
 
 def changed(s: Shots, own: Array) -> Shots:

@@ -87,7 +87,7 @@ class TorqueErrors:
 def search_in_torque(
     traces: Sequence[Trace], split: Split, structure: Structure, shapes: dict[str, tuple[float, ...]], start: Start,
     allowed: Sequence[str], unit: str, say: Callable[[str], None], known: tuple[Fit, Search],
-    trusted: bool, along_few: TorqueRegression, curve: tuple[Dependence, Mapping[str, float]] | None = None,
+    trusted: bool, along_few: TorqueRegression, curves: Sequence[tuple[Dependence, Mapping[str, float]]] = (),
 ) -> Found:  # fmt: skip
     """Find what the declared model lacks, and fit both models with their disturbance.
 
@@ -109,8 +109,8 @@ def search_in_torque(
         effects cannot be followed along the measured motion (a play, a hysteresis).
     along_few
         The samples that search looked at, in torque.
-    curve
-        What a curve over what that model leaves shows, and how far J, C and K move with it, percent.
+    curves
+        What curves over what that model leaves show, and how far J, C and K move with each, percent.
     """
     few, parts = along_few.traces, along_few.split
     scale = scale_of(few, start.platform, ())
@@ -134,7 +134,7 @@ def search_in_torque(
     filtered = any(effects.get(e).place is Place.SENSOR for e in known[0].structure.effects)  # which no torque shows
     if not unfollowed and not filtered:
         say("looking at what is left as a torque")
-        depends = bool(curve or disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on)
+        depends = bool(curves or disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on)
         best = search.run()
         if _better(search, best, trial, depends) and not (trusted and _more_flexible(best, trial)):
             by_likelihood = None
@@ -162,8 +162,9 @@ def search_in_torque(
     lost = [e for e in final.effects if e not in best.structure.effects and effects.get(e).place is not Place.SENSOR]
     if by_likelihood and (unfollowed or lost):
         disturbance = Disturbance(size_nm, unit, size_nm / regression.torque_nm, (), {})
-    if curve is not None and set(final.effects) <= set(known[0].structure.effects):
-        disturbance = with_curve(disturbance, *curve)
+    if set(final.effects) <= set(known[0].structure.effects):
+        for curve in curves:
+            disturbance = with_curve(disturbance, *curve)
 
     def errors(fit: TorqueFit) -> TorqueErrors:
         size = regression.torque_nm

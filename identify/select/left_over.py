@@ -7,7 +7,7 @@ something is left and which of the names explain nothing once it is there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -31,6 +31,7 @@ TRIED = 2  # of the curves with the largest scores
 STEPS = 14
 SHOWN = 25  # places at which a curve is shown
 SURE = 2.0  # standard errors by which a parameter moves
+BY_CHANCE = 1e-4  # of a curve that is no name but may move a parameter: one in a thousand recordings, over ten curves
 ON = {
     "free_angle": "angle", "free_rate": "rate", "free_torque": "torque", "free_time": "time",
     "free_gain_over_time": "time", "free_gain_over_speed": "rate", "free_spring_over_time": "time",
@@ -64,11 +65,21 @@ class LeftOver:
         """Whether it is believed, and takes enough."""
         return self.evidence.support > APART and self.share > WEIGHT
 
+    @property
+    def by_chance(self) -> float:
+        """How often chance alone makes the cost fall as much, where the curve stands for nothing."""
+        parameters = self.evidence.price / np.log(max(self.evidence.fit.count, 2))
+        return float(chi2.sf(max(self.evidence.gain / self.evidence.inflation, 0.0), parameters))
 
-def left_over(search: Stepwise, now: Fit) -> LeftOver | None:
-    """The curve that explains most of what a model leaves; None where none explains enough to be believed."""
+
+def left_over(search: Stepwise, now: Fit) -> tuple[LeftOver | None, list[LeftOver]]:
+    """The curve that explains most of what a model leaves, None where none explains enough to be believed.
+
+    Besides, the other curves that are hardly chance: too little for a belief, but J may be another beside them.
+    """
     problem = search.problem
     best: LeftOver | None = None
+    others: list[LeftOver] = []
     for form in scores(problem, now, search.trials.scale(now), tuple(effects.FREE_FORMS))[:TRIED]:
         if form.gain < HOPE:
             break
@@ -80,7 +91,9 @@ def left_over(search: Stepwise, now: Fit) -> LeftOver | None:
             found = _beside(search, _from_there(search, now, fit), fit, form.effect)
         if found.counts and (best is None or found.evidence.support > best.evidence.support):
             best = found
-    return best
+        elif found.by_chance < BY_CHANCE:
+            others.append(found)
+    return best, others
 
 
 def _beside(search: Stepwise, now: Fit, fit: Fit, form: str) -> LeftOver:
@@ -131,20 +144,19 @@ def dependence_on(search: Stepwise, left: LeftOver) -> tuple[Dependence, dict[st
     as_terms = np.linalg.lstsq(terms / size, torque, rcond=1e-9)[0] / size
     rms = float(np.sqrt(np.mean((torque - terms @ as_terms) ** 2)))
     at, shape = _shape(form, fit)
-    by_chance = float(
-        chi2.sf(max(left.evidence.gain / left.evidence.inflation, 0.0), left.evidence.price / np.log(max(fit.count, 2)))
-    )
     moves: dict[str, float] = {}
     for k, term in enumerate(TERMS):
         here, there = left.now.values.get((term,)), fit.values.get((term,))
         if not here or there is None:
             continue
         moved = there - here + _slope(form, term, at, shape)
-        if ON[form] == "torque" or "gain" in form:  # what passes on another share of the torque is another scale
+        if ON[form] == "torque":  # what passes on another share of the torque is another scale
             moved = float(as_terms[k])
+        elif "gain" in form:  # so is a gain that changes, and nobody knows where along it the recorded torque is right
+            moved = max(moved, float(as_terms[k]), key=abs)
         if abs(moved) > SURE * _error(fit, (term,)):
             moves[term] = 100.0 * abs(moved / here)
-    return Dependence(ON[form], rms, rms / problem.torque_nm, by_chance, tuple(at), tuple(shape)), moves
+    return Dependence(ON[form], rms, rms / problem.torque_nm, left.by_chance, tuple(at), tuple(shape)), moves
 
 
 def _error(fit: Fit, name: Name) -> float:
@@ -169,3 +181,16 @@ def _shape(form: str, fit: Fit) -> tuple[list[float], list[float]]:
     values = np.concatenate([[0.0], own[3:], [0.0]])
     at = np.linspace(own[0], own[1], SHOWN)
     return at.tolist(), np.interp(at, places, values).tolist()
+
+
+def most_moving(
+    search: Stepwise, curves: Sequence[LeftOver], most_percent: Mapping[str, float]
+) -> tuple[Dependence, dict[str, float]] | None:
+    """Of curves beside a model the one that moves J, C or K farthest beyond what is allowed; None where none does."""
+    told = [dependence_on(search, c) for c in curves]
+
+    def excess(curve: tuple[Dependence, dict[str, float]]) -> float:
+        return max((moved / most_percent[term] for term, moved in curve[1].items()), default=0.0)
+
+    worst = max(told, key=excess, default=None)
+    return worst if worst is not None and excess(worst) > 1.0 else None

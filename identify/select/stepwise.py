@@ -77,6 +77,7 @@ class Stepwise:
     best: Fit = None  # type: ignore[assignment]
     inflation: dict[str, float] = field(default_factory=dict)  # of every effect that was added, beside all others
     left: LeftOver | None = None  # a curve that belongs beside the model, though no effect of that kind is known
+    doubtful: list[LeftOver] = field(default_factory=list)  # curves beside the model that are hardly chance
     _on_all: dict[_Key, Fit] = field(default_factory=dict)
     _lacking: dict[_Key, Fit] = field(default_factory=dict)  # fits with one effect less than one that was tried
     _needed: dict[str, float] = field(default_factory=dict)  # support of an effect beside all others
@@ -108,16 +109,17 @@ class Stepwise:
     def beside_what_is_left(self, now: Fit) -> Fit:
         """Without names that explain nothing beside a curve over what is left."""
         self.say("looking at what is left")
-        while (left := left_over(self, now)) is not None:
+        while True:
+            left, self.doubtful = left_over(self, now)
             self.left = left
+            if left is None:
+                break
             name = needless_beside(self, left, self.trials.added(now))
             if name is None:
                 break
             self.dropped.append((name, "beside a curve over what no effect explains, it explains nothing"))
             self.say(f"took {name} back: a curve over what is left explains it")
             now = self._without(now, name, MANY)
-        else:
-            self.left = None
         return now
 
     @property

@@ -1,0 +1,65 @@
+"""The likeliest noise beside a model that stays as it is: torque disturbance, walk and low-pass of the sensor.
+
+A fit steps parameters and noise together, which is quick where both are near. Far off, the noise has long curved
+valleys (less noise behind a gyro's low-pass, and all else more), and a step that is cut short for the one is cut short
+for the other. Alone, the noise needs no prediction: other gains change the innovations through the linear part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from identify.likelihood.fit import Look
+from identify.model.parameters import Name
+from identify.model.structure import Structure
+from identify.simulate.shots import RUNAWAY, Shots
+from rig.arrays import Array
+from rig.dynamics.gains import Noise, innovations_with
+
+if TYPE_CHECKING:
+    from identify.likelihood.prediction_error import PredictionError
+
+WORST = 1e300
+STEP = 0.02  # of a logarithm, in differences
+STEPS = 20
+ENOUGH = 1.0  # slope of the cost, a unit of a logarithm, at which it has arrived
+
+
+@RUNAWAY
+def likeliest_noise(
+    problem: PredictionError, structure: Structure, names: Sequence[Name], x: Array, shots: Sequence[Shots],
+    looks: Sequence[Look], weights: Sequence[Any], noise: Noise, kinds: Sequence[str],
+) -> Noise:  # fmt: skip
+    """From the noise that ``looks`` were predicted with down to the nearest minimum.
+
+    Parameters
+    ----------
+    kinds
+        Numbers of the noise that this model has.
+    """
+    count = int(sum(w.sum() for w in weights)) * problem.readings
+    begun = np.log([getattr(noise, kind) for kind in kinds])
+
+    def of(logs: Array) -> Noise:
+        return problem.within(replace(noise, **dict(zip(kinds, np.exp(logs).tolist(), strict=True))))
+
+    def cost(logs: Array) -> float:
+        there = of(logs)
+        squares = spread = 0.0
+        for s, q, w in zip(shots, looks, weights, strict=True):
+            gains = problem.gains_at(s, structure, names, x, there)
+            spans = [(a, b - 1) for a, b in s.edges]
+            e = innovations_with(q.gains, gains, q.innovations, q.state, s.trace.keep, spans)[w]
+            v = gains.variance[w]
+            squares += float(np.sum(e * e / v))
+            spread += float(np.sum(np.log(v)))
+        value = count * np.log(squares / count) + spread if squares > 0.0 else np.inf
+        return float(value) if np.isfinite(value) else WORST
+
+    found = minimize(cost, begun, method="BFGS", options={"maxiter": STEPS, "gtol": ENOUGH, "eps": STEP})
+    return of(found.x)
