@@ -290,8 +290,13 @@ class Descent:
         self.noise, self.x, self.shots, self.looks, self.cost = place
 
     def _disturbed(self) -> float:
-        """Median over the samples of the prediction's variance over that without a torque disturbance."""
+        """Median over the samples of the prediction's variance over that without a torque disturbance.
+
+        A gyro's walk is left out, too: beside a wrong model it takes what is torque, and would hide it here.
+        """
         p, quiet = self.problem, replace(self.noise, white=0.0, slow=0.0)
+        if p.gyro:
+            quiet = replace(quiet, walk=0.0)
         ratios = [
             (q.variance[w] / p.gains_at(s, self.structure, self.names, self.x, quiet).variance[w])[:, -1]
             for s, q, w in zip(self.shots, self.looks, self.weights, strict=True)

@@ -34,7 +34,8 @@ from rig.dynamics.predictor import predict_ahead
 LONGEST_SHARE = 0.2  # of the longest run: a disturbance slower than that is a constant
 SHORTEST_SAMPLES = 4.0  # time constant of a disturbance, in samples: a faster one is white
 LEAST_TORQUE, MOST_TORQUE = 1e-7, 10.0  # of the torque: how large a disturbance may be
-LEAST_WALK, LITTLE_WALK, MOST_WALK = 1e-7, 1e-5, 1.0  # of the rate, that a gyro's bias walks over a run
+LEAST_WALK, LITTLE_WALK, MOST_WALK = 1e-7, 1e-5, 0.01  # of the rate, that a gyro's bias walks over a run
+MOST_ERROR = 1.0  # of the angle, that an encoder's slow error takes over a run
 LEAST_AHEAD, MOST_AHEAD = 1e-3, 1e8  # times the variance of one reading, of a gyro's noise ahead of its low-pass
 # Of the motion, root mean square, by which a start state may be off: the smoothed motion is worst where a run begins.
 START_RATE, START_ANGLE, UNKNOWN_ANGLE = 0.1, 0.05, 1.0
@@ -106,7 +107,9 @@ class PredictionError:
             float(np.clip(noise.white, self.white(LEAST_TORQUE), self.white(MOST_TORQUE))),
             float(np.clip(noise.slow, self.slow(LEAST_TORQUE), self.slow(MOST_TORQUE))),
             float(np.clip(noise.time_constant_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
-            float(np.clip(noise.walk, self.walk(LEAST_WALK), self.walk(MOST_WALK))) if self.wanders else 0.0,
+            float(np.clip(noise.walk, self.walk(LEAST_WALK), self.walk(MOST_WALK if self.gyro else MOST_ERROR)))
+            if self.wanders
+            else 0.0,
             float(np.clip(noise.ahead, LEAST_AHEAD * self.step_s, MOST_AHEAD * self.step_s)) if self.gyro else 0.0,
             np.inf if self.gyro else float(np.clip(noise.walk_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
         )
