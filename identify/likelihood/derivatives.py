@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from identify.likelihood.prediction_error import PredictionError
 
 NOISE_STEP = 0.02  # of a logarithm of the noise, in its differences
+GAIN_STEP = 0.02  # of a parameter's scale, in differences of gains: those are cut off where they have settled
 BIAS_STEP, START_STEP = 1e-4, 1e-6  # of the motion, of a bias and of a start state
 
 
@@ -35,7 +36,28 @@ class Standpoint:
     looks: Sequence[Look]
 
 
-def derivatives(at: Standpoint, steps: Mapping[int, float], kinds: Sequence[str]) -> list[tuple[Columns, Array, Array]]:
+@dataclass(frozen=True)
+class Derivatives:
+    """One run's derivatives: of the prediction, and of the gains behind it.
+
+    Attributes
+    ----------
+    columns
+        What the parameters do to the scaled innovations with gains that stay.
+    pulled
+        What parameters and logarithms of the noise do through the gains, (n, p + k).
+    spread
+        What they do to the logarithm of the innovations' variance, (n, p + k).
+    """
+
+    columns: Columns
+    pulled: Array
+    spread: Array
+
+
+def derivatives(
+    at: Standpoint, steps: Mapping[int, float], kinds: Sequence[str], through_gains: Mapping[int, float] | None = None
+) -> list[Derivatives]:
     """Every run's derivatives; the predictions they need side by side, of all runs and parameters.
 
     Parameters
@@ -44,11 +66,10 @@ def derivatives(at: Standpoint, steps: Mapping[int, float], kinds: Sequence[str]
         By which the parameters are moved that are free, by their place.
     kinds
         Numbers of the noise whose logarithms are moved, too.
-
-    Returns
-    -------
-    For every run its columns, what the logarithms of the noise do to the scaled innovations, (n, k), and what to the
-    logarithm of their variance, (n, k).
+    through_gains
+        Steps of the parameters whose effect on the gains counts, by their place. Beside the right model it averages
+        out in the innovations, and the information of the parameters does without it; but not in their variance. The
+        lag of a gyro shapes the noise that came before it, and a step that does not know of that goes astray.
     """
     tasks = [
         (i, k) for i, s in enumerate(at.shots) for k in steps
@@ -56,7 +77,7 @@ def derivatives(at: Standpoint, steps: Mapping[int, float], kinds: Sequence[str]
     ]  # fmt: skip
     workers = at.problem.workers
     done = dict(zip(tasks, workers.map(lambda t: _by_parameter(at, t[0], t[1], steps[t[1]]), tasks), strict=True))
-    return list(workers.map(lambda i: _of_run(at, i, done, kinds), range(len(at.shots))))
+    return list(workers.map(lambda i: _of_run(at, i, done, kinds, through_gains or {}), range(len(at.shots))))
 
 
 @RUNAWAY
@@ -65,16 +86,16 @@ def _by_parameter(at: Standpoint, i: int, k: int, step: float) -> Array:
     s, base, there = at.shots[i], at.looks[i], at.x.copy()
     w = s.weight
     there[k] += step
-    # What a parameter does to the gains matters to no innovation that is white, and gains cost a prediction.
     other = at.problem.look(s, at.structure, at.names, there, at.noise, base.gains)
     return np.asarray(((base.innovations[w] - other.innovations[w]) / (step * np.sqrt(base.variance[w]))).ravel())
 
 
 @RUNAWAY
 def _of_run(
-    at: Standpoint, i: int, done: Mapping[tuple[int, int], Array], kinds: Sequence[str]
-) -> tuple[Columns, Array, Array]:
-    """Derivatives of one run; ``done`` are those by parameters.
+    at: Standpoint, i: int, done: Mapping[tuple[int, int], Array], kinds: Sequence[str],
+    through_gains: Mapping[int, float],
+) -> Derivatives:  # fmt: skip
+    """Derivatives of one run; ``done`` are those by parameters with gains that stay.
 
     The noise and the bias act through the linear part: no prediction is needed for theirs.
     """
@@ -88,7 +109,8 @@ def _of_run(
 
     scaled = (base.innovations[w] / root).ravel()
     columns = np.zeros((scaled.size, len(at.x)))
-    pulled, spread = np.zeros((scaled.size, len(kinds))), np.zeros((scaled.size, len(kinds)))
+    count = len(at.x) + len(kinds)
+    pulled, spread = np.zeros((scaled.size, count)), np.zeros((scaled.size, count))
     for k in range(len(at.x)):
         if (i, k) in done:
             columns[:, k] = done[(i, k)]
@@ -98,12 +120,23 @@ def _of_run(
         own = followed(base.gains, h, h)[:, None]
     if p.fits_starts:
         own = np.column_stack([own, _by_start(at, s, base, root)])
-    for k, kind in enumerate(kinds):
+    for k, step in through_gains.items():
+        there = at.x.copy()
+        there[k] += step
+        if len(at.names[k]) > 1:  # of the sensor, whose own states are corrected, and pass that on
+            other = p.look(s, at.structure, at.names, there, at.noise)
+            change = ((base.innovations[w] - other.innovations[w]) / (step * root)).ravel()
+            pulled[:, k], gains = change - columns[:, k], other.gains
+        else:
+            gains = p.gains_at(s, at.structure, at.names, there, at.noise)
+            pulled[:, k] = followed(replace(base.gains, gain=gains.gain, variance=gains.variance), step)
+        spread[:, k] = (np.log(gains.variance[w] / base.variance[w]) / step).ravel()
+    for k, kind in enumerate(kinds, len(at.x)):
         changed = replace(at.noise, **{kind: getattr(at.noise, kind) * float(np.exp(NOISE_STEP))})
         gains = p.gains_at(s, at.structure, at.names, at.x, changed)
         pulled[:, k] = followed(gains, NOISE_STEP)
         spread[:, k] = (np.log(gains.variance[w] / base.variance[w]) / NOISE_STEP).ravel()
-    return Columns(columns, own, scaled, base.variance[w].ravel()), pulled, spread
+    return Derivatives(Columns(columns, own, scaled, base.variance[w].ravel()), pulled, spread)
 
 
 def _by_start(at: Standpoint, s: Shots, base: Look, root: Array) -> Array:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identify.estimate.output_error import held_still
-from identify.likelihood.derivatives import Standpoint, derivatives
+from identify.likelihood.derivatives import GAIN_STEP, Derivatives, Standpoint, derivatives
 from identify.likelihood.fit import Columns, Fit, Look, Prediction
 from identify.likelihood.noise_search import likeliest_noise
 from identify.likelihood.normal_equations import Step, changed, logs_of, normal_equations
@@ -155,7 +155,7 @@ class Descent:
 
     def columns(self) -> list[Columns]:
         """Derivatives of every run, where the descent stands."""
-        return [c for c, _, _ in self._all_columns(False)]
+        return [d.columns for d in self._derivatives(False, False)]
 
     def _looks(self, x: Array, noise: Noise, shots: Sequence[Shots]) -> list[Look]:
         p = self.problem
@@ -171,17 +171,27 @@ class Descent:
         log = sum(float(np.sum(np.log(q.variance[w]))) for q, w in zip(looks, self.weights, strict=True))
         return float(self.count * np.log(squares / self.count) + log)
 
-    def _all_columns(self, of_noise: bool) -> list[tuple[Columns, Array, Array]]:
+    def _derivatives(self, of_noise: bool, of_gains: bool) -> list[Derivatives]:
         """Every run's derivatives, where the descent stands."""
         free = [k for k in range(len(self.names)) if not self.still[k]]
         there = Standpoint(self.problem, self.structure, self.names, self.x, self.noise, self.shots, self.looks)
-        steps = STEP * self.scale * np.where(self.x + STEP * self.scale > self.high, -1.0, 1.0)
-        return derivatives(there, dict(zip(free, steps[free].tolist(), strict=True)), self.kinds if of_noise else [])
 
-    def _solvable(self, of_noise: bool) -> Step:
+        def steps(relative: float, places: Sequence[int]) -> dict[int, float]:
+            size = relative * self.scale * np.where(self.x + relative * self.scale > self.high, -1.0, 1.0)
+            return {k: float(size[k]) for k in places}
+
+        shaping = [k for k in free if of_gains and self._shapes_gains(self.names[k])]
+        return derivatives(there, steps(STEP, free), self.kinds if of_noise else [], steps(GAIN_STEP, shaping))
+
+    @staticmethod
+    def _shapes_gains(name: Name) -> bool:
+        """Whether a parameter is one of the linear part or of the sensor: what effects do to the gains is little."""
+        return len(name) == 1 or effects.get(name[0]).lag is not None
+
+    def _solvable(self, of_noise: bool, of_gains: bool = True) -> Step:
         """The normal equations where the descent stands; the information of the parameters is kept."""
         kinds = len(self.kinds) if of_noise else 0
-        found = normal_equations(self._all_columns(of_noise), len(self.x), kinds, self.count)
+        found = normal_equations(self._derivatives(of_noise, of_gains), len(self.x), kinds, self.count)
         self.information, self._informed = found.information, (self.noise, self.x.tobytes())
         return found
 
@@ -306,7 +316,7 @@ class Descent:
     def found(self) -> Fit:
         """The fit where the descent stands."""
         if self._informed != (self.noise, self.x.tobytes()):
-            self._solvable(False)
+            self._solvable(False, False)
         squares = sum(
             float(np.sum(q.innovations[w] ** 2 / q.variance[w])) for q, w in zip(self.looks, self.weights, strict=True)
         )

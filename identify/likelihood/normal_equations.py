@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify.likelihood.fit import Columns
+from identify.likelihood.derivatives import Derivatives
 from identify.simulate.shots import Shots, moved
 from rig.arrays import Array
 
@@ -26,28 +26,30 @@ class Step:
     level: Array  # by how much the variance of one reading falls with the logarithms of the noise, (k,)
 
 
-def normal_equations(parts: Sequence[tuple[Columns, Array, Array]], p: int, k: int, count: int) -> Step:
+def normal_equations(parts: Sequence[Derivatives], p: int, k: int, count: int) -> Step:
     """Of ``p`` parameters and ``k`` numbers of the noise, from every run's derivatives.
 
     ``count`` is the number of readings that count.
     """
     matrix, right = np.zeros((p + k, p + k)), np.zeros(p + k)
     information, own = np.zeros((p, p)), []
-    squares = sum(float(c.scaled @ c.scaled) for c, _, _ in parts)
+    squares = sum(float(d.columns.scaled @ d.columns.scaled) for d in parts)
     variance = squares / max(count, 1)
-    level = np.sum([v.sum(axis=0) for _, _, v in parts], axis=0) / max(count, 1)
-    for part, pulled, spread in parts:
-        wide, z = np.column_stack([part.columns, pulled]), part.scaled
-        basis, follow = _spanned(part.own)
+    level = np.sum([d.spread.sum(axis=0) for d in parts], axis=0) / max(count, 1)
+    for d in parts:
+        z, wide = d.columns.scaled, d.pulled.copy()
+        wide[:, :p] += d.columns.columns
+        basis, follow = _spanned(d.columns.own)
         across, taken = basis.T @ wide, basis.T @ z
         matrix += (wide.T @ wide - across.T @ across) / variance
         right += (wide.T @ z - across.T @ taken) / variance
         own.append((follow @ across, follow @ taken))
-        information += part.columns.T @ part.columns - across[:, :p].T @ across[:, :p]
-        apart = spread - level  # the scale of all variances is free: only what differs between samples tells
-        matrix[p:, p:] += 0.5 * apart.T @ apart
-        right[p:] -= 0.5 * apart.T @ (1.0 - z * z / variance)
-    return Step(matrix, right, information, own, level)
+        steady = basis.T @ d.columns.columns
+        information += d.columns.columns.T @ d.columns.columns - steady.T @ steady
+        apart = d.spread - level  # the scale of all variances is free: only what differs between samples tells
+        matrix += 0.5 * apart.T @ apart
+        right -= 0.5 * apart.T @ (1.0 - z * z / variance)
+    return Step(matrix, right, information, own, level[p:])
 
 
 def _spanned(own: Array) -> tuple[Array, Array]:
