@@ -54,6 +54,24 @@ class Derivatives:
     pulled: Array
     spread: Array
 
+    def with_variance(self, level: Array, variance: float) -> Columns:
+        """Columns whose products are those of the whole likelihood: after every innovation, what its variance tells.
+
+        A variance tells as much as half a squared unit normal does. ``level`` is the mean of ``spread`` over all runs,
+        (p,), for the scale of all variances is free; ``variance`` that of the scaled innovations.
+        """
+        c, root = self.columns, np.sqrt(0.5 * variance)
+        p = c.columns.shape[1]
+
+        def between(innovations: Array, variances: Array) -> Array:
+            return np.stack([innovations, variances], axis=1).reshape(-1, *innovations.shape[1:])
+
+        return Columns(
+            between(c.columns + self.pulled[:, :p], root * (self.spread[:, :p] - level[:p])),
+            between(c.own, np.zeros_like(c.own)), between(c.scaled, root * (c.scaled**2 / variance - 1.0)),
+            np.repeat(c.variance, 2),
+        )  # fmt: skip
+
 
 def derivatives(
     at: Standpoint, steps: Mapping[int, float], kinds: Sequence[str], through_gains: Mapping[int, float] | None = None

@@ -157,6 +157,14 @@ class Descent:
         """Derivatives of every run, where the descent stands."""
         return [d.columns for d in self._derivatives(False, False)]
 
+    def scores(self) -> list[Columns]:
+        """The same with what the parameters do through the gains, and to the variance of the innovations."""
+        parts = self._derivatives(False, True)
+        squares = sum(float(d.columns.scaled @ d.columns.scaled) for d in parts)
+        variance = squares / max(self.count, 1)
+        level = np.sum([d.spread.sum(axis=0) for d in parts], axis=0) / max(self.count, 1)
+        return [d.with_variance(level, variance) for d in parts]
+
     def _looks(self, x: Array, noise: Noise, shots: Sequence[Shots]) -> list[Look]:
         p = self.problem
         return list(p.workers.map(lambda s: p.look(s, self.structure, self.names, x, noise), shots))

@@ -87,11 +87,11 @@ class PredictionError:
         self.fits_starts = self.torque_free
         self.start_variance = (0.0, 0.0) if self.fits_starts else self._start_variance()
 
-    def columns_at(self, fit: Fit) -> list[Columns]:
-        """Derivatives of every run's innovations where a fit stands."""
+    def columns_at(self, fit: Fit, with_variance: bool = False) -> list[Columns]:
+        """Derivatives of every run's innovations where a fit stands; ``with_variance``, of their whole likelihood."""
         with np.errstate(all="ignore"):
             descent = Descent(self, fit.structure, fit.values, fit.noise, fit.shots, ())
-            return descent.columns()
+            return descent.scores() if with_variance else descent.columns()
 
     def white(self, share: float) -> float:
         """Density of a white torque that is this share of the torque, as ``Noise`` has it."""

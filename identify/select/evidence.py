@@ -88,7 +88,7 @@ class Weigher:
     def evidence(self, effect: str, now: Fit, new: Fit) -> Evidence:
         """A model with one effect or term more against the one without it."""
         added = [n for n in new.names if n not in now.names]
-        inflated = inflation(self.problem.columns_at(new), new, added)
+        inflated = inflation(self.problem.columns_at(new, with_variance=True), new, added)
         torqueless = effect not in TERMS and effects.get(effect).place is Place.SENSOR
         weight = 1.0 if torqueless else self.weight(now, new, inflated < TRUSTED)
         price = (new.penalised - new.cost) - (now.penalised - now.cost)

@@ -187,12 +187,19 @@ class Stepwise:
             best = min(fits.values(), key=lambda f: f.penalised)
             name = plainest(self.weigher, {n: f for n, f in fits.items() if behind(f, best) < APART})
             evidence = self.weigher.evidence(name, rest, fits[name])
-            if evidence.support < APART or evidence.weight < WEIGHT:
+            if evidence.support < APART or evidence.weight < WEIGHT or self._goes_with(term, now, fits[name]):
                 continue
             self.dropped.append((term, f"{name} explains more in its place"))
             self.say(f"replaced {term} by {name}")
             now, self.inflation[name] = fits[name], evidence.inflation
         return now
+
+    def _goes_with(self, term: str, now: Fit, instead: Fit) -> bool:
+        """Whether a model with an effect in the place of a term is likelier still with both."""
+        start = {**instead.values, (term,): now.values[(term,)]}
+        structure = now.structure.plus(*(e for e in instead.structure.effects if e not in now.structure.effects))
+        both = self.problem.fit(structure, start, instead.noise, FEW, carry=instead.shots, thorough=False)
+        return behind(instead, both) > APART
 
     def _without(self, now: Fit, name: str, steps: int = FEW) -> Fit:
         """The same without a term or an effect."""

@@ -87,7 +87,7 @@ class TrialFits:
             v[0].effect: [v[0].start] for v in self.shortlist(now, looks)
         }
         for name in self.unseen(now, names):
-            starts.setdefault(name, [self.of_a_step(name, now)])
+            starts.setdefault(name, []).append(self.of_a_step(name, now))
         for look in self.heaviest(now, names):
             starts.setdefault(look.effect, []).append(look)
         fits = self.each_fitted(now, starts)
