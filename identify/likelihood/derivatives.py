@@ -64,7 +64,7 @@ class Derivatives:
         p = c.columns.shape[1]
 
         def between(innovations: Array, variances: Array) -> Array:
-            return np.stack([innovations, variances], axis=1).reshape(-1, *innovations.shape[1:])
+            return np.stack([innovations, variances], axis=1).reshape(2 * len(innovations), *innovations.shape[1:])
 
         return Columns(
             between(c.columns + self.pulled[:, :p], root * (self.spread[:, :p] - level[:p])),
