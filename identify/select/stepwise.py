@@ -18,7 +18,7 @@ from identify.model.structure import Structure
 from identify.propose.innovation_score import Score
 from identify.select.evidence import APART, TRUSTED, WEIGHT, Evidence, Weigher, behind, disturbed
 from identify.select.left_over import LeftOver, left_over, needless_beside
-from identify.select.preference import cannot_gain, plainest, prefers_special, takes_most
+from identify.select.preference import cannot_gain, plainest, prefers_special
 from identify.select.trial_fits import FEW, HOPE, MANY, TrialFits
 from rig import effects
 from rig.platform import TERMS
@@ -230,10 +230,10 @@ class Stepwise:
         """Of an effect and others in its place, the one that is named, and all that are as likely."""
         best = seen[name]
         for other in seen.values():
-            special = best.effect in effects.get(other.effect).nests and prefers_special(best, other)
+            special = best.effect in effects.get(other.effect).nests and not self._has_more(other, best)
             if other.weight > WEIGHT and behind(best.fit, other.fit) > APART and not special:
                 best = other
-        while held := [n for n in effects.get(best.effect).nests if n in seen and takes_most(seen[n], best)]:
+        while held := [n for n in effects.get(best.effect).nests if n in seen and not self._has_more(best, seen[n])]:
             best = max((seen[n] for n in held), key=lambda e: e.support)
         alike = [
             n for n, e in seen.items()
@@ -247,6 +247,11 @@ class Stepwise:
             likeliest = min(fits.values(), key=lambda f: f.penalised)
             alike = [n for n, f in fits.items() if behind(f, likeliest) < APART]
         return plainest(self.weigher, {n: seen[n].fit for n in alike}), alike
+
+    def _has_more(self, rich: Evidence, special: Evidence) -> bool:
+        """Whether an effect is worth it after its special case, judged as it was when it was added."""
+        more = self.weigher.evidence(rich.effect, special.fit, rich.fit)
+        return more.support > HOPE and more.weight > WEIGHT
 
     def on_all(self, fit: Fit) -> Fit:
         """The same model on all samples."""
