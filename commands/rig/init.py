@@ -18,7 +18,7 @@ from rig.errors import RecordingError, UsageError
 if TYPE_CHECKING:
     from rig.recording.guessing.columns import Column
     from rig.recording.guessing.roles import Choice, Quantity
-    from rig.recording.readers.base import Table
+    from rig.recording.table import Table
 
 ORDER: tuple[Quantity, ...] = ("time", "torque", "rate", "angle")  # in the file
 

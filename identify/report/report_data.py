@@ -19,8 +19,8 @@ from identify.results import Identification
 from rig import effects
 from rig.channels import Channel
 from rig.errors import RecordingError
+from rig.recording.h5_heaps import check_heaps
 from rig.recording.memory import at_most
-from rig.recording.readers.h5_heaps import check_heaps
 
 FILE = "report_data.h5"
 FORMAT = "isp-rig report data"

@@ -12,8 +12,8 @@ import numpy as np
 from rig.arrays import Array, Mask
 from rig.errors import RecordingError
 from rig.recording.consistency import check_angle_against_rate, check_time_unit
-from rig.recording.readers.base import Table
 from rig.recording.run import Run
+from rig.recording.table import Table
 from rig.signals import TorqueHold, Use
 
 MIN_SAMPLES = 40  # in a row, fewer tell nothing of two states, three parameters and the noise

@@ -19,10 +19,10 @@ import numpy as np
 from rig.arrays import Array
 from rig.channels import KINDS, Channel
 from rig.errors import RecordingError
+from rig.recording.h5_heaps import check_heaps
 from rig.recording.journal import JournalError
 from rig.recording.journal_reader import JournalContents
 from rig.recording.memory import at_most
-from rig.recording.readers.h5_heaps import check_heaps
 from rig.recording.run import Recording, Run
 
 FORMAT = "isp-rig recording"

@@ -15,9 +15,9 @@ from rig.errors import RecordingError
 from rig.recording.checks import check_channel, check_run, check_samples, missing_column
 from rig.recording.file_faults import FileFaults
 from rig.recording.readers import read_file
-from rig.recording.readers.base import Table
 from rig.recording.run import Recording, Run, printable
 from rig.recording.stated_units import column_named, factor_of, with_factors_in_place
+from rig.recording.table import Table
 from rig.units import DEG
 
 if TYPE_CHECKING:

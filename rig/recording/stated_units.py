@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from rig.errors import RecordingError
-from rig.recording.readers.base import Table
+from rig.recording.table import Table
 from rig.units import DIMENSIONS, SI, name_and_unit, unit_of
 
 # What a column with a unit over it may be called, besides the default names, which carry theirs.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+import tomllib
 from dataclasses import fields
 from pathlib import Path
 
@@ -51,3 +52,24 @@ def test_a_recording_has_room_for_samples_and_not_for_a_platform() -> None:
         "name", "time_s", "valid", "rate_rad_s", "angle_rad", "torque_time_s", "torque_nm", "torque_hold", "use",
         "min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "channels", "causes", "rate_corner_hz", "rate_delay_s",
     }  # fmt: skip
+
+
+CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
+
+
+def test_no_import_contract_has_an_exception() -> None:
+    assert [c["name"] for c in CONTRACTS if "ignore_imports" in c] == []
+
+
+def test_every_contract_of_layers_has_a_place_for_each_module() -> None:
+    layered = [c for c in CONTRACTS if c["type"] == "layers"]
+    assert [c["name"] for c in layered if "containers" in c and not c.get("exhaustive")] == []
+    (top,) = (c for c in layered if "containers" not in c)
+    packages = {path.parent.name for path in ROOT.glob("*/__init__.py")} - {"tests"}
+    assert {name.strip() for layer in top["layers"] for name in layer.split("|")} == packages
+
+
+def test_everything_of_the_drivers_but_the_codecs_is_closed_to_the_simulator() -> None:
+    (contract,) = (c for c in CONTRACTS if c.get("source_modules") == ["sim_backend"])
+    parts = {p.stem for p in (ROOT / "drivers").iterdir() if p.suffix == ".py" or (p / "__init__.py").is_file()}
+    assert set(contract["forbidden_modules"]) == {f"drivers.{part}" for part in parts - {"__init__", "codecs"}}

@@ -10,8 +10,8 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.errors import RecordingError
-from rig.recording.readers.base import Table
 from rig.recording.stated_units import stated_unit
+from rig.recording.table import Table
 from rig.units import Unit, name_and_unit, unit_of
 
 FEWEST = 10  # numbers that make a column

@@ -1,4 +1,7 @@
-"""Readers of recordings, one a format, found by suffix; a new one is a new file and a line in ``_BY_SUFFIX``."""
+"""Readers of recordings, one a format, found by suffix; a new one is a new file and a line in ``_BY_SUFFIX``.
+
+Those that need a library of an extra are in ``rig.recording.extra_readers``.
+"""
 
 from __future__ import annotations
 
@@ -8,30 +11,31 @@ from importlib import import_module
 from pathlib import Path
 
 from rig.errors import RecordingError
-from rig.recording.readers.base import Table
+from rig.recording.readers.folder import is_ros_bag
 from rig.recording.run import Run
+from rig.recording.table import Table
 
 MAX_FILE_BYTES = 2 * 1024**3
 
 # Longest first where one suffix ends another. The modules load when asked for: SciPy and HDF5 are slow to import.
 _BY_SUFFIX = {
-    ".csv.gz": "csv_text",
-    ".csv": "csv_text",
-    ".tsv": "csv_text",
-    ".txt": "csv_text",
-    ".lvm": "csv_text",
-    ".npz": "npz",
-    ".mat": "mat",
-    ".hdf5": "h5",
-    ".h5": "h5",
-    ".journal": "raw_journal",
-    ".parquet": "parquet",
-    ".mf4": "mf4",
-    ".mdf": "mf4",
-    ".tdms": "tdms",
-    ".bag": "rosbag",
-    ".mcap": "rosbag",
-    ".db3": "rosbag",
+    ".csv.gz": "readers.csv_text",
+    ".csv": "readers.csv_text",
+    ".tsv": "readers.csv_text",
+    ".txt": "readers.csv_text",
+    ".lvm": "readers.csv_text",
+    ".npz": "readers.npz",
+    ".mat": "readers.mat",
+    ".hdf5": "readers.h5",
+    ".h5": "readers.h5",
+    ".journal": "readers.raw_journal",
+    ".parquet": "extra_readers.parquet",
+    ".mf4": "extra_readers.mf4",
+    ".mdf": "extra_readers.mf4",
+    ".tdms": "extra_readers.tdms",
+    ".bag": "extra_readers.rosbag",
+    ".mcap": "extra_readers.rosbag",
+    ".db3": "extra_readers.rosbag",
 }
 
 
@@ -46,17 +50,18 @@ def read_file(path: Path) -> Sequence[Table | Run]:
     Raises RecordingError with cause and cure.
     """
     if _is_folder(path):
-        from rig.recording.readers import folder, rosbag  # noqa: PLC0415  only where one is named
-
-        return rosbag.read(path) if rosbag.is_bag(path) else folder.read(path)
+        return _read_with("extra_readers.rosbag" if is_ros_bag(path) else "readers.folder", path)
     _check_is_file(path)
     suffix = next((s for s in _BY_SUFFIX if path.name.lower().endswith(s)), None)
     if suffix is None:
         raise RecordingError(
             f"{path}: the suffix {path.suffix!r} is not a known format: export it as one of {', '.join(suffixes())}"
         )
-    reader = import_module(f"rig.recording.readers.{_BY_SUFFIX[suffix]}")
-    contents: Sequence[Table | Run] = reader.read(path)
+    return _read_with(_BY_SUFFIX[suffix], path)
+
+
+def _read_with(module: str, path: Path) -> Sequence[Table | Run]:
+    contents: Sequence[Table | Run] = import_module(f"rig.recording.{module}").read(path)
     return contents
 
 

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import IO, cast
 
 from rig.errors import RecordingError
-from rig.recording.readers.base import MAX_SAMPLES
 from rig.recording.readers.timestamps import is_stamp
+from rig.recording.table import MAX_SAMPLES
 from rig.units import bare, unit_of
 
 MAX_LINE_CHARACTERS = 65_536

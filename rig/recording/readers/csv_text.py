@@ -11,9 +11,9 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.errors import RecordingError
-from rig.recording.readers.base import MAX_SAMPLES, Table, too_long
 from rig.recording.readers.csv_layout import Layout, all_lines, layout_of
 from rig.recording.readers.timestamps import Stamps
+from rig.recording.table import MAX_SAMPLES, Table, too_long
 
 _DAMAGE = (OSError, EOFError, zlib.error, UnicodeError)
 

@@ -9,6 +9,13 @@ from rig.errors import RecordingError
 from rig.recording.results import RECORDING_FILE, RECOVERED_FILE, journals_of
 from rig.recording.run import Run
 
+ROS_METADATA = "metadata.yaml"
+
+
+def is_ros_bag(folder: Path) -> bool:
+    """Whether a folder is a bag of ROS 2."""
+    return (folder / ROS_METADATA).is_file() and any(file.suffix in (".db3", ".mcap") for file in folder.iterdir())
+
 
 def read(path: Path) -> Sequence[Run]:
     """Every run of the campaign. Raises RecordingError where the folder holds none that can be read."""

@@ -12,10 +12,10 @@ import numpy as np
 
 from rig.errors import RecordingError
 from rig.recording import hdf5
+from rig.recording.h5_heaps import check_heaps
 from rig.recording.memory import at_most
-from rig.recording.readers.base import MAX_SAMPLES, Table, read_each, too_long
-from rig.recording.readers.h5_heaps import check_heaps
 from rig.recording.run import Run
+from rig.recording.table import MAX_SAMPLES, Table, read_each, too_long
 
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, MemoryError)
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from rig.errors import RecordingError
 from rig.recording.readers import mat4
-from rig.recording.readers.base import MAX_SAMPLES, Table, read_each
+from rig.recording.table import MAX_SAMPLES, Table, read_each
 
 MAX_UNPACKED_BYTES = 8 * 8 * MAX_SAMPLES  # eight columns as long as may be
 MAX_STRUCT_DEPTH = 5

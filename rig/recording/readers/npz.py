@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.recording.readers.base import MAX_SAMPLES, Table, read_each, too_long
+from rig.recording.table import MAX_SAMPLES, Table, read_each, too_long
 
 _DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, ValueError, OSError, RuntimeError, KeyError, MemoryError)
 

@@ -10,8 +10,9 @@ import pytest
 
 from commands.rig.app import app
 from rig.config.load import load_config
+from rig.recording.extra_readers import rasters
 from rig.recording.load import read_recording
-from rig.recording.readers import rasters, read_file, suffixes
+from rig.recording.readers import read_file, suffixes
 from rig.recording.run import Run
 from tests.commands.rig import exported
 from tests.commands.rig.exported import READ

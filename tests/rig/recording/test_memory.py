@@ -11,8 +11,9 @@ import pytest
 
 from benchmarks.fuzz.files import HARMFUL
 from rig.errors import RecordingError
+from rig.recording import h5_heaps
 from rig.recording.memory import at_most
-from rig.recording.readers import h5_heaps, read_file
+from rig.recording.readers import read_file
 
 if sys.platform != "linux":
     pytest.skip("other systems have no limit that holds", allow_module_level=True)

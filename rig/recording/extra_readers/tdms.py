@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.recording.readers.base import Table
-from rig.recording.readers.rasters import Group, one_table, require
+from rig.recording.extra_readers.rasters import Group, one_table, require
+from rig.recording.table import Table
 
 NS = 1e-9
 

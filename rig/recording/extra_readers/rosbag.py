@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.recording.readers.base import MAX_SAMPLES, Table, too_long
-from rig.recording.readers.rasters import Group, one_table, require
+from rig.recording.extra_readers.rasters import Group, one_table, require
+from rig.recording.readers.folder import ROS_METADATA
+from rig.recording.table import MAX_SAMPLES, Table, too_long
 
 NS = 1e-9
-METADATA = "metadata.yaml"
 MOST_ENTRIES = 12  # of an array in a message: joints and vectors, no images and point clouds
 SKIPPED = ("header", "orientation")  # a quaternion is no angle
 # By message type and field: the units that the ROS definitions fix (REP 103).
@@ -30,11 +30,6 @@ UNITS = {
 }
 
 
-def is_bag(folder: Path) -> bool:
-    """Whether a folder is a bag of ROS 2."""
-    return (folder / METADATA).is_file() and any(file.suffix in (".db3", ".mcap") for file in folder.iterdir())
-
-
 def read(path: Path) -> Sequence[Table]:
     """One table. Raises RecordingError where rosbags is missing, or the bag is damaged or of another kind."""
     require("rosbags", path, "rosbag")
@@ -42,8 +37,10 @@ def read(path: Path) -> Sequence[Table]:
     from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
 
     bag = path if path.is_dir() or path.suffix.lower() == ".bag" else path.parent
-    if bag.is_dir() and not (bag / METADATA).is_file():
-        raise RecordingError(f"{path}: {METADATA} of the bag is missing beside it: restore it with `ros2 bag reindex`")
+    if bag.is_dir() and not (bag / ROS_METADATA).is_file():
+        raise RecordingError(
+            f"{path}: {ROS_METADATA} of the bag is missing beside it: restore it with `ros2 bag reindex`"
+        )
     try:
         with AnyReader([bag], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             if reader.message_count > MAX_SAMPLES:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.recording.readers.base import MAX_SAMPLES, Table, read_each, too_long
-from rig.recording.readers.rasters import require
+from rig.recording.extra_readers.rasters import require
+from rig.recording.table import MAX_SAMPLES, Table, read_each, too_long
 
 UNIT_KEYS = (b"unit", b"units", b"Unit")
 NS = 1e-9

@@ -17,7 +17,7 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.errors import RecordingError
-from rig.recording.readers.base import MAX_SAMPLES, Table, read_each, too_long
+from rig.recording.table import MAX_SAMPLES, Table, read_each, too_long
 
 SLOW = 0.1  # of the fastest group's samples: below, a group is a thermometer or a state
 FEWEST = 10  # samples that make a group
