@@ -31,6 +31,7 @@ from identify.rivals.doubts import Doubts
 from identify.rivals.tone_origin import TONE, standing_line, told
 from identify.rivals.whole_runs import WholeRuns
 from identify.runs.clipping import full_scale_of
+from identify.runs.excerpts import describe_excerpts
 from identify.runs.holdout import Split, split
 from identify.runs.measured_channels import offer_of, with_causes
 from identify.runs.observability import why_unseen
@@ -115,6 +116,7 @@ class _Identifier:
         channels = channels_of(runs)
         traces = [prepare(r, i, noise, full_scale=beyond, channels=channels) for i, r in enumerate(runs)]
         self.traces, self.left_out = runs_used(traces, recording.noise is not None, recording.axis, say)
+        self.left_out += describe_excerpts(recording.runs, say)
         self.torque_free = free
         self.torque_noise_above_hz: float | None = None
         self.curve: tuple[Dependence, dict[str, float]] | None = None  # over what is left of a decay
