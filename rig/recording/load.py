@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from rig.errors import RecordingError
 from rig.recording.checks import check_run
 from rig.recording.file_faults import FileFaults
-from rig.recording.long.files import long_files
+from rig.recording.long.files import long_files, shortened
 from rig.recording.readers import read_file
 from rig.recording.run import Recording, Run, printable
 from rig.recording.stated_units import with_factors_in_place
@@ -32,6 +32,7 @@ def read_recording(loaded: LoadedConfig) -> Recording:
     if section is None:
         raise ValueError("the configuration has no recorded section")
     runs: list[Run] = []
+    own: set[int] = set()  # those that this program played: they are used as they are
     faults = FileFaults()
     sources: list[Path] = []
     long = long_files(section, loaded.folder)
@@ -39,15 +40,17 @@ def read_recording(loaded: LoadedConfig) -> Recording:
         path = loaded.folder / Path(entry.file)
         try:
             path = _expanded(loaded.folder, entry.file)
-            found = [long[i].run()] if i in long else runs_of_file(path, entry, section)
+            found, is_own = ([long[i].run()], False) if i in long else runs_of_file(path, entry, section)
         except RecordingError as error:
             faults.add(path, str(error))
             continue
+        own |= set(range(len(runs), len(runs) + len(found))) if is_own else set()
         runs += found
         sources += [path] * len(found)
     wrong = faults.lines() or _fitted_and_held_out(runs, sources)
     if wrong:
         raise RecordingError("\n".join(wrong))
+    runs = shortened(runs, own, section.most_samples)
     info = {"backend": "recorded", "files": [str(path) for path in sources], "config_text": loaded.text}
     return Recording(_with_unique_names(runs), axis=section.axis, noise=section.noise, info=info)
 
@@ -59,8 +62,8 @@ def _expanded(folder: Path, file: str) -> Path:
         raise RecordingError(f"{file}: the home folder (~) is unknown ({error}): give the absolute path") from error
 
 
-def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> list[Run]:
-    """The checked runs of one entry: one of a table, as many as were played of our own files.
+def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> tuple[list[Run], bool]:
+    """The checked runs of one entry: one of a table, as many as were played of our own files; and whether it is ours.
 
     Raises RecordingError.
     """
@@ -77,7 +80,7 @@ def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> lis
             runs.append(check_run(_window(run, entry, path), path, section.scale.model_fields_set))
         except RecordingError as error:
             raise RecordingError(with_factors_in_place(str(error), factors)) from None
-    return runs
+    return runs, any(isinstance(content, Run) for content in contents)
 
 
 def _own_run(path: Path, run: Run, entry: RecordedRun, section: RecordedConfig) -> Run:

@@ -28,20 +28,22 @@ DEFAULT_NAMES: Mapping[Quantity, Mapping[str, float]] = {
 }
 
 
-def columns_of(table: Table, factors: Mapping[Quantity, float], section: RecordedConfig) -> dict[str, Array]:
+def columns_of(table: Table, factors: Mapping[str, float], section: RecordedConfig) -> dict[str, Array]:
     """Every quantity that the file has, in SI units, and "valid", each of shape (n,).
 
     Raises RecordingError for a sample that is said to be valid and is not a number.
     """
     names = _names(table, section)
     values = table.read(list(names.values()))
-    columns = {quantity: values[name] for quantity, name in names.items()}
+    columns: dict[str, Array] = {quantity: values[name] for quantity, name in names.items()}
     valid = check_samples(table, columns)
-    scaled = {q: x if factors[q] == 1.0 else x * factors[q] for q, x in columns.items() if q != "valid"}
-    return {**scaled, "valid": valid}
+    scaled: dict[str, Array] = {
+        q: x if factors[q] == 1.0 else x * factors[q] for q, x in columns.items() if q != "valid"
+    }
+    return {**scaled, "valid": valid.astype(float)}
 
 
-def run_of_table(table: Table, factors: Mapping[Quantity, float], entry: RecordedRun, section: RecordedConfig) -> Run:
+def run_of_table(table: Table, factors: Mapping[str, float], entry: RecordedRun, section: RecordedConfig) -> Run:
     """The whole table as a run, not yet checked. Raises RecordingError."""
     columns = columns_of(table, factors, section)
     valid = columns["valid"].astype(bool)
@@ -98,7 +100,7 @@ def _names(table: Table, section: RecordedConfig) -> dict[Quantity, str]:
     return names
 
 
-def factors_of(table: Table, section: RecordedConfig) -> dict[Quantity, float]:
+def factors_of(table: Table, section: RecordedConfig) -> dict[str, float]:
     """The factor to SI units of every quantity that the file has. Raises RecordingError where one is missing."""
     return {quantity: _factor(table, name, section, quantity) for quantity, name in _names(table, section).items()}
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -96,14 +96,12 @@ def _h5_rows(path: Path, name: str, data: Any, first: int, last: int) -> Array:
 
 
 def _of_parquet(path: Path) -> BlockTable | None:
-    parquet: Any = None
-    with suppress(ImportError):
-        from pyarrow import parquet  # noqa: PLC0415  an extra, and slow to import
-    if parquet is None:
+    if find_spec("pyarrow") is None:
         return None
-    from rig.recording.readers.parquet import columns_of, units_of  # noqa: PLC0415
 
-    file = parquet.ParquetFile(path)
+    from rig.recording.readers.parquet import columns_of, opened, units_of  # noqa: PLC0415
+
+    file = opened(path)
     sizes = [file.metadata.row_group(i).num_rows for i in range(file.metadata.num_row_groups)]
     if not sizes or max(sizes) > MOST_GROUP_ROWS:
         return None
@@ -114,7 +112,7 @@ def _of_parquet(path: Path) -> BlockTable | None:
 
     def read(names: Sequence[str], first: int, last: int) -> Mapping[str, Array]:
         groups = [i for i in range(len(sizes)) if begins[i] < last and begins[i + 1] > first]
-        table = parquet.ParquetFile(path).read_row_groups(groups, columns=list(names))
+        table = opened(path).read_row_groups(groups, columns=list(names))
         at = int(begins[groups[0]])
         values = columns_of(path, table, names)
         return {name: column[first - at : last - at] for name, column in values.items()}

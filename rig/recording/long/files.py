@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +15,7 @@ from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.recording.checks import check_run
 from rig.recording.long.blocks import BlockTable, block_table
-from rig.recording.long.excerpt import take
+from rig.recording.long.excerpt import Taken, take
 from rig.recording.readers.base import MAX_SAMPLES
 from rig.recording.run import Run
 from rig.recording.stated_units import with_factors_in_place
@@ -51,25 +52,17 @@ class LongFile:
             return columns_of(table, factors, section) | {CHANNEL + name: x for name, x in channels.items()}
 
         taken = take(rows, self.first, self.last, self.most, held=held)
-        columns, factor = taken.columns, taken.excerpt.factor
-        torque = columns.get("torque")
-        has_torque = None if torque is None else np.isfinite(torque)
-        run = Run(
+        named = Run(
             name=path.name,
-            time_s=columns["time"],
-            valid=columns["valid"].astype(bool),
-            rate_rad_s=columns.get("rate"),
-            angle_rad=columns.get("angle"),
-            torque_time_s=None if has_torque is None else columns["time"][has_torque],
-            torque_nm=None if torque is None else torque[has_torque],
-            torque_hold=section.torque_hold if factor == 1 else "band_limited",
+            time_s=taken.columns["time"],
+            valid=taken.columns["valid"].astype(bool),
+            torque_hold=section.torque_hold,
             use=entry.use,
             min_rate_rad_s=section.min_rate_of(entry),
             added_inertia_kg_m2=entry.added_inertia_kg_m2,
-            channels={n.removeprefix(CHANNEL): x for n, x in columns.items() if n.startswith(CHANNEL)},
             causes={name: config.channel(name) for name, config in section.columns.channels.items()},
-            excerpt=taken.excerpt,
         )
+        run = with_columns(named, taken)
         try:
             return check_run(run, path, section.scale.model_fields_set)
         except RecordingError as error:
@@ -99,6 +92,51 @@ def long_files(section: RecordedConfig, folder: Path) -> dict[int, LongFile]:
     return out
 
 
+def shortened(runs: Sequence[Run], as_they_are: Collection[int], most: int) -> list[Run]:
+    """The runs with about ``most`` samples in all, those ``as_they_are`` besides, by their places."""
+    total = sum(len(run.time_s) for i, run in enumerate(runs) if i not in as_they_are)
+    if total <= most + most // 100:  # a run that was read in part may have a few samples more than its share
+        return list(runs)
+    return [run if i in as_they_are else _shorter(run, most, total) for i, run in enumerate(runs)]
+
+
+def _shorter(run: Run, most: int, total: int) -> Run:
+    share = max(SHORTEST, most * len(run.time_s) // total)
+    if run.excerpt is not None or len(run.time_s) <= share:
+        return run
+    columns: dict[str, Array] = {"time": run.time_s, "valid": run.valid.astype(float)}
+    columns |= {} if run.rate_rad_s is None else {"rate": run.rate_rad_s}
+    columns |= {} if run.angle_rad is None else {"angle": run.angle_rad}
+    columns |= {CHANNEL + name: values for name, values in run.channels.items()}
+    if run.torque_nm is not None and run.torque_time_s is not None:
+        columns["torque"] = np.full(len(run.time_s), np.nan)
+        columns["torque"][np.searchsorted(run.time_s, run.torque_time_s)] = run.torque_nm
+    taken = take(
+        lambda first, last: {name: values[first:last] for name, values in columns.items()},
+        0, len(run.time_s), share, held=run.torque_hold == "zero_order",
+    )  # fmt: skip
+    return with_columns(run, taken)
+
+
+def with_columns(run: Run, taken: Taken) -> Run:
+    """The run with other samples."""
+    columns = taken.columns
+    torque = columns.get("torque")
+    has_torque = None if torque is None else np.isfinite(torque)
+    return dataclasses.replace(
+        run,
+        time_s=columns["time"],
+        valid=columns["valid"].astype(bool),
+        rate_rad_s=columns.get("rate"),
+        angle_rad=columns.get("angle"),
+        torque_time_s=None if has_torque is None else columns["time"][has_torque],
+        torque_nm=None if torque is None else torque[has_torque],
+        torque_hold=run.torque_hold if taken.excerpt.factor == 1 else "band_limited",
+        channels={n.removeprefix(CHANNEL): x for n, x in columns.items() if n.startswith(CHANNEL)},
+        excerpt=taken.excerpt,
+    )
+
+
 def _window(table: BlockTable, entry: RecordedRun, section: RecordedConfig) -> tuple[int, int]:
     """First row and the row behind the last one between from_s and to_s; the time increases."""
     if entry.from_s is None and entry.to_s is None:
@@ -108,21 +146,20 @@ def _window(table: BlockTable, entry: RecordedRun, section: RecordedConfig) -> t
     def time_at(row: int) -> float:
         return float(columns_of(table.rows(row, row + 1), factors, section)["time"][0])
 
-    first, last = 0, table.count
-    if entry.from_s is not None:
-        first = _first_row(time_at, table.count, lambda t: t >= entry.from_s)  # type: ignore[operator]
-    if entry.to_s is not None:
-        last = _first_row(time_at, table.count, lambda t: t > entry.to_s)  # type: ignore[operator]
+    start = -math.inf if entry.from_s is None else entry.from_s
+    end = math.inf if entry.to_s is None else entry.to_s
+    first = _first_row(time_at, table.count, lambda t: t >= start)
+    last = _first_row(time_at, table.count, lambda t: t > end)
     if last - first < 1:
-        start, end = time_at(0), time_at(table.count - 1)
         raise RecordingError(
-            f"{table.path}: no sample between from_s = {entry.from_s} and to_s = {entry.to_s}: "
-            f"the file runs from {start:g} to {end:g} s"
+            f"{table.path}: no sample between from_s = {start:g} and to_s = {end:g}: "
+            f"the file runs from {time_at(0):g} to {time_at(table.count - 1):g} s"
         )
     return first, last
 
 
-def _first_row(time_at, count, reached):  # type: ignore[no-untyped-def]
+def _first_row(time_at: Callable[[int], float], count: int, reached: Callable[[float], bool]) -> int:
+    """The first row whose time is ``reached``, by bisection."""
     low, high = 0, count
     while low < high:
         middle = (low + high) // 2

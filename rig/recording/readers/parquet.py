@@ -40,6 +40,13 @@ def read(path: Path) -> Sequence[Table]:
     ]
 
 
+def opened(path: Path) -> Any:
+    """The file as pyarrow has it, nothing of it read."""
+    import pyarrow.parquet as pq  # noqa: PLC0415  an extra, and slow to import
+
+    return pq.ParquetFile(path)
+
+
 def units_of(schema: Any) -> Mapping[str, str]:
     """Column -> unit, where its metadata states one."""
     return {f.name: unit for f in schema if (unit := _unit(f.metadata or {}))}
