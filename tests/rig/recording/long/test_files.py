@@ -12,6 +12,7 @@ import pytest
 from benchmarks.long_recording import write_h5
 from identify.runs.excerpts import describe_excerpts
 from rig.config.load import load_config
+from rig.errors import RecordingError
 from rig.recording.load import read_recording
 from rig.recording.run import Excerpt, Run
 
@@ -59,16 +60,10 @@ def test_csv_and_parquet_give_what_hdf5_gives(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "r.h5") as file:
         columns = {name: file[name][()] for name in file}
     parquet.write_table(pyarrow.table(columns), tmp_path / "r.parquet", row_group_size=7000)
-    np.savetxt(
-        tmp_path / "r.csv",
-        np.column_stack(list(columns.values())),
-        delimiter=",",
-        header=",".join(columns),
-        comments="",
-    )
-    runs = [
-        read(tmp_path, f"[{{file: {name}}}]", "  most_samples: 5000\n")[0] for name in ("r.h5", "r.parquet", "r.csv")
-    ]
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(tmp_path / "r.csv", rows, delimiter=",", header=",".join(columns), comments="")
+    most = "  most_samples: 5000\n"
+    runs = [read(tmp_path, f"[{{file: r.{ending}}}]", most)[0] for ending in ("h5", "parquet", "csv")]
     for other in runs[1:]:
         assert other.excerpt == runs[0].excerpt and other.excerpt is not None
         np.testing.assert_allclose(other.rate_rad_s, runs[0].rate_rad_s, rtol=1e-9)
@@ -91,7 +86,7 @@ def test_a_valid_sample_that_is_no_number_is_named_by_its_place_in_the_file(tmp_
     write_h5(tmp_path / "r.h5", 600_000, 10_000.0)
     with h5py.File(tmp_path / "r.h5", "r+") as file:
         file["rate_rad_s"][555_555] = np.nan
-    with pytest.raises(ValueError, match="index 555555: rate is nan"):
+    with pytest.raises(RecordingError, match="index 555555: rate is nan"):
         read(tmp_path, "[{file: r.h5}]")
 
 
