@@ -45,7 +45,7 @@ from identify.select.search_state import Search
 from identify.select.stepwise import Stepwise
 from identify.select.torque_choice import begun
 from identify.signals.prepare import channels_of, prepare
-from identify.signals.trace import Trace
+from identify.signals.trace import Trace, release
 from rig import effects
 from rig.config.identify import IdentifyConfig
 from rig.errors import Aborted
@@ -159,6 +159,7 @@ class _Identifier:
                 self.curve = dependence_on(search.stepwise, left) if left is not None else None
                 return self._concluded(found, doubts)
             if (white and nothing_left) or doubts.other_cause(found):
+                release(search.stepwise.problem.traces)
                 return self._concluded(found, doubts)
             self.say("a torque that was not recorded is left beside the sensor's noise")
             self.more_than_noise = True
