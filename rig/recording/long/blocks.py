@@ -12,6 +12,7 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.errors import RecordingError
+from rig.recording.memory import at_most
 from rig.recording.readers.base import Table, index_label, plain_column
 
 BLOCK = 1 << 18  # rows that are read at once
@@ -63,7 +64,7 @@ def _of_h5(path: Path) -> BlockTable | None:
     from rig.recording.readers.h5_heaps import check_heaps  # noqa: PLC0415
 
     check_heaps(path)
-    with h5py.File(path, "r") as file:
+    with h5py.File(path, "r") as file, at_most(hdf5.MOST_TEXT_BYTES):
         if file.attrs.get("format") == hdf5.FORMAT:
             return None
         inner = h5.datasets(file)
