@@ -31,6 +31,7 @@ from identify.rivals.doubts import Doubts
 from identify.rivals.tone_origin import TONE, standing_line, told
 from identify.rivals.whole_runs import WholeRuns
 from identify.runs.clipping import full_scale_of
+from identify.runs.excerpts import describe_excerpts
 from identify.runs.holdout import Split, split
 from identify.runs.measured_channels import offer_of, with_causes
 from identify.runs.observability import why_unseen
@@ -44,7 +45,7 @@ from identify.select.search_state import Search
 from identify.select.stepwise import Stepwise
 from identify.select.torque_choice import begun
 from identify.signals.prepare import channels_of, prepare
-from identify.signals.trace import Trace
+from identify.signals.trace import Trace, release
 from rig import effects
 from rig.config.identify import IdentifyConfig
 from rig.errors import Aborted
@@ -115,6 +116,7 @@ class _Identifier:
         channels = channels_of(runs)
         traces = [prepare(r, i, noise, full_scale=beyond, channels=channels) for i, r in enumerate(runs)]
         self.traces, self.left_out = runs_used(traces, recording.noise is not None, recording.axis, say)
+        self.left_out += describe_excerpts(recording.runs, say)
         self.torque_free = free
         self.torque_noise_above_hz: float | None = None
         self.curve: tuple[Dependence, dict[str, float]] | None = None  # over what is left of a decay
@@ -157,6 +159,7 @@ class _Identifier:
                 self.curve = dependence_on(search.stepwise, left) if left is not None else None
                 return self._concluded(found, doubts)
             if (white and nothing_left) or doubts.other_cause(found):
+                release(search.stepwise.problem.traces)
                 return self._concluded(found, doubts)
             self.say("a torque that was not recorded is left beside the sensor's noise")
             self.more_than_noise = True

@@ -118,7 +118,7 @@ def _of_table(table: Table, file: str, options: InitOptions, ask: Ask | None) ->
     from rig.recording.guessing.columns import columns_of
     from rig.recording.guessing.roles import guess_roles
     from rig.recording.guessing.scales import axis_of, guess_factors
-    from rig.recording.load import DEFAULT_NAMES
+    from rig.recording.tables import DEFAULT_NAMES
 
     columns = columns_of(table)
     show(_listing(table, columns))

@@ -4,26 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy import signal
 
 from identify.runs.holdout import Split
 from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace
 from rig.arrays import Array
+from rig.decimation import REACH, SAMPLES_A_PERIOD, keeps_white, sharp
 
 ENOUGH = 20_000  # samples, where nothing else is asked for
-SAMPLES_A_PERIOD = 8.0  # of the fastest motion that stands above the noise: beyond, a sample tells nothing new
 HARMONICS = 5.0  # of a decay's swing: it moves no faster, whatever its noise does
 TURNS = 0.02  # of the largest rate, below which a turn may be noise
 SHORTEST_SPAN = 1_500  # samples: slow effects need a span to show in
 COLUMNS = 5  # acceleration, rate, angle, direction, constant
 PLACES = 12  # where a span may begin
-# The low-pass before a decimation: flat to 1e-5 up to 0.6 of the new Nyquist frequency and 100 dB down above it.
-PASSED, KAISER, REACH = 0.8, 10.0, 16  # cut-off over the new Nyquist frequency, window, new samples to either side
-ROLL_OFF = 0.5  # of the one for a decay
 
 
 def reduced(traces: Sequence[Trace], split: Split, enough: int = ENOUGH) -> tuple[list[Trace], Split]:
@@ -95,7 +90,7 @@ def decimated(trace: Trace, factor: int) -> Trace:
         return trace
     order = REACH * factor
     # What a driven platform does close to the new Nyquist frequency has to stay as its torque says.
-    weights = _sharp(factor) if trace.torque is not None else _keeps_white(factor)
+    weights = sharp(factor) if trace.torque is not None else keeps_white(factor)
 
     def passed(values: Array) -> Array:
         padded = np.pad(values, order, mode="reflect", reflect_type="odd")
@@ -114,29 +109,6 @@ def decimated(trace: Trace, factor: int) -> Trace:
         noise=less * trace.noise, beside=None if trace.beside is None else passed(trace.beside),
         beside_noise=less * trace.beside_noise, motion=None, _series={},
     )  # fmt: skip
-
-
-@lru_cache(maxsize=32)
-def _sharp(factor: int) -> Array:
-    return np.asarray(signal.firwin(2 * REACH * factor + 1, PASSED / factor, window=("kaiser", KAISER)))
-
-
-@lru_cache(maxsize=32)
-def _keeps_white(factor: int) -> Array:
-    """A low-pass before a decimation, behind which white noise is white again.
-
-    A sharper one leaves a hole below the new Nyquist frequency, and the likelihood of a long decay takes the noise for
-    coloured. The squares of this one (Meyer's scaling function: Daubechies, Ten Lectures on Wavelets, 5.2) and of its
-    aliases add up to one at every frequency; it is flat up to half the new Nyquist frequency.
-    """
-    count = 64 * REACH * factor
-    of_new_rate = np.abs(np.fft.fftfreq(count)) * factor
-    x = np.clip((of_new_rate - 0.5 * (1.0 - ROLL_OFF)) / ROLL_OFF, 0.0, 1.0)
-    passes = np.cos(0.5 * np.pi * x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3))
-    response = np.fft.fftshift(np.fft.ifft(passes).real)
-    middle, order = count // 2, REACH * factor
-    weights = response[middle - order : middle + order + 1]
-    return np.asarray(weights / np.sum(weights))
 
 
 def _every(mask: Any, factor: int, count: int) -> Any:

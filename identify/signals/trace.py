@@ -241,6 +241,12 @@ class Trace:
         return linear_pieces(np.where(ran_away, 0.0, out), fine)
 
 
+def release(traces: Sequence[Trace]) -> None:
+    """Give the torques back that a search has kept of these runs; they are made again where one is asked for."""
+    for trace in traces:
+        trace._series.clear()
+
+
 def loads_differ(traces: Sequence[Trace]) -> bool:
     """Whether a known inertia was mounted for some of the runs."""
     return len({t.run.added_inertia_kg_m2 for t in traces}) > 1

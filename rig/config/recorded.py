@@ -11,6 +11,7 @@ from rig.config.base import NonNegative, Positive, Section
 from rig.config.channels import ChannelConfig, check_channels
 
 MOST_RUNS = 1000
+MOST_SAMPLES = 50_000  # the five sets of ten seconds at 1 kHz of the paper; about 0.9 GiB of memory
 ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
 
 
@@ -135,6 +136,8 @@ class RecordedConfig(Section):
     """One standard deviation of the measured channel, in its SI unit; estimated if left out."""
     min_rate_rad_s: NonNegative = 0.0
     """Slower samples of all runs are left out of the error and the fit, rad/s."""
+    most_samples: Annotated[int, Field(ge=2_000, le=100_000_000)] = MOST_SAMPLES
+    """Longer recordings are low-passed, decimated and, if need be, cut to so many samples in all."""
 
     @field_validator("runs")
     @classmethod

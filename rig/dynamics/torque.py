@@ -13,6 +13,8 @@ from rig.dynamics.polynomials import Polynomials
 from rig.signals import TorqueHold
 
 KEPT = 6  # readings between the samples: every fit to a run asks for one of a few
+KEPT_BYTES = 64 << 20  # of them; a long run that needs fine steps is read again
+AT_ONCE = 1 << 18  # instants: the times of millions would take as much memory as what is read at them
 
 
 @dataclass(frozen=True)
@@ -67,16 +69,23 @@ class TorqueSignal:
         if found is None:
             found = self._between(start_s, half_step_s, n)
             found.flags.writeable = False  # it is given out again
-            while len(self._read) >= KEPT:  # simulations in other threads may be doing the same
+            while self._read and (len(self._read) >= KEPT or self._kept_bytes() + found.nbytes > KEPT_BYTES):
+                # simulations in other threads may be doing the same
                 self._read.pop(next(iter(self._read), key), None)
             self._read[key] = found
         return found
 
     def _between(self, start_s: float, half_step_s: float, n: int) -> Array:
-        t: Array = start_s + half_step_s * np.arange(n + 1, dtype=np.float64)
         if self.hold == "zero_order":
-            return np.diff(self._impulse(t)) / half_step_s
-        return self.at(t[:-1])
+            return np.diff(self._impulse(start_s + half_step_s * np.arange(n + 1, dtype=np.float64))) / half_step_s
+        out = np.empty(n)
+        for first in range(0, n, AT_ONCE):
+            last = min(first + AT_ONCE, n)
+            out[first:last] = self.at(start_s + half_step_s * np.arange(first, last, dtype=np.float64))
+        return out
+
+    def _kept_bytes(self) -> int:
+        return sum(reading.nbytes for reading in list(self._read.values()))
 
 
 NO_TORQUE = TorqueSignal(np.array([0.0, 1.0]), np.zeros(2), "zero_order")

@@ -16,6 +16,7 @@ from rig.errors import RecordingError
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 HEAP = b"GCOL\x01\0\0\0"
 LARGEST_USER_BLOCK = 1 << 20
+STRIDE = 64 << 20  # bytes that are looked through at once: of a long recording the map would fill the memory
 MOST_TEXTS = 500_000  # of a file; each costs a microsecond here
 
 
@@ -32,7 +33,7 @@ def check_heaps(path: str | Path) -> None:
 def _check(path: Path, data: mmap.mmap) -> None:
     width = _width_of_sizes(data)
     texts = 0
-    at = data.find(HEAP) if width else -1
+    at = _next_heap(data, 0) if width else -1
     while at >= 0:
         for step in _steps(data, at, width):
             texts += 1
@@ -40,7 +41,18 @@ def _check(path: Path, data: mmap.mmap) -> None:
                 raise RecordingError(f"{path}: is damaged (a heap of texts has no end): export it again")
             if texts > MOST_TEXTS:
                 raise RecordingError(f"{path}: holds more than {MOST_TEXTS} texts: keep the columns of numbers only")
-        at = data.find(HEAP, at + 1)
+        at = _next_heap(data, at + 1)
+
+
+def _next_heap(data: mmap.mmap, start: int) -> int:
+    """Where the next heap begins, -1 where none does; what was looked through is given back as memory."""
+    for first in range(start, len(data), STRIDE):
+        at = data.find(HEAP, first, first + STRIDE + len(HEAP) - 1)
+        if at >= 0:
+            return at
+        if hasattr(data, "madvise"):  # not on Windows, where a process is not charged with a file's pages
+            data.madvise(mmap.MADV_DONTNEED)
+    return -1
 
 
 def _width_of_sizes(data: mmap.mmap) -> int:

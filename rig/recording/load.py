@@ -6,33 +6,20 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from rig.arrays import Array
 from rig.errors import RecordingError
-from rig.recording.checks import check_channel, check_run, check_samples, missing_column
+from rig.recording.checks import check_run
 from rig.recording.file_faults import FileFaults
+from rig.recording.long.files import long_files, shortened
 from rig.recording.readers import read_file
 from rig.recording.run import Recording, Run, printable
-from rig.recording.stated_units import column_named, factor_of, with_factors_in_place
-from rig.recording.table import Table
-from rig.units import DEG
+from rig.recording.stated_units import with_factors_in_place
+from rig.recording.tables import factors_of, run_of_table
 
 if TYPE_CHECKING:
     from rig.config.load import LoadedConfig
     from rig.config.recorded import RecordedConfig, RecordedRun
-
-Quantity = Literal["time", "torque", "rate", "angle", "valid"]
-# Default names, and the factor to SI units that the name itself stands for.
-DEFAULT_NAMES: Mapping[Quantity, Mapping[str, float]] = {
-    "time": {"time_s": 1.0},
-    "torque": {"torque_nm": 1.0},
-    "rate": {"rate_rad_s": 1.0, "rate_deg_s": DEG},
-    "angle": {"angle_rad": 1.0, "angle_deg": DEG},
-    "valid": {"valid": 1.0},
-}
 
 
 def read_recording(loaded: LoadedConfig) -> Recording:
@@ -45,21 +32,25 @@ def read_recording(loaded: LoadedConfig) -> Recording:
     if section is None:
         raise ValueError("the configuration has no recorded section")
     runs: list[Run] = []
+    own: set[int] = set()  # those that this program played: they are used as they are
     faults = FileFaults()
     sources: list[Path] = []
-    for entry in section.runs:
+    long = long_files(section, loaded.folder)
+    for i, entry in enumerate(section.runs):
         path = loaded.folder / Path(entry.file)
         try:
             path = _expanded(loaded.folder, entry.file)
-            found = runs_of_file(path, entry, section)
+            found, is_own = ([long[i].run()], False) if i in long else runs_of_file(path, entry, section)
         except RecordingError as error:
             faults.add(path, str(error))
             continue
+        own |= set(range(len(runs), len(runs) + len(found))) if is_own else set()
         runs += found
         sources += [path] * len(found)
     wrong = faults.lines() or _fitted_and_held_out(runs, sources)
     if wrong:
         raise RecordingError("\n".join(wrong))
+    runs = shortened(runs, own, section.most_samples)
     info = {"backend": "recorded", "files": [str(path) for path in sources], "config_text": loaded.text}
     return Recording(_with_unique_names(runs), axis=section.axis, noise=section.noise, info=info)
 
@@ -71,8 +62,8 @@ def _expanded(folder: Path, file: str) -> Path:
         raise RecordingError(f"{file}: the home folder (~) is unknown ({error}): give the absolute path") from error
 
 
-def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> list[Run]:
-    """The checked runs of one entry: one of a table, as many as were played of our own files.
+def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> tuple[list[Run], bool]:
+    """The checked runs of one entry: one of a table, as many as were played of our own files; and whether it is ours.
 
     Raises RecordingError.
     """
@@ -83,14 +74,13 @@ def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> lis
         if isinstance(content, Run):
             run = _own_run(path, content, entry, section)
         else:
-            columns = _columns(content, section)
-            factors = {q: _factor(content, name, section, q) for q, (name, _) in columns.items()}
-            run = _run_of_table(content, columns, factors, entry, section)
+            factors = factors_of(content, section)
+            run = run_of_table(content, factors, entry, section)
         try:
             runs.append(check_run(_window(run, entry, path), path, section.scale.model_fields_set))
         except RecordingError as error:
             raise RecordingError(with_factors_in_place(str(error), factors)) from None
-    return runs
+    return runs, any(isinstance(content, Run) for content in contents)
 
 
 def _own_run(path: Path, run: Run, entry: RecordedRun, section: RecordedConfig) -> Run:
@@ -105,87 +95,6 @@ def _own_run(path: Path, run: Run, entry: RecordedRun, section: RecordedConfig) 
         min_rate_rad_s=max(run.min_rate_rad_s, section.min_rate_of(entry)),
         added_inertia_kg_m2=entry.added_inertia_kg_m2 or run.added_inertia_kg_m2,
     )
-
-
-def _run_of_table(
-    table: Table,
-    columns: Mapping[Quantity, tuple[str, Array]],
-    factors: Mapping[str, float],
-    entry: RecordedRun,
-    section: RecordedConfig,
-) -> Run:
-    valid = check_samples(table, {k: values for k, (_, values) in columns.items()})
-    channels = _channels(table, section, len(valid))
-    time_s, rate, angle, torque = (_scaled(columns, factors, q) for q in ("time", "rate", "angle", "torque"))
-    assert time_s is not None  # _columns refuses a table without time
-    keep = np.isfinite(time_s)  # a lost sample may have lost its time too
-    has_torque = None if torque is None else keep & np.isfinite(torque)
-    return Run(
-        name=table.path.name,
-        time_s=time_s[keep],
-        valid=valid[keep],
-        rate_rad_s=None if rate is None else rate[keep],
-        angle_rad=None if angle is None else angle[keep],
-        torque_time_s=None if has_torque is None else time_s[has_torque],
-        torque_nm=None if torque is None else torque[has_torque],
-        torque_hold=section.torque_hold,
-        use=entry.use,
-        min_rate_rad_s=section.min_rate_of(entry),
-        added_inertia_kg_m2=entry.added_inertia_kg_m2,
-        channels={name: values[keep] for name, values in channels.items()},
-        causes={name: config.channel(name) for name, config in section.columns.channels.items()},
-    )
-
-
-def _channels(table: Table, section: RecordedConfig, count: int) -> dict[str, Array]:
-    """The further columns, in their channel's unit; a reading may be missing. Raises RecordingError."""
-    wanted = section.columns.channels
-    named = {name: config.column or name for name, config in wanted.items()}
-    for name, column in named.items():
-        if column not in table.names:
-            raise missing_column(table, f"channels.{name}", [column], mapped=True)
-    values = table.read(list(named.values())) if named else {}
-    out = {name: wanted[name].scale * values[column] for name, column in named.items()}
-    for name, x in out.items():
-        check_channel(table, name, x, count)
-    return out
-
-
-def _columns(table: Table, section: RecordedConfig) -> dict[Quantity, tuple[str, Array]]:
-    """Name and values of every quantity that the file has, as stored."""
-    names: dict[Quantity, str] = {}
-    for quantity, defaults in DEFAULT_NAMES.items():
-        named = getattr(section.columns, quantity)
-        name = column_named(table, quantity, named, list(defaults))
-        if named is not None and name is None:
-            raise missing_column(table, quantity, [named], mapped=True)
-        if name is not None:
-            names[quantity] = name
-    if "time" not in names:
-        raise missing_column(table, "time", list(DEFAULT_NAMES["time"]), mapped=False)
-    if "rate" not in names and "angle" not in names:
-        either = [*DEFAULT_NAMES["rate"], *DEFAULT_NAMES["angle"]]
-        raise missing_column(table, "rate", either, mapped=False)
-    values = table.read(list(names.values()))
-    return {quantity: (name, values[name]) for quantity, name in names.items()}
-
-
-def _factor(table: Table, name: str, section: RecordedConfig, quantity: Quantity) -> float:
-    """To SI units: the factor given, else that of the unit over the column or of the one that its name stands for."""
-    if quantity in section.scale.model_fields_set:
-        given: float = getattr(section.scale, quantity)
-        return given
-    return factor_of(table, name, quantity, section.axis, DEFAULT_NAMES[quantity].get(name))
-
-
-def _scaled(
-    columns: Mapping[Quantity, tuple[str, Array]], factors: Mapping[str, float], quantity: Quantity
-) -> Array | None:  # fmt: skip
-    """The column in SI units."""
-    if quantity not in columns:
-        return None
-    values, factor = columns[quantity][1], factors[quantity]
-    return values if factor == 1.0 else values * factor
 
 
 def _window(run: Run, entry: RecordedRun, path: Path) -> Run:

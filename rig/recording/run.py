@@ -19,6 +19,29 @@ def printable(name: str) -> str:
 
 
 @dataclass(frozen=True)
+class Excerpt:
+    """How a recording too long to be identified whole became a run.
+
+    Attributes
+    ----------
+    samples
+        That the file holds, within from_s and to_s.
+    factor
+        Of the decimation, behind a low-pass; 1 for none.
+    begin_s, end_s
+        What of it the run is made of.
+    whole
+        Whether that is all of it.
+    """
+
+    samples: int
+    factor: int
+    begin_s: float
+    end_s: float
+    whole: bool
+
+
+@dataclass(frozen=True)
 class Run:
     """One stretch of motion, played or recorded; all arrays are one-dimensional and read-only by custom.
 
@@ -56,6 +79,8 @@ class Run:
     rate_corner_hz, rate_delay_s
         The gyro's own low-pass where its data sheet gives it: -3 dB corner and group delay. The delay is
         already taken off ``time_s``; the rounding is in ``rate_rad_s`` (see ``rig.dynamics.low_pass``).
+    excerpt
+        What was made of a recording longer than ``recorded.most_samples``; None for all of it as it is.
     """
 
     name: str
@@ -74,6 +99,7 @@ class Run:
     causes: Mapping[str, Channel] = field(default_factory=dict)
     rate_corner_hz: float | None = None
     rate_delay_s: float | None = None
+    excerpt: Excerpt | None = None
 
     @property
     def duration_s(self) -> float:

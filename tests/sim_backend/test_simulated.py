@@ -196,6 +196,7 @@ def test_a_run_has_no_place_where_truth_could_hide() -> None:
         "name", "time_s", "valid", "rate_rad_s", "angle_rad", "torque_time_s", "torque_nm", "torque_hold",
         "use", "min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "channels", "causes",
             "rate_corner_hz", "rate_delay_s",  # of the gyro's data sheet
+            "excerpt",  # of a long recording
     }  # fmt: skip
     assert not played(config()).recording.runs[0].channels
 

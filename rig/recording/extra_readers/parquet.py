@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.recording.extra_readers.rasters import require
 from rig.recording.table import MAX_SAMPLES, Table, read_each, too_long
@@ -34,8 +35,26 @@ def read(path: Path) -> Sequence[Table]:
         return _values(path, name, table.column(name).combine_chunks())
 
     names = [name for name in table.column_names if name]
-    units = {f.name: unit for f in table.schema if (unit := _unit(f.metadata or {}))}
-    return [Table(path, tuple(names), read_each(path, column), lambda index: f"row {index + 1}", units)]
+    return [
+        Table(path, tuple(names), read_each(path, column), lambda index: f"row {index + 1}", units_of(table.schema))
+    ]
+
+
+def opened(path: Path) -> Any:
+    """The file as pyarrow has it, nothing of it read."""
+    import pyarrow.parquet as pq  # noqa: PLC0415  an extra, and slow to import
+
+    return pq.ParquetFile(path)
+
+
+def units_of(schema: Any) -> Mapping[str, str]:
+    """Column -> unit, where its metadata states one."""
+    return {f.name: unit for f in schema if (unit := _unit(f.metadata or {}))}
+
+
+def columns_of(path: Path, table: Any, names: Sequence[str]) -> Mapping[str, Array]:
+    """Columns of a table of pyarrow as float64."""
+    return read_each(path, lambda name: _values(path, name, table.column(name).combine_chunks()))(names)
 
 
 def _unit(metadata: Any) -> str:

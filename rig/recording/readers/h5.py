@@ -27,17 +27,17 @@ def read(path: Path) -> Sequence[Table | Run]:
         with h5py.File(path, "r") as file:
             with at_most(hdf5.MOST_TEXT_BYTES):
                 ours = file.attrs.get("format") == hdf5.FORMAT
-            datasets = {} if ours else _datasets(file)
+            columns = {} if ours else datasets(file)
     except _DAMAGE as error:
         raise RecordingError(f"{path}: is not an HDF5 file that can be read ({error}): export it again") from error
     if ours:
         return hdf5.read_recording_h5(path, with_info=False).runs
-    if not datasets:
+    if not columns:
         raise RecordingError(f"{path}: holds no datasets: write time_s, torque_nm, rate_rad_s as datasets")
-    return [Table(path, tuple(datasets), read_each(path, lambda name: _array(path, name, datasets[name])))]
+    return [Table(path, tuple(columns), read_each(path, lambda name: _array(path, name, columns[name])))]
 
 
-def _datasets(file: h5py.File) -> dict[str, str]:
+def datasets(file: h5py.File) -> dict[str, str]:
     """Column name -> path in the file: the last part of the path where that is unique, else all of it.
 
     Links are not followed: a link may lead into another file.

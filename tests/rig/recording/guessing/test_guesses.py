@@ -11,8 +11,8 @@ from rig.errors import RecordingError
 from rig.recording.guessing.columns import columns_of
 from rig.recording.guessing.roles import Choice, Quantity, guess_roles
 from rig.recording.guessing.scales import Factor, axis_of, guess_factors
-from rig.recording.load import DEFAULT_NAMES
 from rig.recording.table import Table
+from rig.recording.tables import DEFAULT_NAMES
 
 T = np.arange(500) * 2e-3
 RATE = 3.0 * np.cos(9.0 * T) * np.exp(-0.5 * T) + np.sin(31.0 * T)
