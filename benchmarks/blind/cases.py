@@ -170,7 +170,10 @@ def _make(rng: Rng, number: int, order: Order) -> Case:
 
 
 def _sets(rng: Rng, plain: Hidden, campaign: str) -> tuple[Excitation, ...]:
-    """Sets of about fifty seconds in all (``low_sines``: of two), each scaled to a drawn share of the limits."""
+    """Sets of about fifty seconds in all, each scaled to a drawn share of the limits.
+
+    ``low_sines`` are two sets of six seconds, ``short`` ones three of two.
+    """
     sets = [sine(1.0, f) for f in PAPER_HZ]
     if campaign == "soft":
         soft = rng.random(5) < 0.5
@@ -181,6 +184,8 @@ def _sets(rng: Rng, plain: Hidden, campaign: str) -> tuple[Excitation, ...]:
     elif campaign == "low_sines":
         low = np.sort(rng.choice(PAPER_HZ[:3], 2, replace=False))
         sets = [sine(1.0, float(f), 6.0, 1.0) for f in low]  # the platform never rings
+    elif campaign == "short":
+        sets = [sine(1.0, f, 2.0) for f in (1.0, 3.0, 9.0)]
     elif campaign == "odd_sines":
         hz = np.sort(0.35 * (11.0 / 0.35) ** rng.random(int(rng.integers(4, 7))))
         sets = [sine(1.0, float(round(f, 3)), float(rng.integers(6, 14))) for f in hz]

@@ -1,0 +1,1 @@
+"""Frozen recordings, and what the product says of them before and after a change that may change nothing."""
