@@ -154,6 +154,8 @@ def dependence_on(search: Stepwise, left: LeftOver) -> tuple[Dependence, dict[st
             moved = float(as_terms[k])
         elif "gain" in form:  # so is a gain that changes, and nobody knows where along it the recorded torque is right
             moved = max(moved, float(as_terms[k]), key=abs)
+        elif ON[form] == "history":  # a short memory is damping and inertia itself: the platform has both together
+            moved += float(as_terms[k])
         if abs(moved) > SURE * _error(fit, (term,)):
             moves[term] = 100.0 * abs(moved / here)
     return Dependence(ON[form], rms, rms / problem.torque_nm, left.by_chance, tuple(at), tuple(shape)), moves

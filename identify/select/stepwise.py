@@ -88,7 +88,18 @@ class Stepwise:
 
     def run(self) -> Fit:
         """Add effects as long as one is worth it; judge each again beside the others; drop what is needless."""
-        for number in range(1, MOST + 1):
+        self._add()
+        for other in (self.in_place_of_terms, self.judged_again):
+            before, self.best = self.best.structure, other(self.best)
+            if _key(self.best.structure) != _key(before):  # beside what was replaced, others may have shown nothing
+                self._add()
+        self.best = self.pruned(self.best, [*self.best.structure.terms, *self.trials.added(self.best)])
+        self.best = self.beside_what_is_left(self.best)
+        return self.best
+
+    def _add(self) -> None:
+        """Effects one at a time, as long as one is worth it."""
+        for number in range(len(self.rounds) + 1, MOST + 1):
             now = self.best
             scores, tried = self.tried(now)
             chosen = self.choice(tried)
@@ -100,11 +111,6 @@ class Stepwise:
                 f"added {chosen}: log-likelihood +{0.5 * new.gain:.3g}, {100.0 * new.weight:.0f} % of the disturbance"
             )
             self.best = self.pruned(new.fit, [e for e in self.trials.added(new.fit) if e != chosen])
-        self.best = self.in_place_of_terms(self.best)
-        self.best = self.judged_again(self.best)
-        self.best = self.pruned(self.best, [*self.best.structure.terms, *self.trials.added(self.best)])
-        self.best = self.beside_what_is_left(self.best)
-        return self.best
 
     def beside_what_is_left(self, now: Fit) -> Fit:
         """Without names that explain nothing beside a curve over what is left."""
@@ -212,7 +218,11 @@ class Stepwise:
         without = now.structure.minus(name)
         for r in reversed(self.rounds):
             if r.chosen == name and _key(r.now.structure) == _key(without):
-                return r.now, {n: e.fit for n, e in r.tried.items() if n != name}
+                tried = {n: e.fit for n, e in r.tried.items() if n != name}
+                for special, fit in self.trials.special_cases(now, r.now, name).items():
+                    if special not in tried or fit.cost < tried[special].cost:
+                        tried[special] = fit
+                return r.now, tried
         rest = self._lacking.get(_key(without))
         if rest is None:
             rest = self._without(now, name, MANY)

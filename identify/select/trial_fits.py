@@ -207,13 +207,14 @@ class TrialFits:
         more = self.problem.fit(fit.structure, fit.values, fit.noise, MANY, carry=fit.shots)
         return more if more.cost < fit.cost else fit
 
-    def instead(self, now: Fit, rest: Fit, name: str, among: Collection[str]) -> dict[str, Fit]:
-        """Fits with another effect, of ``among``, in the place of one."""
-        names = [n for n in self.names(rest) if n in among or n == name]
-        looks = InnovationScores(self.problem, rest, self.scale(rest)).all(names)
+    def special_cases(self, now: Fit, rest: Fit, name: str) -> dict[str, Fit]:
+        """Fits with a special case of an effect in its place, from where the richer one stands.
+
+        Alone its score may point anywhere.
+        """
         fits: dict[str, Fit] = {}
         rest_values = {n: v for n, v in now.values.items() if n[0] != name}
-        for other in effects.get(name).nests:  # from where the richer one stands: alone its score may point anywhere
+        for other in effects.get(name).nests:
             parameters = effects.get(other).parameters
             if other not in self.names(now) or not all(p.linear and not p.per_run for p in parameters):
                 continue
@@ -222,6 +223,13 @@ class TrialFits:
             fits[other] = self.problem.fit(
                 structure, {**rest_values, **own}, now.noise, FEW, carry=now.shots, thorough=False, against=rest.cost
             )
+        return fits
+
+    def instead(self, now: Fit, rest: Fit, name: str, among: Collection[str]) -> dict[str, Fit]:
+        """Fits with another effect, of ``among``, in the place of one."""
+        names = [n for n in self.names(rest) if n in among or n == name]
+        looks = InnovationScores(self.problem, rest, self.scale(rest)).all(names)
+        fits = self.special_cases(now, rest, name)
         own_score = next((v[0].gain for v in looks if v[0].effect == name), 0.0)
         for group in self.shortlist(rest, looks):
             other = group[0].effect
