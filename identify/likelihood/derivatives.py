@@ -149,6 +149,8 @@ def _of_run(
             gains = p.gains_at(s, at.structure, at.names, there, at.noise)
             pulled[:, k] = followed(replace(base.gains, gain=gains.gain, variance=gains.variance), step)
         spread[:, k] = (np.log(gains.variance[w] / base.variance[w]) / step).ravel()
+        if not (np.all(np.isfinite(pulled[:, k])) and np.all(np.isfinite(spread[:, k]))):
+            pulled[:, k] = spread[:, k] = 0.0  # the linear part runs away there: its gains tell nothing
     for k, kind in enumerate(kinds, len(at.x)):
         changed = replace(at.noise, **{kind: getattr(at.noise, kind) * float(np.exp(NOISE_STEP))})
         gains = p.gains_at(s, at.structure, at.names, at.x, changed)
