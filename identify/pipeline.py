@@ -51,7 +51,7 @@ from rig.errors import Aborted
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
-TAKEN_BACK = "effects were found that together leave too much and were taken back; the declared model does not suffice"
+TAKEN_BACK = "rejected: together the effects found still do not explain the data, and neither does the declared model"
 
 NOTHING_YET = (
     "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
@@ -158,7 +158,7 @@ class _Identifier:
                 return self._concluded(found, doubts)
             if (white and nothing_left) or doubts.other_cause(found):
                 return self._concluded(found, doubts)
-            self.say("a torque that was not recorded is left beside the sensor's noise")
+            self.say("the residual holds a torque that was not recorded, in addition to the sensor's noise")
             self.more_than_noise = True
             return self._in_torque(shapes, search, found)
         except (Aborted, KeyboardInterrupt):

@@ -38,9 +38,11 @@ def why_no_proof(found: Identification) -> str:
 
     model = found.final.platform
     if found.aborted or model is None:
-        return "no model came out of the identification"
+        return "the identification gave no model"
     if found.torque_free:
-        return "without torque only ratios to the inertia are known, and no torque can be computed from them"
+        return (
+            "no torque was recorded, so only ratios to the inertia are known and no compensating torque can be computed"
+        )
     if found.axis == "linear":
         return "the rig turns, and this model is that of a linear axis"
     if not cancelled(model):

@@ -120,7 +120,7 @@ def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table, least
     several = shapes(own_hz, table.sensor.sample_rate_hz)
     choice = candidates(several, bearing, table.allowed, look, table.least_torque_nm)
     if not choice:
-        why = f"no set of any kind stays within the limits with {number(table.least_torque_nm, 2)} N m or more"
+        why = f"no kind of excitation stays within the limits at {number(table.least_torque_nm, 2)} N m or more"
         return FollowUp(None, (*without, *(Unparted(p.effect, p.rival, why) for p in pairs)))
     looks = _Looks(pairs, choice, models, look, weight)
     sets = [s for i in _choose(looks) if (s := fitting(choice[i], bearing, table.allowed)) is not None]

@@ -171,8 +171,8 @@ def _within(
         if not factor > SMALLEST:
             break
     raise PreflightRefusal(
-        f"{asked.name}: no torque above {100 * SMALLEST:g} % of the set stays within the limits once it is "
-        f"compensated (travel {allowed.travel_deg:g} deg, rate {allowed.rate_deg_s:g} deg/s, torque "
+        f"{asked.name}: with compensation, even {100 * SMALLEST:g} % of this set's torque exceeds the limits "
+        f"(travel {allowed.travel_deg:g} deg, rate {allowed.rate_deg_s:g} deg/s, torque "
         f"{allowed.torque_nm:g} N m); nothing was moved. Raise the limit under limits: if the machine allows it."
     )
 
@@ -220,4 +220,6 @@ def not_cancelled(model: Platform) -> dict[str, str]:
 
 def _no_torque(name: str) -> str:
     read = effects.get(name).reads
-    return f"what {read.name} reads is not known before the run" if read is not None else "no torque takes it away"
+    return (
+        f"the readings of {read.name} are not known before the run" if read is not None else "no torque can cancel it"
+    )

@@ -70,4 +70,4 @@ def told(runs: Sequence[tuple[str, int, float]], axis: str) -> str:
     if not each:
         return ""
     left_out = ", ".join(each)
-    return f"The platform moved faster than the sensor's full scale; those samples are left out: {left_out}"
+    return f"Samples at the sensor's full scale are excluded, because the platform moved faster: {left_out}"

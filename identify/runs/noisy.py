@@ -39,7 +39,7 @@ def describe_noisy_runs(runs: Sequence[tuple[str, float]]) -> str:
     if not runs:
         return ""
     each = ", ".join(f"{name} ({number(times, 2)} times the noise of the other runs)" for name, times in runs)
-    return f"Left out as too noisy: {each}; look at the cable and record {'it' if len(runs) == 1 else 'them'} once more"
+    return f"Excluded as too noisy: {each}; check the cable and record {'it' if len(runs) == 1 else 'them'} again"
 
 
 def _is_louder(trace: Trace, quiet: float) -> bool:

@@ -87,4 +87,4 @@ def told(runs: Sequence[tuple[str, Array]]) -> str:
     where = "; ".join(f"{name} at {', '.join(f'{t:.4g}' for t in times)} s" for name, times in found)
     count = sum(len(times) for _, times in found)
     each, are = ("1 sample deviates", "is") if count == 1 else (f"{count} samples deviate", "are")
-    return f"{each} by more than {APART:g} times the noise from neighbours that agree and {are} left out: {where}"
+    return f"{each} by more than {APART:g} times the noise from consistent neighbours and {are} excluded: {where}"

@@ -188,6 +188,6 @@ def told(runs: Sequence[tuple[str, float, bool]]) -> str:
     which = ", ".join(name for name, _ in wrong)
     most = max(scatter_s for _, scatter_s in wrong)
     return (
-        f"Time stamps of {which} scatter by up to {1e6 * most:.3g} us (rms) about an even grid, but the motion shows "
-        "that the samples are even: even spacing is assumed"
+        f"Time stamps of {which} have a jitter of up to {1e6 * most:.3g} us rms, but the motion shows that the samples "
+        "are evenly spaced: even spacing is assumed"
     )

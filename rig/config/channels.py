@@ -65,7 +65,10 @@ def check_channels(given: Given) -> Given:
     from rig.errors import ConfigError  # noqa: PLC0415
 
     if len(given) > MOST_CHANNELS:
-        raise ValueError(f"{len(given)} channels, at most {MOST_CHANNELS} are allowed: leave out the least likely")
+        raise ValueError(
+            f"{len(given)} channels, at most {MOST_CHANNELS} are allowed: leave out those "
+            "least likely to act on the platform"
+        )
     wrong: list[tuple[tuple[str | int, ...], str]] = []
     for name, config in given.items():
         fault = name_fault(name)

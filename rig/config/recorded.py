@@ -62,7 +62,7 @@ class ChannelColumn(ChannelConfig):
     @classmethod
     def _not_zero(cls, factor: float) -> float:
         if factor == 0:
-            raise ValueError("a factor of 0 erases the column: give the factor that converts to the channel's unit")
+            raise ValueError("a factor of 0 sets every value to 0: give the factor that converts to the channel's unit")
         return factor
 
 
@@ -112,7 +112,7 @@ class Scale(Section):
     def _not_zero(cls, factor: float) -> float:
         if factor == 0:
             raise ValueError(
-                "a factor of 0 erases the column: give the factor that converts to SI units, e.g. 0.0174533 from "
+                "a factor of 0 sets every value to 0: give the factor that converts to SI units, e.g. 0.0174533 from "
                 "degrees"
             )
         return factor

@@ -30,6 +30,6 @@ EFFECT = Effect(
     kernel=_level,
     formula="level_nm",
     other_minima=_others,
-    stays="at standstill friction holds the platform within a band, and where in it nobody knows before the run",
+    stays="friction holds the platform anywhere within a band, so its rest angle is not known before the run",
     separated_by="from Stribeck and presliding friction: ramp slowly, hold and release; excite at several amplitudes",
 )

@@ -42,7 +42,7 @@ def check_samples(table: Table, columns: Mapping[str, Array]) -> Mask:
     if len(set(lengths.values())) > 1:
         listed = ", ".join(f"{quantity} {count}" for quantity, count in lengths.items())
         raise RecordingError(
-            f"{table.path}: columns of different length ({listed}): export one value a sample for each"
+            f"{table.path}: columns of different length ({listed}): export one value per sample for each"
         )
     flags = columns.get("valid")
     if flags is not None and not np.isfinite(flags).all():

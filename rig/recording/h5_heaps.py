@@ -37,7 +37,7 @@ def _check(path: Path, data: mmap.mmap) -> None:
         for step in _steps(data, at, width):
             texts += 1
             if step <= 0:
-                raise RecordingError(f"{path}: is damaged (a heap of texts has no end): export it again")
+                raise RecordingError(f"{path}: is damaged (its string heap is endless): export it again")
             if texts > MOST_TEXTS:
                 raise RecordingError(f"{path}: holds more than {MOST_TEXTS} texts: keep the columns of numbers only")
         at = data.find(HEAP, at + 1)

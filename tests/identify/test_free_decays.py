@@ -105,5 +105,5 @@ def test_where_a_decay_began_is_fitted_though_the_smoothed_start_is_off() -> Non
 def test_an_added_inertia_without_torque_is_refused_with_what_to_do() -> None:
     bare = pendulum(duration_s=20.0)
     loaded = replace(bare, name="with ring", added_inertia_kg_m2=0.02)
-    with pytest.raises(RecordingError, match=r"with ring .* 0\.02 .*each load by themselves"):
+    with pytest.raises(RecordingError, match=r"with ring .* 0\.02 .*each load separately"):
         identify(Recording((bare, loaded)), Platform(1.0, 0.1, 20.0), QUIET)

@@ -38,9 +38,7 @@ def read(path: Path) -> Sequence[Table]:
 
     bag = path if path.is_dir() or path.suffix.lower() == ".bag" else path.parent
     if bag.is_dir() and not (bag / ROS_METADATA).is_file():
-        raise RecordingError(
-            f"{path}: {ROS_METADATA} of the bag is missing beside it: restore it with `ros2 bag reindex`"
-        )
+        raise RecordingError(f"{path}: {ROS_METADATA} of the bag is missing: restore it with `ros2 bag reindex`")
     try:
         with AnyReader([bag], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             if reader.message_count > MAX_SAMPLES:
@@ -49,7 +47,9 @@ def read(path: Path) -> Sequence[Table]:
     except RecordingError:
         raise
     except Exception as error:
-        raise RecordingError(f"{path}: is no sound ROS bag ({error}): record it again, or export it as CSV") from error
+        raise RecordingError(
+            f"{path}: is not a valid ROS bag ({error}): record it again, or export it as CSV"
+        ) from error
     return [one_table(path, groups)]
 
 

@@ -153,7 +153,7 @@ def test_torque_that_no_drive_makes_well_is_no_way_out() -> None:
     found, recording = case("actuator_lag")
     follow_up = plan_follow_up(found, recording, Peaks(0.01, 0.9, 0.5), RATE_HZ, 12.0)
     assert follow_up is not None and follow_up.plan is None
-    assert "with 0.30 N m or more" in follow_up.unparted[0].reason
+    assert "at 0.30 N m or more" in follow_up.unparted[0].reason
 
 
 def test_without_a_rival_nothing_is_planned() -> None:
@@ -183,7 +183,7 @@ def test_a_rival_that_the_finished_model_excludes_is_not_planned_for() -> None:
     )  # fmt: skip
     follow_up = plan_follow_up(replace(found, verdict=verdict), recording, ALLOWED, RATE_HZ, 12.0)
     assert follow_up is not None and follow_up.plan is None
-    assert "exclude the rival already" in follow_up.unparted[0].reason
+    assert "already exclude the alternative" in follow_up.unparted[0].reason
 
 
 def test_the_file_is_an_excitation_that_a_rig_yaml_may_name(tmp_path: Path) -> None:

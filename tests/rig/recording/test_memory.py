@@ -86,5 +86,5 @@ def test_a_file_with_a_block_of_its_user_before_it_is_walked_too(tmp_path: Path)
     at = data.index(b"GCOL") + 16 + 16 + 8
     data[at : at + 16] = bytes(16)
     path.write_bytes(data)
-    with pytest.raises(RecordingError, match="a heap of texts has no end"):
+    with pytest.raises(RecordingError, match="its string heap is endless"):
         read_file(path)
