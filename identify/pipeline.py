@@ -35,7 +35,7 @@ from identify.runs.holdout import Split, split
 from identify.runs.measured_channels import offer_of, with_causes
 from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced
-from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
+from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_without_motion
 from identify.runs.usable import runs_used
 from identify.select.field_search import Found, search_in_torque, with_curve
 from identify.select.left_over import dependence_on, most_moving
@@ -119,7 +119,7 @@ class _Identifier:
         self.torque_noise_above_hz: float | None = None
         self.curve: tuple[Dependence, dict[str, float]] | None = None  # over what is left of a decay
         self.more_than_noise = False  # is left by all that was found, though nothing else seemed to limit the runs
-        refuse_the_idle(self.traces, free)
+        refuse_without_motion(self.traces, free)
         if free:
             refuse_added_inertia(self.traces)
         self.split: Split = split(self.traces, settings.holdout)

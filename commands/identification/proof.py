@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rig.config.load import LoadedConfig
     from rig.recording.run import Recording
 
-MOST_PROOFS = 2  # of a campaign: the names, and those that came in the place of refuted ones
+MAX_PROOFS = 2  # of a campaign: the names, and those that came in the place of refuted ones
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def prove(
         Where the first proof may not be played; nothing was moved.
     """
     now = Proved(loaded, played, found, played.recording)
-    for number in range(first, first + MOST_PROOFS):
+    for number in range(first, first + MAX_PROOFS):
         if number > first and why_no_proof(now.found):
             break
         part = _part(now, rival if number == first else None, number)

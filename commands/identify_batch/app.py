@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from commands.identify_batch.row import Row
     from commands.terminal.display import Terminal
 
-MOST_OTHERS_NAMED = 3
+MAX_OTHERS_NAMED = 3
 app = new_app("")
 
 Pattern = Annotated[
@@ -119,8 +119,8 @@ def _run(options: Options, terminal: Terminal, stops: StopRequests) -> int:
     require_batch()
     paths, others = campaigns_of(options.pattern)
     if others:
-        named = ", ".join(plain(path) for path in others[:MOST_OTHERS_NAMED])
-        more = ", ..." if len(others) > MOST_OTHERS_NAMED else ""
+        named = ", ".join(plain(path) for path in others[:MAX_OTHERS_NAMED])
+        more = ", ..." if len(others) > MAX_OTHERS_NAMED else ""
         terminal.show(f"{len(others)} match(es) are not recorded campaigns and are skipped: {named}{more}")
     with RowJournal(journal_path(options.out)) as journal:
         terminal.note(f"reading {len(paths)} recorded campaign(s)")

@@ -16,7 +16,7 @@ from identify.signals.trace import Trace
 from rig import effects
 from rig.platform import TERMS, Platform
 
-MOST_PAIRS = 4
+MAX_PAIRS = 4
 EXCLUDED = 25.0  # chi square by which the data have excluded a rival already
 REFIT = 10  # iterations in which a rival is fitted into the finished model
 
@@ -54,9 +54,9 @@ def pairs_of(
                 without.append(Unparted(effect, rival, why))
             elif final is None or model is None or effect not in final.effects:
                 without.append(Unparted(effect, rival, "no fitted model of the alternative is available for planning"))
-            elif len(pairs) == MOST_PAIRS:
+            elif len(pairs) == MAX_PAIRS:
                 without.append(
-                    Unparted(effect, rival, f"at most {MOST_PAIRS} pairs are planned at once; the others come first")
+                    Unparted(effect, rival, f"at most {MAX_PAIRS} pairs are planned at once; the others come first")
                 )
             else:
                 placed = _in_place(final, effect, rival, model, traces, noise)

@@ -26,7 +26,7 @@ AT_NOISE = 1.2
 # Share left, beyond the one announced, from which a name explains less than half of the error's power.
 REFUTED = 0.7
 # Times the error of another name by which it is no better and no worse: less than the models' own numbers move it.
-ALIKE = 1.1
+MIN_ERROR_RATIO = 1.1
 # Error without compensation over the announced one: from here on the name explains less than a quarter of its power.
 UNEXPLAINED = 2.0
 # Share of the error without a name that is left with it, all fitted anew to the runs without compensation, up to
@@ -232,7 +232,9 @@ def _compared(
 
 def _material(ratio: float, rival: EffectProof, name: EffectProof) -> bool:
     """Whether what the two leave differs by more than a tenth, and the worse of them leaves more than noise."""
-    return abs(np.log(ratio)) > np.log(ALIKE) and _over_noise((rival if ratio > 1.0 else name).sets) > AT_NOISE
+    return (
+        abs(np.log(ratio)) > np.log(MIN_ERROR_RATIO) and _over_noise((rival if ratio > 1.0 else name).sets) > AT_NOISE
+    )
 
 
 def _ratio(plan: ProofPlan, pair: str, sets: list[str], found: Found) -> tuple[float, float, float]:

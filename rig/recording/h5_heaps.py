@@ -15,8 +15,8 @@ from rig.errors import RecordingError
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 HEAP = b"GCOL\x01\0\0\0"
-LARGEST_USER_BLOCK = 1 << 20
-MOST_TEXTS = 500_000  # of a file; each costs a microsecond here
+MAX_USER_BLOCK = 1 << 20
+MAX_TEXTS = 500_000  # of a file; each costs a microsecond here
 
 
 def check_heaps(path: str | Path) -> None:
@@ -38,15 +38,15 @@ def _check(path: Path, data: mmap.mmap) -> None:
             texts += 1
             if step <= 0:
                 raise RecordingError(f"{path}: is damaged (its string heap is endless): export it again")
-            if texts > MOST_TEXTS:
-                raise RecordingError(f"{path}: holds more than {MOST_TEXTS} texts: keep the columns of numbers only")
+            if texts > MAX_TEXTS:
+                raise RecordingError(f"{path}: holds more than {MAX_TEXTS} texts: keep the columns of numbers only")
         at = data.find(HEAP, at + 1)
 
 
 def _width_of_sizes(data: mmap.mmap) -> int:
     """Bytes of a size in this file; 0 where it is no HDF5 file."""
     at = 0
-    while at <= min(LARGEST_USER_BLOCK, len(data) - 16):
+    while at <= min(MAX_USER_BLOCK, len(data) - 16):
         if data[at : at + 8] == SIGNATURE:
             return min(data[at + (14 if data[at + 8] < 2 else 10)], 8)  # the library takes no wider one
         at = 2 * at or 512

@@ -10,7 +10,7 @@ from typing import Any
 from identify.report.page.document import Gallery, document
 from identify.report.page.markup import Markup, Piece, bullets, element, join, paragraph, section, table
 from identify.report.page.plots.figure import AFTER, BEFORE, MEASURED, Figure, Panel, Trace, grid, upright
-from identify.report.trend.change_points import FEWEST, Level
+from identify.report.trend.change_points import MIN_CAMPAIGNS, Level
 from identify.report.trend.series import Campaign, Estimate, Series, has_dates, heading, in_order, series_of
 from identify.results import ParameterEstimate
 from identify.wording import joined, number, percent, plain, printable, unit, with_interval
@@ -47,8 +47,8 @@ def _rig(anchor: str, name: str, campaigns: Sequence[Campaign], gallery: Gallery
     found = series_of(campaigns)
     changes = [line for one in found for line in change_sentences(one, campaigns)]
     if not changes:
-        few = len(campaigns) < FEWEST
-        changes = [f"Detecting a change takes at least {FEWEST} campaigns." if few else "No change was found."]
+        few = len(campaigns) < MIN_CAMPAIGNS
+        changes = [f"Detecting a change takes at least {MIN_CAMPAIGNS} campaigns." if few else "No change was found."]
     return section(
         anchor,
         printable(name),

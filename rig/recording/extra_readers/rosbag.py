@@ -18,7 +18,7 @@ from rig.recording.readers.folder import ROS_METADATA
 from rig.recording.table import MAX_SAMPLES, Table, too_long
 
 NS = 1e-9
-MOST_ENTRIES = 12  # of an array in a message: joints and vectors, no images and point clouds
+MAX_ENTRIES = 12  # of an array in a message: joints and vectors, no images and point clouds
 SKIPPED = ("header", "orientation")  # a quaternion is no angle
 # By message type and field: the units that the ROS definitions fix (REP 103).
 UNITS = {
@@ -89,7 +89,7 @@ def _numbers(message: Any, prefix: str) -> Iterator[tuple[str, float]]:
             continue
         if isinstance(value, bool | int | float | np.number):
             yield f"{prefix}{field}", float(value)
-        elif isinstance(value, np.ndarray | list) and 0 < len(value) <= MOST_ENTRIES:
+        elif isinstance(value, np.ndarray | list) and 0 < len(value) <= MAX_ENTRIES:
             for i, entry in enumerate(value):
                 if isinstance(entry, int | float | np.number):
                     label = labels[i] if isinstance(labels, list) and len(labels) == len(value) else i

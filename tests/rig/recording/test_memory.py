@@ -71,7 +71,7 @@ def test_more_texts_than_a_recording_has_are_refused(tmp_path: Path, monkeypatch
     with h5py.File(path, "w") as file:
         file["notes"] = [f"note {k}" for k in range(200)]
     read_file(path)
-    monkeypatch.setattr(h5_heaps, "MOST_TEXTS", 150)
+    monkeypatch.setattr(h5_heaps, "MAX_TEXTS", 150)
     with pytest.raises(RecordingError, match="holds more than 150 texts"):
         read_file(path)
 
