@@ -36,7 +36,7 @@ from identify.runs.holdout import Split, split
 from identify.runs.measured_channels import offer_of, with_causes
 from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced
-from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_the_idle
+from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_without_motion
 from identify.runs.usable import runs_used
 from identify.select.field_search import Found, search_in_torque, with_curve
 from identify.select.left_over import dependence_on, most_moving
@@ -52,7 +52,7 @@ from rig.errors import Aborted
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
-TAKEN_BACK = "effects were found that together leave too much and were taken back; the declared model does not suffice"
+TAKEN_BACK = "rejected: together the effects found still do not explain the data, and neither does the declared model"
 
 NOTHING_YET = (
     "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
@@ -121,7 +121,7 @@ class _Identifier:
         self.torque_noise_above_hz: float | None = None
         self.curve: tuple[Dependence, dict[str, float]] | None = None  # over what is left of a decay
         self.more_than_noise = False  # is left by all that was found, though nothing else seemed to limit the runs
-        refuse_the_idle(self.traces, free)
+        refuse_without_motion(self.traces, free)
         if free:
             refuse_added_inertia(self.traces)
         self.split: Split = split(self.traces, settings.holdout)
@@ -161,7 +161,7 @@ class _Identifier:
             if (white and nothing_left) or doubts.other_cause(found):
                 release(search.stepwise.problem.traces)
                 return self._concluded(found, doubts)
-            self.say("a torque that was not recorded is left beside the sensor's noise")
+            self.say("the residual holds a torque that was not recorded, in addition to the sensor's noise")
             self.more_than_noise = True
             return self._in_torque(shapes, search, found)
         except (Aborted, KeyboardInterrupt):

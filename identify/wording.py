@@ -16,7 +16,7 @@ SYMBOLS = {
     "damping_over_inertia": "C/J",
     "stiffness_over_inertia": "K/J",
 }
-MOST_DIGITS = 7  # significant digits: torque and gyro scales are never calibrated better than 1e-6
+MAX_DIGITS = 7  # significant digits: torque and gyro scales are never calibrated better than 1e-6
 NORMAL_95 = 1.96  # half a 95 % interval in standard errors
 TWO_DIGITS_UP_TO = 3.55  # leading digits of an uncertainty, rule of the Particle Data Group: 1.0 to 3.5 get two digits
 MANY_TIMES = 3.0  # from here on a factor reads better than a percentage
@@ -89,7 +89,7 @@ def _last_place(estimate: ParameterEstimate) -> int | None:
         return None
     order = math.floor(math.log10(half))
     place = order - 1 if half / 10.0**order < TWO_DIGITS_UP_TO else order
-    return max(place, _order(estimate.value) - MOST_DIGITS + 1) if estimate.value else place
+    return max(place, _order(estimate.value) - MAX_DIGITS + 1) if estimate.value else place
 
 
 def _order(value: float) -> int:

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 
 ChannelKind = Literal["current", "temperature", "angle", "acceleration", "rate", "torque", "other"]
 KINDS: tuple[ChannelKind, ...] = get_args(ChannelKind)
-MOST_CHANNELS = 8  # each brings up to five candidates
+MAX_CHANNELS = 8  # each brings up to five candidates
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 
 

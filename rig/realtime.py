@@ -44,7 +44,7 @@ def _libc() -> ctypes.CDLL | None:
 def _first_in_first_out(priority: int) -> str:
     """Empty when granted, else why not."""
     if sys.platform == "win32" or not hasattr(os, "sched_setscheduler"):
-        return "real-time priority (this system has none to give)"
+        return "real-time priority (not available on this system)"
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except OSError as problem:

@@ -20,7 +20,7 @@ from sim_backend.motor import MotorState, motor_torque
 
 ANGLE, RATE, SENSED, TORQUE = range(4)  # columns of what Plant.follow and its like return
 RK4_PHASE_RAD = 0.03  # of the fastest motion in one fine step: leaves (0.03)^4 / 120, 7e-9, of a frequency
-MOST_PARTS = 4096  # fine steps in a tick: a minute at 1 kHz takes some minutes then, and beyond that has no end
+MAX_PARTS = 4096  # fine steps in a tick: a minute at 1 kHz takes some minutes then, and beyond that has no end
 FOLLOW, HOLD, MOTOR = range(3)
 _DRIVE, _SENSOR = 14, 20  # where the filter chains begin in the table of addresses
 
@@ -78,10 +78,10 @@ class Plant:
     def __init__(self, platform: Platform, coarsest_step_s: float, phase_rad: float = RK4_PHASE_RAD) -> None:
         e = Equations(platform)
         needed = coarsest_step_s * e.fastest_rad_s() / phase_rad
-        if not needed <= MOST_PARTS:
+        if not needed <= MAX_PARTS:
             raise ConfigError(
                 f"simulated.platform: its fastest motion, {e.fastest_rad_s() / (2 * np.pi):.3g} Hz, takes "
-                f"{needed:.3g} fine steps a tick, at most {MOST_PARTS} are simulated: raise the inertia, lower the "
+                f"{needed:.3g} fine steps a tick, at most {MAX_PARTS} are simulated: raise the inertia, lower the "
                 "stiffness, the damping or the steepest of its effects, or raise excitation.sample_rate_hz"
             )
         # A power of two, so that grids that halve each other nest and a held torque changes on all of them.

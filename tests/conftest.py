@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
-import sys
-import tempfile
-from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -22,7 +19,7 @@ for _name in ("SIGHUP", "SIGTERM"):
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# Tests with deadlines of their own, by the beginning of their path: beside another one they would be late.
+# Tests with deadlines of their own, by the beginning of their path: two of them at once would be late.
 WITH_DEADLINES = (
     "drivers/amplifiers",
     "drivers/bench",
@@ -47,11 +44,21 @@ WITH_DEADLINES = (
     "system/test_bench",
     "system/test_commands",
     "system/test_full_disk",
+    "system/test_live_view",
     "system/test_report_browser",
     "system/test_safety",
 )
-# So long that whoever comes last waits for them.
-LONGEST = ("system/test_identify_campaigns", "system/test_real_recordings")
+# The files that take longest: begun late, one worker would wait for the other.
+LONGEST = (
+    "identify/rivals/test_tone_origin",
+    "identify/rivals/test_coloured_noise",
+    "identify/test_pipeline",
+    "identify/runs/test_measured_channels",
+    "system/test_identify_campaigns",
+    "system/test_real_recordings",
+    "system/test_from_python",
+    "system/test_effect_of_your_own",
+)
 HERE = Path(__file__).parent
 
 
@@ -63,38 +70,23 @@ def _is_of(path: Path, beginnings: tuple[str, ...]) -> bool:
     return path.is_relative_to(HERE) and path.relative_to(HERE).as_posix().startswith(beginnings)
 
 
-def _locks(controller: int) -> Path:
-    return Path(tempfile.gettempdir()) / f"isp-rig-tests-{controller}"
-
-
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The longest come first, and those that want the machine to themselves last: every change is a wait."""
-    items.sort(key=lambda item: (_has_deadlines(item.path), not _is_of(item.path, LONGEST)))
+    """Those with deadlines come first: one worker takes them all. Then the longest."""
+    items.sort(key=lambda item: (not _has_deadlines(item.path), not _is_of(item.path, LONGEST)))
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
-    """Where several workers run tests, one with deadlines waits for the others' to end, and they wait for it.
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """One worker runs all tests with deadlines, one after the other; the others take the rest, file by file.
 
-    From before the first fixture of a module is made to after the last one is gone.
+    By file, so that what a module computes once is computed once.
     """
-    if sys.platform == "win32" or "PYTEST_XDIST_WORKER" not in os.environ:
-        return (yield)
-    import fcntl  # noqa: PLC0415 (there is none on Windows)
+    from xdist.scheduler import LoadScopeScheduling  # noqa: PLC0415 (tests run without it, too)
 
-    shared = _locks(os.getppid())
-    shared.mkdir(exist_ok=True)
-    with (shared / "queue").open("w") as queue, (shared / "machine").open("w") as machine:
-        fcntl.flock(queue, fcntl.LOCK_EX)  # who waits for the machine is not passed by
-        fcntl.flock(machine, fcntl.LOCK_EX if _has_deadlines(item.path) else fcntl.LOCK_SH)
-        fcntl.flock(queue, fcntl.LOCK_UN)
-        try:
-            return (yield)
-        finally:
-            fcntl.flock(machine, fcntl.LOCK_UN)  # a process that a test has left must not keep it
+    class Lanes(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.partition("::")[0]
+            return "with deadlines" if _has_deadlines(config.rootpath / file) else file
 
-
-def pytest_sessionfinish() -> None:
-    """The one that started the workers takes the locks away."""
-    if "PYTEST_XDIST_WORKER" not in os.environ:
-        shutil.rmtree(_locks(os.getpid()), ignore_errors=True)
+    config.option.loadscopereorder = False  # in the order of the collection, not by number of tests
+    return Lanes(config, log)

@@ -18,7 +18,7 @@ from drivers.capture.wire_capture import pack_frame, unpack_frame
 from drivers.codecs import cia402, lawicel, odrive_cansimple
 from drivers.codecs.lawicel import CanFrame, LawicelDecoder
 from drivers.gyroscopes import make_gyroscope
-from drivers.timing.retiming import LARGEST_CORRECTION_S
+from drivers.timing.retiming import MAX_CORRECTION_S
 from drivers.timing.source_clock import SourceClock
 from drivers.transport.can_link import ReceivedFrame
 from rig.config.bench import AmplifierConfig, CanConfig, GyroscopeConfig
@@ -209,7 +209,7 @@ def clocks(data: bytes) -> int:
         for one in clock.retimed_sets():
             assert len(one.recorded_s) == len(one.refined_s) > 0
             assert np.all(np.diff(one.recorded_s) > 0.0) and np.all(np.diff(one.refined_s) > 0.0), "times out of order"
-            assert np.max(np.abs(one.refined_s - one.recorded_s)) <= LARGEST_CORRECTION_S + 1e-9, "too far"
+            assert np.max(np.abs(one.refined_s - one.recorded_s)) <= MAX_CORRECTION_S + 1e-9, "too far"
     return len(data)
 
 

@@ -15,7 +15,7 @@ JOURNAL_FILE = "recording.journal"
 RECORDING_FILE = "recording.h5"
 RAW_FOLDER = "raw"
 DISK_FULL_ERRNOS = (errno.ENOSPC, errno.EDQUOT)
-MOST_FOLDERS_A_SECOND = 1000  # campaigns of one name that begin within a second
+MAX_FOLDERS_A_SECOND = 1000  # campaigns of one name that begin within a second
 
 
 class ResultsFolder:
@@ -77,5 +77,5 @@ class ResultsFolder:
 
 def _free(path: Path) -> Path:
     """``path``, or the same with the first number behind it that is free."""
-    numbered = (path.with_name(f"{path.name}-{n}") for n in range(2, MOST_FOLDERS_A_SECOND))
+    numbered = (path.with_name(f"{path.name}-{n}") for n in range(2, MAX_FOLDERS_A_SECOND))
     return next((p for p in (path, *numbered) if not p.exists()), path)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rig.config.load import LoadedConfig
     from rig.recording.run import Recording
 
-MOST_PROOFS = 2  # of a campaign: the names, and those that came in the place of refuted ones
+MAX_PROOFS = 2  # of a campaign: the names, and those that came in the place of refuted ones
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,11 @@ def why_no_proof(found: Identification) -> str:
 
     model = found.final.platform
     if found.aborted or model is None:
-        return "no model came out of the identification"
+        return "the identification gave no model"
     if found.torque_free:
-        return "without torque only ratios to the inertia are known, and no torque can be computed from them"
+        return (
+            "no torque was recorded, so only ratios to the inertia are known and no compensating torque can be computed"
+        )
     if found.axis == "linear":
         return "the rig turns, and this model is that of a linear axis"
     if not cancelled(model):
@@ -63,7 +65,7 @@ def prove(
         Where the first proof may not be played; nothing was moved.
     """
     now = Proved(loaded, played, found, played.recording)
-    for number in range(first, first + MOST_PROOFS):
+    for number in range(first, first + MAX_PROOFS):
         if number > first and why_no_proof(now.found):
             break
         part = _part(now, rival if number == first else None, number)

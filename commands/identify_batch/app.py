@@ -22,15 +22,20 @@ if TYPE_CHECKING:
     from commands.identify_batch.row import Row
     from commands.terminal.display import Terminal
 
-MOST_OTHERS_NAMED = 3
+MAX_OTHERS_NAMED = 3
 app = new_app("")
 
 Pattern = Annotated[
     str, typer.Argument(metavar="GLOB", help="In quotation marks: recording.h5 of results folders, or rig.yaml files.")
 ]
-Table = Annotated[Path, typer.Option("--out", metavar="TABLE.parquet", help="The table; a second run goes on with it.")]
+Table = Annotated[
+    Path, typer.Option("--out", metavar="TABLE.parquet", help="The table to write; a second run continues it.")
+]
 Workers = Annotated[
-    int | None, typer.Option("--workers", metavar="N", min=1, max=1024, help="Processes here. Default: one a core.")
+    int | None,
+    typer.Option(
+        "--workers", metavar="N", min=1, max=1024, help="Worker processes on this machine. Default: one per core."
+    ),
 ]
 Scheduler = Annotated[
     str | None, typer.Option(metavar="tcp://HOST:PORT", help="Use the workers of this Dask scheduler instead.")
@@ -38,9 +43,11 @@ Scheduler = Annotated[
 Results = Annotated[Path | None, typer.Option(metavar="DIR", help="Keep a results folder of each campaign in DIR.")]
 Trend = Annotated[Path | None, typer.Option(metavar="FILE.html", help="Also write a page of trends, rig by rig.")]
 Attempts = Annotated[
-    int, typer.Option(metavar="N", min=1, max=100, help="Failed after so many workers were ended by a campaign.")
+    int, typer.Option(metavar="N", min=1, max=100, help="Workers that a campaign may end before it counts as failed.")
 ]
-RetryFailed = Annotated[bool, typer.Option("--retry-failed", help="Identify again what failed in an earlier run.")]
+RetryFailed = Annotated[
+    bool, typer.Option("--retry-failed", help="Identify again the campaigns that failed in an earlier run.")
+]
 BatchSeed = Annotated[int | None, typer.Option("--seed", metavar="N", min=0, max=2**32 - 1, help="Seed of the search.")]
 
 
@@ -112,9 +119,9 @@ def _run(options: Options, terminal: Terminal, stops: StopRequests) -> int:
     require_batch()
     paths, others = campaigns_of(options.pattern)
     if others:
-        named = ", ".join(plain(path) for path in others[:MOST_OTHERS_NAMED])
-        more = ", ..." if len(others) > MOST_OTHERS_NAMED else ""
-        terminal.show(f"{len(others)} match(es) are no recorded campaign and are left out: {named}{more}")
+        named = ", ".join(plain(path) for path in others[:MAX_OTHERS_NAMED])
+        more = ", ..." if len(others) > MAX_OTHERS_NAMED else ""
+        terminal.show(f"{len(others)} match(es) are not recorded campaigns and are skipped: {named}{more}")
     with RowJournal(journal_path(options.out)) as journal:
         terminal.note(f"reading {len(paths)} recorded campaign(s)")
         jobs = _jobs(options, paths)
@@ -126,7 +133,7 @@ def _run(options: Options, terminal: Terminal, stops: StopRequests) -> int:
         except BaseException:
             kept = sum(job.path in journal.rows for job in jobs)
             terminal.show_always(
-                f"{kept} of {len(jobs)} rows are kept in {journal.path}: the same command goes on there"
+                f"{kept} of {len(jobs)} rows are kept in {journal.path}: run the same command to continue"
             )
             raise
         rows = [journal.rows[job.path] for job in jobs]
@@ -142,8 +149,8 @@ def _refuse_usage(options: Options) -> None:
         raise UsageError("--workers and --scheduler exclude each other: the scheduler has workers. Leave one out.")
     if options.out.exists() and not journal_path(options.out).exists():
         raise UsageError(
-            f"--out {options.out} exists without its journal ({journal_path(options.out).name}), so it is unknown what "
-            "is in it: choose another name, or move it away"
+            f"--out {options.out} exists without its journal ({journal_path(options.out).name}), so it cannot be "
+            "continued: choose another name, or move it away"
         )
 
 

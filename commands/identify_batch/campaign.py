@@ -66,7 +66,7 @@ def _reason(error: Exception) -> str:
     if isinstance(error, RigError):
         return str(error)
     if isinstance(error, MemoryError):
-        return "the memory of the worker did not suffice: run fewer campaigns at once (--workers)"
+        return "the worker ran out of memory: run fewer campaigns at once (--workers)"
     if isinstance(error, OSError):
         return f"{error.filename or 'a file'}: {error.strerror or error}"
     return message_of(error, None)
@@ -102,7 +102,7 @@ def _read_results(file: Path, overrides: tuple[str, ...]) -> tuple[Config, Recor
     text = info.get("config_text")
     if not isinstance(text, str):
         raise RecordingError(
-            f"{file}: does not quote its configuration: name it in a rig.yaml (backend: recorded) and match that"
+            f"{file}: does not contain its configuration: name it in a rig.yaml (backend: recorded) and match that"
         )
     source = Path(str(info.get("config_file", "rig.yaml")))
     included = {str(k): str(v) for k, v in dict(info.get("config_included") or {}).items()}

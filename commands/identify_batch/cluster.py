@@ -78,14 +78,14 @@ class DaskPool:
     def check(self) -> None:
         """Raise Aborted where the scheduler is lost, or where no worker of this machine comes up."""
         if self._client.status == "closed":
-            raise Aborted(f"the scheduler at {self._where} is gone: start it and run the same command again.")
+            raise Aborted(f"the scheduler at {self._where} no longer answers: start it and run the same command again.")
         if self._threads():
             self._away_since = None
         elif self._away_since is None:
             self._away_since = time.monotonic()
             self._say(f"waiting for workers at {self._where}")
         elif self._most is not None and time.monotonic() - self._away_since > START_S:
-            raise Aborted(f"no worker process has come up within {START_S:g} s: use fewer --workers.")
+            raise Aborted(f"no worker process has started within {START_S:g} s: use fewer --workers.")
 
 
 def _outcome(future: Future) -> Outcome:
@@ -101,7 +101,7 @@ def _outcome(future: Future) -> Outcome:
         if isinstance(error, ProcessEnded):
             return WorkerDied(str(error))
         return NotRun(f"the worker could not run it: {type(error).__name__}: {error}")
-    return WorkerDied(f"the scheduler gave it up ({future.status})")
+    return WorkerDied(f"the scheduler cancelled it ({future.status})")
 
 
 @contextlib.contextmanager

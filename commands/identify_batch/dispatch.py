@@ -81,7 +81,7 @@ def run_jobs(
                 suspects.append(job)
                 continue
             outcome = NotRun(
-                f"its worker was ended {attempts} time(s) while it ran ({outcome.why}). Most often the memory does not "
-                "suffice: identify it with identify-run, or cut the recording into shorter runs"
+                f"its worker was ended {attempts} time(s) while it ran ({outcome.why}). Usually it ran out of "
+                "memory: identify it with identify-run, or cut the recording into shorter runs"
             )
         finished(job, failed_row(job, outcome.why, version, 0.0) if isinstance(outcome, NotRun) else outcome)

@@ -122,7 +122,7 @@ def _identified_again(
     except (Aborted, KeyboardInterrupt) as error:
         stopped = error
     except UsageError as error:
-        return played, _noted(found, f"the follow-up was played, but cannot be used: {error}"), False
+        return played, _noted(found, f"the follow-up was played, but its data cannot be used: {error}"), False
     return dataclasses.replace(played, cause=stopped), _noted(found, STOPPED_AGAIN, aborted=True), False
 
 

@@ -98,12 +98,15 @@ def prove(
     emulate: Emulate = False,
     yes: Yes = False,
     rival: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Compensate this rival of a name, too: which leaves less?")
+        str | None,
+        typer.Option(metavar="NAME", help="Also compensate this alternative, to see which leaves the smaller error."),
     ] = None,
     seed: Seed = None,
     quiet: Quiet = False,
 ) -> None:
-    """Cancel the named effects on the rig and measure what is left; refuted names are left out and searched anew.
+    """Cancel the named effects on the rig and measure the remaining error.
+
+    Refuted effects are excluded and the search is repeated.
 
     Exit codes: 0 all names confirmed, 1 not all, 2 wrong usage or forecast, 3 device fault, 4 safety trip, 70 internal
     error, 130 Ctrl-C.
@@ -180,7 +183,7 @@ def report(
 @app.command()
 def compare(
     a: Annotated[Path, typer.Argument(metavar="A", help="A results folder.", show_default=False)],
-    b: Annotated[Path, typer.Argument(metavar="B", help="Another, or a later one.", show_default=False)],
+    b: Annotated[Path, typer.Argument(metavar="B", help="The results folder to compare with A.", show_default=False)],
     out: Annotated[
         Path | None, typer.Option(metavar="FILE.html", help="Write the comparison as a page, too; never overwritten.")
     ] = None,
@@ -223,7 +226,7 @@ def init(
     angle_scale: ColumnScale = None,
     axis: Annotated[str | None, typer.Option(metavar="AXIS", help="rotary or linear. Default: by the units.")] = None,
     out: Annotated[Path, typer.Option(metavar="FILE", help="Where to write; never over a file.")] = Path("rig.yaml"),
-    yes: Annotated[bool, typer.Option("--yes", help="Take all guesses, and say them.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Accept all guesses and list them.")] = False,
 ) -> None:
     """Write a commented rig.yaml: from the columns of a recording, or from the ports of this machine."""
 

@@ -76,7 +76,7 @@ def _compensation(home: Path, folder: Path) -> Iterator[str]:
     found = read_report_data(home / FILE).identification
     model = found.final.platform
     if model is None or found.torque_free:
-        raise UsageError(f"{home}: no model came out from which a torque can be computed")
+        raise UsageError(f"{home}: its identification gave no model from which a torque can be computed")
     recording = read_recording_h5(home / RECORDING_FILE)
     most_nm = _most_torque_nm(recording.info)
     made = files(controller_of(model, recording, most_nm))
@@ -102,7 +102,7 @@ def _runs(source: Path, wanted: str, folder: Path) -> Iterator[str]:
 
     runs = [content for content in read_file(source) if isinstance(content, Run)]
     if not runs:
-        raise RecordingError(f"{source}: is not a recording of this program but a table already: use it as it is")
+        raise RecordingError(f"{source}: is already a table, not a recording of this program: use it directly")
     _made(folder)
     write = writers.writer_of(wanted)
     entries: list[dict[str, Any]] = []

@@ -95,7 +95,7 @@ def terminal() -> Ask | None:
         sys.stderr.flush()
         answer = sys.stdin.readline()
         if not answer:
-            raise UsageError("no answer came; nothing was written: give the options (rig init --help)")
+            raise UsageError("no answer was given, so nothing was written: give the options (rig init --help)")
         return answer
 
     return ask

@@ -107,7 +107,7 @@ def _config_of(folder: Path, recording: Recording, seed: int | None) -> LoadedCo
     info = recording.info
     text = info.get("config_text")
     if not isinstance(text, str):
-        raise RecordingError(f"{folder}: its recording does not quote a configuration. Nothing was moved.")
+        raise RecordingError(f"{folder}: its recording does not contain a configuration. Nothing was moved.")
     source = Path(str(info.get("config_file", "rig.yaml")))
     included = {str(k): str(v) for k, v in dict(info.get("config_included") or {}).items()}
     overrides = [str(one) for one in info.get("config_overrides") or ()]

@@ -19,7 +19,7 @@ from rig.sequencer import Observer, Progress
 from rig.sequencer.recorder import SetStatistics
 
 BAR_WIDTH = 24  # characters
-MOST_WAITING = 50  # lines; a terminal that takes none loses bars, not memory
+MAX_WAITING = 50  # lines; a terminal that takes none loses bars, not memory
 DRAIN_TIMEOUT_S = 1.0  # how long a slow terminal is waited for at the end
 LOST = "Stopped because the terminal was closed"
 
@@ -112,7 +112,7 @@ class Terminal:
 
     def overwrite(self, text: str) -> None:
         """Put ``text`` in the place of the line that was put here last."""
-        if self.has_bars and self._lines.qsize() < MOST_WAITING:
+        if self.has_bars and self._lines.qsize() < MAX_WAITING:
             self._is_open_line = True
             self._lines.put(f"\r\x1b[K{text}")
 

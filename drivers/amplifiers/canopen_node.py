@@ -11,7 +11,7 @@ from canopen.sdo import SdoAbortedError, SdoClient, SdoCommunicationError
 
 from drivers.codecs.lawicel import CanFrame
 from drivers.transport.can_link import CanLink, ReceivedFrame
-from drivers.transport.ports import MOST_QUOTED
+from drivers.transport.ports import MAX_QUOTED
 from rig.errors import ConfigError, DeviceFault
 
 MAX_EDS_BYTES = 4 << 20  # the largest of the trade have one
@@ -81,7 +81,7 @@ def read_dictionary(path: Path, node: int) -> canopen.ObjectDictionary:
         raise
     except Exception as problem:  # noqa: BLE001  the library lets parser errors of any kind through
         why = " ".join(str(problem).split())  # it quotes the line, and a file that is no EDS may be a single one
-        why = why if len(why) <= MOST_QUOTED else f"{why[:MOST_QUOTED]} ..."
+        why = why if len(why) <= MAX_QUOTED else f"{why[:MAX_QUOTED]} ..."
         raise ConfigError(f"bench.amplifier.settings.eds: {path} cannot be read as EDS: {why}") from None
 
 

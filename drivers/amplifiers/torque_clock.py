@@ -17,7 +17,7 @@ from drivers.timing.source_clock import SourceClock
 
 BLOCK_S = 0.25  # as in drivers.timing.source_clock
 BLOCKS_KEPT = 240  # a minute
-MOST_UNANSWERED = 16  # requests that wait for an answer
+MAX_UNANSWERED = 16  # requests that wait for an answer
 FAST_SHARE = 0.1  # of the answers of a block; the fastest one may be a slip
 
 
@@ -37,7 +37,7 @@ class TorqueClock:
         self.retiming = ClockRetiming(self._back)
         self._unit_s, self._modulus = unit_s, modulus
         self._stamp: int | None = None
-        self._asked_s: deque[float] = deque(maxlen=MOST_UNANSWERED)
+        self._asked_s: deque[float] = deque(maxlen=MAX_UNANSWERED)
         self._ways_s: list[float] = []
         self._blocks_s: deque[float] = deque(maxlen=BLOCKS_KEPT)
         self._block_end_s = 0.0

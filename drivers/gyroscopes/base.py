@@ -25,7 +25,7 @@ AXES = "xyz"
 BITS_PER_BYTE = 10  # start, eight data bits, stop
 LONGEST_BURST_S = 0.03  # a kernel that was busy hands out what it kept back within this time
 MESSAGES_KEPT = 5  # first and last messages of a device
-MOST_LOST_MARKED = 20_000  # ten seconds at 2 kHz: more is a new start, not a gap
+MAX_LOST_MARKED = 20_000  # ten seconds at 2 kHz: more is a new start, not a gap
 
 
 class Reading(NamedTuple):
@@ -242,7 +242,7 @@ class Gyroscope(ABC):
             return
         step = self.counts_per_sample
         missing = (count - self._count) // step - 1
-        if not 0 < missing <= MOST_LOST_MARKED:
+        if not 0 < missing <= MAX_LOST_MARKED:
             return
         excused = min(missing, self._replaced)
         self._replaced -= excused

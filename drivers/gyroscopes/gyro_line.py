@@ -18,11 +18,11 @@ from rig.errors import DeviceFault
 from rig.interface import GyroSample
 
 RAW_KEPT = 4096  # bytes, for the message where none of them is a packet
-LEAST_SHARE_RECEIVED = 0.5  # of the samples expected at first contact; fewer are another sample rate
+MIN_SHARE_RECEIVED = 0.5  # of the samples expected at first contact; fewer are another sample rate
 RATE_TOLERANCE = 0.05  # of what the file says; crystals are better by far, a stall of this computer looks worse
 PACE_S = 0.25  # s, a block of the sample rate
 PACES_KEPT = 240  # blocks: a minute
-LEAST_FOR_NOISE = 100  # samples
+MIN_FOR_NOISE = 100  # samples
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ class GyroLine:
         if not counts.received:
             return [f"{where}: {gyro.explain_silence(bytes(self._raw))}"]
         found = [f"{where}: {objection}" for objection in gyro.objections()]
-        if counts.received < LEAST_SHARE_RECEIVED * gyro.sample_rate_hz * listened_s:
+        if counts.received < MIN_SHARE_RECEIVED * gyro.sample_rate_hz * listened_s:
             found.append(
                 f"{where}: {counts.received / listened_s:.0f} samples/s instead of {gyro.sample_rate_hz:g}: set "
                 "bench.gyroscope.sample_rate_hz to what the device sends"
@@ -173,7 +173,7 @@ class GyroLine:
         rates = counts.recent_rates
         if not rates:
             found.append(f"{where}: no valid sample ({counts.last_reason or 'no reason given'})")
-        elif len(rates) >= LEAST_FOR_NOISE and min(rates) == max(rates):
+        elif len(rates) >= MIN_FOR_NOISE and min(rates) == max(rates):
             found.append(
                 f"{where}: all of {len(rates)} samples read exactly {math.degrees(rates[0]):.6g} deg/s: a working "
                 f"sensor shows noise. Check that the sensor measures axis {gyro.config.axis} (bench.gyroscope.axis), "

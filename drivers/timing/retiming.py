@@ -30,7 +30,7 @@ MIN_BLOCKS = 12  # blocks: 3 s of readings
 # they follow how busy the machine is, which cancels where both ways are known.
 FAST_TWO_WAY, FAST_ONE_WAY = 0.05, 0.01
 FAST_WAYS = 0.5  # of the blocks with requests and answers
-LARGEST_CORRECTION_S = 5e-3  # beyond that one of the two maps is wrong, and nobody can say which
+MAX_CORRECTION_S = 5e-3  # beyond that one of the two maps is wrong, and nobody can say which
 OWN_LINE = -1
 
 
@@ -184,7 +184,7 @@ class ClockRetiming:
         if offset_s is None:
             return None
         refined_s = sources_s + (self._base_s - delay_s + offset_s)
-        if np.max(np.abs(refined_s - times_s)) > LARGEST_CORRECTION_S or np.any(np.diff(refined_s) <= 0.0):
+        if np.max(np.abs(refined_s - times_s)) > MAX_CORRECTION_S or np.any(np.diff(refined_s) <= 0.0):
             return None
         return RetimedSet(one.start_s, times_s, refined_s)
 

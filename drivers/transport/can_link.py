@@ -24,9 +24,9 @@ from rig.config.bench import CanConfig
 from rig.errors import ConfigError, DeviceFault
 
 POLL_INTERVAL_S = 0.0005  # half a tick of 1 kHz
-MOST_FRAMES_A_POLL = 10_000  # frames: a babbling node must not hold the loop
+MAX_FRAMES_A_POLL = 10_000  # frames: a babbling node must not hold the loop
 SEND_TIMEOUT_S = 0.005  # five ticks of 1 kHz: an adapter that takes longer has stalled
-MOST_ERRORS, ERRORS_WITHIN_S = 20, 0.1  # error frames, s: more is a fault of the bus; chosen, not derived
+MAX_ERRORS, ERRORS_WITHIN_S = 20, 0.1  # error frames, s: more is a fault of the bus; chosen, not derived
 BUS_OFF = 0x40  # error class in the identifier of an error frame (linux/can/error.h: CAN_ERR_BUSOFF)
 OWN_INTERFACE = "slcan_bulk"
 OWN_URLS = {"etas": "ETAS://"}  # what an interface calls its own channels; pyserial has no part in it
@@ -115,7 +115,7 @@ class CanLink:
 
     def _receive(self) -> list[ReceivedFrame]:
         heard: list[ReceivedFrame] = []
-        while len(heard) < MOST_FRAMES_A_POLL:
+        while len(heard) < MAX_FRAMES_A_POLL:
             message = self._bus.recv(0)
             if message is None:
                 break
@@ -136,9 +136,9 @@ class CanLink:
         errors.append(now_s)
         while errors[0] < now_s - ERRORS_WITHIN_S:
             errors.popleft()
-        if len(errors) > MOST_ERRORS:
+        if len(errors) > MAX_ERRORS:
             raise DeviceFault(
-                f"CAN on {self.name}: {len(errors)} error frames within {ERRORS_WITHIN_S:g} s (limit {MOST_ERRORS}): "
+                f"CAN on {self.name}: {len(errors)} error frames within {ERRORS_WITHIN_S:g} s (limit {MAX_ERRORS}): "
                 "check termination, bit rate, shield and that another node acknowledges what is sent"
             )
 

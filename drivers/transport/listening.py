@@ -16,7 +16,7 @@ from collections.abc import Callable
 from drivers.transport.ports import BytePort
 from rig.errors import DeviceFault
 
-MOST_CHUNKS = 100_000  # half a minute of a loop that hangs; then the oldest go
+MAX_CHUNKS = 100_000  # half a minute of a loop that hangs; then the oldest go
 LISTEN_S = 0.05  # between two looks at whether to stop
 
 
@@ -34,7 +34,7 @@ class ListeningPort:
     def __init__(self, port: BytePort, clock: Callable[[], float] = time.monotonic) -> None:
         self._port, self._clock = port, clock
         # Appending and taking are each done at once, so that no lock can hold either thread up.
-        self._chunks: deque[tuple[float, bytes]] = deque(maxlen=MOST_CHUNKS)
+        self._chunks: deque[tuple[float, bytes]] = deque(maxlen=MAX_CHUNKS)
         self._something = threading.Event()
         self._fault: DeviceFault | None = None
         self._closing = False

@@ -19,7 +19,7 @@ from rig.errors import DeviceFault
 
 POSIX = sys.platform != "win32"
 URL_SIGN = "://"  # anywhere: pyserial splits at the first one
-MOST_QUOTED = 200
+MAX_QUOTED = 200
 _BULK = 65_536
 _ONE_READ = 2048
 
@@ -188,7 +188,7 @@ def url_fault(port: str) -> str | None:
     """
     if URL_SIGN not in port:
         return None
-    return f"{port[:MOST_QUOTED]!r} is a URL, and only plain names and paths of ports are taken: /dev/ttyUSB0, COM3"
+    return f"{port[:MAX_QUOTED]!r} is a URL, and only plain names and paths of ports are taken: /dev/ttyUSB0, COM3"
 
 
 def is_same_port(one: str, other: str) -> bool:

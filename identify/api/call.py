@@ -133,7 +133,9 @@ def _found(recording: Recording, asked: Settings, progress: Callable[[str], None
 
 def _refuse_beside_a_recording(names: Sequence[str]) -> None:
     if names:
-        raise InputError(f"{names[0]} was given beside a Recording, which holds it itself: leave {names[0]}= out")
+        raise InputError(
+            f"{names[0]} cannot be combined with a Recording, which already contains it: leave {names[0]}= out"
+        )
 
 
 def _require_readings(asked: Settings) -> None:
@@ -148,7 +150,9 @@ def _require_readings(asked: Settings) -> None:
 def _with_known_channels(recording: Recording, asked: Settings) -> Recording:
     """The recording itself, once it has every channel that was asked for."""
     for name in asked.readings:
-        raise InputError(f"channels[{name!r}] has 'values' beside a Recording, which holds them itself: leave them out")
+        raise InputError(
+            f"channels[{name!r}] has 'values' although the Recording already contains them: leave them out"
+        )
     there = sorted({name for run in recording.runs for name in run.channels})
     for name in asked.config.identify.channels:
         if name not in there:

@@ -36,13 +36,14 @@ def column(name: str, values: Any, where: str = "") -> Array:
         array = np.asarray(values)
     except (ValueError, TypeError) as error:  # rows of different length; or whatever an object's __array__ raises
         raise InputError(
-            f"{said} cannot be made an array ({error}): pass one number a sample, and several runs as a list of arrays"
+            f"{said} cannot be converted to an array ({error}): pass one number per sample; several runs as a list of "
+            "arrays"
         ) from None
     if array.dtype.kind in _DATES:
         raise InputError(f"{said} holds dates or durations ({array.dtype}): {_in_seconds(name, array.dtype.kind)}")
     if array.ndim == 0 or (array.ndim == 1 and array.dtype.kind == "O" and any(np.ndim(v) for v in array)):
         shown = repr(values)[:60] if array.ndim == 0 else "arrays inside"
-        raise InputError(f"{said} is {shown}, not a column of numbers: pass one number a sample, shape (n,)")
+        raise InputError(f"{said} is {shown}, not a column of numbers: pass one number per sample, shape (n,)")
     if array.ndim > 1:
         cure = ".ravel()" if array.size == max(array.shape) else "one column, or several runs as a list of arrays"
         raise InputError(f"{said} has shape {array.shape}, not (n,): pass {cure}")

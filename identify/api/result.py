@@ -101,7 +101,9 @@ class Result:
         try:
             return final_platform(self.identification, self._model.platform(), self._model.inertia_declared)
         except ValueError:
-            raise InputError("no model came out of these data: read .reasons, and record what it asks for") from None
+            raise InputError(
+                "no model could be identified from these data: read .reasons and record what it asks for"
+            ) from None
 
     def to_dict(self) -> dict[str, Any]:
         """result.json of ``identify-run`` as plain values: the same keys, None where there is no number."""
@@ -118,7 +120,7 @@ class Result:
         try:
             return model_text(self.identification, self._model.platform(), self._model.inertia_declared)
         except ValueError as error:
-            raise InputError(f"no model came out of these data that may be declared ({error}): read .reasons") from None
+            raise InputError(f"the identified model is not a valid declared model ({error}): read .reasons") from None
 
     def save(self, folder: str | Path, name: str = "from Python") -> Path:
         """Write the results folder of ``identify-run``: result.json, report.html, model.yaml and recording.h5.
@@ -134,7 +136,7 @@ class Result:
         except FileExistsError:
             raise InputError(f"{path} exists and is never overwritten: choose another folder") from None
         except OSError as error:
-            raise InputError(f"{path} cannot be made ({error.strerror}): choose another folder") from None
+            raise InputError(f"{path} cannot be created ({error.strerror}): choose another folder") from None
         declared, given = self._model.platform(), self._model.inertia_declared
         write_results(path, self.identification, self.recording, declared, name, inertia_declared=given)
         return path

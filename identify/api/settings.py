@@ -73,7 +73,7 @@ def _model(declared: Any) -> Any:
         try:
             declared = ModelConfig.from_platform(declared)
         except (ValueError, KeyError) as error:
-            raise InputError(f"declared: this platform is none that a model may have ({error}): correct it") from None
+            raise InputError(f"declared: this platform is not a valid model ({error}): correct it") from None
     if isinstance(declared, ModelConfig):
         return declared.model_dump(mode="json", exclude_unset=True, exclude_none=True)
     if not isinstance(declared, Mapping | str):

@@ -14,7 +14,7 @@ import numpy as np
 
 from identify.bounds import advice
 from identify.bounds.identifiability import Information, information_of, together
-from identify.bounds.planned import FEWEST, silent
+from identify.bounds.planned import MIN_SAMPLES, silent
 from identify.model.parameters import Name
 from identify.results import Identification, ParameterEstimate
 from identify.signals.prepare import one_noise, prepare
@@ -23,7 +23,7 @@ from identify.wording import joined, percent
 from rig.platform import TERMS
 from rig.recording.run import Recording
 
-FAR = 3.0  # times the bound above which the model, and not the sensor, is the limit
+MODEL_LIMITED_RATIO = 3.0  # times the bound above which the model, and not the sensor, is the limit
 NARROW = 0.7  # of the bound below which a standard error is no longer believable
 TOTAL = "all sets together"
 
@@ -77,7 +77,7 @@ def compare_with_bound(found: Identification, recording: Recording) -> tuple[Bou
 def usable_traces(recording: Recording) -> list[Trace]:
     """The runs that are long enough to tell anything, all with one noise."""
     found = [prepare(silent(run), i, recording.noise) for i, run in enumerate(recording.runs)]
-    usable = [t for t in found if t.stretches and t.count > FEWEST]
+    usable = [t for t in found if t.stretches and t.count > MIN_SAMPLES]
     return one_noise(usable, recording.noise is not None)
 
 
@@ -119,7 +119,11 @@ def _sentence(
             f"the data would determine {joined(lost)} but for the unexplained residual: find the cause of the "
             "residual first"
         )
-    far = {n: achieved[n] / expected[n] for n in achieved if expected[n] > 0.0 and achieved[n] > FAR * expected[n]}
+    far = {
+        n: achieved[n] / expected[n]
+        for n in achieved
+        if expected[n] > 0.0 and achieved[n] > MODEL_LIMITED_RATIO * expected[n]
+    }
     narrow = [n for n in achieved if achieved[n] < NARROW * expected[n]]
     if not far and narrow:
         bounds = joined([f"{symbols[n]} {_percent(expected[n])}" for n in narrow])

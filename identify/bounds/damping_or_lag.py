@@ -15,7 +15,7 @@ from identify.signals.trace import Trace
 from identify.wording import number
 from rig.platform import Platform
 
-SLOW = 0.5  # of the natural frequency: faster sets tell one from the other
+SLOW_SET_RATIO = 0.5  # of the natural frequency: faster sets tell one from the other
 LAGS = ("torque_delay", "actuator_lag", "sensor_lag")
 LATE_S = 1e-3  # the example in the sentence
 WELL_KNOWN_INERTIA = (
@@ -42,7 +42,7 @@ def lag_for_damping(platform: Platform, inertia_std_error: float, traces: Sequen
         return ""
     natural_hz = float(np.sqrt(stiffness / inertia)) / (2.0 * np.pi)
     if inertia_std_error < WELL_KNOWN_INERTIA * inertia or not all(
-        highest_torque_hz(t) < SLOW * natural_hz for t in traces
+        highest_torque_hz(t) < SLOW_SET_RATIO * natural_hz for t in traces
     ):
         return ""
     with np.errstate(all="ignore"):

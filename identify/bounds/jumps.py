@@ -18,7 +18,10 @@ from rig import effects
 from rig.arrays import Array
 from rig.effects.base import Place
 
-SMALL, LARGE = 1e-7, 0.3  # of the value: a change that only a slope shows, and one that moves a jump past samples
+SLOPE_STEP, JUMP_STEP = (
+    1e-7,
+    0.3,
+)  # of the value: only a slope shows it; it moves a jump past samples
 POINTS = 400  # of the measured motion at which the torque is looked at
 JUMP = "jumps"
 
@@ -59,8 +62,8 @@ def _jumps(fitted: Fitted, name: Name, traces: Sequence[Trace]) -> bool:
 
     at = values[name[1]]
     now = torque_nm(at)
-    return np.array_equal(now, torque_nm(at * (1.0 + SMALL))) and any(
-        not np.array_equal(now, torque_nm(at * (1.0 + sign * LARGE))) for sign in (-1.0, 1.0)
+    return np.array_equal(now, torque_nm(at * (1.0 + SLOPE_STEP))) and any(
+        not np.array_equal(now, torque_nm(at * (1.0 + sign * JUMP_STEP))) for sign in (-1.0, 1.0)
     )
 
 

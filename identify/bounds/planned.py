@@ -20,7 +20,7 @@ from rig.platform import Platform
 from rig.recording.run import Recording, Run
 
 ASSUMED_NOISE_RAD_S = math.radians(0.05)  # the accuracy of the paper's gyro
-FEWEST = 40  # samples
+MIN_SAMPLES = 40  # samples
 
 
 def of_planned_campaign(
@@ -62,7 +62,7 @@ def of_recorded_campaign(recording: Recording, declared: Platform) -> list[str]:
     """Lines on every run and on all together, at J, C, K that a quick regression finds in the data itself."""
     usable = [r for r in recording.runs if r.use != "holdout"] or list(recording.runs)
     traces = [prepare(silent(r), i, recording.noise) for i, r in enumerate(usable)]
-    traces = [t for t in traces if t.stretches and t.count > FEWEST]
+    traces = [t for t in traces if t.stretches and t.count > MIN_SAMPLES]
     if not traces or not any(np.ptp(t.measured) > 0.0 for t in traces):
         return []
     structure = Structure(declared.terms)

@@ -25,9 +25,9 @@ from rig.recording.run import Array
 
 DRAWS = 8
 SURE = 8.0  # standard deviations above what the draws show on average
-FEWEST = 500  # samples
+MIN_SAMPLES = 500  # samples
 OVERSAMPLED = 8.0  # samples in a period of the low-pass's cut-off: more tell nothing more
-LEAST = 0.01  # of the residual's power: a single multiple with less is not told
+MIN_HARMONIC_SHARE = 0.01  # of the residual's power: a single multiple with less is not told
 ASTRAY = 0.5  # of the motion
 
 
@@ -56,7 +56,7 @@ def diagnose(
     if not traces or (torque and sensor.platform is None):
         return ()
     runs = [_run(t, sensor, torque, i) for i, t in enumerate(traces)]
-    if sum(int(np.sum(r.use)) for r in runs) < FEWEST or not all(np.all(np.isfinite(r.left)) for r in runs):
+    if sum(int(np.sum(r.use)) for r in runs) < MIN_SAMPLES or not all(np.all(np.isfinite(r.left)) for r in runs):
         return ()
     total = np.mean(np.concatenate([r.left[r.use] for r in runs]) ** 2, axis=0)
     if not np.all(total[:2] > 0.0):
@@ -176,5 +176,5 @@ def _harmonics(found: Repeated, i: int) -> Harmonics:
     total = found.total
     own, odd, even = ((_shares(p, total)[i] if found.parted else None) for p in (found.own, found.odd, found.even))
     repeats = _shares(found.own + found.odd + found.even, total)[i]
-    orders = {k: float(p[i] / total[i]) for k, p in found.orders.items() if p[i] > LEAST * total[i]}
+    orders = {k: float(p[i] / total[i]) for k, p in found.orders.items() if p[i] > MIN_HARMONIC_SHARE * total[i]}
     return Harmonics(repeats, own, odd, even, orders)

@@ -16,7 +16,7 @@ from rig.recording.run import Array
 SETTLED = 0.3  # of a run, left out: there it still rings
 STANDS_OUT = 20.0  # times the power around, and times that of the sensor's noise
 STEADY = 2.0  # ratio of the amplitudes in both halves
-ALIKE = 3.0  # ratio of the amplitudes in two runs
+MAX_AMPLITUDE_RATIO = 3.0  # ratio of the amplitudes in two runs
 OWN = 0.03  # of the natural frequency: a line that near is the platform's own ring
 SWING, SWINGS = 0.1, 4  # the same of a free swing, whose frequency moves with its amplitude, and of its multiples
 BLOCK = 40  # bins whose median is what stands around
@@ -145,7 +145,7 @@ def _grouped(lines: Sequence[_Line], runs: Sequence[Moved]) -> tuple[FreeLine, .
         left = [x for x in left if x not in near]
         sizes = [x.size for x in near]
         several = len({x.run for x in near}) >= min(2, len(runs))
-        if several and any(x.locked is False for x in near) and max(sizes) < ALIKE * min(sizes):
+        if several and any(x.locked is False for x in near) and max(sizes) < MAX_AMPLITUDE_RATIO * min(sizes):
             hertz = float(np.median([x.hertz for x in near]))
             found.append(FreeLine(hertz, float(np.median(sizes)), len({x.run for x in near})))
     return tuple(found[:MOST])

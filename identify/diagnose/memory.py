@@ -26,7 +26,7 @@ BLOCKS = 16  # a run
 LONGEST = 400_000  # steps along the path of one run
 RIDGE = 1e-7
 ANGLES = 16  # bins in which the two directions are compared
-FEWEST = 8  # samples of either direction in a bin
+MIN_BIN_SAMPLES = 8  # samples of either direction in a bin
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def direction_power(runs: Sequence[Moved]) -> Array:
     count = np.bincount(cell, minlength=4 * ANGLES)
     sums = np.column_stack([np.bincount(cell, y, minlength=4 * ANGLES) for y in left.T])
     mean = (sums / np.maximum(count, 1)[:, None]).reshape(2, 2, ANGLES, -1)
-    known = np.all(count.reshape(4, ANGLES) >= FEWEST, axis=0)
+    known = np.all(count.reshape(4, ANGLES) >= MIN_BIN_SAMPLES, axis=0)
     half = 0.5 * (mean[:, 1] - mean[:, 0])  # fold, bin, residual
     weight = np.where(known, np.bincount(bins, minlength=ANGLES), 0.0) / len(angle)
     return np.asarray(weight @ (half[0] * half[1]))

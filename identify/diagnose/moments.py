@@ -11,11 +11,11 @@ from identify.results import Moment
 from rig.recording.run import Array
 
 WINDOW_S = 0.25
-FEWEST = 12  # windows in a run: of fewer none is a moment
-LOUD = 10.0  # times the median power of the run's windows
-MOST_OF_IT = 0.5  # of the residual's power of all runs that they hold together
+MIN_WINDOWS = 12  # windows in a run: of fewer none is a moment
+EVENT_POWER_RATIO = 10.0  # times the median power of the run's windows
+MIN_TOTAL_SHARE = 0.5  # of the residual's power of all runs that they hold together
 RARE = 0.1  # of all windows at most
-LEAST = 0.05  # of the power: a moment with less is not told
+MIN_EVENT_SHARE = 0.05  # of the power: a moment with less is not told
 MANY = 3  # moments: more are no accident
 
 
@@ -38,8 +38,8 @@ def _of_one(runs: Sequence[tuple[float, Array]], begins_s: Sequence[float], name
     total = sum(float(np.sum(power)) for _, power in runs)
     found, count = [], 0
     for (window_s, power), begin_s, name in zip(runs, begins_s, names, strict=True):
-        loud = power > LOUD * float(np.median(power))
-        if len(power) < FEWEST or total <= 0.0 or not np.any(loud):
+        loud = power > EVENT_POWER_RATIO * float(np.median(power))
+        if len(power) < MIN_WINDOWS or total <= 0.0 or not np.any(loud):
             continue
         count += int(np.sum(loud))
         edges = np.flatnonzero(np.diff(np.concatenate([[0], loud.astype(int), [0]])))
@@ -47,5 +47,5 @@ def _of_one(runs: Sequence[tuple[float, Array]], begins_s: Sequence[float], name
             share = float(np.sum(power[a:b])) / total
             found.append(Moment(name, begin_s + a * window_s, begin_s + b * window_s, share))
     rare = count <= RARE * sum(len(power) for _, power in runs)
-    main = sorted((m for m in found if m.share > LEAST), key=lambda m: -m.share)[:MANY]
-    return tuple(main) if rare and sum(m.share for m in main) > MOST_OF_IT else ()
+    main = sorted((m for m in found if m.share > MIN_EVENT_SHARE), key=lambda m: -m.share)[:MANY]
+    return tuple(main) if rare and sum(m.share for m in main) > MIN_TOTAL_SHARE else ()

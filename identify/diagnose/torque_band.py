@@ -28,7 +28,7 @@ SAMPLES_A_PERIOD = 4.0  # of the cut-off: what the low-pass passed needs no more
 EDGE_PERIODS = 3.0  # of the cut-off, left out at both ends of a run
 FOLDS, BLOCKS = 3, 9  # a third of the runs, or of the blocks of each run, is held out in turn
 STILL, STILL_PERIODS = 5.0, 0.5  # standard deviations of the smoothed rate, for so many periods of the cut-off
-AROUND_REVERSAL, MOST_AROUND = 0.6, 0.35  # periods of the cut-off left out either side, up to a share of samples
+AROUND_REVERSAL, MAX_REVERSAL_SHARE = 0.6, 0.35  # periods of the cut-off left out either side, up to a share of samples
 
 _QUANTITIES = {"angle": 0, "rate": 1, "torque": 3}  # of a trace's fine motion
 
@@ -101,7 +101,7 @@ class TorqueBand:
         near = np.zeros(len(slow), dtype=bool)
         for k in turned:
             near[max(0, k - reach + 1) : k + reach + 1] = True
-        return out | near if np.mean(near & t.keep) < MOST_AROUND * np.mean(t.keep) else out
+        return out | near if np.mean(near & t.keep) < MAX_REVERSAL_SHARE * np.mean(t.keep) else out
 
     def _passed(self, i: int, values: Array) -> Array:
         return low_pass(values, self.cutoff_hz, self.traces[i].step_s)[self._rows[i]]

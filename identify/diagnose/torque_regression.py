@@ -22,9 +22,9 @@ from identify.model.structure import Shapes, Structure
 from rig import effects
 from rig.arrays import Array
 
-BLOCK, BLOCKS_A_RUN, FEWEST_BLOCKS = 8, 24, 8  # samples behind the low-pass in a block, and how many blocks
+BLOCK, BLOCKS_A_RUN, MIN_BLOCKS = 8, 24, 8  # samples behind the low-pass in a block, and how many blocks
 RIDGE = 1e-9  # of their own size, on the gains of free-form columns: two of them may be alike
-FEWEST_FOR_LINES, LEAST_TRAVEL_RAD = 64, 0.5  # samples, and travel to show a line against the angle
+MIN_FOR_LINES, MIN_TRAVEL_RAD = 64, 0.5  # samples, and travel to show a line against the angle
 
 
 @dataclass(frozen=True)
@@ -254,13 +254,13 @@ class TorqueRegression(TorqueBand):
         hz: list[tuple[float, float]] = []
         orders: list[tuple[float, float]] = []
         for i, (t, r) in enumerate(zip(self.traces, fit.residuals, strict=True)):
-            if len(r) < FEWEST_FOR_LINES:
+            if len(r) < MIN_FOR_LINES:
                 continue
             time = self._rows[i] * t.step_s
             hz += lines(time, r, self.cutoff_hz)
             angle = self._motion[i][0]
             travel = float(np.ptp(angle))
-            if travel > LEAST_TRAVEL_RAD:
+            if travel > MIN_TRAVEL_RAD:
                 ordered = np.argsort(angle)
                 most = min(400.0, 0.2 * len(r) / travel * 2.0 * np.pi)
                 orders += [
@@ -284,7 +284,7 @@ class TorqueRegression(TorqueBand):
                 powers = np.array([(np.mean(x), np.mean(y)) for x, y in pairs])
                 fall += (powers[:, 0] - powers[:, 1]).tolist()
                 ratio += np.log(np.maximum(powers[:, 0], 1e-300) / np.maximum(powers[:, 1], 1e-300)).tolist()
-        if len(fall) < FEWEST_BLOCKS or np.mean(fall) <= 0.0:
+        if len(fall) < MIN_BLOCKS or np.mean(fall) <= 0.0:
             return 0.0, 0.0
         return standard_errors(fall), standard_errors(ratio)
 

@@ -25,7 +25,7 @@ from rig.recording.run import Array
 
 EDGE_PERIODS = 3.0  # of the low-pass: that much at either end of a run it has not settled
 BINS = 30
-FEWEST = 20  # samples in a bin
+MIN_BIN_SAMPLES = 20  # samples in a bin
 
 
 def motion(trace: Trace, cutoff_hz: float) -> tuple[Array, Array, Array]:
@@ -171,7 +171,7 @@ def dependence(traces: Sequence[RunTraces], cutoff_hz: float) -> dict[str, float
         left.append(np.where(use, values, 0.0))
         known.append(use)
     use = np.concatenate(known) if known else np.zeros(0, dtype=bool)
-    if int(np.sum(use)) < FEWEST * BINS:
+    if int(np.sum(use)) < MIN_BIN_SAMPLES * BINS:
         return {}
     y = np.concatenate(left)[use]
 

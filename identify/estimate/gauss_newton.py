@@ -20,7 +20,7 @@ from rig.recording.run import Array
 
 ROBUST_FROM = 12  # shots: fewer show no outlier
 OUTLIER = 4.0  # times the median error of a shot
-FORETOLD = 0.1  # of the fall of the squares that sensitivities may miss to be kept
+MAX_PREDICTION_MISS = 0.1  # of the fall of the squares that sensitivities may miss to be kept
 
 
 def _total(parts: Sequence[Reduced]) -> tuple[Array, Array, Array, Array]:
@@ -130,7 +130,7 @@ class GaussNewton:
                 self.x, self.shots, self.residuals = new, trial, residuals
                 self.damping = max(self.damping / 30.0, 1e-9)
                 self.outlier = _outlier(losses, self.counts)
-                return Step(length, cost - after, cost, missed <= FORETOLD * (cost - after))
+                return Step(length, cost - after, cost, missed <= MAX_PREDICTION_MISS * (cost - after))
             self.damping = max(self.damping * 30.0, 1e-5)
         return None
 

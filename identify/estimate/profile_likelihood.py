@@ -18,12 +18,12 @@ from identify.estimate.started_at_rest import (
     INERTIA,
     Refit,
     chi_square,
-    hangs_on_rings,
-    held_to_rest,
+    depends_on_ringing,
     inertia_std_error,
-    is_shaken_far_below,
+    is_quasi_static,
     near,
     values_of,
+    with_fixed_initial_state,
 )
 from identify.model.parameters import Name, bounds_of, ordered
 from identify.signals.torque_band import highest_torque_hz
@@ -32,19 +32,19 @@ from identify.simulate.shots import RUNAWAY, residual_at
 from rig.platform import TERMS
 from rig.recording.run import Array
 
-FAR = 2.0  # standard errors beside the fit, to begin with
-MOST = 10  # doublings of that
+INITIAL_STEP_SIGMAS = 2.0  # standard errors beside the fit, to begin with
+MAX_DOUBLINGS = 10  # doublings of that
 RISE = 25.0  # of chi square at either end of what is looked at: dents are half as deep
 BOUND = 4.0  # of chi square at an end beyond which nothing is to be looked at: a 95 % interval ends before it
 LOOKS = 11  # between the ends
 COARSE = (0.5, 0.71, 0.84, 1.19, 1.41, 2.0)  # times the inertia: a deep dent may lie far from the bottom
 REACH = 100.0  # standard errors: no dent is deeper in that
 DEEP = 20.0  # of chi square: no chance makes a dent of that
-MOST_LOOKS = 800  # a damping ratio apart, which is how narrow a ring makes them
-LEAST = 1e-3  # of the inertia: less is not looked at
+MAX_GRID_POINTS = 800  # a damping ratio apart, which is how narrow a ring makes them
+MIN_INERTIA_SHARE = 1e-3  # of the inertia: less is not looked at
 
 
-class Valley(NamedTuple):
+class ProfileLikelihood(NamedTuple):
     """The squares along the inertia.
 
     Attributes
@@ -59,7 +59,7 @@ class Valley(NamedTuple):
     slope: Array
 
 
-def settled(free: Estimate, noise: float, refit: Refit) -> tuple[Estimate, Valley | None]:
+def settled(free: Estimate, noise: float, refit: Refit) -> tuple[Estimate, ProfileLikelihood | None]:
     """A fit over whole runs, at the bottom of the valley where its inertia hangs on rings.
 
     Parameters
@@ -74,15 +74,15 @@ def settled(free: Estimate, noise: float, refit: Refit) -> tuple[Estimate, Valle
     The fit, and the valley: ``free`` itself and None where the inertia is known well, or far from the noise; None also
     where the torque makes the platform ring, which tells the inertia.
     """
-    held = held_to_rest(free, noise, refit)
+    held = with_fixed_initial_state(free, noise, refit)
     fit = _out_of_a_dent(held, noise, refit)
-    if fit is held and not hangs_on_rings(fit, noise):
+    if fit is held and not depends_on_ringing(fit, noise):
         return fit, None
     bottom, valley = _bottom(fit, noise, refit)
     return bottom if bottom is fit else _informed(bottom), valley
 
 
-def widened(covariance: Array, names: tuple[Name, ...], fit: Estimate, valley: Valley) -> Array:
+def widened(covariance: Array, names: tuple[Name, ...], fit: Estimate, valley: ProfileLikelihood) -> Array:
     """A covariance of ``names`` with the inertia as uncertain as its valley is wide, and the others along it."""
     at = names.index(INERTIA)
     slope = valley.slope[[fit.names.index(n) for n in names]]
@@ -96,7 +96,7 @@ def _out_of_a_dent(fit: Estimate, noise: float, refit: Refit) -> Estimate:
     Shaken far below its resonance a platform of too little inertia and no damping rings on and on, however small the
     ring: in that it follows the noise, and knows its inertia to a thousandth of a percent.
     """
-    if not (_rests(fit) and near(fit, noise) and is_shaken_far_below(fit)):
+    if not (_rests(fit) and near(fit, noise) and is_quasi_static(fit)):
         return fit
     fastest = 2.0 * np.pi * max(highest_torque_hz(s.trace) for s in fit.shots)
     if not fastest > 0.0:
@@ -116,19 +116,19 @@ def _informed(fit: Estimate) -> Estimate:
     return replace(fit, information=np.sum([x.T @ x for x in columns], axis=0))
 
 
-def _bottom(fit: Estimate, noise: float, refit: Refit) -> tuple[Estimate, Valley | None]:
+def _bottom(fit: Estimate, noise: float, refit: Refit) -> tuple[Estimate, ProfileLikelihood | None]:
     at, rests = fit.names.index(INERTIA), _rests(fit)
 
     def beside(e: Estimate, inertia: float) -> Estimate:
-        value = max(inertia, LEAST * float(fit.values[at]))
+        value = max(inertia, MIN_INERTIA_SHARE * float(fit.values[at]))
         return refit({**values_of(e), INERTIA: value}, rests=rests, held=[INERTIA], carry=e.shots)
 
     error, inertia = inertia_std_error(fit), float(fit.values[at])
     looks = [times * inertia for times in COARSE if abs(times - 1.0) * inertia < REACH * error]
     centre = min((fit, *(beside(fit, look) for look in looks)), key=lambda e: chi_square(e, noise))
-    step = FAR * error
-    least = LEAST * inertia
-    for _ in range(MOST):
+    step = INITIAL_STEP_SIGMAS * error
+    least = MIN_INERTIA_SHARE * inertia
+    for _ in range(MAX_DOUBLINGS):
         middle = float(centre.values[at])
         sides = [beside(centre, middle + move) for move in (-step, step)]
         rises = [chi_square(s, noise) - chi_square(centre, noise) for s in sides]
@@ -141,12 +141,12 @@ def _bottom(fit: Estimate, noise: float, refit: Refit) -> tuple[Estimate, Valley
         step *= 2.0  # over the dents, and faster where the bottom is far
     slope = (sides[1].values - sides[0].values) / float(sides[1].values[at] - sides[0].values[at])
     if not min(rises) > BOUND:
-        return centre, Valley(float(centre.values[at]), slope)  # open on one side: nothing is known of it
+        return centre, ProfileLikelihood(float(centre.values[at]), slope)  # open on one side: nothing is known of it
     centre, std_error = _vertex(centre, [beside(centre, look) for look in _between(sides, at)], sides, noise, beside)
     found = _where_it_rings(centre, slope, noise, refit) if rests else None
     if found is not None:
         return found, None
-    return centre, Valley(std_error, slope)
+    return centre, ProfileLikelihood(std_error, slope)
 
 
 def _between(sides: Sequence[Estimate], at: int) -> list[float]:
@@ -187,7 +187,7 @@ def _where_it_rings(centre: Estimate, slope: Array, noise: float, refit: Refit) 
         return None
     ratio = float(damping / (2.0 * np.sqrt(stiffness * inertia)))
     looks = inertia * np.exp(np.arange(np.log(COARSE[0]), np.log(COARSE[-1]), ratio))
-    if not 1 < len(looks) < MOST_LOOKS:
+    if not 1 < len(looks) < MAX_GRID_POINTS:
         return None
     low, high = (np.array([bounds_of(n)[i] for n in names]) for i in (0, 1))
     moved = [ordered(names, np.clip(centre.values + slope * (look - inertia), low, high)) for look in looks]

@@ -21,11 +21,11 @@ from identify.simulate.shots import Shots, may_rest
 from rig.dynamics import Equations
 
 WEAK = 1e-3  # relative standard error of the inertia beyond which a ring of noise may decide it
-NEAR = 2.0  # mean square over the noise's variance up to which the noise, not the model, is in the way
+NOISE_LIMITED_RATIO = 2.0  # mean square over the noise's variance up to which the noise, not the model, is in the way
 BY_CHANCE = 15.0  # fall of chi square that two start values a run make of noise, their ring free to find its place
 ROUNDS = 3  # the place of rest moves with the model
 SETTLED = 0.1  # of chi square, between rounds
-FAR_BELOW = 0.1  # of the natural frequency: what shakes no faster hardly tells the inertia but by a ring
+QUASI_STATIC_RATIO = 0.1  # of the natural frequency: what shakes no faster hardly tells the inertia but by a ring
 INERTIA: Name = ("inertia",)
 
 
@@ -42,7 +42,7 @@ class Refit(Protocol):
         """
 
 
-def held_to_rest(free: Estimate, noise: float, refit: Refit) -> Estimate:
+def with_fixed_initial_state(free: Estimate, noise: float, refit: Refit) -> Estimate:
     """A fit over whole runs, anew with the runs held to the rest they begin at, where that decides the inertia.
 
     Parameters
@@ -57,7 +57,7 @@ def held_to_rest(free: Estimate, noise: float, refit: Refit) -> Estimate:
     ``free`` itself where the inertia does not hang on rings, where no run begins at rest, or where rest does not
     describe the runs: where they fit worse by more than the start states' share in the noise.
     """
-    if not (hangs_on_rings(free, noise) or (near(free, noise) and is_shaken_far_below(free))):
+    if not (depends_on_ringing(free, noise) or (near(free, noise) and is_quasi_static(free))):
         return free
     resting = sum(may_rest(s.trace, Equations(free.platform(s.number, s.added))) for s in free.shots)
     best, before = free, np.inf
@@ -73,7 +73,7 @@ def held_to_rest(free: Estimate, noise: float, refit: Refit) -> Estimate:
     return best
 
 
-def hangs_on_rings(fit: Estimate, noise: float) -> bool:
+def depends_on_ringing(fit: Estimate, noise: float) -> bool:
     """Whether the inertia is known so little, beside the noise, that a ring of noise may decide it."""
     if INERTIA not in fit.names or not near(fit, noise):
         return False
@@ -82,10 +82,10 @@ def hangs_on_rings(fit: Estimate, noise: float) -> bool:
 
 def near(fit: Estimate, noise: float) -> bool:
     """Whether the noise, not the model, is in the way."""
-    return bool(fit.sigma**2 < NEAR * noise**2)
+    return bool(fit.sigma**2 < NOISE_LIMITED_RATIO * noise**2)
 
 
-def is_shaken_far_below(fit: Estimate) -> bool:
+def is_quasi_static(fit: Estimate) -> bool:
     """Whether all torque is far below the natural frequency: a ring of noise looks like knowledge there.
 
     One that does not decay goes along with the noise of a whole run, at a frequency that tells the inertia to a
@@ -96,7 +96,7 @@ def is_shaken_far_below(fit: Estimate) -> bool:
     if not (inertia > 0.0 and stiffness > 0.0) or not inertia_std_error(fit) > 0.0:
         return False
     natural_hz = float(np.sqrt(stiffness / inertia)) / (2.0 * np.pi)
-    return all(highest_torque_hz(s.trace) < FAR_BELOW * natural_hz for s in fit.shots)
+    return all(highest_torque_hz(s.trace) < QUASI_STATIC_RATIO * natural_hz for s in fit.shots)
 
 
 def inertia_std_error(fit: Estimate) -> float:

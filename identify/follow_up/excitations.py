@@ -19,7 +19,7 @@ from rig.recording.run import Array
 AMPLITUDES = (1.0, 0.3, 0.1, 0.03)  # of what the limits allow
 SHORTEST_S, LONGEST_S = 5.0, 15.0
 PERIODS = 100.0  # of the platform's own oscillation in a set
-SLOW_S = 40.0  # a set long enough for what drifts
+DRIFT_SET_S = 40.0  # a set long enough for what drifts
 HIGHEST = 0.08  # of the sample rate: beyond, what happens between the samples is part of the answer
 TONES = (
     (0.017, "a slow sine"),
@@ -74,7 +74,7 @@ def shapes(natural_hz: float, sample_rate_hz: float) -> tuple[Shape, ...]:
     length = float(np.clip(math.ceil(PERIODS / natural_hz), SHORTEST_S, LONGEST_S))
     top = HIGHEST * sample_rate_hz
     out = [_sine(f * natural_hz, length, words) for f, words in (*TONES, *ABOVE) if f * natural_hz < top]
-    out.append(_sine(0.31 * natural_hz, SLOW_S, "a long sine", (1.0,)))
+    out.append(_sine(0.31 * natural_hz, DRIFT_SET_S, "a long sine", (1.0,)))
     for low, high, words in (
         (0.02, 0.5, "a slow multisine"), (0.1, 2.0, "a multisine around resonance"),
         (1.2, 3.0, "a multisine above resonance"),
@@ -93,7 +93,7 @@ def _hz(value: float) -> float:
 
 
 def _sine(hz: float, length_s: float, words: str, amplitudes: tuple[float, ...] = AMPLITUDES) -> Shape:
-    long_enough = max(length_s, min(SLOW_S, math.ceil(4.0 / hz)))
+    long_enough = max(length_s, min(DRIFT_SET_S, math.ceil(4.0 / hz)))
     return Shape(lambda m: Sine(torque_nm=m, frequency_hz=_hz(hz), duration_s=long_enough), words, amplitudes)
 
 

@@ -16,7 +16,7 @@ from identify.signals.trace import Trace
 from rig import effects
 from rig.platform import TERMS, Platform
 
-MOST_PAIRS = 4
+MAX_PAIRS = 4
 EXCLUDED = 25.0  # chi square by which the data have excluded a rival already
 REFIT = 10  # iterations in which a rival is fitted into the finished model
 
@@ -35,7 +35,7 @@ def never_reason(effect: str, rival: str, travel_deg: float) -> str:
     """Why no excitation within the allowed travel can tell two effects apart; empty where some can."""
     read = [c.name for c in (effects.get(effect).reads, effects.get(rival).reads) if c is not None]
     if read:
-        return f"no torque makes {' and '.join(read)} change: play a run in which that changes by itself"
+        return f"{' and '.join(read)} cannot be varied by the torque: record a run in which it varies on its own"
     return effects.get(effect).alike(rival, travel_deg) or effects.get(rival).alike(effect, travel_deg)
 
 
@@ -53,13 +53,15 @@ def pairs_of(
             if why:
                 without.append(Unparted(effect, rival, why))
             elif final is None or model is None or effect not in final.effects:
-                without.append(Unparted(effect, rival, "there is no fitted model of it to plan with"))
-            elif len(pairs) == MOST_PAIRS:
-                without.append(Unparted(effect, rival, f"the {MOST_PAIRS} pairs before it come first"))
+                without.append(Unparted(effect, rival, "no fitted model of the alternative is available for planning"))
+            elif len(pairs) == MAX_PAIRS:
+                without.append(
+                    Unparted(effect, rival, f"at most {MAX_PAIRS} pairs are planned at once; the others come first")
+                )
             else:
                 placed = _in_place(final, effect, rival, model, traces, noise)
                 if placed is None:
-                    why = "in the finished model the data so far exclude the rival already"
+                    why = "with the final model, the present data already exclude the alternative"
                     without.append(Unparted(effect, rival, why))
                 else:
                     pairs.append(

@@ -28,17 +28,17 @@ from rig.platform import Platform
 from rig.preflight import Peaks
 from rig.recording.run import Recording
 
-LEAST = 25.0  # chi square that a plan has to promise: five standard errors
+MIN_CHI_SQUARE = 25.0  # chi square that a plan has to promise: five standard errors
 GOOD = 400.0  # from which more sets are not worth their time
 BEST = 1e4  # from which more of it proves nothing more
-ALIKE = 0.5  # of the best score: the shorter of two such sets is played
-MOST_SETS = 4
+EQUIVALENT_SCORE_RATIO = 0.5  # of the best score: the shorter of two such sets is played
+MAX_SETS = 4
 FAINT = 0.005  # of the largest torque played so far: drives take torque in steps of about a thousandth
 PROOFS = 3  # sets that are put to the proof in a round
 LOOKED_AT = 14  # candidates of a pair whose sensitivities are taken
 LOOKS = 30.0  # samples a period of the platform's own oscillation: no shape goes beyond three times its frequency
 USUAL_HZ = 5.0  # where nothing swings
-LEAST_DAMPING = 0.05  # of the identified one, where the runs hardly tell it
+MIN_DAMPING_SHARE = 0.05  # of the identified one, where the runs hardly tell it
 IN_DOUBT = 3.0  # times its interval
 WELL_KNOWN = 0.8  # of it, that far below
 CAP = 1.3  # times the predicted travel: what a set may reach on a rig whose declared model is another one
@@ -105,9 +105,9 @@ def _least_damping(found: Identification) -> float:
     """
     damping = found.final.parameters.get("damping")
     if damping is None or not damping.value > 0.0:
-        return LEAST_DAMPING
+        return MIN_DAMPING_SHARE
     below = IN_DOUBT * (damping.value - damping.ci95[0]) / damping.value
-    return float(np.clip(1.0 - below, LEAST_DAMPING, 1.0))
+    return float(np.clip(1.0 - below, MIN_DAMPING_SHARE, 1.0))
 
 
 def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table, least_damping: float) -> FollowUp:
@@ -120,14 +120,14 @@ def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table, least
     several = shapes(own_hz, table.sensor.sample_rate_hz)
     choice = candidates(several, bearing, table.allowed, look, table.least_torque_nm)
     if not choice:
-        why = f"no set of any kind stays within the limits with {number(table.least_torque_nm, 2)} N m or more"
+        why = f"no kind of excitation stays within the limits at {number(table.least_torque_nm, 2)} N m or more"
         return FollowUp(None, (*without, *(Unparted(p.effect, p.rival, why) for p in pairs)))
     looks = _Looks(pairs, choice, models, look, weight)
     sets = [s for i in _choose(looks) if (s := fitting(choice[i], bearing, table.allowed)) is not None]
     partings, failed = [], list(without)
     for pair in pairs:
         best = looks.checked(sets, pair) if sets else 0.0
-        if best >= LEAST:
+        if best >= MIN_CHI_SQUARE:
             partings.append(Parting(pair.effect, pair.rival, best))
         else:
             failed.append(Unparted(pair.effect, pair.rival, _too_little(pair, best)))
@@ -145,7 +145,7 @@ def _too_little(pair: Pair, reached: float) -> str:
     told = f" (to distinguish it {cure})" if cure.startswith("from ") else ""
     return (
         f"no excitation within the limits separates them: the best reaches a chi-square of {number(reached, 2)}, "
-        f"{LEAST:g} is needed{told}"
+        f"{MIN_CHI_SQUARE:g} is needed{told}"
     )
 
 
@@ -177,7 +177,7 @@ class _Looks:
         per = max(1, LOOKED_AT // len(shares))
         out = []
         for share in shares:
-            mine = [i for i, c in enumerate(self.choice) if c.share == share and size[i] > LEAST]
+            mine = [i for i, c in enumerate(self.choice) if c.share == share and size[i] > MIN_CHI_SQUARE]
             out += sorted(mine, key=lambda i: -size[i])[:per]
         return out
 
@@ -217,8 +217,8 @@ class _Looks:
         """In the worse of both directions; too little in one is too little."""
         least = np.inf
         for way in pair.ways:
-            least = min(least, settled(way, plans, self._sensor, self._weight, LEAST))
-            if least < LEAST:
+            least = min(least, settled(way, plans, self._sensor, self._weight, MIN_CHI_SQUARE))
+            if least < MIN_CHI_SQUARE:
                 break
         return float(least)
 
@@ -244,11 +244,12 @@ def _choose(looks: _Looks) -> list[int]:
     """
     chosen: list[int] = []
     reached, stands = 0.0, [0.0] * len(looks.pairs)
-    while looks.shortlist and len(chosen) < MOST_SETS:
+    while looks.shortlist and len(chosen) < MAX_SETS:
         gains = {i: looks.score([*chosen, i]) for i in looks.shortlist}
         best = max(gains.values())
         alike = sorted(
-            (i for i, g in gains.items() if g > best - ALIKE), key=lambda i: (looks.duration(i), -looks.choice[i].share)
+            (i for i, g in gains.items() if g > best - EQUIVALENT_SCORE_RATIO),
+            key=lambda i: (looks.duration(i), -looks.choice[i].share),
         )
         others = sorted((i for i in gains if i not in alike), key=lambda i: -gains[i])
         order = _varied(looks, [*alike, *others])

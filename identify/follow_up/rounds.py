@@ -33,13 +33,13 @@ def after_playing(
     before = first.follow_up
     assert before is not None and before.plan is not None  # it was played
     pairs = [(p.effect, p.rival) for p in before.plan.partings]
-    apart = tuple(pair for pair in pairs if told_apart(newer, *pair))
+    apart = tuple(pair for pair in pairs if is_distinguished(newer, *pair))
     played = FollowUpRound(before.plan, apart, tuple(pair for pair in pairs if pair not in apart))
     without = errors_on(earlier_model, newer, recording) if earlier_model is not None else None
     return replace(newer, follow_up=FollowUp(None, (), (*before.rounds, played), "", without))
 
 
-def told_apart(found: Identification, effect: str, rival: str) -> bool:
+def is_distinguished(found: Identification, effect: str, rival: str) -> bool:
     """Whether one of the two is named and the other no longer passes for it."""
     confusable, named = found.verdict.confusable_with, found.verdict.effects
     one = effect in named and rival not in confusable.get(effect, ())

@@ -38,10 +38,10 @@ from rig.recording.run import Array
 AVERAGES = 5.0  # that a Welch estimate needs
 SEGMENTS = 12  # of one record, half overlapping
 RINGS = 2.0  # times the ring that a segment has to hold: shorter ones blur a resonance
-ALIKE = 3  # bins either way over which the power of a segment is smoothed before segments are counted
+SMOOTHING_BINS = 3  # bins either way over which the power of a segment is smoothed before segments are counted
 HANN_OVERLAP = 1.056  # half-overlapping Hann segments over independent ones (Bendat & Piersol, chapter 11)
 CORRECTED = {"whole periods": coherence_over_periods, "segments": coherence_over_segments}
-FEWEST = 64  # samples
+MIN_SAMPLES = 64  # samples
 
 
 def measured_response(records: Sequence[Record], settle_s: float) -> Response | None:
@@ -57,7 +57,7 @@ def measured_response(records: Sequence[Record], settle_s: float) -> Response | 
     """
     first = records[0]
     usable = [r for r in records if np.all(np.isfinite(r.motion)) and np.all(np.isfinite(r.torque_nm))]
-    if not usable or len(first.torque_nm) < FEWEST or np.ptp(first.torque_nm) == 0.0:
+    if not usable or len(first.torque_nm) < MIN_SAMPLES or np.ptp(first.torque_nm) == 0.0:
         return None
     period = period_of(first.torque_nm, first.step_s)
     found = None
@@ -142,7 +142,8 @@ def over_segments(records: Sequence[Record], settle_s: float = 0.0) -> Response 
     )
     power = np.abs(u) ** 2
     suu, syy, syu = power.sum(axis=0), (np.abs(y) ** 2).sum(axis=0), (y * np.conj(u)).sum(axis=0)
-    smooth = np.apply_along_axis(np.convolve, 1, power, np.ones(2 * ALIKE + 1), "same")  # the scatter of noise is none
+    # Smoothed, because the scatter of noise is no structure.
+    smooth = np.apply_along_axis(np.convolve, 1, power, np.ones(2 * SMOOTHING_BINS + 1), "same")
     alone = smooth.sum(axis=0) ** 2 / np.maximum((smooth**2).sum(axis=0), 1e-300) / HANN_OVERLAP
     f = fft.rfftfreq(length, step)
     found = _averaged(f, np.where(f < 1.5 / (length * step), 0.0, suu), syy, syu, alone, "segments")

@@ -21,7 +21,7 @@ from rig.effects.base import Effect, Place
 from rig.platform import Platform
 from rig.recording.run import Array
 
-LINEAR = 1e-6  # relative: what a sum of motions may differ from the sum of the torques
+LINEARITY_TOLERANCE = 1e-6  # relative: what a sum of motions may differ from the sum of the torques
 PROBE_S = 4.0  # length of an impulse response: eight of the longest time constants that a lag is searched up to
 FINENESS = 40.0  # samples of it in a period of the highest frequency
 
@@ -89,7 +89,7 @@ def _filter_response(effect: Effect, values: tuple[float, ...], frequency_hz: Ar
 
     rest = answer(np.zeros(n))
     whole, tenth = answer(pulse) - rest, answer(-0.1 * pulse) - rest
-    if not np.allclose(tenth, -0.1 * whole, rtol=0.0, atol=LINEAR * float(np.max(np.abs(pulse)))):
+    if not np.allclose(tenth, -0.1 * whole, rtol=0.0, atol=LINEARITY_TOLERANCE * float(np.max(np.abs(pulse)))):
         return None
     used = np.flatnonzero(np.abs(whole) > 1e-9 * np.max(np.abs(whole)))
     turn = np.exp(-2j * np.pi * np.outer(frequency_hz, step * (used - 1.0)))
@@ -114,7 +114,7 @@ def _load_response(effect: Effect, p: tuple[float, ...], s: Complex, size: Size)
         x = scale * rng.uniform(-1.0, 1.0, len(scale))
         there = rows(x, 3.7, size.torque_nm) - rest
         reach = np.abs(unit) @ scale + 1e-12
-        if np.any(np.abs(there - unit @ x) > LINEAR * reach):
+        if np.any(np.abs(there - unit @ x) > LINEARITY_TOLERANCE * reach):
             return None
     motion = np.stack([np.ones(len(s)), s])  # angle and rate over angle
     states = effect.states

@@ -16,9 +16,9 @@ from rig.recording.run import Array
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 TRUSTED = 0.8  # coherence below which a line is drawn pale
-LARGEST_GAIN_ERROR = 0.25  # relative error of the gain (2 dB) above which it is drawn pale as well
+MAX_GAIN_ERROR = 0.25  # relative error of the gain (2 dB) above which it is drawn pale as well
 EXCITED = 1e-4  # of the strongest line's power (-40 dB): what lies below is not excited
-MOST = 240  # lines of one response
+MAX_LINES = 240  # lines of one response
 SPARSE = 0.5  # share of the bins of a band below which its lines stand apart
 
 
@@ -75,8 +75,8 @@ class Response:
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
-        """Lines whose coherence reaches ``TRUSTED`` and whose error stays below ``LARGEST_GAIN_ERROR``, shape (m,)."""
-        return np.asarray((self.coherence >= TRUSTED) & (self.relative_error <= LARGEST_GAIN_ERROR))
+        """Lines whose coherence reaches ``TRUSTED`` and whose error stays below ``MAX_GAIN_ERROR``, shape (m,)."""
+        return np.asarray((self.coherence >= TRUSTED) & (self.relative_error <= MAX_GAIN_ERROR))
 
 
 def decibel(response: Complex) -> Array:
@@ -108,12 +108,12 @@ def relative_error_of(coherence: Array, averages: Array) -> Array:
 
 
 def chosen(f: Array, power: Array) -> NDArray[np.int_]:
-    """Excited lines above zero, at most ``MOST`` of them, evenly over the logarithm of frequency."""
+    """Excited lines above zero, at most ``MAX_LINES`` of them, evenly over the logarithm of frequency."""
     inside = f > 0.0
     at = np.flatnonzero(inside & (power > EXCITED * np.max(power, where=inside, initial=0.0)))
-    if len(at) <= MOST:
+    if len(at) <= MAX_LINES:
         return at
-    wanted = np.geomspace(f[at[0]], f[at[-1]], MOST)
+    wanted = np.geomspace(f[at[0]], f[at[-1]], MAX_LINES)
     return np.unique(at[np.clip(np.searchsorted(f[at], wanted), 0, len(at) - 1)])
 
 

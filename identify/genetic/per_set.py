@@ -36,7 +36,7 @@ ARRIVED = (
 )
 NEAR_NOISE = 2.0  # times the objective that the noise makes
 SIMULATED = 8  # iterations of the fit that a set's values are held against
-APART = 3.0  # standard errors from it: further off, the distance is the error
+MAX_SIGMAS = 3.0  # standard errors from it: further off, the distance is the error
 WELL_KNOWN = 0.05  # relative standard error up to which a set alone determines a parameter
 KEYS = {"inertia": "inertia_kg_m2", "damping": "damping_nm_s_rad", "stiffness": "stiffness_nm_rad"}
 
@@ -228,7 +228,7 @@ def _result(
     errors = np.maximum(np.sqrt(np.maximum(np.diag(covariance), 0.0)), least)
     errors = np.maximum(errors, [bound.get(term, 0.0) for (term,) in solution.labels])
     apart = np.abs(simulated - [run.parameters[term] for (term,) in solution.labels])
-    errors = np.where(apart > APART * errors, apart, errors)
+    errors = np.where(apart > MAX_SIGMAS * errors, apart, errors)
     errors = _tied(trace, errors, solution.labels, run.parameters, platform)
     parameters, identifiable = {}, []
     for i, (term,) in enumerate(solution.labels):

@@ -96,12 +96,12 @@ def controller_of(model: Platform, recording: Recording, most_torque_nm: float) 
 def _why_not(name: str) -> str:
     effect = effects.get(name)
     if effect.place is Place.SENSOR:
-        return "it is in the reading and not in the motion"
+        return "it changes the measurement, not the motion"
     if effect.inverse is not None:
-        return "a drive is led by its inverse, which needs to know the torque that comes next"
+        return "its compensation inverts the drive's dynamics, which requires the future torque command"
     if effect.states:
-        return "it has a memory: what it does depends on the motion before"
-    return effect.stays or "it depends on something else"
+        return "it has memory: its torque depends on past motion"
+    return effect.stays or "it depends on other quantities"
 
 
 def _reach(runs: Sequence[Run]) -> tuple[float, float]:

@@ -23,14 +23,14 @@ def _about(controller: Controller) -> list[str]:
     lines = [
         "Torque in N m to add to the command of a drive, so that the platform moves as J, C and K alone would.",
         f"Model {controller.version} (from a hash of its values). Identified up to "
-        f"{controller.most_angle_rad:.4g} rad and {controller.most_rate_rad_s:.4g} rad/s: beyond, the",
-        f"value there is kept. Never more than {controller.most_torque_nm:.4g} N m. In a closed loop begin with less",
-        "than all of the friction: what is compensated too much makes the loop oscillate.",
-        "angle_rad counts from the zero of the encoder, with a gyro alone from rest without torque; torque_nm is the",
-        "torque on the shaft.",
+        f"{controller.most_angle_rad:.4g} rad and {controller.most_rate_rad_s:.4g} rad/s;",
+        f"beyond, the value at that limit is used. The output is limited to {controller.most_torque_nm:.4g} N m.",
+        "In a closed loop, start with a part of the friction: overcompensation makes the loop oscillate.",
+        "angle_rad is measured from the encoder's zero or, with a gyro alone, from the rest angle without torque;",
+        "torque_nm is the torque on the shaft.",
     ]
-    lines += [f"In it: {', '.join(plain(t.effect) for t in controller.terms)}."]
-    lines += [f"Not in it: {plain(name)}: {why}." for name, why in controller.left_out.items()]
+    lines += [f"Included: {', '.join(plain(t.effect) for t in controller.terms)}."]
+    lines += [f"Not included: {plain(name)}: {why}." for name, why in controller.left_out.items()]
     return [line.encode("ascii", "replace").decode() for line in lines]
 
 

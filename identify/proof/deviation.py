@@ -79,7 +79,7 @@ def explained_left(
 def _as_set(run: Run, planned: PlannedSet) -> tuple[Run, float]:
     """A run with the set alone as its torque, and how long after the run the set begins. Raises ValueError."""
     if run.torque_nm is None or run.torque_time_s is None:
-        raise ValueError(f"{run.name}: has no torque")
+        raise ValueError(f"{run.name}: no torque was recorded")
     made = planned.excitation
     if not isinstance(made, CompensatedSet):
         return run, 0.0

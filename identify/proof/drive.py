@@ -16,9 +16,9 @@ from rig.signals import TorqueHold
 
 PARTS = 8  # of a tick: a torque that jumps is placed to an eighth of one, and its area exactly
 NO_LATENCY = 0.02  # of a tick: the rounding of commands
-MOST_LATENCY_S = 0.05  # later than that it is another torque
+MAX_LATENCY_S = 0.05  # later than that it is another torque
 UNLIKE = 0.1  # of a recorded torque that may differ from the planned one
-LEAST_SAMPLES, LAG_STEPS = 100, 4
+MIN_SAMPLES, LAG_STEPS = 100, 4
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def latency_of(recording: Recording, sets: Sequence[PlannedSet], tick_s: float) 
 
 def _lag(time_s: Array | None, torque_nm: Array | None, planned: PlannedSet) -> float | None:
     """By how much a recorded torque follows a planned one, by least squares (Gauss-Newton); None where it does not."""
-    if time_s is None or torque_nm is None or len(time_s) < LEAST_SAMPLES:
+    if time_s is None or torque_nm is None or len(time_s) < MIN_SAMPLES:
         return None
     lag_s = 0.0
     for _ in range(LAG_STEPS):
@@ -69,7 +69,7 @@ def _lag(time_s: Array | None, torque_nm: Array | None, planned: PlannedSet) -> 
         lag_s += float(moved / size)
     left = torque_nm - table @ np.array([size, moved])
     alike = float(np.sum(left**2)) < UNLIKE**2 * float(np.sum(torque_nm**2))
-    return lag_s if alike and abs(lag_s) < MOST_LATENCY_S else None
+    return lag_s if alike and abs(lag_s) < MAX_LATENCY_S else None
 
 
 def resolution_of(recording: Recording) -> float | None:

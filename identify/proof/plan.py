@@ -18,7 +18,7 @@ from rig.preflight import Peaks, predict
 from rig.recording.run import Run
 
 ALL, PLAIN = "all", "plain"
-SMALLEST = 0.02  # share of a set's torque below which it is not worth playing
+MIN_TORQUE_SHARE = 0.02  # share of a set's torque below which it is not worth playing
 ATTEMPTS = 12
 # Of the travel and the rate that a campaign may use. A compensated platform is damped less than before, so that it
 # rings on from wherever friction or a gap held it when the set began: with 1 N m on 681 N m/rad that took 0.25 deg of a
@@ -168,11 +168,11 @@ def _within(
         if worst >= 1.0:
             return made, factor
         factor *= BACK_OFF * worst
-        if not factor > SMALLEST:
+        if not factor > MIN_TORQUE_SHARE:
             break
     raise PreflightRefusal(
-        f"{asked.name}: no torque above {100 * SMALLEST:g} % of the set stays within the limits once it is "
-        f"compensated (travel {allowed.travel_deg:g} deg, rate {allowed.rate_deg_s:g} deg/s, torque "
+        f"{asked.name}: with compensation, even {100 * MIN_TORQUE_SHARE:g} % of this set's torque exceeds the limits "
+        f"(travel {allowed.travel_deg:g} deg, rate {allowed.rate_deg_s:g} deg/s, torque "
         f"{allowed.torque_nm:g} N m); nothing was moved. Raise the limit under limits: if the machine allows it."
     )
 
@@ -202,12 +202,12 @@ def _allowed_share(planned: PlannedSet, variant: str, models: Models, allowed: P
 
 def announced(model: Platform, plain: PlannedSet, better: PlannedSet, drive: Drive, angle: bool) -> Announced:
     """What stays of the error against the linear model by the model's own account; nothing where there was none."""
-    several = [deviation(simulated_run(s, model, drive, angle), s, model, QUIET) for s in (plain, better)]
+    several = [deviation(simulated_run(s, model, drive, angle), s, model, NEGLIGIBLE_NOISE) for s in (plain, better)]
     share = share_left([(several[0], several[1], plain.duration_s)])
     return Announced(share.left if share is not None else 0.0, several[0].rms)
 
 
-QUIET = 1e-9  # noise of a simulated sensor in the unit of its channel: far below what any effect does
+NEGLIGIBLE_NOISE = 1e-9  # noise of a simulated sensor in the unit of its channel: far below what any effect does
 
 
 def not_cancelled(model: Platform) -> dict[str, str]:
@@ -220,4 +220,6 @@ def not_cancelled(model: Platform) -> dict[str, str]:
 
 def _no_torque(name: str) -> str:
     read = effects.get(name).reads
-    return f"what {read.name} reads is not known before the run" if read is not None else "no torque takes it away"
+    return (
+        f"the readings of {read.name} are not known before the run" if read is not None else "no torque can cancel it"
+    )

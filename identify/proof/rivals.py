@@ -19,6 +19,6 @@ def rival_models(found: Identification, rival: str) -> dict[str, Platform]:
     out = {f"{effect} / {rival}": by_rival[rival] for effect, by_rival in models.items() if rival in by_rival}
     if not out:
         known = sorted({name for by_rival in models.values() for name in by_rival})
-        which = f"its rivals are {', '.join(known)}" if known else "no name of it has a rival with a fitted model"
-        raise UsageError(f"--rival {rival}: this result has no such rival: {which}. Nothing was moved.")
+        which = f"choose one of {', '.join(known)}" if known else "none of its effects has a fitted alternative"
+        raise UsageError(f"--rival {rival}: this result has no such alternative: {which}. Nothing was moved.")
     return out

@@ -18,7 +18,7 @@ from rig.preflight import Peaks
 from rig.recording.run import Run
 
 STEP_S = 1e-3
-MOST_TIMES = 1.05  # of the torque of a recorded set to which it speaks for a larger one
+MAX_TORQUE_RATIO = 1.05  # of the torque of a recorded set to which it speaks for a larger one
 
 
 def expected_peaks(run: Run, plain: PlannedSet, planned: PlannedSet, model: Platform) -> Peaks | None:
@@ -39,7 +39,7 @@ def expected_peaks(run: Run, plain: PlannedSet, planned: PlannedSet, model: Plat
     own = np.asarray(plain.torque(time_s - lead_s), dtype=float)
     recorded_nm = 0.0 if run.torque_nm is None else float(np.max(np.abs(run.torque_nm), initial=0.0))
     times = float(np.max(np.abs(own), initial=0.0)) / recorded_nm if recorded_nm > 0.0 else math.inf
-    if times > MOST_TIMES or run.rate_rad_s is None or np.sum(run.valid) < 2:
+    if times > MAX_TORQUE_RATIO or run.rate_rad_s is None or np.sum(run.valid) < 2:
         return None
     ok = run.valid & np.isfinite(run.rate_rad_s)
     rate = times * np.interp(time_s - lead_s, run.time_s[ok], run.rate_rad_s[ok], left=0.0)

@@ -26,7 +26,7 @@ AT_NOISE = 1.2
 # Share left, beyond the one announced, from which a name explains less than half of the error's power.
 REFUTED = 0.7
 # Times the error of another name by which it is no better and no worse: less than the models' own numbers move it.
-ALIKE = 1.1
+MIN_ERROR_RATIO = 1.1
 # Error without compensation over the announced one: from here on the name explains less than a quarter of its power.
 UNEXPLAINED = 2.0
 # Share of the error without a name that is left with it, all fitted anew to the runs without compensation, up to
@@ -141,9 +141,9 @@ def status_of(
         explains nothing, whatever is left.
     """
     if share is None:
-        return "cannot be told", "without compensation the error is no more than the sensor's noise"
-    went = f"{_percent(share.gone)} of the error went away ({_interval(share)})"
-    told = f"{went}, announced were {_percent(1.0 - announced)}"
+        return "cannot be told", "without compensation, the error does not exceed the sensor's noise"
+    went = f"{_percent(share.gone)} of the error was cancelled ({_interval(share)})"
+    told = f"{went}; {_percent(1.0 - announced)} was predicted"
     near = max(CONFIRMED, AS_ANNOUNCED * announced)
     if announced > REFUTED:
         return _of_little(announced, over_announced, told)
@@ -151,8 +151,8 @@ def status_of(
         return "confirmed", told
     far = max(REFUTED, AS_ANNOUNCED * announced)
     if share.ci95[0] > far:
-        return "refuted", f"{told}: with this name it should have gone"
-    return "partly", f"{told}: something else is left"
+        return "refuted", f"{told}. If this effect were the cause, it would have been cancelled"
+    return "partly", f"{told}. The rest has another cause"
 
 
 def _numbers_or_name(
@@ -173,8 +173,9 @@ def _numbers_or_name(
         left = explained_left(runs, model, without, recording.noise)
         if left <= EXPLAINS:
             why = (
-                f"{one.why.split(':')[0]}, but fitted anew it explains the runs without compensation up to "
-                f"{_percent(left)}: its numbers, or J, C and K, are off. Identify again from all runs"
+                f"{one.why.split('. ')[0]}. After refitting, however, the effect explains all but {_percent(left)} of "
+                "the error without compensation: its parameters, or J, C and K, are inaccurate. Identify again from "
+                "all runs"
             )
             out[name] = replace(one, status="partly", why=why)
     if total.status == "refuted" and not any(one.status == "refuted" for one in out.values()):
@@ -186,8 +187,11 @@ def _numbers_or_name(
 def _of_little(announced: float, over_announced: float, told: str) -> tuple[ProofStatus, str]:
     """Of a name of which by its own model most stays."""
     if over_announced > UNEXPLAINED:
-        return "refuted", f"the error without compensation is {over_announced:.2g} times what this name makes of it"
-    return "cannot be told", f"{told}: no torque takes away more of it"
+        return (
+            "refuted",
+            f"the error without compensation is {over_announced:.2g} times the error that this effect predicts",
+        )
+    return "cannot be told", f"{told}. No torque can cancel more of it"
 
 
 def _percent(share: float) -> str:
@@ -211,9 +215,9 @@ def _compared(
     for pair, rival in rivals.items():
         effect, name = pair.split(" / ")
         ratio, low, high = _ratio(plan, pair, sets, found)
-        told = f"{plain_words(name)} leaves {ratio:.2g} times the error that {plain_words(effect)} leaves"
+        told = f"the error left by compensating {plain_words(name)} is {ratio:.2g} times that of {plain_words(effect)}"
         if low <= 1.0 <= high or not _material(ratio, rival, total):
-            why = f"{told}, which is no more than chance or noise"
+            why = f"{told}, a difference within chance and noise"
             out[pair] = replace(rival, status="cannot be told", why=why)
             if effect in single and single[effect].status == "confirmed":
                 single[effect] = replace(single[effect], status="cannot be told", why=f"confirmed, but {why}")
@@ -228,7 +232,9 @@ def _compared(
 
 def _material(ratio: float, rival: EffectProof, name: EffectProof) -> bool:
     """Whether what the two leave differs by more than a tenth, and the worse of them leaves more than noise."""
-    return abs(np.log(ratio)) > np.log(ALIKE) and _over_noise((rival if ratio > 1.0 else name).sets) > AT_NOISE
+    return (
+        abs(np.log(ratio)) > np.log(MIN_ERROR_RATIO) and _over_noise((rival if ratio > 1.0 else name).sets) > AT_NOISE
+    )
 
 
 def _ratio(plan: ProofPlan, pair: str, sets: list[str], found: Found) -> tuple[float, float, float]:

@@ -24,7 +24,7 @@ def plan_lines(plan: ProofPlan, model: Platform) -> list[str]:
     for variant in plan.variants:
         for name, (left, _) in plan.announced[variant].items():
             if left > NOTABLE:
-                lines.append(f"  {name}: about {percent(left)} of the error {_of(variant)} will stay")
+                lines.append(f"  {name}: about {percent(left)} of the error {_of(variant)} will remain")
     for name in model.effects:
         effect = effects.get(name)
         if effect.cancelled_by_torque and effect.stays:
@@ -63,7 +63,7 @@ def _found(proof: Proof) -> Iterator[str]:
                 yield _sentence(capital(plain(name)), one)
     for pair, one in proof.rivals.items():
         effect, rival = pair.split(" / ")
-        yield _sentence(f"{capital(plain(rival))} in the place of {plain(effect)}", one)
+        yield _sentence(f"{capital(plain(rival))} instead of {plain(effect)}", one)
     for name, why in proof.not_cancelled.items():
         yield f"{capital(plain(name))} was not compensated: {why}."
     if proof.excluded:
@@ -72,7 +72,7 @@ def _found(proof: Proof) -> Iterator[str]:
 
 def _left_out(proof: Proof) -> str:
     names = capital(joined([plain(n) for n in proof.excluded]))
-    return f"{names}: excluded, and the search was run again on all data, those of the proof included."
+    return f"{names}: excluded; the search was repeated on all data, including the proof's."
 
 
 def _sentence(who: str, one: EffectProof) -> str:

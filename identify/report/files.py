@@ -193,11 +193,11 @@ def final_platform(identification: Identification, declared: Platform, inertia_d
     Raises
     ------
     ValueError
-        Where no model came out.
+        Where no model was identified.
     """
     found = identification.final.platform
     if found is None:
-        raise ValueError("no model came out")
+        raise ValueError("no model was identified")
     return with_inertia(found, declared.inertia_kg_m2) if identification.torque_free and inertia_declared else found
 
 

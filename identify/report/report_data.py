@@ -25,8 +25,8 @@ from rig.recording.memory import at_most
 FILE = "report_data.h5"
 FORMAT = "isp-rig report data"
 VERSION = 1
-MOST_VALUES = 60_000_000  # half a gigabyte; a longer campaign keeps no report data
-MOST_BYTES = 2 << 30
+MAX_VALUES = 60_000_000  # half a gigabyte; a longer campaign keeps no report data
+MAX_BYTES = 2 << 30
 # What h5py and json raise over a damaged file; a link that leads nowhere reads as None.
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, MemoryError, RecursionError)
 
@@ -68,7 +68,7 @@ def image_of(data: ReportData) -> bytes | None:
     """The bytes of report_data.h5; None where the campaign is too long for it to be read back."""
     arrays = Arrays()
     text = json.dumps(encode(data, arrays))
-    if sum(array.size for array in arrays.kept) > MOST_VALUES:
+    if sum(array.size for array in arrays.kept) > MAX_VALUES:
         return None
     # Made in memory: on a full disk the HDF5 library crashes instead of raising.
     with h5py.File(FILE, "w", driver="core", backing_store=False) as file:
@@ -92,7 +92,7 @@ def read_report_data(path: Path) -> ReportData:
     """
     try:
         check_heaps(path)
-        with h5py.File(path, "r") as file, at_most(MOST_BYTES):
+        with h5py.File(path, "r") as file, at_most(MAX_BYTES):
             _check_format(path, file)
             text = _plain(path, file, "identification")[()]
             arrays = _arrays(path, file)
@@ -116,7 +116,7 @@ def _check_format(path: Path, file: h5py.File) -> None:
 
 
 def _arrays(path: Path, file: h5py.File) -> list[AnyArray]:
-    group, found, left = file["arrays"], [], MOST_VALUES
+    group, found, left = file["arrays"], [], MAX_VALUES
     for name in sorted(group, key=int):
         dataset = _plain(path, group, name)
         left -= dataset.size

@@ -13,7 +13,7 @@ import numpy as np
 from rig.recording.run import Array
 
 SHORTEST = 3  # samples that are equal to the last bit
-LEAST = 3  # plateaus in all runs: what is cut off once may be something else
+MIN_PLATEAUS = 3  # plateaus in all runs: what is cut off once may be something else
 STEPS = 5.0  # of the sensor's resolution that a plateau cuts off at least
 CURVE = 4.0  # a parabola of slope s at both ends and length n is s * n / 4 high
 
@@ -27,7 +27,7 @@ def full_scale_of(rates: Sequence[Array]) -> tuple[float, float]:
         One array (n,) a run, of the samples that are there; in any unit.
     """
     (bottom, below), (top, above) = (_ceiling([sign * rate for rate in rates]) for sign in (-1.0, 1.0))
-    shows = below + above >= LEAST
+    shows = below + above >= MIN_PLATEAUS
     return (-bottom if shows and below else -np.inf), (top if shows and above else np.inf)
 
 
@@ -70,4 +70,4 @@ def told(runs: Sequence[tuple[str, int, float]], axis: str) -> str:
     if not each:
         return ""
     left_out = ", ".join(each)
-    return f"The platform moved faster than the sensor's full scale; those samples are left out: {left_out}"
+    return f"Samples at the sensor's full scale are excluded, because the platform moved faster: {left_out}"

@@ -18,8 +18,8 @@ from rig.errors import RecordingError
 from rig.platform import Platform
 from rig.recording.run import Array, Run
 
-OWN = 0.999  # share of a channel that angle, rate and acceleration explain: it is the platform's own motion
-STILL = 1e-9  # of its largest reading: a channel that moves by less does not move
+MAX_OWN_MOTION_SHARE = 0.999  # of a channel, explained by angle, rate and acceleration: it is the platform's own motion
+CONSTANT_TOLERANCE = 1e-9  # of its largest reading: a channel that moves by less does not move
 FAINT = 0.05  # of the largest current: below, its noise is what the ratio shows
 REFUSED = "refused: "  # how the status of such a candidate begins
 
@@ -162,17 +162,19 @@ def _why_not(channel: Channel, traces: Sequence[Trace]) -> dict[str, str]:
     name = plain(channel.name)
     without = [t.run.name for t in traces if channel.name not in t.run.causes]
     if without:
-        why = f"{without[0]} does not have {name}, and it has to be in every run"
+        why = f"{without[0]} has no {name}; the channel is needed in every run"
         return {"": why, "drive": why}
     acting = [_at_samples(channel, t) for t in traces]
     largest = max(float(np.max(np.abs(t.run.channels[channel.name]), initial=0.0, where=np.isfinite(
         t.run.channels[channel.name]))) for t in traces)  # fmt: skip
-    if max(float(np.max(a)) for a in acting) - min(float(np.min(a)) for a in acting) <= STILL * max(largest, 1e-300):
+    if max(float(np.max(a)) for a in acting) - min(float(np.min(a)) for a in acting) <= CONSTANT_TOLERANCE * max(
+        largest, 1e-300
+    ):
         at = (channel.reference or 0.0) + float(acting[0][0]) / (channel.factor or 1.0)
-        why = f"{name} stands at {number(at, 5)} in every run; J, C and K are those there"
+        why = f"{name} is constant at {number(at, 5)} in all runs; J, C and K hold for that value"
         return {"": why, "drive": why, "still": why}
     share = _own_share(acting, traces)
-    if share <= OWN:
+    if share <= MAX_OWN_MOTION_SHARE:
         return {}
     told = number(100.0 * share, 5)
     return {"": f"{told} % of {name} is the platform's own motion (its angle, rate and acceleration) in these runs"}

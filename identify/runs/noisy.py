@@ -14,10 +14,10 @@ from identify.signals.noise import SCATTER, UPPER, least_of, noise_of
 from identify.signals.trace import Trace
 from identify.wording import number
 
-LOUDER = 1.2  # times the noise of the other runs: less is fitted with them and hardly shows
+NOISY_RATIO = 1.2  # times the noise of the other runs: less is fitted with them and hardly shows
 CERTAIN = 5.0  # standard errors
-FEWEST = 2  # quiet runs without which nobody knows which ones are noisy
-MOST = 0.5  # of the runs
+MIN_QUIET_RUNS = 2  # quiet runs without which nobody knows which ones are noisy
+MAX_NOISY_SHARE = 0.5  # of the runs
 
 
 def noisy_runs(traces: Sequence[Trace]) -> list[tuple[Trace, float]]:
@@ -29,7 +29,7 @@ def noisy_runs(traces: Sequence[Trace]) -> list[tuple[Trace, float]]:
         if not quiet > 0.0:
             continue
         loud = [(t, t.noise / quiet) for t in mine if _is_louder(t, quiet)]
-        if len(mine) - len(loud) >= FEWEST and len(loud) < MOST * len(mine):
+        if len(mine) - len(loud) >= MIN_QUIET_RUNS and len(loud) < MAX_NOISY_SHARE * len(mine):
             out += [(t, times) for t, times in loud if _is_white(t)]
     return out
 
@@ -39,12 +39,12 @@ def describe_noisy_runs(runs: Sequence[tuple[str, float]]) -> str:
     if not runs:
         return ""
     each = ", ".join(f"{name} ({number(times, 2)} times the noise of the other runs)" for name, times in runs)
-    return f"Left out as too noisy: {each}; look at the cable and record {'it' if len(runs) == 1 else 'them'} once more"
+    return f"Excluded as too noisy: {each}; check the cable and record {'it' if len(runs) == 1 else 'them'} again"
 
 
 def _is_louder(trace: Trace, quiet: float) -> bool:
     chance = SCATTER / float(np.sqrt(len(trace.measured)))
-    return trace.noise > quiet * max(LOUDER, 1.0 + CERTAIN * chance)
+    return trace.noise > quiet * max(NOISY_RATIO, 1.0 + CERTAIN * chance)
 
 
 def _is_white(trace: Trace) -> bool:

@@ -9,11 +9,11 @@ import numpy as np
 from identify.signals.trace import Trace
 from rig.errors import RecordingError
 
-FEWEST = 100  # samples: of 50 a stiffness was told thirty times more closely than they knew it
-MOVES = 3.0  # times the sensor's noise that a motion has to reach
+MIN_SAMPLES = 100  # samples: of 50 a stiffness was told thirty times more closely than they knew it
+MIN_SIGNAL_TO_NOISE = 3.0  # times the sensor's noise that a motion has to reach
 
 
-def refuse_the_idle(traces: Sequence[Trace], free: bool) -> None:
+def refuse_without_motion(traces: Sequence[Trace], free: bool) -> None:
     """Refuse a recording in which nothing happens.
 
     Raises
@@ -22,10 +22,11 @@ def refuse_the_idle(traces: Sequence[Trace], free: bool) -> None:
         Where no run moves more than the sensor's noise, or the torque never changes in any run.
     """
     moved = [float(np.std(t.measured[t.keep])) / max(t.noise, 1e-300) for t in traces]
-    if max(moved) < MOVES:
+    if max(moved) < MIN_SIGNAL_TO_NOISE:
         raise RecordingError(
-            f"no run moves more than {max(moved):.2g} times the sensor's noise (needed: {MOVES:g}): nothing to "
-            "identify; use more torque, or give recorded.noise if the noise is smaller than it looks"
+            f"the motion of every run is at most {max(moved):.2g} times the sensor's noise (needed: "
+            f"{MIN_SIGNAL_TO_NOISE:g}), so nothing can be identified: use more torque, or set recorded.noise if the "
+            "noise is smaller than estimated"
         )
     steady = [t.torque is not None and float(np.ptp(t.torque.torque_nm)) == 0.0 for t in traces]
     if not free and all(steady):
@@ -35,7 +36,7 @@ def refuse_the_idle(traces: Sequence[Trace], free: bool) -> None:
         )
 
 
-def refuse_a_moment(traces: Sequence[Trace]) -> None:
+def refuse_too_short(traces: Sequence[Trace]) -> None:
     """Refuse a recording so short that its noise, start states and bias hide what its motion tells.
 
     Raises
@@ -44,10 +45,10 @@ def refuse_a_moment(traces: Sequence[Trace]) -> None:
         Where all runs together hold too few samples.
     """
     count = sum(t.count for t in traces)
-    if count < FEWEST:
+    if count < MIN_SAMPLES:
         raise RecordingError(
-            f"{count} usable samples in all (needed: {FEWEST}): too few to separate J, C and K from the start states; "
-            "record longer, at least a few periods of the platform's own ring"
+            f"{count} usable samples in all (needed: {MIN_SAMPLES}): too few to separate J, C and K from the initial "
+            "states: record at least a few periods of the platform's natural oscillation"
         )
 
 
@@ -63,8 +64,8 @@ def refuse_added_inertia(traces: Sequence[Trace]) -> None:
     if loaded:
         raise RecordingError(
             f"{loaded[0].name} was recorded with an added inertia of {loaded[0].added_inertia_kg_m2:g} and without "
-            "torque: only ratios to the inertia can be known, and there is nothing to add it to; identify the runs of "
-            "each load by themselves, without added_inertia_kg_m2 and with model.inertia_kg_m2 of the loaded platform"
+            "torque: only ratios to the inertia can be known, so the added inertia cannot be used; identify the runs "
+            "of each load separately, without added_inertia_kg_m2 and with model.inertia_kg_m2 of the loaded platform"
         )
 
 

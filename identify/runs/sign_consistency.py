@@ -19,7 +19,7 @@ from rig.recording.run import Array
 EXPLAINED = 0.7  # share of a run's torque that the shared platform explains with one sign
 CONTRADICTED = 0.5  # share of it that is left with the other sign, refitted
 MINOR = 0.3  # of the larger torque: a smaller one of inertia or spring that may have any sign
-MOST_AT_ONCE = 10  # runs whose signs are tried in all ways; of more each is tried against the rest
+MAX_EXHAUSTIVE_RUNS = 10  # runs whose signs are tried in all ways; of more each is tried against the rest
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def _best(runs: Sequence[_Run]) -> Array:
         values = _fit(runs, signs)
         return sum(_left(r, s, values) for r, s in zip(runs, signs, strict=True))
 
-    if len(runs) <= MOST_AT_ONCE:
+    if len(runs) <= MAX_EXHAUSTIVE_RUNS:
         best = min((np.array(way) for way in product((1.0, -1.0), repeat=len(runs))), key=left)
     else:
         best = np.ones(len(runs))

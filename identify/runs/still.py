@@ -32,8 +32,8 @@ def describe_still_runs(runs: Sequence[Trace], axis: str) -> str:
     what, unit = ("force", "N") if axis == "linear" else ("torque", "N m")
     each = [f"{t.run.name} ({number(_largest(t), 3)} {unit})" for t in runs]
     return (
-        f"Left out because the platform stood still: {joined(each)}; friction held it against that {what}, or "
-        "the drive was off"
+        f"Excluded because the platform did not move: {joined(each)}; friction held it at that {what}, or the drive "
+        "was off"
     )
 
 

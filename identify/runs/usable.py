@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from identify.runs.noisy import describe_noisy_runs, noisy_runs
-from identify.runs.refusals import refuse_a_moment
+from identify.runs.refusals import refuse_too_short
 from identify.runs.sign_consistency import describe_reversed_runs, reversed_runs
 from identify.runs.still import describe_still_runs, still_runs
 from identify.signals.prepare import above_steps, one_noise
@@ -48,7 +48,7 @@ def runs_used(traces: Sequence[Trace], noise_known: bool, axis: str, say: Callab
         raise RecordingError(
             "no run holds a usable stretch of 40 samples: look at valid, min_rate_rad_s, from_s and to_s"
         )
-    refuse_a_moment(usable)
+    refuse_too_short(usable)
     flipped = reversed_runs(usable)
     for trace in flipped:
         say(f"{trace.run.name} is left out: its torque has the opposite sign of the other runs'")

@@ -14,7 +14,7 @@ from rig.recording.run import Array, Run
 
 FINER = 8  # entries of a table a sample: straight between them a 29 Hz acceleration at 1 kHz is right to 4e-5
 BRIDGED_S = 0.05  # of lost readings that a straight line may stand for
-SLOW_S = 1.0  # nothing that has a temperature changes it faster: readings are smoothed over this, their noise acts not
+SMOOTHING_S = 1.0  # no temperature changes faster: readings are smoothed over this, so that their noise does not act
 CLEAR = 2.0  # times the noise's power, which is taken off a reading's spectrum: hardly any of it stays
 AROUND = 5  # lines, and stretches, over which a reading's power is averaged
 STRETCH = 2048  # samples
@@ -61,7 +61,7 @@ def table_of(run: Run, channel: Channel, step_s: float) -> tuple[Array, float]:
         right = np.clip(np.searchsorted(time, samples), 1, len(time) - 1)
         near = (time[right] - time[right - 1] < 3.0 * step_s) & (samples <= time[-1])
         straight = np.where(near, CubicSpline(time, x)(samples), straight)
-    window = min(round(SLOW_S / step_s), n) // 2 * 2 + 1
+    window = min(round(SMOOTHING_S / step_s), n) // 2 * 2 + 1
     if channel.kind == "temperature" and window > 4 and window <= n:
         straight = savgol_filter(straight, window, 2)
     elif channel.kind != "temperature" and n >= 64:

@@ -14,8 +14,8 @@ import numpy as np
 from rig.recording.run import Array
 
 FEW = 8  # in one run; more of them are something that the platform or its surroundings do
-APART = 30.0  # times the noise
-FAR_BEYOND = 4.0  # times the largest of what the run does more often
+GLITCH_SIGMAS = 30.0  # times the noise
+GLITCH_STEP_RATIO = 4.0  # times the largest of what the run does more often
 INSIDE = np.array([1.0, -6.0, 15.0, 0.0, 15.0, -6.0, 1.0]) / 20.0  # a quintic through three neighbours on each side
 ENDS = np.array([4.0, -6.0, 4.0, -1.0])  # a cubic through the four before, the latest first
 ENDS_SPREAD = 8.4  # times as much noise in what the cubic foretells
@@ -51,7 +51,7 @@ def glitches(values: Array, usable: Any, noise: float | None = None) -> Any:
     apart = _apart(values)
     apart[3:-3] *= sound
     peaks, usual = _highest(apart)
-    limit = max(APART * noise, FAR_BEYOND * usual)
+    limit = max(GLITCH_SIGMAS * noise, GLITCH_STEP_RATIO * usual)
     out[[p for p in peaks if apart[p] > limit]] = True
     return out
 
@@ -66,7 +66,7 @@ def _apart(values: Array) -> Array:
 def _torn_end(values: Array, usable: Any, noise: float) -> bool:
     """Whether the last sample stands apart from those before it, and none of them is what stands apart."""
     ahead = np.abs(values[4:] - np.convolve(values[:-1], ENDS, mode="valid"))
-    limit = max(ENDS_SPREAD * APART * noise, FAR_BEYOND * _highest(ahead[:-1])[1])
+    limit = max(ENDS_SPREAD * GLITCH_SIGMAS * noise, GLITCH_STEP_RATIO * _highest(ahead[:-1])[1])
     return bool(np.all(usable[-5:]) and ahead[-1] > max(limit, STEEPEST * np.max(_apart(values[-12:]))))
 
 
@@ -87,4 +87,6 @@ def told(runs: Sequence[tuple[str, Array]]) -> str:
     where = "; ".join(f"{name} at {', '.join(f'{t:.4g}' for t in times)} s" for name, times in found)
     count = sum(len(times) for _, times in found)
     each, are = ("1 sample deviates", "is") if count == 1 else (f"{count} samples deviate", "are")
-    return f"{each} by more than {APART:g} times the noise from neighbours that agree and {are} left out: {where}"
+    return (
+        f"{each} by more than {GLITCH_SIGMAS:g} times the noise from consistent neighbours and {are} excluded: {where}"
+    )

@@ -14,10 +14,10 @@ LOWER = 0.8  # of the periodogram's values
 LOWER_MEAN = (1.0 - (1.0 - LOWER) * (1.0 - np.log(1.0 - LOWER))) / LOWER  # of an exponential distribution, its mean one
 SCATTER = 1.55  # of ``noise_of`` over the root of the number of samples, as a share of itself
 
-LEAST_LEVELS = 8  # of a channel, for its steps to be seen
+MIN_LEVELS = 8  # of a channel, for its steps to be seen
 SAME, WHOLE = 1e-12, 0.02  # of the largest value, and of a step: as near as a file's digits bring them
 
-ALIKE = 3.0  # standard errors by which two readings of one noise may differ
+AGREEMENT_SIGMAS = 3.0  # standard errors by which two readings of one noise may differ
 
 
 UPPER = (0.5, 0.98)  # of Nyquist: where the noise is read
@@ -47,7 +47,7 @@ def rounding_of(values: Array) -> float | None:
     A platform at rest, or one that sticks, leaves a coarse encoder no noise to be read at all.
     """
     levels = np.unique(values)
-    if len(levels) < LEAST_LEVELS:
+    if len(levels) < MIN_LEVELS:
         return None
     apart = np.diff(levels)
     apart = apart[apart > SAME * float(np.max(np.abs(levels)))]
@@ -77,7 +77,7 @@ def least_of(found: Sequence[tuple[float, int]]) -> float:
     value, weight = 0.0, 0
     for noise, count in sorted(found):
         apart = SCATTER * np.sqrt(1.0 / count + (1.0 / weight if weight else 0.0))
-        if weight and noise > value * (1.0 + ALIKE * apart):
+        if weight and noise > value * (1.0 + AGREEMENT_SIGMAS * apart):
             break
         value, weight = (value * weight + noise * count) / (weight + count), weight + count
     return float(value)

@@ -24,10 +24,10 @@ EVEN = 0.02  # of a period: samples so close to the beat are on it
 SCATTER = 0.9  # of a period: stamps that scatter by more have no beat
 HOLE = 1.9  # periods between two samples beyond which one is missing
 WANDERING = 0.3  # of a period: spacings that scatter by more belong to no beat, however slow its wander
-NEAR = 1.5  # periods: instants that lie no farther from samples on both sides are read off a spline
-MOST_HOLES = 20  # times as many missing samples as there are
+MAX_SAMPLE_DISTANCE = 1.5  # periods: instants that lie no farther from samples on both sides are read off a spline
+MAX_MISSING_RATIO = 20  # times as many missing samples as there are
 MOVES = 4  # each along the motion that the one before made out
-SLOW = 0.5  # of the Nyquist frequency: motion above it is not followed when samples are moved
+MOTION_BAND = 0.5  # of the Nyquist frequency: motion above it is not followed when samples are moved
 ABOVE = 2.0  # times the highest frequency that stands out of the noise: the low-pass must leave the motion as it is
 FEW = 64  # samples that tell nothing about their noise
 
@@ -89,7 +89,7 @@ def beat_of(name: str, time_s: Array) -> Beat:
     spacing = np.diff(time_s)
     step = float(np.median(spacing))
     index = np.rint(time_s / step).astype(np.int64)
-    if int(index[-1]) + 1 > MOST_HOLES * len(time_s):
+    if int(index[-1]) + 1 > MAX_MISSING_RATIO * len(time_s):
         widest = int(np.argmax(spacing))
         raise RecordingError(
             f"{name}: {len(time_s)} samples {step:.3g} s apart span {time_s[-1]:.6g} s, with a gap of "
@@ -137,7 +137,7 @@ def sampled(beat: Beat, time_s: Array, values: Array, good: Any) -> Sampled:
     near = good & (beat.scattered | (np.abs(late_s) < 0.5 * beat.step_s))
     there[beat.index[near]] = True
     if not beat.scattered and np.any(np.abs(late_s) > EVEN * beat.step_s):
-        there |= _beside(grid, time_s[good], NEAR * beat.step_s)
+        there |= _beside(grid, time_s[good], MAX_SAMPLE_DISTANCE * beat.step_s)
     scatter_s = float(np.sqrt(np.mean(late_s[near] ** 2))) if np.any(near) else 0.0
     splined = np.asarray(CubicSpline(time_s[good], values[good])(grid), dtype=float)
     if not beat.scattered or np.sum(near) < FEW:
@@ -174,7 +174,7 @@ def torque_instants(torque_time_s: Array, time_s: Array, laid: Sampled) -> Array
 
 def _followed(values: Array, step_s: float, cutoff_hz: float) -> Any:
     """The motion in a channel, as a function of the time since its first instant."""
-    wn = min(2.0 * ABOVE * cutoff_hz * step_s, SLOW)
+    wn = min(2.0 * ABOVE * cutoff_hz * step_s, MOTION_BAND)
     sos = signal.butter(3, wn, output="sos")
     slow = signal.sosfiltfilt(sos, values, padlen=min(len(values) - 1, int(10.0 / wn)))
     return make_interp_spline(step_s * np.arange(len(values)), slow, k=5)
@@ -188,6 +188,6 @@ def told(runs: Sequence[tuple[str, float, bool]]) -> str:
     which = ", ".join(name for name, _ in wrong)
     most = max(scatter_s for _, scatter_s in wrong)
     return (
-        f"Time stamps of {which} scatter by up to {1e6 * most:.3g} us (rms) about an even grid, but the motion shows "
-        "that the samples are even: even spacing is assumed"
+        f"Time stamps of {which} have a jitter of up to {1e6 * most:.3g} us rms, but the motion shows that the samples "
+        "are evenly spaced: even spacing is assumed"
     )

@@ -14,7 +14,7 @@ OWN = 0.03  # of the natural frequency: a line that near is the platform's own
 TONE = 0.8  # of the torque's power in one line
 START_S = 0.5  # in which a sharp mode that nothing excites later has rung
 STANDS_OUT = 5.0  # times the median power
-MOST_RINGS = 2
+MAX_RINGS = 2
 LINE = 4.0  # times the noise at which a spectral line is one: e^-16 is the chance of a bin
 
 
@@ -65,7 +65,7 @@ def rings_hz(traces: Sequence[Trace], residuals: Sequence[Array], natural_hz: fl
     f = np.fft.rfftfreq(4 * length, traces[0].step_s)
     power[(np.abs(f - natural_hz) < 2.0 / START_S) | (f < 2.0 / START_S)] = 0.0
     peaks = signal.find_peaks(power, height=STANDS_OUT * float(np.median(power)))[0]
-    return tuple(float(f[k]) for k in peaks[np.argsort(-power[peaks])][:MOST_RINGS])
+    return tuple(float(f[k]) for k in peaks[np.argsort(-power[peaks])][:MAX_RINGS])
 
 
 def ringing_hz(traces: Sequence[Trace], natural_hz: float) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from identify.signals.trace import UPSAMPLING, Trace
 from rig.recording.run import Array
 
-MOST = 0.999  # of the torque's power
+POWER_SHARE = 0.999  # of the torque's power
 
 
 def highest_torque_hz(trace: Trace) -> float:
@@ -20,5 +20,5 @@ def highest_torque_hz(trace: Trace) -> float:
 def highest_hz(torque_nm: Array, step_s: float) -> float:
     """The frequency below which nearly all of a sampled torque is, (n,); zero where there is none."""
     power = np.cumsum(np.abs(np.fft.rfft(torque_nm)) ** 2)
-    at = int(np.searchsorted(power, MOST * power[-1]))
+    at = int(np.searchsorted(power, POWER_SHARE * power[-1]))
     return at / (len(torque_nm) * step_s)

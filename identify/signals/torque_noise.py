@@ -22,7 +22,7 @@ FLOOR = 0.7  # of the Nyquist frequency: above it stands the floor
 ABOVE = 8.0  # times the floor's power: a torque that is no noise
 MARGIN = 1.5  # times the highest frequency of such a torque: above it there is none
 HIGHEST = 0.6  # of the Nyquist frequency: a floor that begins higher is no matter
-LEAST = 1e-4  # of the torque: less noise is none
+MIN_NOISE_RATIO = 1e-4  # of the torque: less noise is none
 BINS = 6  # of the spectrum to either side over which it is averaged
 SURELY = 3.0  # times the floor, below which a part counts as noise
 
@@ -41,7 +41,7 @@ def quieter(traces: Sequence[Trace]) -> tuple[list[Trace], float] | None:
         values = t.torque.torque_nm
         f, power = signal.welch(values, fs=2.0 * half, nperseg=min(len(values), SEGMENT))
         floor = float(np.median(power[f > FLOOR * half]))
-        if np.sqrt(floor * half) < LEAST * float(np.std(values)):
+        if np.sqrt(floor * half) < MIN_NOISE_RATIO * float(np.std(values)):
             return None
         floors.append(floor)
         over = f[power > ABOVE * floor]

@@ -11,7 +11,7 @@ from identify.model.parameters import Name, platform_of
 from identify.model.structure import Structure
 from identify.signals.trace import Trace
 from identify.simulate.shots import Shots, from_rest, make_shots, may_rest
-from identify.simulate.stuck_start import begin_where_it_stuck
+from identify.simulate.stuck_start import stuck_initial_state
 from rig.dynamics import Equations
 from rig.dynamics.equations import MAX_SUBSTEPS
 from rig.recording.run import Array
@@ -59,6 +59,6 @@ def shots_for(
         if carry is not None and np.array_equal(carry[i].first, shots.first):
             shots.starts, shots.bias = carry[i].starts.copy(), carry[i].bias
         elif length is None and equations.sticks:
-            begin_where_it_stuck(shots, equations)
+            stuck_initial_state(shots, equations)
         out.append(shots)
     return out

@@ -12,7 +12,7 @@ from rig import effects
 from rig.dynamics import Equations, Tangent, smooth
 from rig.recording.run import Array
 
-LARGEST = 8_000_000  # numbers in the coefficients of one run: beyond, simulations cost less than room
+MAX_COEFFICIENTS = 8_000_000  # numbers in the coefficients of one run: beyond, simulations cost less than room
 
 
 class Neighbourhood:
@@ -111,7 +111,7 @@ def neighbourhood_of(shots: Shots, equations: Equations) -> Neighbourhood | None
         not np.any(shots.active)
         or not equations.loads
         or not smooth(equations)
-        or size * (size + 3) * shots.grid.n > LARGEST
+        or size * (size + 3) * shots.grid.n > MAX_COEFFICIENTS
     ):
         return None
     return Neighbourhood(shots, equations)

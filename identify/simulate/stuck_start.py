@@ -23,7 +23,7 @@ SLOW_TO_BREAK = 3.0  # times the torque that holds: by then it has broken loose
 
 
 @RUNAWAY
-def begin_where_it_stuck(shots: Shots, equations: Equations) -> None:
+def stuck_initial_state(shots: Shots, equations: Equations) -> None:
     """Move the start angle of a run that begins stuck to where the model fits its beginning best, in place."""
     trace = shots.trace
     reach = holding_nm(equations) / equations.jck[2] if equations.jck[2] > 0.0 else 0.0

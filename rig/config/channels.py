@@ -7,7 +7,7 @@ from typing import Annotated, Self, TypeVar
 
 from pydantic import Field, model_validator
 
-from rig.channels import MOST_CHANNELS, Channel, ChannelKind, name_fault
+from rig.channels import MAX_CHANNELS, Channel, ChannelKind, name_fault
 from rig.config.base import Positive, Section
 from rig.config.effects import KeyFaults
 
@@ -64,8 +64,11 @@ def check_channels(given: Given) -> Given:
     from rig import effects  # noqa: PLC0415  compiled kernels: not paid for by a config without channels
     from rig.errors import ConfigError  # noqa: PLC0415
 
-    if len(given) > MOST_CHANNELS:
-        raise ValueError(f"{len(given)} channels, at most {MOST_CHANNELS} are allowed: leave out the least likely")
+    if len(given) > MAX_CHANNELS:
+        raise ValueError(
+            f"{len(given)} channels, at most {MAX_CHANNELS} are allowed: leave out those "
+            "least likely to act on the platform"
+        )
     wrong: list[tuple[tuple[str | int, ...], str]] = []
     for name, config in given.items():
         fault = name_fault(name)

@@ -10,8 +10,8 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from rig.config.base import Section
 from rig.excitation import Chirp, FreeDecay, Multisine, RampHoldRelease, Sine
 
-LEAST_SAMPLES = 40  # of a set; an arbitrary floor
-MOST_SETS = 200
+MIN_SAMPLES = 40  # of a set; an arbitrary floor
+MAX_SETS = 200
 PAPER_SETS: tuple[tuple[float, float], ...] = ((300, 0.5), (300, 1.0), (250, 3.0), (200, 6.0), (150, 9.0))
 
 
@@ -57,8 +57,8 @@ class ExcitationConfig(Section):
     @classmethod
     def _one_to_two_hundred(cls, sets: tuple[AnySet, ...]) -> tuple[AnySet, ...]:
         # After the sets themselves, or one wrong set would also be reported as a list that is too short.
-        if not 1 <= len(sets) <= MOST_SETS:
-            raise ValueError(f"has {len(sets)} sets: give 1 to {MOST_SETS}, or leave the key out for the paper's five")
+        if not 1 <= len(sets) <= MAX_SETS:
+            raise ValueError(f"has {len(sets)} sets: give 1 to {MAX_SETS}, or leave the key out for the paper's five")
         return sets
 
     @model_validator(mode="after")
@@ -71,11 +71,11 @@ class ExcitationConfig(Section):
                     f"sets.{number}: {highest_hz:g} Hz cannot be played at {self.sample_rate_hz:g} ticks a second: "
                     f"at most {self.sample_rate_hz / 2:g} Hz, or raise sample_rate_hz"
                 )
-            if planned.duration_s * self.sample_rate_hz < LEAST_SAMPLES:
+            if planned.duration_s * self.sample_rate_hz < MIN_SAMPLES:
                 count = planned.duration_s * self.sample_rate_hz
                 raise ValueError(
                     f"sets.{number}: {planned.duration_s:g} s are {count:.3g} samples at {self.sample_rate_hz:g} Hz, "
                     "too few to identify from: duration_s has to be at least "
-                    f"{LEAST_SAMPLES / self.sample_rate_hz:g} s"
+                    f"{MIN_SAMPLES / self.sample_rate_hz:g} s"
                 )
         return self

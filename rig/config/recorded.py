@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from rig.config.base import NonNegative, Positive, Section
 from rig.config.channels import ChannelConfig, check_channels
 
-MOST_RUNS = 1000
+MAX_RUNS = 1000
 MOST_SAMPLES = 50_000  # the five sets of ten seconds at 1 kHz of the paper; about 0.9 GiB of memory
 ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
 
@@ -63,7 +63,7 @@ class ChannelColumn(ChannelConfig):
     @classmethod
     def _not_zero(cls, factor: float) -> float:
         if factor == 0:
-            raise ValueError("a factor of 0 erases the column: give the factor that converts to the channel's unit")
+            raise ValueError("a factor of 0 sets every value to 0: give the factor that converts to the channel's unit")
         return factor
 
 
@@ -113,7 +113,7 @@ class Scale(Section):
     def _not_zero(cls, factor: float) -> float:
         if factor == 0:
             raise ValueError(
-                "a factor of 0 erases the column: give the factor that converts to SI units, e.g. 0.0174533 from "
+                "a factor of 0 sets every value to 0: give the factor that converts to SI units, e.g. 0.0174533 from "
                 "degrees"
             )
         return factor
@@ -143,9 +143,9 @@ class RecordedConfig(Section):
     @classmethod
     def _one_to_a_thousand(cls, runs: tuple[RecordedRun, ...]) -> tuple[RecordedRun, ...]:
         # After the runs themselves, or one wrong run would also be reported as a list that is too short.
-        if not 1 <= len(runs) <= MOST_RUNS:
+        if not 1 <= len(runs) <= MAX_RUNS:
             given = f"a list of {len(runs)}" if runs else "[]"
-            raise ValueError(f"{given} is not allowed: has to be at least 1 and at most {MOST_RUNS} runs")
+            raise ValueError(f"{given} is not allowed: has to be at least 1 and at most {MAX_RUNS} runs")
         return runs
 
     @model_validator(mode="after")

@@ -7,11 +7,11 @@ the loader.
 
 from __future__ import annotations
 
-from rig.channels import MOST_CHANNELS
+from rig.channels import MAX_CHANNELS
 from rig.config.effects_schema import candidates_schema, effects_schema, known_effects_only
-from rig.config.excitation import MOST_SETS
+from rig.config.excitation import MAX_SETS
 from rig.config.json_schema import DRAFT, Json, model_schema
-from rig.config.recorded import MOST_RUNS
+from rig.config.recorded import MAX_RUNS
 from rig.config.root import BACKENDS, Config
 
 _IN_A_NAME = r'[^\x00-\x1f\x7f/\\<>:"|?*]'
@@ -76,15 +76,15 @@ def _narrow(definitions: Json) -> None:
     model = definitions["ModelConfig"]["properties"]
     model["terms"] |= {"uniqueItems": True, "contains": {"const": "inertia"}}
     _or(model, "effects_from", dict(model["effects_from"]["items"]))  # one file need not be a list
-    definitions["ExcitationConfig"]["properties"]["sets"] |= {"minItems": 1, "maxItems": MOST_SETS}
-    definitions["RecordedConfig"]["properties"]["runs"] |= {"minItems": 1, "maxItems": MOST_RUNS}
+    definitions["ExcitationConfig"]["properties"]["sets"] |= {"minItems": 1, "maxItems": MAX_SETS}
+    definitions["RecordedConfig"]["properties"]["runs"] |= {"minItems": 1, "maxItems": MAX_RUNS}
     definitions["RecordedRun"]["properties"]["file"]["pattern"] = FILE_PATTERN
     factors = [definitions["Scale"]["properties"][key] for key in ("torque", "rate", "angle")]
     for factor in (*factors, definitions["ChannelColumn"]["properties"]["scale"]):
         factor["not"] = {"const": 0}
     for section in ("ModelConfig", "IdentifyConfig", "Columns"):
         channels = definitions[section]["properties"]["channels"]
-        channels |= {"propertyNames": {"pattern": CHANNEL_NAME}, "maxProperties": MOST_CHANNELS}
+        channels |= {"propertyNames": {"pattern": CHANNEL_NAME}, "maxProperties": MAX_CHANNELS}
 
 
 def _name_effects(definitions: Json) -> None:

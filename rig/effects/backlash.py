@@ -27,6 +27,6 @@ EFFECT = Effect(
     formula="-stiffness_nm_rad * fmin(fmax(angle_rad, -half_gap_rad), half_gap_rad)",
     kinks=lambda values: (-values[0], values[0]),
     leans_on=("stiffness",),
-    stays="where in its gap the platform rests nobody knows before the run",
+    stays="the rest angle within the gap is not known before the run",
     separated_by="from cubic stiffness and cogging: excite at a small and at a large amplitude",
 )

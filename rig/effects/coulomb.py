@@ -6,7 +6,7 @@ from rig.effects.base import Effect, LargeStart, Parameter, Place, Scale, kernel
 
 # Factors on the fitted level from which the fit is started again: a fit in which the platform never sticks may end at
 # a level that is far too low.
-LARGER = (3.0, 8.0)
+START_FACTORS = (3.0, 8.0)
 
 
 @kernel
@@ -15,7 +15,7 @@ def _level(angle, speed, time, torque, state, dstate, p):  # type: ignore[no-unt
 
 
 def _others(jck: tuple[float, float, float], own: tuple[float, ...], scale: Scale) -> tuple[LargeStart, ...]:
-    return tuple(LargeStart({}, {"level": factor * own[0]}) for factor in LARGER)
+    return tuple(LargeStart({}, {"level": factor * own[0]}) for factor in START_FACTORS)
 
 
 EFFECT = Effect(
@@ -30,6 +30,6 @@ EFFECT = Effect(
     kernel=_level,
     formula="level_nm",
     other_minima=_others,
-    stays="at standstill friction holds the platform within a band, and where in it nobody knows before the run",
+    stays="friction holds the platform anywhere within a band, so its rest angle is not known before the run",
     separated_by="from Stribeck and presliding friction: ramp slowly, hold and release; excite at several amplitudes",
 )

@@ -53,6 +53,6 @@ EFFECT = Effect(
     follows_within_rad=lambda values: values[4] / values[5],
     nests=("presliding_friction",),
     resembles_much=True,
-    stays="how far the contact is bent when the run begins nobody knows before it",
+    stays="the initial deflection of the contact is not known before the run",
     separated_by="from presliding friction: repeat at several amplitudes",
 )

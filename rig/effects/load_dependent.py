@@ -21,6 +21,6 @@ EFFECT = Effect(
     parameters=(Parameter("factor", "1", "friction torque over transmitted torque", linear=True, high=0.5),),
     kernel=_level,
     formula="factor * fabs(torque_nm)",
-    stays="at standstill friction holds the platform within a band, and where in it nobody knows before the run",
+    stays="friction holds the platform anywhere within a band, so its rest angle is not known before the run",
     separated_by="from Coulomb friction: repeat at another amplitude",
 )

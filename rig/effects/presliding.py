@@ -47,6 +47,6 @@ EFFECT = Effect(
     fastest_rad_s=_fastest,
     follows_within_rad=lambda values: values[4],
     nests=("coulomb_friction",),
-    stays="how far the contact is bent when the run begins nobody knows before it",
+    stays="the initial deflection of the contact is not known before the run",
     separated_by="from Coulomb friction and hysteresis: repeat at a small amplitude",
 )

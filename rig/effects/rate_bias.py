@@ -22,5 +22,5 @@ EFFECT = Effect(
         Parameter("bias", "rad/s", "zero-rate output", linear=True, low=-float("inf"), suffix="rad_s", per_run=True),
     ),
     kernel=_bias,
-    stays="it is in the reading and not in the motion",
+    stays="it changes the measurement, not the motion",
 )

@@ -33,6 +33,6 @@ EFFECT = Effect(
             cure="measure the motor current, or add a second sensor",
         )
     },
-    stays="it is in the reading and not in the motion: the linear model is read through the same lag",
+    stays="it changes the measurement, not the motion: the linear model is measured through the same lag",
     separated_by="from a delay: excite at higher frequencies",
 )

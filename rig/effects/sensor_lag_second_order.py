@@ -47,6 +47,6 @@ EFFECT = Effect(
     kernel=_low_pass,
     filter_states=lambda step_s, values: 3,
     lag=lambda values: (values[0], 0.5 * values[0] ** 2),
-    stays="it is in the reading and not in the motion: the linear model is read through the same lag",
+    stays="it changes the measurement, not the motion: the linear model is measured through the same lag",
     separated_by="from a delay: excite at higher frequencies",
 )

@@ -43,7 +43,7 @@ class ExcitationSet(BaseModel):
     @classmethod
     def _name_is_printed(cls, name: str) -> str:
         if not name.isprintable():
-            raise ValueError("holds a character that cannot be seen or that turns the text around: leave it out")
+            raise ValueError("contains an invisible character or one that reverses the text direction: remove it")
         return name
 
     @property

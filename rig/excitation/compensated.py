@@ -11,7 +11,7 @@ from rig.arrays import Array
 from rig.excitation.base import ExcitationSet
 from rig.excitation.planned import PlannedSet
 
-NEAR = np.array([0, -1, 1, -2, 2])  # ticks, the likeliest first
+TICK_OFFSETS = np.array([0, -1, 1, -2, 2])  # ticks, the likeliest first
 ON_TIME = 1e-3  # of a tick: rounding of its instant
 
 
@@ -67,7 +67,7 @@ class HeldCommands:
         A late tick sends the command of its instant, and a drive stamps what it applied by its own clock.
         """
         nearest = np.rint(time_s / self.tick_s).astype(np.int64)
-        around = np.clip(nearest[:, None] + NEAR, 0, len(self.torque_nm) - 1)
+        around = np.clip(nearest[:, None] + TICK_OFFSETS, 0, len(self.torque_nm) - 1)
         off = np.abs(self.torque_nm[around] - recorded_nm[:, None])
         ticks: Array = np.take_along_axis(around, np.argmin(off, axis=1)[:, None], axis=1)[:, 0] * self.tick_s
         return ticks

@@ -27,7 +27,7 @@ STEP_BLOCK_S, STEP_BLOCKS = 0.01, 6  # steps are remembered for as long as a dri
 # From the first to the third sample: 0.3 of a period of the paper's platform (29 Hz), in which its acceleration changes
 # without any step. Gyros below 200 samples per second are not checked. tests/rig/guard holds from 3 to 100 ms.
 LONGEST_GAP_S = 0.01
-LEAST_NOISE_RAD_S = 2e-3  # a tenth of a degree a second, where the rest before told nothing
+MIN_NOISE_RAD_S = 2e-3  # a tenth of a degree a second, where the rest before told nothing
 
 REST_ENERGIES = 10.0  # a ring that is left over from before may give back what it has
 DELAYS_S = (0.0, 0.003, 0.006)  # of the torque behind its command, of which any may be the true one
@@ -36,9 +36,9 @@ STORED_FACTOR = INERTIA_FACTOR  # of the energy stored by the declared model, wh
 # Of the most energy stored: what may be missing. Less trips falsely (0.2: one of forty random platforms), more misses a
 # wrong sign within half a cycle (0.5: at 6 and 12 Hz); runs of tests/rig/guard, those marked slow included.
 STORED_SHARE = 0.3
-LEAST_RATE_RAD_S = 0.5  # energies below that of so slow a motion are let be
+MIN_RATE_RAD_S = 0.5  # energies below that of so slow a motion are let be
 
-MOVES_RAD_S, MOVES_MOST_RAD_S = math.radians(0.5), math.radians(3.0)  # however the rest before rang
+MOVES_RAD_S, MOVES_MAX_RAD_S = math.radians(0.5), math.radians(3.0)  # however the rest before rang
 MOVES_SHARE = 0.01  # of the largest rate of the set
 STILL_FOR_S = 0.04  # beyond any delay between a torque and the sample that shows it
 # By how much the torque may change at standstill: times the largest torque of the set so far, within shares of the
@@ -46,7 +46,7 @@ STILL_FOR_S = 0.04  # beyond any delay between a torque and the sample that show
 # friction (decision 0016: two thirds). The least share lets small sets stick on friction of a tenth of the limit;
 # tests/rig/guard holds from 0.05 to 0.4, at 0.02 a platform without a fault trips. The most bounds both; at 0.8 a
 # gyro that came off its shaft is missed.
-STILL_PEAKS, STILL_LEAST, STILL_MOST = 1.3, 0.2, 0.4
+STILL_PEAKS, STILL_MIN, STILL_MAX = 1.3, 0.2, 0.4
 
 
 class Jump(Check):
@@ -62,7 +62,7 @@ class Jump(Check):
     def begin(self, start_s: float, rest: Rest) -> None:
         """From the next two samples on."""
         super().begin(start_s, rest)
-        self._noise = max(rest.noise_rad_s, LEAST_NOISE_RAD_S)
+        self._noise = max(rest.noise_rad_s, MIN_NOISE_RAD_S)
         self._older: tuple[float, float] | None = None
         self._last: tuple[float, float] | None = None
 
@@ -147,7 +147,7 @@ class WrongSign(Check):
         """From rest."""
         super().begin(start_s, rest)
         self._bias = rest.bias_rad_s
-        self._least = self._inertia * (0.5 * LEAST_RATE_RAD_S**2 + REST_ENERGIES * rest.noise_rad_s**2)
+        self._least = self._inertia * (0.5 * MIN_RATE_RAD_S**2 + REST_ENERGIES * rest.noise_rad_s**2)
         self._accounts = tuple(Account(delay_s) for delay_s in DELAYS_S)
         self._last: tuple[float, float] | None = None
         self._angle = self._stored_most = 0.0
@@ -193,7 +193,7 @@ class Standstill(Check):
         """At rest, at zero torque."""
         super().begin(start_s, rest)
         self._bias = rest.bias_rad_s
-        self._moves = min(max(NOISE_SIGMAS * rest.noise_rad_s, MOVES_RAD_S), MOVES_MOST_RAD_S)
+        self._moves = min(max(NOISE_SIGMAS * rest.noise_rad_s, MOVES_RAD_S), MOVES_MAX_RAD_S)
         self._past = TorqueHistory()
         self._fastest = self._peak_nm = 0.0
         self._low = self._high = 0.0
@@ -235,7 +235,7 @@ class Standstill(Check):
         given, most = self._limits.standstill_torque_nm, self._limits.torque_nm
         if given is not None:
             return given
-        return max(STILL_LEAST * most, min(STILL_MOST * most, STILL_PEAKS * self._peak_nm))
+        return max(STILL_MIN * most, min(STILL_MAX * most, STILL_PEAKS * self._peak_nm))
 
 
 def motion_checks(limits: LimitsConfig, platform: Platform) -> Sequence[Check]:

@@ -37,7 +37,7 @@ SWEEPS = 6  # of the coordinate descent, which starts from the last fit
 TURNED_LEAVES = 0.3  # of the torque, at most
 LEAVES_MORE, TIMES_AS_MUCH = 0.2, 1.5  # what upright leaves at least, beside what turned round leaves
 PASSED_SHARE = 0.3  # of the torque's change that the filters let through: beyond some 18 Hz a second mode turns signs
-LEAST_SHARE = 0.05  # of the most torque that there was in such moments of the set
+MIN_SHARE = 0.05  # of the most torque that there was in such moments of the set
 # 80 ms of the same verdict, so that a single fit (an impact, a stick) is none; as much is added until a reversed sign
 # is seen. Not critical: tests/rig/guard holds from 1 to 12.
 BLOCKS_IN_A_ROW = 4
@@ -139,7 +139,7 @@ class ReversedSign(Check):
         self._remember(time_s)
         whole = float(self._whole[0])
         self._most = max(self._most, whole)
-        least = max(LEAST_SHARE * self._most, PASSED_SHARE * self._given)
+        least = max(MIN_SHARE * self._most, PASSED_SHARE * self._given)
         if time_s - self._begun_s < FADES_S or whole <= least:
             return None
         turned = self._left(TURNED)

@@ -18,7 +18,7 @@ from rig.excitation import PlannedSet, planned
 from rig.platform import Platform
 from rig.preflight.simulated_sets import Peaks, SetForecast, SetSequence, has_no_restoring_spring, largest_factor
 
-SMALLEST_REPORTED_DEG = 0.005  # half of the last digit shown
+MIN_REPORTED_DEG = 0.005  # half of the last digit shown
 LIMIT_KEYS = ("limits.travel_deg", "limits.rate_deg_s", "limits.torque_nm")
 __all__ = ["Peaks", "Prediction", "peaks", "plan", "predict", "predict_all"]
 
@@ -100,7 +100,7 @@ class Prediction:
             f"{self.planned.name}: {self.peaks.torque_nm:.1f} N m would move the platform by "
             f"{self.peaks.travel_deg:.2f} deg at up to {self.peaks.rate_deg_s:.0f} deg/s"
         )
-        if abs(self.starts_deg) >= SMALLEST_REPORTED_DEG:
+        if abs(self.starts_deg) >= MIN_REPORTED_DEG:
             text += f", starting {self.starts_deg:.2f} deg from the start of the campaign"
         return text
 

@@ -18,9 +18,9 @@ from rig.signals import TorqueHold, Use
 
 MIN_SAMPLES = 40  # in a row, fewer tell nothing of two states, three parameters and the noise
 # No torque, rate, angle or time of a machine in SI units comes near; squares of it would overflow.
-LARGEST_VALUE = 1e12  # of any quantity in SI units: far beyond any platform
+MAX_VALUE = 1e12  # of any quantity in SI units: far beyond any platform
 SHORTEST_STEP_S = 1e-8  # 100 MHz: nothing samples a platform faster
-SMALLEST_PEAK = 1e-30  # a channel that stays below: squares of it would vanish
+MIN_PEAK = 1e-30  # a channel that stays below: squares of it would vanish
 
 
 def missing_column(table: Table, quantity: str, names: Sequence[str], *, mapped: bool) -> RecordingError:
@@ -42,7 +42,7 @@ def check_samples(table: Table, columns: Mapping[str, Array]) -> Mask:
     if len(set(lengths.values())) > 1:
         listed = ", ".join(f"{quantity} {count}" for quantity, count in lengths.items())
         raise RecordingError(
-            f"{table.path}: columns of different length ({listed}): export one value a sample for each"
+            f"{table.path}: columns of different length ({listed}): export one value per sample for each"
         )
     flags = columns.get("valid")
     if flags is not None and not np.isfinite(flags).all():
@@ -55,7 +55,7 @@ def check_samples(table: Table, columns: Mapping[str, Array]) -> Mask:
         )
     valid = np.ones(lengths["time"], dtype=bool) if flags is None else flags != 0
     for quantity, values in columns.items():
-        bad = valid & ~(np.abs(values) <= LARGEST_VALUE)
+        bad = valid & ~(np.abs(values) <= MAX_VALUE)
         if quantity != "valid" and bad.any():
             i = int(np.argmax(bad))
             cure = "correct it, delete the row, or mark the row valid = 0"
@@ -79,7 +79,7 @@ def check_channel(table: Table, name: str, values: Array, count: int) -> None:
             f"{table.path}: channel {name!r} has {known.sum()} readings that are numbers, at least 2 are needed: "
             f"record it, or take {key} out"
         )
-    if np.max(np.abs(values[known])) > LARGEST_VALUE:
+    if np.max(np.abs(values[known])) > MAX_VALUE:
         i = int(np.argmax(np.where(known, np.abs(values), 0.0)))
         raise RecordingError(
             f"{table.path}: {table.label(i)}: channel {name!r} is {values[i]:g}: correct it, or leave it empty"
@@ -169,11 +169,11 @@ def _check_motion(run: Run, path: Path) -> None:
         )
     for name, given in ((channel, values[run.valid]), ("torque", run.torque_nm)):
         largest = float(np.max(np.abs(given))) if given is not None and len(given) else 0.0
-        if 0.0 < largest < SMALLEST_PEAK:
+        if 0.0 < largest < MIN_PEAK:
             raise RecordingError(
                 f"{path}: the {name} never exceeds {largest:g}, which is implausible: correct recorded.scale.{name}"
             )
-        if largest > LARGEST_VALUE:
+        if largest > MAX_VALUE:
             raise RecordingError(
                 f"{path}: the {name} reaches {largest:g}, which is implausible: correct recorded.scale.{name}"
             )

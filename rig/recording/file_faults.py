@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
-MOST_NAMED = 4  # further files with the same fault
+MAX_NAMED = 4  # further files with the same fault
 _NUMBER = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?|nan|inf")
 
 
@@ -33,5 +33,5 @@ class FileFaults:
 def _also(names: list[str]) -> str:
     if not names:
         return ""
-    more = len(names) - MOST_NAMED
-    return f" (the same in {', '.join(names[:MOST_NAMED])}{f' and {more} more' if more > 0 else ''})"
+    more = len(names) - MAX_NAMED
+    return f" (the same in {', '.join(names[:MAX_NAMED])}{f' and {more} more' if more > 0 else ''})"

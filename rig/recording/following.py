@@ -12,7 +12,7 @@ import numpy as np
 from rig.arrays import Array
 from rig.recording.journal import BLOCK_HEAD, FRAME_HEAD, MARKER, MAX_FRAME_BYTES
 
-MOST_AT_ONCE = 4 * 1024 * 1024  # bytes of one look
+MAX_AT_ONCE = 4 * 1024 * 1024  # bytes of one look
 
 
 class JournalFollower:
@@ -25,7 +25,7 @@ class JournalFollower:
         """Type and payload of every frame that is whole by now. Raises OSError where the file cannot be read."""
         with self._path.open("rb") as file:
             file.seek(self._position)
-            data = file.read(MOST_AT_ONCE)
+            data = file.read(MAX_AT_ONCE)
         at = 0
         while len(data) - at >= FRAME_HEAD.size:
             marker, kind, length, crc = FRAME_HEAD.unpack_from(data, at)

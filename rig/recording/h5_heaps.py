@@ -15,9 +15,9 @@ from rig.errors import RecordingError
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 HEAP = b"GCOL\x01\0\0\0"
-LARGEST_USER_BLOCK = 1 << 20
+MAX_USER_BLOCK = 1 << 20
 STRIDE = 64 << 20  # bytes that are looked through at once: of a long recording the map would fill the memory
-MOST_TEXTS = 500_000  # of a file; each costs a microsecond here
+MAX_TEXTS = 500_000  # of a file; each costs a microsecond here
 
 
 def check_heaps(path: str | Path) -> None:
@@ -38,9 +38,9 @@ def _check(path: Path, data: mmap.mmap) -> None:
         for step in _steps(data, at, width):
             texts += 1
             if step <= 0:
-                raise RecordingError(f"{path}: is damaged (a heap of texts has no end): export it again")
-            if texts > MOST_TEXTS:
-                raise RecordingError(f"{path}: holds more than {MOST_TEXTS} texts: keep the columns of numbers only")
+                raise RecordingError(f"{path}: is damaged (its string heap is endless): export it again")
+            if texts > MAX_TEXTS:
+                raise RecordingError(f"{path}: holds more than {MAX_TEXTS} texts: keep the columns of numbers only")
         at = _next_heap(data, at + 1)
 
 
@@ -58,7 +58,7 @@ def _next_heap(data: mmap.mmap, start: int) -> int:
 def _width_of_sizes(data: mmap.mmap) -> int:
     """Bytes of a size in this file; 0 where it is no HDF5 file."""
     at = 0
-    while at <= min(LARGEST_USER_BLOCK, len(data) - 16):
+    while at <= min(MAX_USER_BLOCK, len(data) - 16):
         if data[at : at + 8] == SIGNATURE:
             return min(data[at + (14 if data[at + 8] < 2 else 10)], 8)  # the library takes no wider one
         at = 2 * at or 512

@@ -33,9 +33,9 @@ _VALUES = ("name", "torque_hold", "use", *_NUMBERS)
 # What h5py raises over a damaged file; a link that leads nowhere reads as None.
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, MemoryError, RecursionError)
 # The library takes what a damaged reference to a text says it is long, up to 4 GiB, before it looks for the text.
-MOST_TEXT_BYTES = 256 << 20
-MOST_BYTES = 2 << 30  # all that is read, twice
-MOST_VALUES = 60_000_000  # half a gigabyte of numbers: an hour of six channels at 2 kHz is a third of it
+MAX_TEXT_BYTES = 256 << 20
+MAX_BYTES = 2 << 30  # all that is read, twice
+MAX_VALUES = 60_000_000  # half a gigabyte of numbers: an hour of six channels at 2 kHz is a third of it
 
 
 def write_recording_h5(path: str | Path, recording: Recording, journal: JournalContents | None = None) -> None:
@@ -118,8 +118,8 @@ def read_recording_h5(path: str | Path, *, with_info: bool = True) -> Recording:
     """
     try:
         check_heaps(path)
-        with h5py.File(path, "r") as file, at_most(MOST_BYTES):
-            with at_most(MOST_TEXT_BYTES):
+        with h5py.File(path, "r") as file, at_most(MAX_BYTES):
+            with at_most(MAX_TEXT_BYTES):
                 if file.attrs.get("format") != FORMAT:
                     raise RecordingError(
                         f"{path}: is not a recording of this program: map its columns under `recorded`"
@@ -144,18 +144,18 @@ class _Reader:
 
     def __init__(self, path: str | Path) -> None:
         self._path = path
-        self._values_left = MOST_VALUES
+        self._values_left = MAX_VALUES
 
     def run(self, group: h5py.Group) -> Run:
         """One run. Raises RecordingError, or what _DAMAGE lists."""
-        with at_most(MOST_TEXT_BYTES):
+        with at_most(MAX_TEXT_BYTES):
             values: dict[str, Any] = {name: group.attrs[name] for name in _VALUES if name in group.attrs}
         values = {name: float(value) if name in _NUMBERS else str(value) for name, value in values.items()}
         arrays: dict[str, Any] = {name: self._numbers(group, name) for name in _ARRAYS if name in group}
         arrays["valid"] = np.asarray(arrays["valid"], dtype=bool)
         inner = group.get("channels", {})
         channels = {name: self._numbers(inner, name) for name in inner}
-        with at_most(MOST_TEXT_BYTES):
+        with at_most(MAX_TEXT_BYTES):
             causes = {name: _cause(name, inner[name].attrs) for name in inner if inner[name].attrs.get("kind") in KINDS}
         return Run(**values, **arrays, channels=channels, causes=causes)
 
@@ -169,7 +169,7 @@ class _Reader:
             raise RecordingError(f"{self._path}: {name!r} holds {data.dtype} values, not numbers")
         self._values_left -= data.size
         if self._values_left < 0:
-            raise RecordingError(f"{self._path}: holds more than {MOST_VALUES} values: cut it into several recordings")
+            raise RecordingError(f"{self._path}: holds more than {MAX_VALUES} values: cut it into several recordings")
         return np.asarray(data[()], dtype=np.float64)
 
 

@@ -13,7 +13,7 @@ RECORDING_FILE = "recording.h5"
 RECOVERED_FILE = "recovered.h5"
 JOURNAL_FILE = "recording.journal"
 EARLIER_JOURNAL = "earlier_{}.journal"
-MOST_FILES = 1000
+MAX_FILES = 1000
 
 
 def journals_of(folder: Path) -> list[Path]:
@@ -38,7 +38,7 @@ def free_name(folder: Path, name: str) -> Path:
     Raises RecordingError where a thousand are taken.
     """
     path = folder / name
-    numbered = (path.with_stem(f"{path.stem}_{n}") for n in range(2, MOST_FILES))
+    numbered = (path.with_stem(f"{path.stem}_{n}") for n in range(2, MAX_FILES))
     for candidate in (path, *numbered):
         if not candidate.exists() and not candidate.is_symlink():
             return candidate

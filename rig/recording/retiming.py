@@ -16,8 +16,8 @@ from rig.arrays import Array
 
 BEGUN_S = "begun_s"
 EVENT_KEY = "restamped"
-MOST_POINTS = 10_000_000
-LARGEST_STEP_S = 1.0  # what a file says must not turn a recording upside down
+MAX_POINTS = 10_000_000
+MAX_STEP_S = 1.0  # what a file says must not turn a recording upside down
 
 
 class Retiming(NamedTuple):
@@ -42,9 +42,9 @@ def _points(pairs: Sequence[Sequence[float]], start_s: float) -> Array | None:
     points = np.array(pairs, dtype=float) - start_s
     if points.size == 0:
         return None
-    if points.ndim != 2 or len(points) != 2 or points.size > MOST_POINTS or not np.all(np.isfinite(points)):
+    if points.ndim != 2 or len(points) != 2 or points.size > MAX_POINTS or not np.all(np.isfinite(points)):
         raise ValueError("points of a map of times are two rows of finite numbers")
-    if np.any(np.diff(points, axis=1) <= 0.0) or np.any(np.abs(points[1] - points[0]) > LARGEST_STEP_S):
+    if np.any(np.diff(points, axis=1) <= 0.0) or np.any(np.abs(points[1] - points[0]) > MAX_STEP_S):
         raise ValueError("a map of times keeps their order, and moves none by more than a second")
     return points
 

@@ -58,7 +58,7 @@ def plain_column(path: Path, name: str, values: Any) -> Array:
     if array.dtype.kind not in "fiub":
         raise RecordingError(f"{where} holds {array.dtype} values, not numbers: save it as numbers")
     if array.ndim == 0:
-        raise RecordingError(f"{where} is a single number: it needs one value a sample")
+        raise RecordingError(f"{where} is a single number: it needs one value per sample")
     if array.size != max(array.shape):
         raise RecordingError(
             f"{where} has shape {array.shape}: save each quantity as an array of its own, of shape (n,)"

@@ -14,7 +14,7 @@ from rig.preflight.simulated_sets import Peaks, SetForecast, SetSequence, has_no
 
 CLEARLY = 0.8  # of the limit: a prediction above it is within what a declared model is good for
 FACTOR = 2.0  # by which each declared number is changed, to see which of them makes the motion larger
-LARGER = 1.1  # times the predicted motion: less does not explain a trip
+MIN_EXCESS_RATIO = 1.1  # times the predicted motion: less does not explain a trip
 NAMED = 2  # suspects in a sentence
 
 
@@ -56,7 +56,7 @@ def suspected_parameter(trip: Trip, declared: Platform, sets: Sequence[PlannedSe
         "the declared damping may be too large": replace(declared, damping_nm_s_rad=c / FACTOR),
     }
     larger = {words: float(getattr(_peaks(p, sets, rest_s), quantity)) for words, p in others.items() if p != declared}
-    suspects = [w for w in sorted(larger, key=lambda w: -larger[w]) if larger[w] > LARGER * predicted]
+    suspects = [w for w in sorted(larger, key=lambda w: -larger[w]) if larger[w] > MIN_EXCESS_RATIO * predicted]
     what = " or ".join(suspects[:NAMED]) or "the declared model may lack an effect"
     return f"The declared model predicted at most {predicted:.3g} {trip.unit} in this set: {what}."
 

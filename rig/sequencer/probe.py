@@ -20,25 +20,25 @@ from rig.errors import SafetyTrip
 from rig.excitation import PlannedSet
 from rig.guard.base import Rest, Tick
 from rig.platform import Platform
-from rig.sequencer.pulse_inertia import FEWEST_SAMPLES, InertiaRange, estimate_inertia, initial_direction
+from rig.sequencer.pulse_inertia import MIN_SAMPLES, InertiaRange, estimate_inertia, initial_direction
 
 SHORTEST_S, LONGEST_S = 0.01, 0.1  # of a pulse: from ten samples at 1 kHz to what a campaign can wait for
 PERIOD_SHARE = 0.5  # of the declared period of the ring: the length of a pulse
 LISTEN_PERIODS = 0.6  # of the ring, after a pulse: beyond the first swing back
 LATE_S = 0.05  # samples and torque may be so late
-FIRST_RATE, LARGEST_RATE, LARGEST_TRAVEL = 0.05, 0.6, 0.3  # of the limits, by the declared model
+FIRST_RATE, MAX_RATE, MAX_TRAVEL = 0.05, 0.6, 0.3  # of the limits, by the declared model
 # Ratio of torques: a further pulse has to be harder by this. It decides how closely the largest torque allowed is tried
 # before a platform is called stuck: tests/rig/sequencer holds from 1.001 to 1.05.
-LEAST_STEP = 1.02
+MIN_STEP = 1.02
 # Ratio to the first pulse: three doublings. By the declared model this is 8 FIRST_RATE = 0.4 of the rate limit.
 GENTLE_STEPS = 8.0
-LARGEST_TORQUE = 0.3  # of the campaign's
+MAX_TORQUE = 0.3  # of the campaign's
 # A response counts if its peak exceeds both: so many standard deviations of the noise (the peak is then known to 1 in
 # 40), and this rate. More of either takes harder pulses, less trusts a smaller motion. Calibration:
 # tests/rig/sequencer holds from 5 to 160 sigma and from 0.5 to 12 deg/s; above, a scale wrong by three is no longer
 # recognised under 15 N m of friction.
-CLEAR_SIGMAS, CLEAR_LEAST_RAD_S = 40.0, math.radians(5.0)
-MOST_LEVELS = 16  # pulses: doublings from the first torque to any limit
+CLEAR_SIGMAS, CLEAR_MIN_RAD_S = 40.0, math.radians(5.0)
+MAX_LEVELS = 16  # pulses: doublings from the first torque to any limit
 RANGE_TOLERANCE = 0.9  # a range may stick out of the allowed one by a tenth
 # Of the peak rate of a pulse: slower at its beginning, the platform started from rest, and its first motion gives the
 # sign; else the sign of the pulse before is kept. Not critical: tests/rig/sequencer holds from 0.005 to 0.4.
@@ -80,13 +80,13 @@ class Probe:
         peak_rate, peak_angle = _predicted_response(platform, self.pulse_s)
         rate = math.radians(limits.rate_deg_s)
         # What a harder pulse adds, were the inertia half of what is declared, has to stay below these.
-        self._rate_per_nm, self._most_rad_s = 2.0 * peak_rate, LARGEST_RATE * rate
-        self._step_nm = LARGEST_TRAVEL * math.radians(limits.travel_deg) / (2.0 * peak_angle)
+        self._rate_per_nm, self._most_rad_s = 2.0 * peak_rate, MAX_RATE * rate
+        self._step_nm = MAX_TRAVEL * math.radians(limits.travel_deg) / (2.0 * peak_angle)
         campaign_nm = max(_peak_torque_nm(s) for s in sets) if sets else limits.torque_nm
         given = config.torque_nm
         first_nm = FIRST_RATE * rate / peak_rate
         # A campaign of little torque is probed with more of it, as far as that is little for the platform.
-        own_nm = max(LARGEST_TORQUE * campaign_nm, min(campaign_nm, GENTLE_STEPS * first_nm))
+        own_nm = max(MAX_TORQUE * campaign_nm, min(campaign_nm, GENTLE_STEPS * first_nm))
         self.largest_nm = min(own_nm if given is None else given, limits.torque_nm)
         self._torque_nm = min(first_nm, self.largest_nm)
         self._direction, self._sign = 1.0, 0.0
@@ -117,7 +117,7 @@ class Probe:
         answer = self._evaluate_pulse(self._clear_rate_per_nm)
         room_nm = min((self._most_rad_s - answer.peak_rad_s) / self._rate_per_nm, self._step_nm, self._torque_nm)
         next_nm = min(self._torque_nm + room_nm, self.largest_nm)
-        is_last = next_nm < LEAST_STEP * self._torque_nm or len(self._responses) >= MOST_LEVELS
+        is_last = next_nm < MIN_STEP * self._torque_nm or len(self._responses) >= MAX_LEVELS
         if is_last and answer.inertia is None:
             answer = self._evaluate_pulse(0.0)  # what little there is has to do, friction being fitted too
         self._responses.append(answer)
@@ -141,9 +141,9 @@ class Probe:
         data = np.array(self._samples, dtype=float).reshape(-1, 2)
         data = data[(data[:, 0] >= self._pulse_at_s) & (data[:, 0] <= self._pulse_at_s + self.pulse_s + self._listen_s)]
         peak = float(np.max(np.abs(data[:, 1]))) if len(data) else 0.0
-        clear = max(CLEAR_SIGMAS * self._rest.noise_rad_s, CLEAR_LEAST_RAD_S, clear_share * self._torque_nm)
+        clear = max(CLEAR_SIGMAS * self._rest.noise_rad_s, CLEAR_MIN_RAD_S, clear_share * self._torque_nm)
         # An answer that is larger than foreseen is clear too: the inertia may be the one that is wrong.
-        if peak < clear or len(data) < FEWEST_SAMPLES:
+        if peak < clear or len(data) < MIN_SAMPLES:
             return PulseResponse(self._torque_nm, peak, None)
         if self._sign == 0.0 or abs(data[0, 1]) < STILL_SHARE * peak:  # else it still rings from the pulse before
             self._sign = self._direction * initial_direction(data[:, 1])

@@ -36,7 +36,7 @@ def test_regular_clocks_are_stamped_anew_so_that_what_is_said_of_them_is_looked_
 ) -> None:
     drive, gyro = regular_clocks()
     assert clocks(drive) == len(drive) and clocks(gyro) == len(gyro)
-    monkeypatch.setattr(can_targets, "LARGEST_CORRECTION_S", -1.0)
+    monkeypatch.setattr(can_targets, "MAX_CORRECTION_S", -1.0)
     for regular in (drive, gyro):
         with pytest.raises(AssertionError, match="too far"):
             clocks(regular)

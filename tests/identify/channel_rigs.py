@@ -33,7 +33,7 @@ def nothing(_time: float, _angle: float, _rate: float) -> float:
 
 def played(
     channel: Channel, reading: Scalar, *, load: Load = nothing, shaft: Shaft = as_asked, reading_noise: float = 0.02,
-    seed: int = 0, duration_s: float = 4.0, sets: Sequence[tuple[float, float]] = SETS,
+    seed: int = 0, duration_s: float = 2.5, sets: Sequence[tuple[float, float]] = SETS,
 ) -> Recording:  # fmt: skip
     """A campaign from rest, set by set, with the channel as a noisy sensor beside it reads it."""
     rng = np.random.default_rng(seed)
@@ -68,7 +68,7 @@ def run(
     )  # fmt: skip
 
 
-def sagging(torque_constant: float, seed: int = 0, duration_s: float = 4.0, reading_noise: float = 0.0005) -> Recording:
+def sagging(torque_constant: float, seed: int = 0, duration_s: float = 2.5, reading_noise: float = 0.0005) -> Recording:
     """A drive whose bus sags under what it gives: a third state, so that the current departs from what was asked."""
     rng = np.random.default_rng(seed)
     runs = []

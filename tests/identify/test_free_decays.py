@@ -45,8 +45,16 @@ def pendulum(
     return Run("decay", time, np.ones(len(time), dtype=bool), angle_rad=angle)
 
 
-def test_a_decay_at_the_sensors_noise_names_gravity_friction_and_drag() -> None:
-    found = identify(Recording((pendulum(duration_s=40.0),)), Platform(1.0, 0.1, 20.0), QUIET)
+@pytest.mark.parametrize(
+    "offered",
+    [
+        ["unbalance", "coulomb_friction", "quadratic_damping", "stribeck_friction", "cubic_stiffness"],
+        pytest.param(None, marks=pytest.mark.slow),  # the whole library
+    ],
+)
+def test_a_decay_at_the_sensors_noise_names_gravity_friction_and_drag(offered: list[str] | None) -> None:
+    settings = IdentifyConfig.model_validate({"candidates": offered})
+    found = identify(Recording((pendulum(0.01, 40.0),)), Platform(1.0, 0.1, 20.0), settings)
     assert set(found.verdict.effects) == {"unbalance", "coulomb_friction", "quadratic_damping"}
     effects = found.final.effect_parameters
     assert effects["unbalance"]["sine"].value == pytest.approx(GRAVITY, rel=1e-3)
@@ -105,5 +113,5 @@ def test_where_a_decay_began_is_fitted_though_the_smoothed_start_is_off() -> Non
 def test_an_added_inertia_without_torque_is_refused_with_what_to_do() -> None:
     bare = pendulum(duration_s=20.0)
     loaded = replace(bare, name="with ring", added_inertia_kg_m2=0.02)
-    with pytest.raises(RecordingError, match=r"with ring .* 0\.02 .*each load by themselves"):
+    with pytest.raises(RecordingError, match=r"with ring .* 0\.02 .*each load separately"):
         identify(Recording((bare, loaded)), Platform(1.0, 0.1, 20.0), QUIET)

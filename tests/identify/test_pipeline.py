@@ -30,7 +30,7 @@ HIGH = Platform(0.2, 0.45, 6773.0)
 
 @cache
 def recording(*, friction: bool = True) -> Recording:
-    return campaign({"coulomb_friction": {"level": 1.0}} if friction else None, duration_s=4.0)
+    return campaign({"coulomb_friction": {"level": 1.0}} if friction else None, duration_s=2.5)
 
 
 @cache
@@ -195,7 +195,7 @@ def test_who_stops_the_search_gets_what_there_is_and_is_told_so(stop: BaseExcept
         if text.startswith("added"):
             raise stop
 
-    found = identify(campaign({"coulomb_friction": {"level": 1.0}}, duration_s=4), LOW, SETTINGS, interrupt)
+    found = identify(campaign({"coulomb_friction": {"level": 1.0}}, duration_s=2.5), LOW, SETTINGS, interrupt)
     assert found.aborted
     assert not found.accepted
     assert found.reasons == (interrupted_reason(found.verdict.effects),)
@@ -208,7 +208,7 @@ def test_who_stops_before_anything_is_fitted_gets_nothing() -> None:
         raise Aborted("Stopped by Ctrl-C.")
 
     with pytest.raises(Aborted):
-        identify(campaign(duration_s=4), LOW, SETTINGS, interrupt)
+        identify(campaign(duration_s=2.5), LOW, SETTINGS, interrupt)
 
 
 @pytest.mark.parametrize(("scale", "named"), [(1.0, ()), (1.05, ("torque_scale",))])

@@ -164,7 +164,7 @@ def test_ctrl_c_ends_with_130_keeps_what_is_done_and_says_how_to_go_on(
         out, err = client.communicate(timeout=FAR_S)
     assert client.returncode == 130, err
     assert out == ""
-    assert f"of {COUNT} rows are kept in {table}.journal: the same command goes on there" in err
+    assert f"of {COUNT} rows are kept in {table}.journal: run the same command to continue" in err
     assert "Stopped by Ctrl-C" in err
     assert "Traceback" not in err
     assert not psutil.wait_procs(workers, timeout=FAR_S)[1]

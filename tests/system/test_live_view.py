@@ -89,7 +89,7 @@ def live(tmp_path: Path) -> Iterator[LiveRun]:
 
 def test_the_stop_button_takes_the_torque_off_as_the_drive_saw_it(live: LiveRun) -> None:
     page = live.browser
-    page.wait_for("parseFloat(document.getElementById('peak').textContent) > 20.0")
+    page.wait_for("parseFloat(document.getElementById('peak').textContent) > 20.0")  # N m, at the crest of the set
     assert "± " in page.evaluate("document.querySelector('#fit tbody').textContent")
     drawn = (
         "[...document.querySelectorAll('canvas')].every(c => c.getContext('2d').getImageData(0, 0, c.width, c.height)"

@@ -77,7 +77,7 @@ def disturbance_section(a: SavedResult, b: SavedResult) -> Section:
         moved = [percent(one.moves_percent.get(name)) for one in (first, last)]
         rows.append((f"moves {SYMBOLS.get(name, plain(name))} by", *moved, "", ""))
     letters = [letter for letter, one in (("A", a), ("B", b)) if one.disturbance is None]
-    notes = [f"{letter} has none: it is told only where a torque was recorded." for letter in letters]
+    notes = [f"{letter} has none: it is computed only if a torque was recorded." for letter in letters]
     if len(letters) == 2:
         rows = []
     return Section("Disturbance: the torque left after the final model", ("", "A", "B", "B / A", "unit"), tuple(rows),

@@ -11,7 +11,7 @@ from identify.report.comparison.saved import SavedNumber, SavedResult
 from identify.report.comparison.section import Section
 from identify.wording import capital, plain, sentence, title
 
-RULE = "Beyond both: the change is larger than both 95 % intervals, which have no point in common."
+RULE = "Beyond both: the change is larger than each 95 % interval, and the two intervals do not overlap."
 TERMS = ("inertia", "damping", "stiffness")
 
 
@@ -57,8 +57,8 @@ def _overview(a: SavedResult, b: SavedResult, names: tuple[str, str], changed: l
             notes.append(f"{letter} was stopped: its numbers are those of the samples recorded before.")
         if one.is_torque_free and not (a.is_torque_free and b.is_torque_free):
             notes.append(
-                f"{letter} has no torque, so only ratios to the inertia are known: C/J and K/J have no counterpart "
-                "beside J, C and K."
+                f"{letter} has no torque, so only ratios to the inertia are known: C/J and K/J cannot be "
+                "compared with J, C and K."
             )
         notes += [f"{letter} was not accepted: {sentence(reason)}" for reason in one.reasons if not one.accepted]
     return Section("Comparison", ("", "A", "B"), tuple(rows), tuple(notes), words=(0, 1, 2))
@@ -85,8 +85,8 @@ def _parameters(a: SavedResult, b: SavedResult) -> tuple[Section, list[str]]:
             changed.append(f"{line.words} ({change.relative})" if change.relative != ABSENT else line.words)
     if set(a.final.effect_parameters) != set(b.final.effect_parameters):
         notes.append(
-            "The two models have different effects, and J, C and K are those beside the effects: an effect that only "
-            "one of them has may account for their change."
+            "The two models have different effects: a change of J, C or K may be due to an effect that only one of "
+            "them includes."
         )
     head = ("", "A", "B", "B - A", "of A", "beyond both", "unit")
     found = Section("Parameters of the final models, with 95 % intervals", head, tuple(rows), (RULE, *notes), (0, 6))

@@ -21,12 +21,12 @@ from rig.arrays import Array
 # 2007).
 PENALTY = 3.0
 SHORTEST = 2  # campaigns of a level; a single one that is off is an outlier
-FEWEST = 6  # campaigns: with fewer, the scatter is not known
+MIN_CAMPAIGNS = 6  # campaigns: with fewer, the scatter is not known
 # The median of few steps is often too small, and every deviation then seems a change: its square is raised by this
 # over n. Of 100 series of 8 campaigns without a change 14 showed one without it, 7 do with it
 # (`python -m benchmarks.batch --changes`).
 SPARE = 8.0
-FAR = 4.0  # standard deviations; chance shows one such step in 16000
+CHANGE_SIGMAS = 4.0  # standard deviations; chance shows one such step in 16000
 MEDIAN_OF_NORMAL = 0.6745  # median of |x| in standard deviations
 
 
@@ -59,7 +59,7 @@ def levels(values: Array, std_errors: Array) -> tuple[Level, ...]:
     sigma = np.sqrt(std_errors**2 + scatter(values, std_errors) ** 2)
     sigma = np.maximum(sigma, max(1e-9 * float(np.max(np.abs(values))), 1e-150))  # of equal values nothing scatters
     weights = 1.0 / np.maximum(sigma, _lonely(values, sigma)) ** 2
-    cuts = _cuts(values, weights) if n >= FEWEST else [0, n]
+    cuts = _cuts(values, weights) if n >= MIN_CAMPAIGNS else [0, n]
     out = []
     for first, end in pairwise(cuts):
         w = weights[first:end]
@@ -70,7 +70,7 @@ def levels(values: Array, std_errors: Array) -> tuple[Level, ...]:
 
 def scatter(values: Array, std_errors: Array) -> float:
     """Standard deviation from campaign to campaign beyond the intervals, in the unit of the values."""
-    if len(values) < FEWEST:
+    if len(values) < MIN_CAMPAIGNS:
         return 0.0
     steps = np.abs(np.diff(values))
     of_steps = (float(np.median(steps)) / MEDIAN_OF_NORMAL) ** 2 / 2.0 * (1.0 + SPARE / len(values))
@@ -80,17 +80,17 @@ def scatter(values: Array, std_errors: Array) -> float:
 def _lonely(values: Array, sigma: Array) -> Array:
     """How far a campaign is off that stands alone, shape (n,); 0 for all others. It then weighs next to nothing.
 
-    Alone is what lies beyond both neighbours by more than ``FAR`` standard deviations of such a step; the first and the
-    last, beyond the next two.
+    Alone is what lies beyond both neighbours by more than ``CHANGE_SIGMAS`` standard deviations of such a step; the
+    first and the last, beyond the next two.
     """
     n = len(values)
     out = np.zeros(n)
-    if n < FEWEST:
+    if n < MIN_CAMPAIGNS:
         return out
     i = np.arange(n)
     near = np.stack([np.where(i == 0, 2, i - 1), np.where(i == n - 1, n - 3, i + 1)])
     steps = values - values[near]
-    far = np.abs(steps) > FAR * np.hypot(sigma, sigma[near])
+    far = np.abs(steps) > CHANGE_SIGMAS * np.hypot(sigma, sigma[near])
     alone = far.all(axis=0) & (steps[0] * steps[1] > 0.0)
     out[alone] = np.abs(steps).max(axis=0)[alone]
     return out

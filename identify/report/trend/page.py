@@ -10,7 +10,7 @@ from typing import Any
 from identify.report.page.document import Gallery, document
 from identify.report.page.markup import Markup, Piece, bullets, element, join, paragraph, section, table
 from identify.report.page.plots.figure import AFTER, BEFORE, MEASURED, Figure, Panel, Trace, grid, upright
-from identify.report.trend.change_points import FEWEST, Level
+from identify.report.trend.change_points import MIN_CAMPAIGNS, Level
 from identify.report.trend.series import Campaign, Estimate, Series, has_dates, heading, in_order, series_of
 from identify.results import ParameterEstimate
 from identify.wording import joined, number, percent, plain, printable, unit, with_interval
@@ -47,8 +47,8 @@ def _rig(anchor: str, name: str, campaigns: Sequence[Campaign], gallery: Gallery
     found = series_of(campaigns)
     changes = [line for one in found for line in change_sentences(one, campaigns)]
     if not changes:
-        few = len(campaigns) < FEWEST
-        changes = [f"Fewer than {FEWEST} campaigns: no change is looked for." if few else "No change was found."]
+        few = len(campaigns) < MIN_CAMPAIGNS
+        changes = [f"Detecting a change takes at least {MIN_CAMPAIGNS} campaigns." if few else "No change was found."]
     return section(
         anchor,
         printable(name),
@@ -99,8 +99,8 @@ def _figure(name: str, campaigns: Sequence[Campaign], found: Sequence[Series]) -
     quantities = joined([panel.title for panel in panels])
     return Figure(
         label=f"{printable(name)}: {quantities} from campaign to campaign",
-        caption="Points with 95 % intervals; lines are levels, dotted where one gives way to the next. "
-        + ("" if dated else "Not all campaigns say when they were played, so they stand in the order of their paths."),
+        caption="Points: campaigns with 95 % intervals. Lines: constant levels, dotted between two levels. "
+        + ("" if dated else "Some campaigns have no date, so all are sorted by path."),
         traces=traces,
         layout=layout,
         height=PANEL_PX * len(panels) + MARGIN_PX,

@@ -22,7 +22,7 @@ MAX_FILE_BYTES = 256 * 1024
 MAX_NODES = 20_000
 MAX_CHARACTERS = 2_000_000
 MAX_DEPTH = 40
-MOST_BRACKETS = 200  # open at once, those in quotes and comments counted too
+MAX_BRACKETS = 200  # open at once, those in quotes and comments counted too
 _BRACKETS = re.compile(r"[\[\]{}]")
 
 KeyPath = tuple[str | int, ...]
@@ -148,7 +148,7 @@ def _refuse_deep_brackets(text: str, source: str) -> None:
     depth = 0
     for bracket in _BRACKETS.finditer(text):
         depth = depth + 1 if bracket.group() in "[{" else max(0, depth - 1)
-        if depth > MOST_BRACKETS:
+        if depth > MAX_BRACKETS:
             raise ConfigError(f"{source}: nested too deeply: a configuration has at most {MAX_DEPTH} levels")
 
 

@@ -25,7 +25,7 @@ def read(path: Path) -> Sequence[Table]:
             groups = [group for i in range(len(file.groups)) if (group := _group(file, i)).columns]
             raw = any(str(c.name).startswith(RAW_CAN) for g in file.groups for c in g.channels)
     except Exception as error:
-        raise RecordingError(f"{path}: is no sound MDF file ({error}): export the recording again") from error
+        raise RecordingError(f"{path}: is not a valid MDF file ({error}): export the recording again") from error
     if raw and not groups:
         raise RecordingError(
             f"{path}: holds raw CAN frames and no signals: decode it with the DBC file first (asammdf: "

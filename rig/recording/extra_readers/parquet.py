@@ -29,7 +29,7 @@ def read(path: Path) -> Sequence[Table]:
             raise too_long(path, file.metadata.num_rows)
         table = file.read().flatten()
     except (pa.ArrowException, OSError, ValueError) as error:
-        raise RecordingError(f"{path}: is no sound Parquet file ({error}): export the recording again") from error
+        raise RecordingError(f"{path}: is not a valid Parquet file ({error}): export the recording again") from error
 
     def column(name: str) -> Any:
         return _values(path, name, table.column(name).combine_chunks())

@@ -19,8 +19,8 @@ from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.recording.table import MAX_SAMPLES, Table, read_each, too_long
 
-SLOW = 0.1  # of the fastest group's samples: below, a group is a thermometer or a state
-FEWEST = 10  # samples that make a group
+MIN_RATE_RATIO = 0.1  # of the fastest group's samples: below, a group is a thermometer or a state
+MIN_GROUP_SAMPLES = 10  # samples that make a group
 
 
 @dataclass(frozen=True)
@@ -59,11 +59,12 @@ def one_table(path: Path, groups: Sequence[Group]) -> Table:
 
     Raises RecordingError where no group has samples.
     """
-    timed = [g for g in groups if g.time_s is not None and len(g.time_s) >= FEWEST and _lasts_s(g) > 0.0]
+    timed = [g for g in groups if g.time_s is not None and len(g.time_s) >= MIN_GROUP_SAMPLES and _lasts_s(g) > 0.0]
     used = timed or [g for g in groups if g.columns]
     if not used:
         raise RecordingError(
-            f"{path}: holds no group of channels with {FEWEST} samples: export the recording again, or as CSV"
+            f"{path}: holds no group of channels with {MIN_GROUP_SAMPLES} samples: export the recording again, or "
+            "as CSV"
         )
     base = _base(timed) if timed else max(used, key=lambda g: max(len(v) for v in g.columns.values()))
     if base.time_s is not None and len(base.time_s) > MAX_SAMPLES:
@@ -90,7 +91,7 @@ def _lasts_s(group: Group) -> float:
 
 def _base(timed: Sequence[Group]) -> Group:
     rates = [len(g.time_s) / _lasts_s(g) for g in timed if g.time_s is not None]
-    measured = [(rate, i) for i, rate in enumerate(rates) if rate >= SLOW * max(rates)]
+    measured = [(rate, i) for i, rate in enumerate(rates) if rate >= MIN_RATE_RATIO * max(rates)]
     return timed[min(measured)[1]]
 
 

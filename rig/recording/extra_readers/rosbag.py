@@ -18,7 +18,7 @@ from rig.recording.readers.folder import ROS_METADATA
 from rig.recording.table import MAX_SAMPLES, Table, too_long
 
 NS = 1e-9
-MOST_ENTRIES = 12  # of an array in a message: joints and vectors, no images and point clouds
+MAX_ENTRIES = 12  # of an array in a message: joints and vectors, no images and point clouds
 SKIPPED = ("header", "orientation")  # a quaternion is no angle
 # By message type and field: the units that the ROS definitions fix (REP 103).
 UNITS = {
@@ -38,9 +38,7 @@ def read(path: Path) -> Sequence[Table]:
 
     bag = path if path.is_dir() or path.suffix.lower() == ".bag" else path.parent
     if bag.is_dir() and not (bag / ROS_METADATA).is_file():
-        raise RecordingError(
-            f"{path}: {ROS_METADATA} of the bag is missing beside it: restore it with `ros2 bag reindex`"
-        )
+        raise RecordingError(f"{path}: {ROS_METADATA} of the bag is missing: restore it with `ros2 bag reindex`")
     try:
         with AnyReader([bag], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             if reader.message_count > MAX_SAMPLES:
@@ -49,7 +47,9 @@ def read(path: Path) -> Sequence[Table]:
     except RecordingError:
         raise
     except Exception as error:
-        raise RecordingError(f"{path}: is no sound ROS bag ({error}): record it again, or export it as CSV") from error
+        raise RecordingError(
+            f"{path}: is not a valid ROS bag ({error}): record it again, or export it as CSV"
+        ) from error
     return [one_table(path, groups)]
 
 
@@ -89,7 +89,7 @@ def _numbers(message: Any, prefix: str) -> Iterator[tuple[str, float]]:
             continue
         if isinstance(value, bool | int | float | np.number):
             yield f"{prefix}{field}", float(value)
-        elif isinstance(value, np.ndarray | list) and 0 < len(value) <= MOST_ENTRIES:
+        elif isinstance(value, np.ndarray | list) and 0 < len(value) <= MAX_ENTRIES:
             for i, entry in enumerate(value):
                 if isinstance(entry, int | float | np.number):
                     label = labels[i] if isinstance(labels, list) and len(labels) == len(value) else i

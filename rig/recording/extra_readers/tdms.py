@@ -24,7 +24,7 @@ def read(path: Path) -> Sequence[Table]:
         file = TdmsFile.read(path)
         groups = [one for group in file.groups() for one in _groups(group)]
     except Exception as error:
-        raise RecordingError(f"{path}: is no sound TDMS file ({error}): export the recording again") from error
+        raise RecordingError(f"{path}: is not a valid TDMS file ({error}): export the recording again") from error
     return [one_table(path, groups)]
 
 

@@ -14,7 +14,7 @@ from rig.recording.stated_units import stated_unit
 from rig.recording.table import Table
 from rig.units import Unit, name_and_unit, unit_of
 
-FEWEST = 10  # numbers that make a column
+MIN_NUMBERS = 10  # numbers that make a column
 LONGEST_SUFFIX = 3  # words of a name that may be its unit: "torque_n_m", "rate_rad_s"
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[^\W\dA-Za-z_]+", re.UNICODE)
 
@@ -109,7 +109,7 @@ def _column(table: Table, name: str, values: Array | str, length: int) -> Column
 def _unusable(values: Array, length: int) -> str:
     if len(values) != length:
         return f"has {len(values)} values, the others have {length}"
-    if np.isfinite(values).sum() < FEWEST:
+    if np.isfinite(values).sum() < MIN_NUMBERS:
         return f"has {int(np.isfinite(values).sum())} numbers"
     return ""
 

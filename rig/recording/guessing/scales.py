@@ -11,7 +11,7 @@ from rig.recording.guessing.columns import Column
 from rig.recording.guessing.roles import COUNTERS, Choice, Quantity, relation
 from rig.units import DEG, DIMENSIONS, SI, TURN
 
-NEAR = 0.03  # relative, of a factor between angle and rate
+FACTOR_TOLERANCE = 0.03  # relative, of a factor between angle and rate
 SAME_MOTION = 0.95
 # Where nobody says the unit: above this a number is rather degrees than radians.
 DEGREES_FROM = {"rate": 100.0, "angle": TURN}
@@ -135,12 +135,12 @@ def _both_unknown(factor: float, large: bool) -> dict[Quantity, Factor]:
     sign, turned = (1.0, "") if factor > 0 else (-1.0, ", with the opposite sign")
     why = f"as the angle changes {abs(factor):.4g} times as fast as the rate says"
     for angle_unit, of_angle, rate_unit, of_rate in PAIRS:
-        if abs(of_angle * abs(factor) / of_rate - 1.0) < NEAR:
+        if abs(of_angle * abs(factor) / of_rate - 1.0) < FACTOR_TOLERANCE:
             return {
                 "angle": Factor(of_angle, f"{angle_unit}, {why}", True),
                 "rate": Factor(sign * of_rate, f"{rate_unit}{turned}, {why}", sign > 0),
             }
-    if abs(abs(factor) - 1.0) >= NEAR:
+    if abs(abs(factor) - 1.0) >= FACTOR_TOLERANCE:
         return {}
     value, unit = (DEG, "deg") if large else (1.0, "rad")
     why = "as angle and rate agree, and neither says its unit"
@@ -165,6 +165,6 @@ def _snapped(factor: float, quantity: str) -> Factor:
     units += [("rpm", TURN / 60)] if quantity == "rate" else []
     turned = "" if factor > 0 else ", with the opposite sign"
     for unit, value in units:
-        if abs(abs(factor) / value - 1.0) < NEAR:
+        if abs(abs(factor) / value - 1.0) < FACTOR_TOLERANCE:
             return Factor(float(np.sign(factor)) * value, f"{unit}{turned}, as it agrees with the {other}", factor > 0)
     return Factor(float(f"{factor:.6g}"), f"a unit of its own{turned}, by comparison with the {other}", False)

@@ -65,7 +65,7 @@ def _of_h5(path: Path) -> BlockTable | None:
     from rig.recording.readers import h5  # noqa: PLC0415
 
     check_heaps(path)
-    with h5py.File(path, "r") as file, at_most(hdf5.MOST_TEXT_BYTES):
+    with h5py.File(path, "r") as file, at_most(hdf5.MAX_TEXT_BYTES):
         if file.attrs.get("format") == hdf5.FORMAT:
             return None
         inner = h5.datasets(file)

@@ -92,7 +92,10 @@ def all_lines(path: Path, encoding: str) -> Iterator[tuple[int, str]]:
         while line := text_file.readline(MAX_LINE_CHARACTERS):
             number += 1
             if number > MAX_LINES:
-                raise RecordingError(f"{path}: more than {MAX_LINES} lines, empty ones counted: is it a recording?")
+                raise RecordingError(
+                    f"{path}: more than {MAX_LINES} lines (empty ones included), the most that is read: "
+                    "split it into runs"
+                )
             characters += len(line)
             if characters > MAX_CHARACTERS:
                 raise RecordingError(f"{path}: unpacks to more than {MAX_CHARACTERS >> 30} GiB: cut it into runs")
@@ -115,7 +118,7 @@ def _encoding(path: Path) -> str:
     if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16"
     if b"\0" in head:
-        raise RecordingError(f"{path}: is not text, whatever its suffix says: export the recording as CSV")
+        raise RecordingError(f"{path}: is not a text file, despite its suffix: export the recording as CSV")
     try:
         codecs.getincrementaldecoder("utf-8")().decode(head)  # the last character may be cut
     except UnicodeDecodeError:

@@ -25,7 +25,7 @@ def read(path: Path) -> Sequence[Table | Run]:
     try:
         check_heaps(path)
         with h5py.File(path, "r") as file:
-            with at_most(hdf5.MOST_TEXT_BYTES):
+            with at_most(hdf5.MAX_TEXT_BYTES):
                 ours = file.attrs.get("format") == hdf5.FORMAT
             columns = {} if ours else datasets(file)
     except _DAMAGE as error:
@@ -66,7 +66,7 @@ def _array(path: Path, name: str, inner: str) -> Any:
             count = int(np.prod(dataset.shape or (0,), dtype=object))
             if count * max(1, dataset.dtype.itemsize) > 16 * MAX_SAMPLES:
                 raise too_long(path, count)
-            with at_most(hdf5.MOST_BYTES):
+            with at_most(hdf5.MAX_BYTES):
                 return dataset[()]
     except _DAMAGE as error:
         raise RecordingError(f"{path}: dataset {name!r} is damaged ({error}): export it again") from error

@@ -92,7 +92,7 @@ def test_what_cannot_be_exported_is_said_and_leaves_no_folder(tmp_path: Path) ->
     write_recording_h5(tmp_path / "recording.h5", Recording((held_run(),)))
     for source, to, said in (
         ("recording.h5", "xlsx", "choose one of csv, mat, npz, blf, asc, mf4"),
-        ("a.csv", "mat", "a table already"),
+        ("a.csv", "mat", "is already a table"),
         ("absent.h5", "csv", "no such file"),
         ("recording.h5", "blf", "only a bench run has a CAN log"),
     ):

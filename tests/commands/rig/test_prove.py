@@ -113,7 +113,7 @@ def test_a_rival_is_played_too_and_the_worse_one_refuted(tmp_path: Path, monkeyp
 def test_an_unknown_rival_is_said_and_nothing_moves(folder: Path) -> None:
     before = contents(folder)
     done = command(app, "prove", folder, "--rival", "backlash")
-    assert done.exit_code == 2 and "--rival backlash: this result has no such rival" in done.stderr
+    assert done.exit_code == 2 and "--rival backlash: this result has no such alternative" in done.stderr
     assert contents(folder) == before
 
 

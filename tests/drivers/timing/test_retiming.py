@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drivers.amplifiers.torque_clock import TorqueClock
-from drivers.timing.retiming import LARGEST_CORRECTION_S, OWN_LINE, ClockRetiming
+from drivers.timing.retiming import MAX_CORRECTION_S, OWN_LINE, ClockRetiming
 from drivers.timing.source_clock import SourceClock
 
 START_S = 1000.0
@@ -177,7 +177,7 @@ def test_maps_that_contradict_each_other_by_milliseconds_are_left_alone():
     hindsight.begin_set(2000.0)
     at = START_S + 40.0
     for k in range(100):
-        hindsight.record(at + k * 1e-3 + 2 * LARGEST_CORRECTION_S, at - START_S + k * 1e-3, OWN_LINE)
+        hindsight.record(at + k * 1e-3 + 2 * MAX_CORRECTION_S, at - START_S + k * 1e-3, OWN_LINE)
     hindsight.end_tick()
     hindsight.end_set()
     assert len(hindsight.retimed_sets()) == 4

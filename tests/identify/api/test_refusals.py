@@ -114,7 +114,7 @@ REFUSED = {
     ),
     "declared's platform": (
         partial(good, declared=Platform(-1.0)),
-        "declared: this platform is none that a model may have",
+        "declared: this platform is not a valid model",
     ),
     "settings": (
         partial(good, settings={"candidate": []}),
@@ -140,10 +140,13 @@ REFUSED = {
         partial(good, channels={"winding": {"kind": "temperature", "values": T[:4]}}),
         "channels['winding']['values'] has 4 values and time_s has 200",
     ),
-    "torque beside a recording": (partial(identify, Recording((RUN,)), M), "torque_nm was given beside a Recording"),
+    "torque beside a recording": (
+        partial(identify, Recording((RUN,)), M),
+        "torque_nm cannot be combined with a Recording",
+    ),
     "axis beside a recording": (
         partial(identify, Recording((RUN,)), axis="rotary"),
-        "axis was given beside a Recording",
+        "axis cannot be combined with a Recording",
     ),
     "no run": (partial(identify, Recording(())), "the recording has no runs: pass at least one"),
     "no Run": (partial(identify, Recording((T,))), "where a Run has to be: make it with rig.Run"),  # type: ignore[arg-type]

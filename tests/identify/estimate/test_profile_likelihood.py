@@ -11,7 +11,7 @@ import pytest
 from identify.estimate.final_fit import Fitted, by_output_error
 from identify.estimate.output_error import Estimate, refine
 from identify.estimate.profile_likelihood import settled
-from identify.estimate.started_at_rest import hangs_on_rings, held_to_rest
+from identify.estimate.started_at_rest import depends_on_ringing, with_fixed_initial_state
 from identify.model.structure import Structure
 from identify.signals.prepare import prepare
 from identify.signals.trace import Trace
@@ -121,8 +121,8 @@ def test_a_well_known_inertia_is_left_alone() -> None:
     def never(*_: object, **__: object) -> Estimate:
         raise AssertionError("fitted again")
 
-    assert not hangs_on_rings(free, NOISE_RAD_S)
-    assert held_to_rest(free, NOISE_RAD_S, never) is free
+    assert not depends_on_ringing(free, NOISE_RAD_S)
+    assert with_fixed_initial_state(free, NOISE_RAD_S, never) is free
     assert settled(free, NOISE_RAD_S, never) == (free, None)
 
 

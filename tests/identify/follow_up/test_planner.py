@@ -12,7 +12,7 @@ import pytest
 from benchmarks.blind.excitations import read
 from identify.bounds.identifiability import planned_trace
 from identify.follow_up.pairs import free_run, never_reason
-from identify.follow_up.planner import GOOD, LEAST, plan_follow_up, with_follow_up
+from identify.follow_up.planner import GOOD, MIN_CHI_SQUARE, plan_follow_up, with_follow_up
 from identify.follow_up.wording import follow_up_yaml
 from identify.results import FollowUp, FollowUpPlan, Identification
 from rig.config.excitation import ExcitationConfig
@@ -76,7 +76,7 @@ def models_of(rival: str) -> tuple[Platform, Platform]:
 def test_a_pair_that_the_record_leaves_alike_gets_a_plan_within_a_minute_of_torque(rival: str) -> None:
     plan = plan_for(rival)
     (parting,) = plan.partings
-    assert parting.rival == rival and parting.separation > LEAST
+    assert parting.rival == rival and parting.separation > MIN_CHI_SQUARE
     assert plan.duration_s < 60.0
     assert rival.split("_", maxsplit=1)[0] in plan.why.lower()
 
@@ -95,7 +95,7 @@ def test_a_rival_fitted_to_all_the_data_misses_them_by_what_was_promised(rival: 
     together = replace(recording, runs=(*recording.runs, *new))
     before = chi_square(passed, recording) - chi_square(named, recording)
     after = chi_square(fitted(passed, together), together) - chi_square(fitted(named, together), together)
-    assert before < LEAST < after
+    assert before < MIN_CHI_SQUARE < after
     assert after > 0.3 * min(plan_for(rival).partings[0].separation, GOOD)
 
 
@@ -145,7 +145,7 @@ def test_where_the_limits_leave_too_little_nothing_is_planned_and_the_verdict_sa
     found, recording = case("coulomb_friction")
     follow_up = plan_follow_up(found, recording, Peaks(0.04, 0.3, 5.0), RATE_HZ, 12.0)
     assert follow_up is not None and follow_up.plan is None
-    assert f"{LEAST:g} is needed" in follow_up.unparted[0].reason
+    assert f"{MIN_CHI_SQUARE:g} is needed" in follow_up.unparted[0].reason
     assert "No follow-up for" in with_follow_up(found, follow_up).verdict.sentences[-1]
 
 
@@ -153,7 +153,7 @@ def test_torque_that_no_drive_makes_well_is_no_way_out() -> None:
     found, recording = case("actuator_lag")
     follow_up = plan_follow_up(found, recording, Peaks(0.01, 0.9, 0.5), RATE_HZ, 12.0)
     assert follow_up is not None and follow_up.plan is None
-    assert "with 0.30 N m or more" in follow_up.unparted[0].reason
+    assert "at 0.30 N m or more" in follow_up.unparted[0].reason
 
 
 def test_without_a_rival_nothing_is_planned() -> None:
@@ -183,7 +183,7 @@ def test_a_rival_that_the_finished_model_excludes_is_not_planned_for() -> None:
     )  # fmt: skip
     follow_up = plan_follow_up(replace(found, verdict=verdict), recording, ALLOWED, RATE_HZ, 12.0)
     assert follow_up is not None and follow_up.plan is None
-    assert "exclude the rival already" in follow_up.unparted[0].reason
+    assert "already exclude the alternative" in follow_up.unparted[0].reason
 
 
 def test_the_file_is_an_excitation_that_a_rig_yaml_may_name(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identify.conclude.next_steps import next_steps
-from identify.follow_up.rounds import after_playing, errors_on, limits_of, promises_more, told_apart
+from identify.follow_up.rounds import after_playing, errors_on, is_distinguished, limits_of, promises_more
 from identify.follow_up.separation import Sensor, Share, Way, prior_of, settled
 from identify.follow_up.wording import lines, verdict_sentences
 from identify.report.files import result_json
@@ -33,10 +33,10 @@ def plan(separation: float) -> FollowUpPlan:
 
 
 def test_a_pair_is_told_apart_when_one_is_named_and_the_other_no_longer_passes_for_it() -> None:
-    assert told_apart(verdict(("coulomb_friction",), coulomb_friction=()), *PAIR)
-    assert told_apart(verdict(("stribeck_friction",), stribeck_friction=("presliding_friction",)), *PAIR)
-    assert not told_apart(verdict(("coulomb_friction",), coulomb_friction=("stribeck_friction",)), *PAIR)
-    assert not told_apart(verdict(("cubic_stiffness",), cubic_stiffness=()), *PAIR)
+    assert is_distinguished(verdict(("coulomb_friction",), coulomb_friction=()), *PAIR)
+    assert is_distinguished(verdict(("stribeck_friction",), stribeck_friction=("presliding_friction",)), *PAIR)
+    assert not is_distinguished(verdict(("coulomb_friction",), coulomb_friction=("stribeck_friction",)), *PAIR)
+    assert not is_distinguished(verdict(("cubic_stiffness",), cubic_stiffness=()), *PAIR)
 
 
 @pytest.mark.parametrize(("second", "worth"), [(900.0, True), (100.0, False)])

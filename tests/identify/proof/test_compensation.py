@@ -162,7 +162,9 @@ def test_the_sets_alternate_and_stay_within_the_limits() -> None:
 
 def test_a_set_that_no_torque_brings_within_the_limits_is_refused_in_words() -> None:
     model = with_effects(coulomb_friction={"level": 20.0})
-    with pytest.raises(PreflightRefusal, match="3 Hz: no torque above 2 % of the set stays within the limits"):
+    with pytest.raises(
+        PreflightRefusal, match="3 Hz: with compensation, even 2 % of this set's torque exceeds the limits"
+    ):
         plan_proof(model, [SET], Peaks(10.0, 400.0, 10.0), Drive(1e-3, "zero_order"))
 
 

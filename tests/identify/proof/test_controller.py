@@ -125,8 +125,8 @@ def test_what_is_no_function_of_angle_and_rate_is_said() -> None:
     )
     made = controller_of(model, recording(), 100.0)
     assert set(made.left_out) == {"torque_delay", "creep"}
-    assert "Not in it: torque delay" in files(made)["compensation.h"]
-    with pytest.raises(UsageError, match="function of angle, rate and torque: torque_delay: a drive is led"):
+    assert "Not included: torque delay" in files(made)["compensation.h"]
+    with pytest.raises(UsageError, match="function of angle, rate and torque: torque_delay: its compensation inverts"):
         controller_of(with_effects(torque_delay={"delay": 1e-3}), recording(), 100.0)
 
 

@@ -79,7 +79,7 @@ def test_a_wrong_name_is_refuted() -> None:
     wrong = with_effects(quadratic_damping={"factor": 0.01})
     proof = proof_of(CUBIC, wrong)
     assert proof.effects["quadratic_damping"].status == "refuted"
-    assert "with this name it should have gone" in proof.total.why
+    assert "If this effect were the cause, it would have been cancelled" in proof.total.why
 
 
 def test_of_several_each_is_judged_by_what_comes_back_without_it() -> None:
@@ -92,13 +92,13 @@ def test_of_several_each_is_judged_by_what_comes_back_without_it() -> None:
 
 def test_a_name_that_leaves_another_effect_is_not_all_of_it() -> None:
     total = proof_of(with_effects(coulomb_friction={"level": 0.03}, **CUBIC.effects), CUBIC).total
-    assert total.status == "partly" and "something else is left" in total.why
+    assert total.status == "partly" and "The rest has another cause" in total.why
 
 
 def test_a_right_name_beside_a_wrong_damping_is_not_refuted() -> None:
     one = proof_of(CUBIC, replace(CUBIC, damping_nm_s_rad=-0.02)).effects["cubic_stiffness"]
     assert one.share is not None and one.share.ci95[0] > 0.7
-    assert one.status == "partly" and "J, C and K, are off. Identify again from all runs" in one.why
+    assert one.status == "partly" and "J, C and K, are inaccurate. Identify again from all runs" in one.why
 
 
 def test_an_effect_that_makes_nothing_explains_nothing() -> None:
@@ -179,7 +179,7 @@ def test_the_limits_of_the_verdict(left: float, low: float, announced: float, st
 
 def test_a_name_that_makes_little_of_a_large_error_explains_nothing() -> None:
     status, why = status_of(Share(1.0, (0.99, 1.01)), 0.95, 50.0, over_announced=9.0)
-    assert status == "refuted" and "9 times what this name makes of it" in why
+    assert status == "refuted" and "9 times the error that this effect predicts" in why
 
 
 def test_what_is_noise_is_confirmed_whatever_share_of_little_it_is() -> None:
@@ -200,8 +200,8 @@ def test_result_json_and_the_sentences_hold_what_was_found() -> None:
 def test_what_will_stay_is_said_before_anything_moves() -> None:
     model = replace(COULOMB, effects={**COULOMB.effects, "torque_saturation": {"limit": 90.0}})
     said = "\n".join(plan_lines(plan_proof(model, SETS, ALLOWED, DRIVE), model))
-    assert "of the error against the linear model will stay" in said
-    assert "Coulomb friction: at standstill friction holds the platform within a band" in said
+    assert "of the error against the linear model will remain" in said
+    assert "Coulomb friction: friction holds the platform anywhere within a band" in said
     assert "Torque saturation is not compensated: above its limit the drive gives no more torque" in said
 
 

@@ -28,11 +28,13 @@ def passed(order: int, hertz: float) -> Callable[[Array], Array]:
     return lambda noise: np.asarray(signal.lfilter(b, a, noise))
 
 
-def recorded(colour: Callable[[Array], Array] | None, effects: Effects | None = None, seed: int = 0) -> Recording:
+def recorded(
+    colour: Callable[[Array], Array] | None, effects: Effects | None = None, seed: int = 0, duration_s: float = 2.5
+) -> Recording:
     """The paper's sets, read by a gyro of that noise."""
     runs = []
     for i, (m, f) in enumerate(SETS):
-        run = sine_run(m, f, effects=effects, noise=1e-9 if colour else NOISE_RAD_S, seed=i)
+        run = sine_run(m, f, effects=effects, noise=1e-9 if colour else NOISE_RAD_S, seed=i, duration_s=duration_s)
         assert run.rate_rad_s is not None
         if colour:
             noise = colour(white(len(run.rate_rad_s) + 2000, NOISE_RAD_S, 10 * seed + i))[2000:]
@@ -49,7 +51,7 @@ def found_in(recording: Recording, candidates: list[str]) -> tuple[Identificatio
 
 @pytest.mark.parametrize(("order", "hertz"), [(2, 50.0), (1, 60.0)])
 def test_noise_that_the_gyro_filters_is_no_missing_effect(order: int, hertz: float) -> None:
-    found, said = found_in(recorded(passed(order, hertz)), [])
+    found, said = found_in(recorded(passed(order, hertz), duration_s=4.0), [])
     assert found.accepted
     assert any(ONCE_MORE in line for line in said)
     colour = found.noise_floor.holdout_rate_rms
@@ -97,7 +99,7 @@ def test_white_noise_needs_no_second_look() -> None:
 
 
 def test_noise_in_the_recorded_torque_swells_at_the_resonance_and_is_not_the_sensors() -> None:
-    runs = recorded(None).runs
+    runs = recorded(None, duration_s=4.0).runs
     noisy = [
         replace(r, torque_nm=r.torque_nm + white(len(r.torque_nm), 3.0, i))
         for i, r in enumerate(runs)

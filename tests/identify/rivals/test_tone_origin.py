@@ -17,13 +17,14 @@ from rig.recording.run import Recording, Run
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, sine_run
 
 HERTZ, TORQUE_NM = 13.37, 0.8
+LASTS_S = 2.5  # 33 periods of the line
 SETS = ((67.0, 6.0), (111.0, 1.0), (104.0, 3.0))
 SETTINGS = IdentifyConfig.model_validate({"candidates": ["periodic_disturbance", "coulomb_friction", "cogging"]})
 
 
 def shaken(torque_nm: float, hertz: float, seed: int, added: float = 0.0, stands: bool = True) -> Run:
     """A sine set on a platform that a pump shakes; ``stands``: since long before."""
-    run = sine_run(torque_nm, hertz, seed=seed)
+    run = sine_run(torque_nm, hertz, seed=seed, duration_s=LASTS_S)
     s, phase = 2j * np.pi * HERTZ, 0.7 + 1.9 * seed
     j, c, k = TRUTH
     turning = -TORQUE_NM * np.exp(1j * phase) / ((j + added) * s * s + c * s + k)
@@ -38,7 +39,7 @@ def shaken(torque_nm: float, hertz: float, seed: int, added: float = 0.0, stands
 
 def heard(torque_nm: float, hertz: float, seed: int, added: float = 0.0) -> Run:
     """A sine set whose gyro shows a vibration that folds back to the same frequency."""
-    run = sine_run(torque_nm, hertz, seed=seed, jck=(TRUTH[0] + added, *TRUTH[1:]))
+    run = sine_run(torque_nm, hertz, seed=seed, jck=(TRUTH[0] + added, *TRUTH[1:]), duration_s=LASTS_S)
     assert run.rate_rad_s is not None
     line = 0.09 * np.sin(2.0 * np.pi * (1000.0 - HERTZ) * run.time_s + 1.3 * seed)
     return replace(run, rate_rad_s=run.rate_rad_s + line, added_inertia_kg_m2=added)
@@ -87,7 +88,7 @@ def test_records_that_begin_in_motion_do_not_tell_either(made) -> None:  # type:
 
 
 def test_a_line_in_one_run_is_told_with_that_run_and_its_size_there() -> None:
-    runs = [heard(*one, seed=k) if k == 2 else sine_run(*one, seed=k) for k, one in enumerate(SETS)]
+    runs = [heard(*one, seed=k) if k == 2 else sine_run(*one, seed=k, duration_s=LASTS_S) for k, one in enumerate(SETS)]
     found = found_in(runs)
     assert found.verdict.effects == ()
     assert "13.37 Hz (only in 3 Hz) is left open" in found.verdict.left_open
@@ -118,7 +119,7 @@ def test_nothing_is_named_that_was_only_found_beside_an_open_line() -> None:
     late = {"torque_delay": {"delay": 0.0013}}
     runs = []
     for k, one in enumerate(SETS):
-        run = sine_run(*one, seed=k, effects=late)
+        run = sine_run(*one, seed=k, effects=late, duration_s=LASTS_S)
         assert run.rate_rad_s is not None
         line = 0.09 * np.sin(2.0 * np.pi * HERTZ * run.time_s + 1.3 * k)
         runs.append(replace(run, rate_rad_s=run.rate_rad_s + line))
@@ -135,7 +136,10 @@ def test_nothing_is_named_that_was_only_found_beside_an_open_line() -> None:
 )
 def test_a_line_at_the_frequency_of_one_runs_own_torque_is_that_torque(gain: float, late: int, said: str) -> None:
     """A drive that gave one percent less in one run; or its rows one sample late, and what was cut off in front."""
-    runs = [sine_run(*one, seed=k) for k, one in enumerate(((67.0, 6.0), (111.0, 1.0), (104.0, 3.0), (60.0, 15.0)))]
+    runs = [
+        sine_run(*one, seed=k, duration_s=LASTS_S)
+        for k, one in enumerate(((67.0, 6.0), (111.0, 1.0), (104.0, 3.0), (60.0, 15.0)))
+    ]
     assert runs[3].torque_nm is not None
     runs[3] = replace(runs[3], torque_nm=np.roll(runs[3].torque_nm, late) * gain)
     found = found_in(runs)

@@ -48,7 +48,7 @@ def test_a_platform_at_rest_or_one_that_reaches_a_constant_rate_once_tells_none(
 
 def test_it_is_told_in_which_runs() -> None:
     said = told([("a", 12, np.radians(400.0)), ("b", 0, 0.0)], "rotary")
-    assert said.endswith("left out: a (12 samples at 400 deg/s)")
+    assert said.endswith("the platform moved faster: a (12 samples at 400 deg/s)")
     assert told([("a", 12, 1.5)], "linear").endswith("a (12 samples at 1.5 m/s)")
     assert told([("b", 0, 0.0)], "rotary") == ""
 
@@ -66,4 +66,4 @@ def test_what_is_cut_off_bends_no_parameter_and_nothing_is_named_for_it() -> Non
     assert found.accepted and not found.verdict.effects
     for name, true in zip(TERMS, TRUTH, strict=True):
         assert found.before.parameters[name].value == pytest.approx(true, rel=3e-4)
-    assert "faster than the sensor's full scale" in found.holdout_note
+    assert "Samples at the sensor's full scale are excluded" in found.holdout_note

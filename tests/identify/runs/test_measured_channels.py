@@ -235,11 +235,11 @@ def test_a_measured_torque_may_drive_but_is_no_torque_of_its_own_on_the_same_sha
 def test_a_channel_that_stands_still_or_is_missing_in_a_run_is_no_cause() -> None:
     still, warm = np.full(len(TIME), 23.0), 23.0 + TIME**2
     x = {"x": Channel("x", "temperature")}
-    assert "stands at 23.000 in every run" in offered(swing({"x": still}, x))[1]["x_gain"]
+    assert "is constant at 23.000 in all runs" in offered(swing({"x": still}, x))[1]["x_gain"]
     assert offered(swing({"x": warm}, x))[0] == ("x_gain", "x_stiffness", "x_damping", "x_friction")
     both = offered(swing({"x": warm}, x), swing({}, {}, "cold.csv"))
     assert both[0] == ()
-    assert "cold.csv does not have x" in both[1]["x_gain"]
+    assert "cold.csv has no x" in both[1]["x_gain"]
 
 
 def test_a_channel_that_no_run_has_is_told_with_those_there_are() -> None:
@@ -259,7 +259,7 @@ def test_a_declared_effect_of_a_channel_that_stands_still_is_set_aside_with_a_re
     still = np.full(len(TIME), 23.0)
     candidates, idle = offered(swing({"x": still}, {}), declared=model.platform())
     assert candidates == ()
-    assert idle["x_gain"] == "x stands at 23.000 in every run; J, C and K are those there"
+    assert idle["x_gain"] == "x is constant at 23.000 in all runs; J, C and K hold for that value"
 
 
 def test_a_model_that_reads_a_channel_is_refused_where_a_run_does_not_have_it() -> None:

@@ -52,7 +52,7 @@ def test_a_clean_campaign_with_a_noisy_run_is_accepted_without_it_and_says_so() 
     found = identify(with_noise(1.0, 1.0, 4.0, 1.0, 1.0), DECLARED, IdentifyConfig())
     assert found.accepted
     assert not found.verdict.effects
-    assert "Left out as too noisy: 3 Hz (4.0 times the noise of the other runs)" in found.holdout_note
+    assert "Excluded as too noisy: 3 Hz (4.0 times the noise of the other runs)" in found.holdout_note
 
 
 def test_nothing_is_told_where_nothing_was_left_out() -> None:

@@ -26,7 +26,7 @@ def test_a_low_pass_above_what_the_samples_hold_is_refused_with_both_numbers() -
 
 def test_runs_in_which_nothing_moves_are_refused() -> None:
     still = replace(RUN, rate_rad_s=1e-3 * white(len(RUN.time_s)))
-    with pytest.raises(RecordingError, match="nothing to identify"):
+    with pytest.raises(RecordingError, match="nothing can be identified"):
         identify(Recording((still,)), Platform(*TRUTH), IdentifyConfig())
 
 

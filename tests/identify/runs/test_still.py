@@ -48,4 +48,4 @@ def test_friction_is_named_from_the_runs_that_moved() -> None:
     found = identify(Recording(runs), DECLARED, settings)
     assert found.verdict.effects == ("coulomb_friction",)
     assert found.accepted, found.reasons
-    assert "the platform stood still: 9 Hz (5.00 N m)" in found.holdout_note
+    assert "the platform did not move: 9 Hz (5.00 N m)" in found.holdout_note

@@ -22,7 +22,7 @@ def found(effects: Effects) -> Identification:
     """Sets with an effect and with a small torque that was not recorded."""
     runs = []
     for seed, (torque_nm, hertz) in enumerate(SETS):
-        run = sine_run(torque_nm, hertz, seed=seed, effects=effects)
+        run = sine_run(torque_nm, hertz, seed=seed, effects=effects, duration_s=2.5)
         assert run.torque_nm is not None
         runs.append(replace(run, torque_nm=run.torque_nm + white(len(run.torque_nm), 0.003 * torque_nm, 50 + seed)))
     return identify(Recording(tuple(runs)), Platform(*TRUTH), OFFERED)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identify.signals.glitches import APART, FEW, glitches, told
+from identify.signals.glitches import FEW, GLITCH_SIGMAS, glitches, told
 from identify.signals.prepare import prepare
 from rig.dynamics import TorqueSignal, simulate
 from rig.platform import Platform
@@ -71,6 +71,6 @@ def test_a_spike_costs_its_own_sample_and_the_noise_is_the_noise() -> None:
 
 def test_it_is_told_where_they_were() -> None:
     said = told([("a", np.array([1.5])), ("b", np.zeros(0)), ("c", np.array([2.0, 3.25]))])
-    assert said.startswith(f"3 samples deviate by more than {APART:g} times the noise")
-    assert said.endswith("left out: a at 1.5 s; c at 2, 3.25 s")
+    assert said.startswith(f"3 samples deviate by more than {GLITCH_SIGMAS:g} times the noise")
+    assert said.endswith("excluded: a at 1.5 s; c at 2, 3.25 s")
     assert told([("a", np.zeros(0))]) == ""

@@ -51,7 +51,7 @@ def test_where_only_the_stamps_scatter_the_samples_are_taken_as_even() -> None:
     found = sampled(beat_of("x", time), time, values, np.ones(len(time), bool))
     assert found.stamps_wrong
     np.testing.assert_array_equal(found.values, values)
-    assert "scatter by up to 49.9 us" in told([("x", found.scatter_s, True), ("y", 1.0, False)])
+    assert "a jitter of up to 49.9 us" in told([("x", found.scatter_s, True), ("y", 1.0, False)])
     assert told([("x", 1e-4, False)]) == ""
 
 

@@ -58,8 +58,8 @@ CASES = {
     "set turned around": (
         'backend: simulated\nsimulated: {}\nexcitation:\n  sets: [{torque_nm: 1, frequency_hz: 1, name: "\\u202ea"}]',
         ":4: excitation.sets.0.name",
-        "turns the text around",
-        "leave it out",
+        "reverses the text direction",
+        "remove it",
     ),
     "set faster than its ticks": (
         "backend: simulated\nsimulated: {}\nexcitation:\n  sets: [{torque_nm: 1, frequency_hz: 1.0e+6}]",
@@ -132,7 +132,7 @@ CASES = {
     ),
     "window backwards": (RUNS + "      from_s: 3\n      to_s: 2", ":4: recorded.runs.0", "to_s = 2", "later than"),
     "nothing to fit": (RUNS + "      use: holdout", "recorded", "there is nothing to fit", "set use: fit"),
-    "zero scale": (RUNS + "  scale: {torque: 0}", ":5: recorded.scale.torque", "erases", "converts to SI"),
+    "zero scale": (RUNS + "  scale: {torque: 0}", ":5: recorded.scale.torque", "every value to 0", "converts to SI"),
     "column used twice": (
         RUNS + "  columns: {rate: a, angle: a}",
         ":5: recorded.columns",

@@ -107,7 +107,7 @@ def test_an_empty_or_a_wild_channel_is_refused_with_its_key_or_line(tmp_path: Pa
         ("{cubic: {kind: other}}", r"a channel 'cubic' would make an effect 'cubic_stiffness', and there is one"),
         ("{a: {kind: other, column: T}, b: {kind: other, column: T}}", r"column 'T' is used for two quantities"),
         ("{w: {kind: temperature, torque_constant_nm_a: 1}}", r"torque_constant_nm_a belongs to kind: current"),
-        ("{w: {kind: other, scale: 0}}", r"a factor of 0 erases the column"),
+        ("{w: {kind: other, scale: 0}}", r"a factor of 0 sets every value to 0"),
         ("{w: {kind: other, colum: T}}", r"unknown key 'colum', did you mean 'column'"),
         ("{" + ", ".join(f"x{i}: {{kind: other}}" for i in range(9)) + "}", r"9 channels, at most 8 are allowed"),
     ],

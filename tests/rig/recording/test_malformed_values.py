@@ -168,7 +168,7 @@ ARRAYS: dict[str, tuple[Columns, str, str, str, str]] = {
         "",
         "",
         "different length (time 500, torque 499, rate 500, angle 500)",
-        "one value a sample",
+        "one value per sample",
     ),
     "complex": (changed(torque_nm=np.ones(500) * 1j), "", "", "complex numbers", "save its real part"),
     "text array": (changed(torque_nm=np.array(["1.0"] * 500)), "", "", "not numbers", "save it as numbers"),
@@ -180,7 +180,7 @@ ARRAYS: dict[str, tuple[Columns, str, str, str, str]] = {
         "its own array",
     ),
     "two-dimensional": (changed(torque_nm=np.ones((500, 3))), "", "", "shape (500, 3)", "an array of its own"),
-    "single number": (changed(torque_nm=np.float64(1)), "", "", "a single number", "one value a sample"),
+    "single number": (changed(torque_nm=np.float64(1)), "", "", "a single number", "one value per sample"),
     "window outside": (
         motion(),
         "",

@@ -71,7 +71,7 @@ def test_more_texts_than_a_recording_has_are_refused(tmp_path: Path, monkeypatch
     with h5py.File(path, "w") as file:
         file["notes"] = [f"note {k}" for k in range(200)]
     read_file(path)
-    monkeypatch.setattr(h5_heaps, "MOST_TEXTS", 150)
+    monkeypatch.setattr(h5_heaps, "MAX_TEXTS", 150)
     with pytest.raises(RecordingError, match="holds more than 150 texts"):
         read_file(path)
 
@@ -86,5 +86,5 @@ def test_a_file_with_a_block_of_its_user_before_it_is_walked_too(tmp_path: Path)
     at = data.index(b"GCOL") + 16 + 16 + 8
     data[at : at + 16] = bytes(16)
     path.write_bytes(data)
-    with pytest.raises(RecordingError, match="a heap of texts has no end"):
+    with pytest.raises(RecordingError, match="its string heap is endless"):
         read_file(path)

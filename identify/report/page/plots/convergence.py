@@ -22,7 +22,7 @@ from identify.report.page.plots.figure import (
 from identify.results import GeneticRun, Identification
 from identify.wording import SYMBOLS, number, plain
 
-SMALLEST = 1e-13  # relative: what double precision leaves
+ROUNDING_FLOOR = 1e-13  # relative: what double precision leaves
 
 
 def genetic_runs(identification: Identification) -> list[GeneticRun]:
@@ -43,7 +43,7 @@ def convergence_figure(identification: Identification) -> Figure | None:
         generation = np.arange(1, len(run.history) + 1, dtype=float)
         drawn.append(lines(generation, run.history / run.j_dec, run.name, color, width=width))
         if run.closed_form_objective is not None and run.closed_form_objective > 0.0:
-            excess = np.maximum(run.history / run.closed_form_objective - 1.0, SMALLEST)
+            excess = np.maximum(run.history / run.closed_form_objective - 1.0, ROUNDING_FLOOR)
             drawn.append(lines(generation, excess, run.name, color, 2, width=width))
     panels = [
         Panel("generation", "J / J_dec", "objective against J_dec (Eq. 14)", y_log=True, extra_y={"dtick": 1}),

@@ -12,7 +12,7 @@ from identify.results import Identification
 from identify.wording import depends_on, number
 
 DIRECTIONS = {"tickvals": [-1, 1], "ticktext": ["backward", "forward"], "range": [-1.5, 1.5]}
-FEWEST_FOR_A_CURVE = 3
+MIN_FOR_A_CURVE = 3
 
 
 def disturbance_table(identification: Identification) -> Markup:
@@ -45,7 +45,7 @@ def shape_figure(identification: Identification) -> Figure | None:
     drawn, panels = [], []
     for panel, term in enumerate(shown, 1):
         x, y = np.array(term.at), np.array(term.shape_nm)
-        draw = lines if len(x) >= FEWEST_FOR_A_CURVE else points
+        draw = lines if len(x) >= MIN_FOR_A_CURVE else points
         size = {"width": 2.2} if draw is lines else {"size": 10, "opacity": 1.0}
         drawn.append(draw(x, y, f"depends on the {depends_on(term.on, identification.axis)}", AFTER, panel, **size))
         ticks = {"zeroline": True} | (DIRECTIONS if term.on == "direction" else {})

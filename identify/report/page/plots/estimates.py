@@ -11,7 +11,7 @@ from identify.report.page.plots.figure import AFTER, BEFORE, MEASURED, Figure, P
 from identify.results import Identification, ParameterEstimate
 from identify.wording import percent, title, value_of
 
-FAR = 3.0  # an estimate further out than this many times the spread of the others is named, not drawn
+MAX_SPREADS = 3.0  # an estimate further out than this many times the spread of the others is named, not drawn
 
 
 def estimates_figure(identification: Identification) -> Figure | None:
@@ -29,7 +29,7 @@ def estimates_figure(identification: Identification) -> Figure | None:
     for panel, name in enumerate(names, 1):
         centre = final[name].value
         relative = [(label, _relative(values.get(name), centre), color) for label, values, color in rows]
-        reach = FAR * max(abs(p[0]) + p[1] for label, p, _ in relative if p and label != "declared model alone")
+        reach = MAX_SPREADS * max(abs(p[0]) + p[1] for label, p, _ in relative if p and label != "declared model alone")
         for at, (label, point, color) in enumerate(relative):
             inside = point is not None and abs(point[0]) <= max(reach, 1e-9)
             if inside and point:

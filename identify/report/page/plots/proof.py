@@ -38,7 +38,7 @@ def proof_figure(identification: Identification, proof: Proof) -> Figure:
     layout = grid(panels, gap=0.08)
     layout["shapes"] = shapes
     return Figure(
-        label=f"Measured {name} less that of the linear model, without and with the compensating torque, set by set",
+        label=f"Measured {name} minus the linear model, without and with the compensating torque, for each set",
         heading="Measured against the linear model",
         caption="Dashed green: twice the noise of the sensor. Linear model: J, C and K alone, given the same set.",
         traces=once_in_legend(drawn),

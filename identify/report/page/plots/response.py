@@ -9,7 +9,7 @@ import numpy as np
 
 from identify.frequency.measured_response import measured_response
 from identify.frequency.model_response import Size, linear_response
-from identify.frequency.spectra import LARGEST_GAIN_ERROR, TRUSTED, Complex, Record, Response, decibel
+from identify.frequency.spectra import MAX_GAIN_ERROR, TRUSTED, Complex, Record, Response, decibel
 from identify.report.page.plots.figure import (
     AFTER,
     BEFORE,
@@ -267,7 +267,7 @@ def _caption(sets: Sequence[SetResponse], left_out: Sequence[str]) -> str:
     caption += "Off by: difference between simulation and measurement, relative to the larger of the two. "
     caption += (
         f"Dotted: coherence {TRUSTED:g}. Pale crosses: coherence below it, or a standard error above "
-        f"{100 * LARGEST_GAIN_ERROR:g} %"
+        f"{100 * MAX_GAIN_ERROR:g} %"
     )
     return caption + (
         f" ({pale} of {sum(len(s.measured.frequency_hz) for s in sets)} points)." if pale else " (none here)."

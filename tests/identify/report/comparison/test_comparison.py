@@ -159,7 +159,7 @@ def test_other_effects_are_told_with_their_parameters_and_that_they_may_be_the_s
         "A names Coulomb friction, B names presliding friction, and the data of B cannot tell the two apart"
         in notes(sections)
     )
-    assert "J, C and K are those beside the effects" in notes(sections)
+    assert "may be due to an effect that only one of them includes" in notes(sections)
 
 
 def test_an_effect_that_was_declared_is_not_called_found(compared: Callable[..., tuple[Section, ...]]) -> None:

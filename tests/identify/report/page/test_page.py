@@ -23,7 +23,7 @@ from identify.report.page.plots.spectrum import spectrum, spectrum_figures
 from identify.report.page.tables import parameter_table
 from identify.residual import FreeLine
 from identify.results import Identification
-from identify.wording import MOST_DIGITS
+from identify.wording import MAX_DIGITS
 from rig.recording.run import Array
 from tests.identify.sample import SIGMA, sample, unhappy
 
@@ -67,7 +67,7 @@ def test_no_number_has_more_digits_than_an_interval_supports(page: str) -> None:
     body = page[page.index("<body") :].partition('id="origin"')[0]
     visible = re.sub(r"<(script|style).*?</\1>|<[^>]*>", " ", body, flags=re.DOTALL)
     digits = [n.replace(".", "").lstrip("0") for n in re.findall(r"(?<![\w.])\d[\d.]*", visible)]
-    assert max(len(n) for n in digits) == MOST_DIGITS
+    assert max(len(n) for n in digits) == MAX_DIGITS
 
 
 def test_a_campaign_that_is_not_accepted_says_why_and_what_next() -> None:

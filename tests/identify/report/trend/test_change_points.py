@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identify.report.trend.change_points import FEWEST, levels, scatter
+from identify.report.trend.change_points import MIN_CAMPAIGNS, levels, scatter
 
 
 def noisy(means: list[float], scatter_: float = 1.0, seed: int = 0) -> np.ndarray:
@@ -72,7 +72,7 @@ def test_a_common_offset_does_not_matter() -> None:
 
 def test_too_few_campaigns_have_one_level_and_none_has_none() -> None:
     few = np.array([0.0, 0.0, 0.0, 90.0, 90.0])
-    assert len(few) < FEWEST
+    assert len(few) < MIN_CAMPAIGNS
     assert begins(few) == [0]
     assert levels(np.array([]), np.array([])) == ()
 
