@@ -118,12 +118,9 @@ class TrialFits:
     def each_fitted(
         self, now: Fit, starts: Mapping[str, Sequence[Mapping[Name, float] | TorqueLook]]
     ) -> dict[str, Fit]:
-        """Candidates fitted one after the other; one that begins far behind the best so far is not followed.
-
-        Nor is one that is behind the model it holds.
-        """
+        """Candidates fitted one after the other; one that begins far behind the best so far is not followed."""
         fits: dict[str, Fit] = {}
-        least = now.cost
+        least = np.inf
         for name, begin in starts.items():
             fit = self.fitted(now, name, begin, least)
             if fit is not None:
