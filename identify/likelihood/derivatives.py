@@ -115,14 +115,19 @@ def _of_run(
 ) -> Derivatives:  # fmt: skip
     """Derivatives of one run; ``done`` are those by parameters with gains that stay.
 
-    The noise and the bias act through the linear part: no prediction is needed for theirs.
+    Noise and bias act on a linear platform alike wherever it stands, and no prediction is needed for theirs. Where a
+    gap, a stop or dry friction bends the motion, what they do depends on where it is: those are predicted.
     """
     p, s, base = at.problem, at.shots[i], at.looks[i]
     w, spans = s.weight, [(a, b - 1) for a, b in s.edges]
     root = np.sqrt(base.variance[w])
+    bends = at.structure.bends
 
     def followed(gains: Gains, h: float, bias: float = 0.0) -> Array:
-        e = innovations_with(base.gains, gains, base.innovations, base.state, s.trace.keep, spans, bias)
+        if bends:
+            e = p.look(moved(s, (np.zeros(2), bias)), at.structure, at.names, at.x, at.noise, gains).innovations
+        else:
+            e = innovations_with(base.gains, gains, base.innovations, base.state, s.trace.keep, spans, bias)
         return np.asarray(((base.innovations[w] - e[w]) / (h * root)).ravel())
 
     scaled = (base.innovations[w] / root).ravel()

@@ -2,7 +2,8 @@
 
 A fit steps parameters and noise together, which is quick where both are near. Far off, the noise has long curved
 valleys (less noise behind a gyro's low-pass, and all else more), and a step that is cut short for the one is cut short
-for the other. Alone, the noise needs no prediction: other gains change the innovations through the linear part.
+for the other. Alone beside a linear platform, the noise needs no prediction: what other gains do to the innovations is
+the same wherever the platform stands.
 """
 
 from __future__ import annotations
@@ -54,7 +55,10 @@ def likeliest_noise(
         for s, q, w in zip(shots, looks, weights, strict=True):
             gains = problem.gains_at(s, structure, names, x, there)
             spans = [(a, b - 1) for a, b in s.edges]
-            e = innovations_with(q.gains, gains, q.innovations, q.state, s.trace.keep, spans)[w]
+            if structure.bends:
+                e = problem.look(s, structure, names, x, there, gains).innovations[w]
+            else:
+                e = innovations_with(q.gains, gains, q.innovations, q.state, s.trace.keep, spans)[w]
             v = gains.variance[w]
             squares += float(np.sum(e * e / v))
             spread += float(np.sum(np.log(v)))

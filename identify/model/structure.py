@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from rig import effects
+from rig.effects.base import Place
 from rig.platform import TERMS
 
 Shapes = Mapping[str, tuple[float, ...]]
@@ -20,9 +21,14 @@ class Structure:
     terms: tuple[str, ...] = TERMS
     effects: tuple[str, ...] = ()
 
-    def plus(self, name: str) -> Structure:
-        """With one effect more."""
-        return replace(self, effects=(*self.effects, name))
+    @property
+    def bends(self) -> bool:
+        """Whether an effect acts on the motion itself: what a disturbance does then depends on where the motion is."""
+        return any(effects.get(e).place in (Place.LOAD, Place.FRICTION) for e in self.effects)
+
+    def plus(self, *names: str) -> Structure:
+        """With more effects."""
+        return replace(self, effects=(*self.effects, *names))
 
     def minus(self, name: str) -> Structure:
         """With one effect or term less."""
