@@ -26,6 +26,7 @@ LITTLE = 1e-3  # of the torque: how much of a candidate is tried
 SCALED = (0.1, 10.0)  # by how much a score may scale a shape that means "none" at zero
 FOLLOWED = 0.5  # of the inertia: parameters of the model that follow a candidate farther do not
 SHAPES = 3  # of a candidate that are kept to begin a fit from
+SYNERGY = 2.0  # times what both are worth alone, that two at once are worth: else one leads to the other
 SINGULAR = 1e-9  # of the largest eigenvalue
 
 Push = tuple[dict[Name, float], bool]  # parameter values of a little of a candidate, and whether it may turn its sign
@@ -47,6 +48,33 @@ class Score:
     gain: float
     start: dict[Name, float]
     shape: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Projected:
+    """What a little of a candidate does to the innovations, (n, k), the model's own parameters projected out.
+
+    ``along_base`` is what was projected out, (b, k).
+    """
+
+    columns: Array
+    pushes: list[Push]
+    along_base: Array
+
+    def solved(self, residual: Array) -> tuple[Array, float]:
+        """How many times each push explains most of a residual, (k,), and the fall of the sum of squares."""
+        size = np.sqrt(np.sum(self.columns**2, axis=0))
+        square, along = self.columns.T @ self.columns / np.outer(size, size), self.columns.T @ residual / size
+        lowest = np.array([-np.inf if free else 0.0 for _, free in self.pushes])
+        share, fall = bounded(square, along, lowest)
+        return share / size, fall
+
+    def beside(self, other: _Projected) -> _Projected:
+        """Two candidates at once."""
+        return _Projected(
+            np.column_stack([self.columns, other.columns]), [*self.pushes, *other.pushes],
+            np.column_stack([self.along_base, other.along_base]),
+        )  # fmt: skip
 
 
 class InnovationScores:
@@ -84,6 +112,32 @@ class InnovationScores:
         self.residual = rest - self.basis @ (self.basis.T @ rest)
         self.square = float(self.residual @ self.residual)
 
+    def pairs(self, singles: Sequence[Score]) -> list[tuple[Score, Score, float]]:
+        """Two candidates at once, at the shapes of their single scores: the pairs that are worth more than twice what
+        both are worth alone, the largest gain first.
+
+        A friction that levels off and a drag that grows with the square of the rate are both nearly a damping, each
+        with what the other lacks: either alone shows little.
+        """
+        if self.lost:
+            return []
+        with np.errstate(all="ignore"):
+            found = self.problem.workers.map(lambda s: self._projected(effects.get(s.effect), s.shape), singles)
+            parts = [(s, p) for s, p in zip(singles, found, strict=True) if p is not None]
+        out: list[tuple[Score, Score, float]] = []
+        for i, (one, mine) in enumerate(parts):
+            for other, theirs in parts[:i]:
+                if {one.effect, other.effect} & {*effects.get(one.effect).nests, *effects.get(other.effect).nests}:
+                    continue
+                share, fall = mine.beside(theirs).solved(self.residual)
+                gain = self._gain(fall)
+                if gain > SYNERGY * (one.gain + other.gain):
+                    k = len(mine.pushes)
+                    first = replace(one, start=_start(effects.get(one.effect), mine.pushes, share[:k]))
+                    second = replace(other, start=_start(effects.get(other.effect), theirs.pushes, share[k:]))
+                    out.append((first, second, gain))
+        return sorted(out, key=lambda pair: -pair[2])
+
     def all(self, names: Sequence[str]) -> list[list[Score]]:
         """Every candidate at its best shapes, the largest gain first; of each a few shapes to begin from."""
         if self.lost:
@@ -99,6 +153,23 @@ class InnovationScores:
     @RUNAWAY
     def score(self, effect: Effect, shape: tuple[float, ...]) -> Score | None:
         """One candidate at given shapes; None where it does nothing."""
+        there = self._projected(effect, shape)
+        if there is None:
+            return None
+        share, fall = there.solved(self.residual)
+        gain = self._gain(fall)
+        gainless = not any(p.linear for p in effect.parameters)
+        if gainless:
+            one = there.columns[:, 0]
+            as_it_is = self._gain(float(2.0 * one @ self.residual - one @ one))
+            if as_it_is > 0.5 * gain:  # where it does as well at its own size, that is a better place to begin
+                return Score(effect.name, max(gain, as_it_is), dict(there.pushes[0][0]), shape)
+        moved = self.follow @ (there.along_base @ share)
+        return Score(effect.name, gain, {**self._followed(moved), **_start(effect, there.pushes, share)}, shape)
+
+    @RUNAWAY
+    def _projected(self, effect: Effect, shape: tuple[float, ...]) -> _Projected | None:
+        """What a little of a candidate does that the model's own parameters do not; None where it does nothing."""
         pushes = self._pushes(effect, shape)
         columns = [c for c in (self._direction(effect, push) for push, _ in pushes) if c is not None]
         if not columns or len(columns) != len(pushes):
@@ -106,20 +177,10 @@ class InnovationScores:
         wide = np.stack(columns, axis=1)
         along_base = self.basis.T @ wide
         wide = wide - self.basis @ along_base
-        size = np.sqrt(np.sum(wide**2, axis=0))
+        size = np.sum(wide**2, axis=0)
         if not np.all(np.isfinite(size)) or np.any(size <= 0.0):
             return None
-        square, along = wide.T @ wide / np.outer(size, size), wide.T @ self.residual / size
-        lowest = np.array([-np.inf if free else 0.0 for _, free in pushes])
-        share, fall = bounded(square, along, lowest)
-        gain = self._gain(fall)
-        gainless = not any(p.linear for p in effect.parameters)
-        if gainless:
-            as_it_is = self._gain(float(2.0 * along[0] * size[0] - size[0] ** 2))
-            if as_it_is > 0.5 * gain:  # where it does as well at its own size, that is a better place to begin
-                return Score(effect.name, max(gain, as_it_is), dict(pushes[0][0]), shape)
-        moved = self.follow @ (along_base @ (share / size))
-        return Score(effect.name, gain, {**self._followed(moved), **_start(effect, pushes, share / size)}, shape)
+        return _Projected(wide, pushes, along_base)
 
     def _followed(self, moved: Array) -> dict[Name, float]:
         """The model's gains where they follow a candidate; as they are where that takes them far."""

@@ -54,6 +54,8 @@ class Evidence:
         Penalty for the parameters that were added (Schwarz 1978).
     weight
         Share of the disturbance's power that goes with the model; one for an effect in the sensor, which is no torque.
+    beyond
+        Share that goes of what predictions err by beyond the sensor's noise.
     """
 
     effect: str
@@ -62,6 +64,7 @@ class Evidence:
     inflation: float
     price: float
     weight: float
+    beyond: float = 0.0
 
     @property
     def support(self) -> float:
@@ -86,13 +89,13 @@ class Weigher:
         self.problem, self.regression, self.floor_nm = problem, regression, floor_nm
 
     def evidence(self, effect: str, now: Fit, new: Fit) -> Evidence:
-        """A model with one effect or term more against the one without it."""
+        """A model with more against the one without it; ``effect`` is the effect or term that is judged."""
         added = [n for n in new.names if n not in now.names]
         inflated = inflation(self.problem.columns_at(new, with_variance=True), new, added)
         torqueless = effect not in TERMS and effects.get(effect).place is Place.SENSOR
         weight = 1.0 if torqueless else self.weight(now, new, inflated < TRUSTED)
         price = (new.penalised - new.cost) - (now.penalised - now.cost)
-        return Evidence(effect, new, now.cost - new.cost, inflated, price, weight)
+        return Evidence(effect, new, now.cost - new.cost, inflated, price, weight, beyond(now, new))
 
     def weight(self, now: Fit, new: Fit, trusted: bool) -> float:
         """Share of the disturbance that goes: of its power in the band of the motion, or of its white part.
@@ -108,9 +111,8 @@ class Weigher:
             cutoff_hz = self.regression.cutoff_hz
             if now.noise.white * cutoff_hz > SHOWS * in_band(now.noise, cutoff_hz):
                 shares.append(1.0 - new.noise.white * new.variance / (now.noise.white * now.variance))
-        beyond = 1.0 - (disturbed(new) - 1.0) / max(disturbed(now) - 1.0, 1e-300)
-        if beyond > MOST:
-            shares.append(beyond)
+        if (share := beyond(now, new)) > MOST:
+            shares.append(share)
         return float(max(shares))
 
     def left(self, fit: TorqueFit) -> float:
@@ -182,6 +184,11 @@ def shape_of(fit: Fit, name: str) -> tuple[float, ...]:
 def disturbed(fit: Fit) -> float:
     """By how much more than the sensor's noise the prediction errs: one where no torque disturbs."""
     return fit.disturbed
+
+
+def beyond(now: Fit, new: Fit) -> float:
+    """Share that goes of what predictions err by beyond the sensor's noise."""
+    return 1.0 - (disturbed(new) - 1.0) / max(disturbed(now) - 1.0, 1e-300)
 
 
 def inflation(parts: Sequence[Columns], fit: Fit, names: Sequence[Name]) -> float:

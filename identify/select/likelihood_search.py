@@ -104,7 +104,7 @@ class LikelihoodSearch:
                 fit = seen.fit if seen is not None else None
                 bic = -seen.support if seen is not None else -score.gain
                 found.candidates.append(
-                    Candidate(score.effect, r.number, bic, None, _status(score.effect, r.chosen, named, fit))
+                    Candidate(score.effect, r.number, bic, None, _status(score.effect, r.added, named, fit))
                 )
         rivals = {k: s.rivals.get(k, {}) for k in named}
         found.rivals = {k: tuple(v) for k, v in rivals.items()}
@@ -113,12 +113,12 @@ class LikelihoodSearch:
         return found
 
 
-def _status(name: str, chosen: str | None, named: Sequence[str], fit: Fit | None) -> str:
-    if name == chosen:
+def _status(name: str, added: Sequence[str], named: Sequence[str], fit: Fit | None) -> str:
+    if name in added:
         return "added" if name in named else "added, then no longer needed"
     if fit is None:
         return "screened out"
-    return "no better" if chosen else "not worth it"
+    return "no better" if added else "not worth it"
 
 
 def _judged(fit: Fit, noise: float) -> Judged:

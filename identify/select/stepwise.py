@@ -43,7 +43,12 @@ class Round:
     now: Fit
     scores: tuple[Score, ...]
     tried: Mapping[str, Evidence]
-    chosen: str | None
+    added: tuple[str, ...]
+
+    @property
+    def chosen(self) -> str | None:
+        """The effect that was taken alone."""
+        return self.added[0] if len(self.added) == 1 else None
 
 
 @dataclass
@@ -98,19 +103,63 @@ class Stepwise:
         return self.best
 
     def _add(self) -> None:
-        """Effects one at a time, as long as one is worth it."""
+        """Effects one at a time as long as one is worth it, and two at once where neither shows alone.
+
+        What a model predicts wrongly while much is missing may hide how much of the torque an effect carries. One that
+        is proven and lets predictions err by clearly less is therefore added on trial: it stays if others are found
+        beside it and it carries its share by then.
+        """
+        trial: tuple[str, Fit] | None = None  # the effect on trial, and the model without it
         for number in range(len(self.rounds) + 1, MOST + 1):
             now = self.best
             scores, tried = self.tried(now)
             chosen = self.choice(tried)
-            self.rounds.append(Round(number, now, tuple(scores), tried, chosen))
-            if chosen is None:
+            new = tried[chosen] if chosen else self._pair(now, scores)
+            added = tuple(e for e in new.fit.structure.effects if e not in now.structure.effects) if new else ()
+            if new is None and trial is None and (new := self._on_trial(tried)):
+                trial, added = (new.effect, now), (new.effect,)
+                self.say(f"added {new.effect} on trial: log-likelihood +{0.5 * new.gain:.3g}")
+                self.rounds.append(Round(number, now, tuple(scores), tried, added))
+                self.best = new.fit
+                continue
+            self.rounds.append(Round(number, now, tuple(scores), tried, added))
+            if new is None:
                 break
-            new = tried[chosen]
             self.say(
-                f"added {chosen}: log-likelihood +{0.5 * new.gain:.3g}, {100.0 * new.weight:.0f} % of the disturbance"
+                f"added {' and '.join(added)}: log-likelihood +{0.5 * new.gain:.3g}, "
+                f"{100.0 * new.weight:.0f} % of the disturbance"
             )
-            self.best = self.pruned(new.fit, [e for e in self.trials.added(new.fit) if e != chosen])
+            self.best = self.pruned(new.fit, [e for e in self.trials.added(new.fit) if e not in added])
+            if trial and self._carries(trial[0]):
+                trial = None
+        if trial:
+            self.say(f"took {trial[0]} back")
+            self.best = self._without_trial(*trial)
+
+    def _pair(self, now: Fit, scores: Sequence[Score]) -> Evidence | None:
+        """The likeliest two effects at once that are worth it together; None where none are."""
+        seen = [self.weigher.evidence(one, now, fit) for one, _, fit in self.trials.pairs(now, scores)]
+        good = [e for e in seen if e.support > HOPE and e.weight > WEIGHT]
+        return min(good, key=lambda e: e.fit.penalised, default=None)
+
+    @staticmethod
+    def _on_trial(tried: Mapping[str, Evidence]) -> Evidence | None:
+        """The likeliest effect that is proven, though it carries little torque as yet."""
+        proven = [e for e in tried.values() if e.support > HOPE and e.beyond > WEIGHT]
+        return min(proven, key=lambda e: e.fit.penalised, default=None)
+
+    def _carries(self, name: str) -> bool:
+        """Whether an effect carries its share beside all others."""
+        if name not in self.best.structure.effects:
+            return True
+        evidence = self.weigher.evidence(name, self._without(self.best, name), self.best)
+        return evidence.support > APART and evidence.weight > WEIGHT
+
+    def _without_trial(self, name: str, before: Fit) -> Fit:
+        """The model without an effect that carries nothing still: as it was, or with what was found since."""
+        self.dropped.append((name, "it carries no torque that the others do not"))
+        found = len(self.best.structure.effects) > len(before.structure.effects) + 1
+        return self._without(self.best, name, MANY) if found else before
 
     def beside_what_is_left(self, now: Fit) -> Fit:
         """Without names that explain nothing beside a curve over what is left."""

@@ -26,6 +26,7 @@ from rig.platform import TERMS
 
 HOPE = 20.0  # fall of the cost, parameters paid for, that no chance among all candidates and shapes makes
 TRIED = 4  # candidates of a round, by their scores, that are fitted
+PAIRS = 2  # pairs of a round, by their scores, that are fitted
 HEAVIEST = 3  # candidates by their weight in torque that are fitted beside those
 FAINT = 0.02  # of the best score: what promises so little is not what the round is about
 FEW, MANY = 14, 25  # steps of a fit that is compared, and of one that is kept
@@ -97,6 +98,22 @@ class TrialFits:
             if not set(effects.get(name).nests) & set(near):  # a special case that is as good is taken in its place
                 fits[name] = self.further(fits[name])
         return [v[0] for v in looks], fits
+
+    def pairs(self, now: Fit, singles: Sequence[Score]) -> list[tuple[str, str, Fit]]:
+        """Two effects at once where one alone shows little, fitted: those with the largest gains."""
+        torque = [s for s in singles if effects.get(s.effect).place is not Place.SENSOR and not simplicity(s.effect)]
+        price = float(np.log(max(now.count, 2)))
+        out: list[tuple[str, str, Fit]] = []
+        for one, other, gain in InnovationScores(self.problem, now, self.scale(now)).pairs(torque)[:PAIRS]:
+            parameters = sum(len(effects.get(s.effect).parameters) for s in (one, other))
+            if gain < HOPE + price * parameters:
+                continue
+            fit = self.problem.fit(
+                now.structure.plus(one.effect, other.effect), {**now.values, **one.start, **other.start}, now.noise,
+                MANY, carry=now.shots, thorough=False, against=now.cost,
+            )  # fmt: skip
+            out.append((one.effect, other.effect, fit))
+        return out
 
     def unseen(self, now: Fit, names: Sequence[str]) -> list[str]:
         """Lags of the gyro, of a model without one: where a large disturbance follows every reading, their scores are
