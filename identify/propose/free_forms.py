@@ -63,8 +63,11 @@ def scores(problem: PredictionError, fit: Fit, scale: Scale, allowed: Sequence[s
         return sorted((s for s in found if s is not None), key=lambda s: -s.gain)
 
 
-def fitted(problem: PredictionError, now: Fit, form: Score, steps: int) -> Fit:
-    """A model with a free form beside it, or in the place of the friction that it contains."""
+def fitted(problem: PredictionError, now: Fit, form: Score, steps: int, least: float = np.inf) -> Fit:
+    """A model with a free form beside it, or in the place of the friction that it contains.
+
+    ``least`` is the cost that it must be below after a few steps to be followed to its end.
+    """
     effect = effects.get(form.effect)
     held = [e for e in now.structure.effects if e in effect.nests]
     structure = now.structure
@@ -76,7 +79,8 @@ def fitted(problem: PredictionError, now: Fit, form: Score, steps: int) -> Fit:
     for p in effect.parameters:
         start[(effect.name, p.name)] = level if p.linear else next(shape)
     return problem.fit(
-        structure.plus(effect.name), start, now.noise, steps, carry=now.shots, thorough=False, against=now.cost
+        structure.plus(effect.name), start, now.noise, steps, carry=now.shots, thorough=False, against=now.cost,
+        least=least,
     )  # fmt: skip
 
 

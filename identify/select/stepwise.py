@@ -16,8 +16,9 @@ from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.propose.innovation_score import Score
+from identify.select.curve_rivals import beaten_by_a_curve
 from identify.select.evidence import APART, TRUSTED, WEIGHT, Evidence, Weigher, behind, disturbed
-from identify.select.left_over import LeftOver, left_over, needless_beside
+from identify.select.left_over import ON, LeftOver, left_over, needless_beside
 from identify.select.preference import cannot_gain, plainest, prefers_special
 from identify.select.trial_fits import FEW, HOPE, MANY, TrialFits
 from rig import effects
@@ -99,7 +100,7 @@ class Stepwise:
             if _key(self.best.structure) != _key(before):  # beside what was replaced, others may have shown nothing
                 self._add()
         self.best = self.pruned(self.best, [*self.best.structure.terms, *self.trials.added(self.best)])
-        self.best = self.beside_what_is_left(self.best)
+        self.best = self.beside_what_is_left(self.against_curves(self.best))
         return self.best
 
     def _add(self) -> None:
@@ -160,6 +161,33 @@ class Stepwise:
         self.dropped.append((name, "it carries no torque that the others do not"))
         found = len(self.best.structure.effects) > len(before.structure.effects) + 1
         return self._without(self.best, name, MANY) if found else before
+
+    def against_curves(self, now: Fit) -> Fit:
+        """Without names that a curve in their place beats; what else is there is judged beside that curve next."""
+        if self.trials.added(now):
+            self.say("comparing what was found with curves in its place")
+        found = beaten_by_a_curve(self, now)
+        if found is None:
+            return now
+        names, curve, rest = found
+        self.dropped += [(n, f"a curve over the {ON[curve]} explains clearly more in its place") for n in names]
+        self.say(f"took {' and '.join(names)} back: a curve over the {ON[curve]} explains clearly more")
+        return rest
+
+    def without(self, now: Fit, names: Sequence[str]) -> Fit:
+        """The same without some effects, fitted."""
+        structure = now.structure
+        for name in names:
+            structure = structure.minus(name)
+        known = [r.now for r in self.rounds if _key(r.now.structure) == _key(structure)]
+        if known:
+            return known[-1]
+        if (key := _key(structure)) not in self._lacking:
+            values = {k: v for k, v in now.values.items() if k[0] not in names}
+            self._lacking[key] = self.problem.fit(
+                structure, values, now.noise, FEW, carry=now.shots, thorough=False
+            )  # fmt: skip
+        return self._lacking[key]
 
     def beside_what_is_left(self, now: Fit) -> Fit:
         """Without names that explain nothing beside a curve over what is left."""

@@ -1,0 +1,69 @@
+"""Named effects against curves in their place: a name that a curve over the same quantity beats clearly is a wrong one.
+
+Two or three waves over the angle come near any bump. A curve over the angle has more parameters than the effect that is
+there, and is straight between its places, so beside the right effect it is never clearly likelier, all parameters paid
+for. Where it is, the torque does depend on the angle, but not as any effect of the library does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from identify.likelihood.fit import Fit
+from identify.propose.free_forms import fitted, ranges
+from identify.propose.innovation_score import InnovationScores
+from identify.select.evidence import APART, behind, shape_of
+from rig import effects
+
+if TYPE_CHECKING:
+    from identify.select.stepwise import Stepwise
+
+COMPARABLE = 0.3  # of the score of the effect, that a curve has: with less it is not fitted
+NEAR = 0.5  # of what the effect explains, that a curve has after a few steps: with less it is not followed
+STEPS = 14
+CURVES: Mapping[str, Sequence[str]] = {
+    "restoring torque": ("free_angle",), "position-dependent torque": ("free_angle",), "friction": ("free_rate",),
+    "drive": ("free_torque",), "surroundings": ("free_time",),
+}  # fmt: skip
+
+
+def beaten_by_a_curve(search: Stepwise, now: Fit) -> tuple[list[str], str, Fit] | None:
+    """Names that a curve in their place beats, the curve, and the model without them; None where none does.
+
+    Several effects of one kind (two waves over the angle) are judged together.
+    """
+    groups: dict[str, list[str]] = {}
+    for name in search.trials.added(now):
+        groups.setdefault(effects.first_of(name), []).append(name)
+    for first, names in groups.items():
+        curves = CURVES.get(effects.get(first).family, ())
+        if not curves:
+            continue
+        rest = search.without(now, names)
+        curve = _in_place(search, now, rest, names, curves)
+        if curve is not None and behind(now, curve[1]) > APART:
+            return names, curve[0], rest
+    return None
+
+
+def _in_place(
+    search: Stepwise, now: Fit, rest: Fit, names: Sequence[str], curves: Sequence[str]
+) -> tuple[str, Fit] | None:  # fmt: skip
+    """The best of some curves in the place of effects, fitted; None where none comes near."""
+    problem = search.problem
+    tests = InnovationScores(problem, rest, search.trials.scale(rest))
+    if tests.lost:
+        return None
+    at = ranges(problem, rest)
+    with np.errstate(all="ignore"):
+        own = [tests.score(effects.get(n), shape_of(now, n)) for n in names]
+        found = [tests.score(effects.get(c), at[c]) for c in curves if c in at]
+    score = max((s.gain for s in own if s is not None), default=0.0)
+    best = max((s for s in found if s is not None), key=lambda s: s.gain, default=None)
+    if best is None or best.gain < COMPARABLE * score:
+        return None
+    fit = fitted(problem, rest, best, STEPS, rest.cost - NEAR * (rest.cost - now.cost))
+    return (best.effect, fit) if np.isfinite(fit.cost) else None
