@@ -93,7 +93,7 @@ class Descent:
         self.looks = self._looks(self.x, self.noise, self.shots)
         self.cost = self._cost(self.looks)
         self.alone = noise is None  # nobody has looked for the noise yet
-        if self.alone:
+        if self.alone and not structure.bends:  # else every look is a prediction
             self._noise_alone()
         self.information: Array = np.zeros((len(self.x), len(self.x)))
         self._informed: tuple[Noise, bytes] | None = None

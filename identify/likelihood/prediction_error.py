@@ -85,7 +85,7 @@ class PredictionError:
         # A decay shows nothing but how it began and how it swings on, far beyond what is linear about its prediction:
         # where it began is fitted, and not corrected as the readings come in.
         self.fits_starts = self.torque_free
-        self.start_variance = (0.0, 0.0) if self.fits_starts else self._start_variance()
+        self.start_variance = (0.0, 0.0, 0.0) if self.fits_starts else self._start_variance()
 
     def columns_at(self, fit: Fit, with_variance: bool = False) -> list[Columns]:
         """Derivatives of every run's innovations where a fit stands; ``with_variance``, of their whole likelihood."""
@@ -274,14 +274,16 @@ class PredictionError:
             return np.arange(n) >= lead, [(told[0][0], n - 1)], (lead,)
         return keep, spans, (keep.tobytes(),)
 
-    def _start_variance(self) -> tuple[float, float]:
-        """Of angle and rate at the start of a stretch, read off the smoothed motion; over that of one reading."""
+    def _start_variance(self) -> tuple[float, float, float]:
+        """Of angle and rate at the start of a stretch, read off the smoothed motion, and of the acceleration there, of
+        which nothing is assumed but its size; over that of one reading.
+        """
         smoothed = float(np.mean([t.fine[4] ** 2 for t in self.traces]))
         rate = 4.0 * smoothed + (START_RATE * self.rate_rad_s) ** 2
         known = self.both or all(t.channel == "angle" for t in self.traces)
         noise = float(np.sqrt(np.mean([self._noises(t)[-1] ** 2 for t in self.traces]))) if known else 0.0
         angle = 4.0 * noise**2 + ((START_ANGLE if known else UNKNOWN_ANGLE) * self.angle_rad) ** 2
-        return angle / self.reading_variance, rate / self.reading_variance
+        return angle / self.reading_variance, rate / self.reading_variance, self.acceleration**2 / self.reading_variance
 
     def on_grid(self, cost: Callable[[Noise], float]) -> Noise:
         """The best of a coarse grid of noises: white alone first, then a slow part beside it."""

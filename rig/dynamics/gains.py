@@ -212,7 +212,7 @@ def _discrete(
 
 def gains_of(
     jck: Array, noise: Noise, step_s: float, sensing: Sensing, keep: Any, spans: Sequence[tuple[int, int]],
-    start_variance: tuple[float, float] = (0.0, 0.0),
+    start_variance: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Gains:  # fmt: skip
     """Kalman gains along a run.
 
@@ -227,7 +227,8 @@ def gains_of(
     spans
         First and last sample of every stretch.
     start_variance
-        Of angle and rate at the start of a stretch, over that of one reading.
+        Of angle, rate and acceleration at the start of a stretch, over that of one reading. What a low-pass holds back
+        there is its time constant times the acceleration, and nobody knows that.
     """
     phi, q = _discrete(*jck.tolist(), noise, sensing.lag, step_s)
     lagging = sensing.lag[0] > 0.0
@@ -250,7 +251,12 @@ def gains_of(
     elif noise.walk > 0.0:
         start[BIAS, BIAS] = 0.5 * noise.walk * noise.walk_s
     if lagging:
-        start[SENSED, SENSED] = start[RATE, SENSED] = start[SENSED, RATE] = start[RATE, RATE]
+        first, second = sensing.lag
+        start[RATE, SENSED] = start[SENSED, RATE] = start[RATE, RATE]
+        start[SENSED, SENSED] = start[RATE, RATE] + first**2 * start_variance[2]
+        if second > 0.0:
+            start[SLOPE, SLOPE] = start_variance[2]
+            start[SENSED, SLOPE] = start[SLOPE, SENSED] = -first * start_variance[2]
     # A state that is neither read, nor driven, nor unknown at the start needs no arithmetic.
     there = np.flatnonzero((np.arange(STATES) <= SLOW) | (np.diag(q) > 0.0) | (np.diag(start) > 0.0))
     at = np.ix_(there, there)
