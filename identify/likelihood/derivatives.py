@@ -116,15 +116,16 @@ def _of_run(
     """Derivatives of one run; ``done`` are those by parameters with gains that stay.
 
     Noise and bias act on a linear platform alike wherever it stands, and no prediction is needed for theirs. Where a
-    gap, a stop or dry friction bends the motion, what they do depends on where it is: those are predicted.
+    gap, a stop or dry friction bends the motion, what they do depends on where it is: those are predicted. What J, C
+    and K do through the gains is little beside what they do themselves, and is followed along the linear part always.
     """
     p, s, base = at.problem, at.shots[i], at.looks[i]
     w, spans = s.weight, [(a, b - 1) for a, b in s.edges]
     root = np.sqrt(base.variance[w])
     bends = at.structure.bends
 
-    def followed(gains: Gains, h: float, bias: float = 0.0) -> Array:
-        if bends:
+    def followed(gains: Gains, h: float, bias: float = 0.0, predict: bool = bends) -> Array:
+        if predict:
             e = p.look(moved(s, (np.zeros(2), bias)), at.structure, at.names, at.x, at.noise, gains).innovations
         else:
             e = innovations_with(base.gains, gains, base.innovations, base.state, s.trace.keep, spans, bias)
@@ -152,7 +153,7 @@ def _of_run(
             pulled[:, k], gains = change - columns[:, k], other.gains
         else:
             gains = p.gains_at(s, at.structure, at.names, there, at.noise)
-            pulled[:, k] = followed(replace(base.gains, gain=gains.gain, variance=gains.variance), step)
+            pulled[:, k] = followed(replace(base.gains, gain=gains.gain, variance=gains.variance), step, predict=False)
         spread[:, k] = (np.log(gains.variance[w] / base.variance[w]) / step).ravel()
         if not (np.all(np.isfinite(pulled[:, k])) and np.all(np.isfinite(spread[:, k]))):
             pulled[:, k] = spread[:, k] = 0.0  # the linear part runs away there: its gains tell nothing

@@ -39,7 +39,8 @@ def beaten_by_a_curve(search: Stepwise, now: Fit) -> tuple[list[str], str, Fit] 
     for name in search.trials.added(now):
         groups.setdefault(effects.first_of(name), []).append(name)
     for first, names in groups.items():
-        curves = CURVES.get(effects.get(first).family, ())
+        effect = effects.get(first)
+        curves = [*CURVES.get(effect.family, ()), *(("free_memory",) if effect.states else ())]
         if not curves:
             continue
         rest = search.without(now, names)
