@@ -107,6 +107,7 @@ def test_white_noise_needs_no_second_look() -> None:
     assert not any(ONCE_MORE in line for line in said)
 
 
+@pytest.mark.slow
 def test_noise_in_the_recorded_torque_swells_at_the_resonance_and_is_not_the_sensors() -> None:
     runs = recorded(None, duration_s=4.0).runs
     noisy = [
@@ -149,6 +150,7 @@ def test_runs_under_one_and_the_same_sine_do_not_tell_noise_from_what_answers_to
     assert "What is left is noise" not in found.holdout_note
 
 
+@pytest.mark.slow
 def test_a_drive_whose_gain_goes_with_the_angle_is_no_noise_under_multisines() -> None:
     """All bins of a multisine as long as its run answer to it: on a damped platform that had passed for noise."""
     runs = [damped_multisine(seed) for seed in range(2)]

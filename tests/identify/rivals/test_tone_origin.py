@@ -107,17 +107,24 @@ def test_who_knows_that_it_is_a_torque_declares_it() -> None:
     assert found.before.parameters["inertia"].value == pytest.approx(TRUTH[0], rel=1e-4)
 
 
-def test_a_known_mass_shows_a_torque_and_a_line_of_the_sensor() -> None:
-    loads = [0.0, 0.0, 0.6 * TRUTH[0]]
-    torque = found_in([shaken(*one, seed=k, added=m) for k, (one, m) in enumerate(zip(SETS, loads, strict=True))])
+LOADS = (0.0, 0.0, 0.6 * TRUTH[0])
+
+
+def test_a_known_mass_shows_a_torque() -> None:
+    torque = found_in([shaken(*one, seed=k, added=m) for k, (one, m) in enumerate(zip(SETS, LOADS, strict=True))])
     assert torque.verdict.effects == ("periodic_disturbance",)
-    sensor = found_in([heard(*one, seed=k, added=m) for k, (one, m) in enumerate(zip(SETS, loads, strict=True))])
+
+
+@pytest.mark.slow
+def test_a_known_mass_shows_a_line_of_the_sensor() -> None:
+    sensor = found_in([heard(*one, seed=k, added=m) for k, (one, m) in enumerate(zip(SETS, LOADS, strict=True))])
     assert sensor.verdict.effects == ()
     assert sensor.verdict.unexplained
     assert "comes from the sensor and is no torque" in sensor.verdict.left_open
     assert not any("tell whether" in reason for reason in sensor.reasons)
 
 
+@pytest.mark.slow
 def test_nothing_is_named_that_was_only_found_beside_an_open_line() -> None:
     late = {"torque_delay": {"delay": 0.0013}}
     runs = []

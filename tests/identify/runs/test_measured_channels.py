@@ -149,6 +149,7 @@ def test_the_measured_current_takes_the_place_of_the_torque_asked_of_a_drive_tha
     assert_terms(found)
 
 
+@pytest.mark.slow
 def test_where_channel_and_library_do_as_well_the_library_is_named_and_the_channel_stands_beside_it() -> None:
     """A temperature that rises evenly within one run is time itself."""
     even = lambda t: 21.0 + 0.7 * t  # noqa: E731

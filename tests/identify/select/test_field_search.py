@@ -43,8 +43,9 @@ def right(found: Identification, servo: Servo) -> None:
     assert found.accepted
 
 
-def test_a_servo_with_nothing_hidden_is_accepted_and_nothing_is_named() -> None:
-    found = found_in(PLAIN)
+@OFFERED
+def test_a_servo_with_nothing_hidden_is_accepted_and_nothing_is_named(offered: tuple[str, ...] | None) -> None:
+    found = found_in(PLAIN, offered)
     assert found.verdict.effects == ()
     assert found.disturbance is not None
     assert found.disturbance.relative == pytest.approx(0.008, rel=0.8)
