@@ -87,10 +87,9 @@ def recordings(subject: CheckSubject) -> list[str]:
 
 def identifiability(subject: CheckSubject) -> list[str]:
     """What every set alone and all together can determine about the declared platform."""
-    from identify.bounds.planned import of_planned_campaign, of_recorded_campaign
-
     config = subject.loaded.config
     if subject.stage is None:
+        from identify.bounds.recorded import of_recorded_campaign
         from rig.recording.load import read_recording
 
         try:
@@ -99,6 +98,8 @@ def identifiability(subject: CheckSubject) -> list[str]:
             return []
         lines = of_recorded_campaign(recording, config.model.platform())
     else:
+        from identify.bounds.planned import of_planned_campaign
+
         rig = subject.stage.rig
         platform = config.model.platform()
         # A set that would break a limit is refused by the forecast; here it speaks at the torque that passes.

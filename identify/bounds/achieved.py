@@ -14,7 +14,7 @@ import numpy as np
 
 from identify.bounds import advice
 from identify.bounds.identifiability import Information, information_of, together
-from identify.bounds.planned import MIN_SAMPLES, silent
+from identify.bounds.recorded import MIN_SAMPLES, silent
 from identify.model.parameters import Name
 from identify.results import Identification, ParameterEstimate
 from identify.signals.prepare import one_noise, prepare

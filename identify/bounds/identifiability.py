@@ -17,8 +17,7 @@ import numpy as np
 
 from identify.model.parameters import Name, names_of
 from identify.model.structure import Structure
-from identify.signals.prepare import prepare
-from identify.signals.trace import Trace
+from identify.signals.trace import UPSAMPLING, Trace
 from identify.simulate.sensitivities import nuisance_basis, sensitivities
 from identify.simulate.shots import make_shots
 from rig import effects
@@ -183,7 +182,29 @@ def planned_trace(
         rate_rad_s=motion.sensed_rate_rad_s if sees_rate else None, angle_rad=None if sees_rate else motion.angle_rad,
         torque_time_s=time, torque_nm=torque.torque_nm, frequency_hz=planned.frequency_hz,
     )  # fmt: skip
+    from identify.signals.prepare import prepare  # noqa: PLC0415  slow to load: no forecast needs it
+
     return prepare(run, number, noise, lead_in_s=0.0)
+
+
+def _forecast_trace(platform: Platform, planned: PlannedSet, sample_rate_hz: float, noise: float, number: int) -> Trace:
+    """The same behind a gyro, where nothing is to be found out about the record: its motion is known as simulated."""
+    count = round(planned.duration_s * sample_rate_hz) + 1
+    time, fine = (
+        np.arange(count) / sample_rate_hz,
+        np.arange((count - 1) * UPSAMPLING + 1) / sample_rate_hz / UPSAMPLING,
+    )
+    torque = TorqueSignal(time, np.asarray(planned.torque(time), dtype=float))
+    motion = simulate(platform, fine, torque)
+    rate = motion.sensed_rate_rad_s
+    run = Run(
+        planned.name, time, np.ones(count, dtype=bool), rate_rad_s=rate[::UPSAMPLING], torque_time_s=time,
+        torque_nm=torque.torque_nm, frequency_hz=planned.frequency_hz,
+    )  # fmt: skip
+    return Trace(
+        run, "rate", 1.0 / sample_rate_hz, rate[::UPSAMPLING], np.ones(count, dtype=bool), [(0, count - 1)], torque,
+        noise, 0.5 * sample_rate_hz, number, motion=(motion.angle_rad, rate, fine, torque.at(fine), 0.0),
+    )  # fmt: skip
 
 
 def vector_of(platform: Platform, runs: int) -> tuple[Structure, tuple[Name, ...], Array]:
@@ -240,7 +261,7 @@ def of_planned(
     platform: Platform, sets: Sequence[PlannedSet], sample_rate_hz: float, noise_rad_s: float
 ) -> tuple[Information, ...]:
     """What each planned set alone would tell about a platform, each played from rest."""
-    traces = [planned_trace(platform, s, sample_rate_hz, noise_rad_s, i) for i, s in enumerate(sets)]
+    traces = [_forecast_trace(platform, s, sample_rate_hz, noise_rad_s, i) for i, s in enumerate(sets)]
     return tuple(information_of(t, platform, len(traces), (0.0, 0.0)) for t in traces)
 
 

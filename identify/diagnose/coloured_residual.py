@@ -70,13 +70,19 @@ def coloured_cost(a: Array, y: Array, run: Array, x: Array, given: Array | None)
     filters = autoregression(r, run, order) if given is None else given
     order = len(filters) - 1
 
+    members = [np.flatnonzero(run == k) for k in np.unique(run)]
+
     def whitened(m: Array) -> Array:
         out = []
-        for k in np.unique(run):
-            part = m[run == k]
+        for one in members:
+            part = m[one]
             if len(part) <= order:
                 continue
-            out.append(sum(f * part[order - i : len(part) - i] for i, f in enumerate(filters)))
+            left = filters[0] * part[order:]
+            term = np.empty_like(left)
+            for i in range(1, order + 1):
+                left += np.multiply(part[order - i : len(part) - i], filters[i], out=term)
+            out.append(left)
         return np.concatenate(out)
 
     best = np.inf

@@ -7,7 +7,7 @@ Every shape at every amplitude is simulated on both models; what the loser could
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,27 +15,20 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from identify.bounds.achieved import usable_traces
+from identify.follow_up.choice import MIN_CHI_SQUARE, Looks, choose
 from identify.follow_up.excitations import Candidate, candidates, fitting, shapes
 from identify.follow_up.pairs import Pair, pairs_of
-from identify.follow_up.separation import Sensor, Share, Way, coarser, measured, settled, share_of, shots_of
+from identify.follow_up.separation import Sensor, coarser
 from identify.follow_up.wording import verdict_sentences, why_of
 from identify.results import FollowUp, FollowUpPlan, Identification, Parting, Unparted
 from identify.wording import number
 from rig import effects
 from rig.config.excitation import ExcitationConfig
-from rig.excitation import PlannedSet
 from rig.platform import Platform
 from rig.preflight import Peaks
 from rig.recording.run import Recording
 
-MIN_CHI_SQUARE = 25.0  # chi square that a plan has to promise: five standard errors
-GOOD = 400.0  # from which more sets are not worth their time
-BEST = 1e4  # from which more of it proves nothing more
-EQUIVALENT_SCORE_RATIO = 0.5  # of the best score: the shorter of two such sets is played
-MAX_SETS = 4
 FAINT = 0.005  # of the largest torque played so far: drives take torque in steps of about a thousandth
-PROOFS = 3  # sets that are put to the proof in a round
-LOOKED_AT = 14  # candidates of a pair whose sensitivities are taken
 LOOKS = 30.0  # samples a period of the platform's own oscillation: no shape goes beyond three times its frequency
 USUAL_HZ = 5.0  # where nothing swings
 MIN_DAMPING_SHARE = 0.05  # of the identified one, where the runs hardly tell it
@@ -122,8 +115,8 @@ def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table, least
     if not choice:
         why = f"no kind of excitation stays within the limits at {number(table.least_torque_nm, 2)} N m or more"
         return FollowUp(None, (*without, *(Unparted(p.effect, p.rival, why) for p in pairs)))
-    looks = _Looks(pairs, choice, models, look, weight)
-    sets = [s for i in _choose(looks) if (s := fitting(choice[i], bearing, table.allowed)) is not None]
+    looks = Looks(pairs, choice, models, look, weight)
+    sets = [s for i in choose(looks) if (s := fitting(choice[i], bearing, table.allowed)) is not None]
     partings, failed = [], list(without)
     for pair in pairs:
         best = looks.checked(sets, pair) if sets else 0.0
@@ -153,129 +146,6 @@ def natural_hz(platform: Platform) -> float:
     """The frequency that a platform swings at, or a usual one where it has no spring."""
     j, k = platform.inertia_kg_m2, platform.stiffness_nm_rad
     return float(np.sqrt(k / j) / (2.0 * np.pi)) if k > 0.0 and j > 0.0 else USUAL_HZ
-
-
-class _Looks:
-    """Chi square between the models of each pair under each candidate, computed where it is asked for."""
-
-    def __init__(
-        self, pairs: Sequence[Pair], choice: Sequence[Candidate], models: Sequence[Platform], sensor: Sensor,
-        weight: float,
-    ) -> None:  # fmt: skip
-        self.pairs, self.choice, self._sensor, self._weight = pairs, choice, sensor, weight
-        self._models = models
-        self._checked: dict[tuple[int, ...], float] = {}  # by the identity of what is kept here anyway
-        self._shares: dict[tuple[int, int, int], Share] = {}
-        self.shortlist = sorted({i for p in pairs for i in self._promising(p)})
-
-    def _promising(self, pair: Pair) -> list[int]:
-        """The candidates with the largest difference of each amplitude: a small one may tell more in the end."""
-        one, other = (self._models.index(m) for m in pair.models)
-        scale = self._weight / self._sensor.noise**2
-        size = [scale * float(np.sum((c.seen[one] - c.seen[other]) ** 2)) for c in self.choice]
-        shares = sorted({c.share for c in self.choice}, reverse=True)
-        per = max(1, LOOKED_AT // len(shares))
-        out = []
-        for share in shares:
-            mine = [i for i, c in enumerate(self.choice) if c.share == share and size[i] > MIN_CHI_SQUARE]
-            out += sorted(mine, key=lambda i: -size[i])[:per]
-        return out
-
-    def _share(self, i: int, k: int, w: int, way: Way) -> Share:
-        key = (i, k, w)
-        if key not in self._shares:
-            trace = measured(way.truth, self.choice[i].planned, self._sensor)
-            found = share_of(way.model, shots_of(way.model, trace))
-            g = self._weight
-            self._shares[key] = Share(g * found.squares, g * found.gradient, g * found.information)
-        return self._shares[key]
-
-    def separation(self, chosen: Sequence[int], k: int) -> float:
-        """Chi square between the models of pair ``k`` after all chosen sets, in the worse direction."""
-        left = []
-        for w, way in enumerate(self.pairs[k].ways):
-            several = [self._share(i, k, w, way) for i in chosen]
-            total = several[0]
-            for one in several[1:]:
-                total = total + one
-            left.append(total.left(way.prior))
-        return min(left)
-
-    def score(self, chosen: Sequence[int]) -> float:
-        """How well all pairs are parted to first order: more of what is enough counts nothing."""
-        return _worth(self.separation(chosen, k) for k in range(len(self.pairs)))
-
-    def checked(self, sets: Sequence[Candidate], pair: Pair) -> float:
-        """Chi square between the models of a pair after all sets, the loser fitted along the bend."""
-        plans = [s.planned for s in sets]
-        key = (*(id(p) for p in plans), id(pair))
-        if key not in self._checked:
-            self._checked[key] = self._settled(plans, pair)
-        return self._checked[key]
-
-    def _settled(self, plans: Sequence[PlannedSet], pair: Pair) -> float:
-        """In the worse of both directions; too little in one is too little."""
-        least = np.inf
-        for way in pair.ways:
-            least = min(least, settled(way, plans, self._sensor, self._weight, MIN_CHI_SQUARE))
-            if least < MIN_CHI_SQUARE:
-                break
-        return float(least)
-
-    def proved(self, chosen: Sequence[int], before: Sequence[float] | None = None) -> list[float]:
-        """The same for every pair; of pairs that fewer sets part well enough ``before``, what these promised."""
-        sets = [self.choice[i] for i in chosen]
-        known = before or [0.0] * len(self.pairs)
-        return [b if b >= GOOD else self.checked(sets, pair) for pair, b in zip(self.pairs, known, strict=True)]
-
-    def duration(self, i: int) -> float:
-        """Length of a candidate in seconds."""
-        return self.choice[i].planned.duration_s
-
-
-def _worth(separations: Iterable[float]) -> float:
-    return float(sum(np.log1p(np.clip(x, 0.0, BEST)) for x in separations))
-
-
-def _choose(looks: _Looks) -> list[int]:
-    """Set by set, each the one that parts most; the shortest of those that do nearly as well.
-
-    What looks best to first order is put to the proof, one after the other, until one stands.
-    """
-    chosen: list[int] = []
-    reached, stands = 0.0, [0.0] * len(looks.pairs)
-    while looks.shortlist and len(chosen) < MAX_SETS:
-        gains = {i: looks.score([*chosen, i]) for i in looks.shortlist}
-        best = max(gains.values())
-        alike = sorted(
-            (i for i, g in gains.items() if g > best - EQUIVALENT_SCORE_RATIO),
-            key=lambda i: (looks.duration(i), -looks.choice[i].share),
-        )
-        others = sorted((i for i in gains if i not in alike), key=lambda i: -gains[i])
-        order = _varied(looks, [*alike, *others])
-        proofs: dict[int, list[float]] = {}
-        for i in order[:PROOFS]:
-            proofs[i] = looks.proved([*chosen, i], stands)
-            if min(proofs[i]) >= GOOD:
-                break
-        winner = max(proofs, key=lambda i: _worth(proofs[i]))
-        if chosen and _worth(proofs[winner]) < reached + 0.1:  # of the logarithm: nothing that would be seen
-            break
-        chosen.append(winner)
-        stands = proofs[winner]
-        reached = _worth(stands)
-        if min(stands) >= GOOD:
-            break
-    return chosen
-
-
-def _varied(looks: _Looks, order: Sequence[int]) -> list[int]:
-    """The same order, but the best of every amplitude first: where one amplitude misleads, the next is another."""
-    first: list[int] = []
-    for i in order:
-        if looks.choice[i].share not in {looks.choice[k].share for k in first}:
-            first.append(i)
-    return [*first, *(i for i in order if i not in first)]
 
 
 def _section(sets: Sequence[Candidate], table: Table) -> dict[str, Any]:

@@ -45,7 +45,7 @@ def ranges(problem: PredictionError, fit: Fit) -> dict[str, Range]:
         return float(low), float(high)
 
     over = {"rad": inner(angle), "rad/s": inner(rate), "N*m": inner(torque), "s": time}
-    out = {name: over[effect.parameters[0].unit] for name, effect in effects.FREE_FORMS.items()}
+    out = {name: over[effect.parameters[0].unit] for name, effect in effects.free_forms().items()}
     out["free_gain_over_speed"] = (0.0, inner(np.abs(rate))[1])
     out["free_memory"] = (FASTEST_MEMORY / max(turning, 1e-300), 0.0)
     return {n: r for n, r in out.items() if r[0] != r[1]}

@@ -80,7 +80,7 @@ def left_over(search: Stepwise, now: Fit) -> tuple[LeftOver | None, list[LeftOve
     problem = search.problem
     best: LeftOver | None = None
     others: list[LeftOver] = []
-    for form in scores(problem, now, search.trials.scale(now), tuple(effects.FREE_FORMS))[:TRIED]:
+    for form in scores(problem, now, search.trials.scale(now), tuple(effects.free_forms()))[:TRIED]:
         if form.gain < HOPE:
             break
         fit = fitted(problem, now, form, STEPS)

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy import signal
 
 from rig.recording.run import Array
+
+
+@lru_cache(maxsize=64)
+def _sections(wn: float) -> Array:
+    """Of the filter, (1, 6), at a cut-off over Nyquist's: a search asks hundreds of times for a few of them."""
+    return np.asarray(signal.butter(2, wn, output="sos"))
 
 
 def low_pass(values: Array, cutoff_hz: float, step_s: float) -> Array:
@@ -13,5 +21,4 @@ def low_pass(values: Array, cutoff_hz: float, step_s: float) -> Array:
     wn = 2.0 * cutoff_hz * step_s
     if wn >= 0.95:
         return values
-    sos = signal.butter(2, wn, output="sos")
-    return np.asarray(signal.sosfiltfilt(sos, values, padlen=min(len(values) - 1, int(6.0 / wn) + 10)))
+    return np.asarray(signal.sosfiltfilt(_sections(wn), values, padlen=min(len(values) - 1, int(6.0 / wn) + 10)))

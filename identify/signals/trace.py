@@ -8,11 +8,9 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from scipy import signal
 from scipy.interpolate import CubicSpline
 
 from identify.model.effect_torque import torque_along
-from identify.signals.channel_readings import table_of
 from identify.signals.prefilter import held_pieces, linear_pieces, smooth_pieces
 from rig import effects
 from rig.channels import Channel
@@ -94,6 +92,8 @@ class Trace:
     def table(self, channel: Channel) -> tuple[Array, float]:
         """What a channel does from the start of the run, finer than the samples, and the entries a second."""
         if channel not in self._tables:
+            from identify.signals.channel_readings import table_of  # noqa: PLC0415  as below
+
             self._tables[channel] = table_of(self.run, channel, self.step_s)
         return self._tables[channel]
 
@@ -132,6 +132,8 @@ class Trace:
         wn = self.cutoff_hz / nyquist
         y = self.measured
         if wn < 0.8:
+            from scipy import signal  # noqa: PLC0415  slow to load: a forecast knows its motion
+
             sos = signal.butter(3, wn, output="sos")
             y = signal.sosfiltfilt(sos, y, padlen=min(len(y) - 1, int(10.0 / wn)))
         t = self.step_s * np.arange(len(y))

@@ -5,7 +5,7 @@ Effects from outside the package (installed ones, and files that a rig.yaml name
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -13,7 +13,6 @@ from pathlib import Path
 
 from rig.channels import Channel
 from rig.effects import _channels, _outside
-from rig.effects._free_form import FREE_FORMS
 from rig.effects.base import Effect, Parameter, Place, Scale, filter_kernel, kernel
 
 _MODULES = {
@@ -81,8 +80,8 @@ def get(name: str) -> Effect:
         return _further(name)
     if name in _FORMS:
         return _form(name)
-    if name in FREE_FORMS:
-        return FREE_FORMS[name]
+    if name.startswith("free_") and name in free_forms():
+        return free_forms()[name]
     return _channels.get(name) if name in _channels.names() else _outside.get(name)
 
 
@@ -101,6 +100,13 @@ def _further(name: str) -> Effect:
 def _form(name: str) -> Effect:
     effect: Effect = import_module(f"rig.effects.{name}").EFFECT
     return effect
+
+
+def free_forms() -> Mapping[str, Effect]:
+    """The curves that show what no effect describes, by name; loaded when first asked for."""
+    from rig.effects._free_form import FREE_FORMS  # noqa: PLC0415  compiled kernels: a simulation needs none of them
+
+    return FREE_FORMS
 
 
 def forms(name: str) -> tuple[str, ...]:
@@ -153,6 +159,6 @@ def file_of(name: str) -> Path | None:
 
 
 __all__ = [
-    "FREE_FORMS", "Effect", "Parameter", "Place", "Scale", "declare_channels", "exists", "file_of", "filter_kernel",
-    "first_of", "forms", "further", "get", "kernel", "known", "names", "of_channel", "read_file",
+    "Effect", "Parameter", "Place", "Scale", "declare_channels", "exists", "file_of", "filter_kernel",
+    "first_of", "forms", "free_forms", "further", "get", "kernel", "known", "names", "of_channel", "read_file",
 ]  # fmt: skip

@@ -12,70 +12,21 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-import numba as nb
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
 from rig.channels import Channel
-from rig.effects.base import Effect, Parameter, Place, kernel
+from rig.effects.base import Effect, Parameter, Place
 from rig.errors import ConfigError
 
 SLOTS = 3  # numbers behind an effect's own parameters: where the table is, entries a second, entries
 AT_REST: Any = np.zeros(2)  # the table of a channel that nobody measures: it stands at its reference
 
 
-@intrinsic
-def _floats(typingctx: Any, address: Any) -> Any:
-    """Pointer to the float64 values at an address."""
-    signature = types.CPointer(types.float64)(types.int64)
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.inttoptr(args[0], ir.DoubleType().as_pointer())
-
-    return signature, codegen
-
-
-@nb.njit(error_model="numpy")
-def _reading(time, p):  # type: ignore[no-untyped-def]
-    """What the channel reads at a time, straight between the entries of its table, constant beyond its ends."""
-    table, count = _floats(np.int64(p[4])), np.int64(p[6])
-    place = min(max(time * p[5], 0.0), count - 1.0)
-    i = min(np.int64(place), count - 2)
-    return table[i] + (place - i) * (table[i + 1] - table[i])
-
-
-@kernel
-def _torque(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
-    return p[3] * _reading(time, p)
-
-
-@kernel
-def _stiffness(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
-    return p[3] * _reading(time, p) * angle
-
-
-@kernel
-def _damping(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
-    return p[3] * _reading(time, p) * rate
-
-
-@kernel
-def _gain(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
-    return -p[3] * _reading(time, p) * torque
-
-
-@kernel
-def _drive(angle, rate, time, torque, state, dstate, p):  # type: ignore[no-untyped-def]
-    return p[3] * (torque - _reading(time, p))
-
-
 @dataclass(frozen=True)
 class _Way:
     """One way in which a channel may act: T = slope * (x - x0) * what its unit says."""
 
-    kernel: Any
+    kernel: str  # its name in ``_channel_kernels``
     place: Place
     equation: str
     meaning: str
@@ -90,30 +41,30 @@ class _Way:
 _ALONE = "from other effects: record a run in which {x} changes by itself"
 _WAYS = {
     "torque": _Way(
-        _torque, Place.LOAD, "T = slope * (x - x0)", "A torque proportional to {x}: coupling, tilt, a cable.",
+        "torque_of", Place.LOAD, "T = slope * (x - x0)", "A torque proportional to {x}: coupling, tilt, a cable.",
         "Resisting: positive with {x} above x0.", "N*m", "nm", _ALONE, "coupling",
     ),
     "stiffness": _Way(
-        _stiffness, Place.LOAD, "T = slope * (x - x0) * th", "The stiffness changes with {x}.",
+        "stiffness_of", Place.LOAD, "T = slope * (x - x0) * th", "The stiffness changes with {x}.",
         "K is the stiffness at x0; a positive slope stiffens.", "N*m/rad", "nm_rad", _ALONE, "restoring torque",
     ),
     "damping": _Way(
-        _damping, Place.LOAD, "T = slope * (x - x0) * w", "The damping changes with {x}.",
+        "damping_of", Place.LOAD, "T = slope * (x - x0) * w", "The damping changes with {x}.",
         "C is the damping at x0; a positive slope damps.", "N*m*s/rad", "nm_s_rad", _ALONE, "friction",
     ),
     "gain": _Way(
-        _gain, Place.LOAD, "M = [1 + slope * (x - x0)] * torque",
+        "gain_of", Place.LOAD, "M = [1 + slope * (x - x0)] * torque",
         "The torque per ampere changes with {x}: magnets weaken as they warm.",
         "The recorded torque is right at x0; with a negative slope the shaft gets less above x0.", "1", "1", _ALONE,
         "drive",
     ),
     "friction": _Way(
-        _torque, Place.FRICTION, "T = slope * (x - x0) * sgn(w)", "Dry friction changes with {x}.",
+        "torque_of", Place.FRICTION, "T = slope * (x - x0) * sgn(w)", "Dry friction changes with {x}.",
         "coulomb_friction is the level at x0; a negative slope lowers it above x0.", "N*m", "nm", _ALONE, "friction",
         ("coulomb_friction",),
     ),
     "drive": _Way(
-        _drive, Place.LOAD, "M = torque + share * (factor * x - torque)",
+        "drive_of", Place.LOAD, "M = torque + share * (factor * x - torque)",
         "The torque on the shaft is that of {x}, not the recorded one, where the two differ.",
         "1: the shaft follows {x} alone; 0: it follows the recorded torque.", "1", "",
         "from a lag or limit of the drive: play torques at which {x} differs from the recorded torque in another way",
@@ -160,6 +111,8 @@ def declare(channels: Iterable[Channel], is_taken: Callable[[str], bool]) -> Non
 
 def make(channel: Channel, way: str) -> Effect:
     """The effect that a channel has in one way."""
+    from rig.effects import _channel_kernels  # noqa: PLC0415  compiled kernels: only where there is a channel
+
     form, words = _WAYS[way], channel.name.replace("_", " ")
     if way == "drive":
         parameter = Parameter("share", "1", "share of the torque that follows the channel", linear=True)
@@ -171,7 +124,8 @@ def make(channel: Channel, way: str) -> Effect:
     return Effect(
         name=effect_name(channel.name, way), family=form.family, place=form.place, equation=form.equation,
         source="first-order dependence on a measured channel", meaning=form.meaning.format(x=words),
-        sign=form.sign.format(x=words), parameters=(parameter,), kernel=form.kernel, lower_order=form.lower_order,
+        sign=form.sign.format(x=words), parameters=(parameter,),
+        kernel=getattr(_channel_kernels, form.kernel), lower_order=form.lower_order,
         separated_by=form.separated_by.format(x=words), reads=channel,
     )  # fmt: skip
 

@@ -38,7 +38,10 @@ def values(model: dict[str, Any]) -> dict[str, float]:
 @pytest.mark.parametrize(
     "offered",
     [
-        "[coulomb_friction, torque_delay, presliding_friction, sensor_lag, unbalance]",
+        "[coulomb_friction, torque_delay]",
+        pytest.param(
+            "[coulomb_friction, torque_delay, presliding_friction, sensor_lag, unbalance]", marks=pytest.mark.slow
+        ),
         pytest.param("null", marks=pytest.mark.slow),  # the whole library, as the file has it
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -31,10 +32,18 @@ class RealRig(ScriptedRig):
         return Statement(Torque.REAL, ("a scripted rig",))
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+@pytest.fixture(scope="module")
+def identified(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A campaign on the simulated rig in which the cubic spring was named."""
-    return campaign(tmp_path, monkeypatch)
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        return campaign(tmp_path_factory.mktemp("identified"), monkeypatch)
+
+
+@pytest.fixture
+def folder(identified: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of it, to add a proof to."""
+    stand_in(monkeypatch, right())
+    return shutil.copytree(identified, tmp_path / "out")
 
 
 def campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, found: object = None) -> Path:

@@ -70,6 +70,7 @@ def test_a_moment_is_told_with_its_run_its_time_and_what_to_do() -> None:
     assert "from_s or to_s" in said
 
 
+@pytest.mark.slow
 def test_a_push_of_half_a_second_is_told_by_the_whole_identification() -> None:
     recording = campaign(duration_s=5)
     runs = list(recording.runs)

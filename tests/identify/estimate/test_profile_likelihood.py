@@ -35,7 +35,7 @@ def fitted(traces: Sequence[Trace], inertia: float) -> Fitted:
     return by_output_error(traces, Structure(), start, 0.1, use, use)
 
 
-@pytest.mark.parametrize("begun", [0.5, 2.0])
+@pytest.mark.parametrize("begun", [pytest.param(0.5, marks=pytest.mark.slow), 2.0])
 def test_an_inertia_that_shows_in_rings_of_noise_comes_out_within_its_interval(begun: float) -> None:
     off = []
     for seed in range(5):
@@ -86,7 +86,14 @@ def test_runs_that_begin_in_motion_tell_as_little_and_say_so() -> None:
 
 
 @pytest.mark.parametrize(
-    ("seed", "begun"), [(0, 1e-4), (2, 1e-4), (4, 8.714331e-5), (5, 1.293086e-04), (7, 6.847339e-5)]
+    ("seed", "begun"),
+    [
+        pytest.param(0, 1e-4, marks=pytest.mark.slow),
+        (2, 1e-4),
+        pytest.param(4, 8.714331e-5, marks=pytest.mark.slow),
+        (5, 1.293086e-04),
+        pytest.param(7, 6.847339e-5, marks=pytest.mark.slow),
+    ],
 )
 def test_one_slow_run_leaves_the_inertia_open_or_nearly(seed: int, begun: float) -> None:
     traces = slow(seed)[:1]

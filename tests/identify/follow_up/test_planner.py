@@ -11,8 +11,9 @@ import pytest
 
 from benchmarks.blind.excitations import read
 from identify.bounds.identifiability import planned_trace
+from identify.follow_up.choice import GOOD, MIN_CHI_SQUARE
 from identify.follow_up.pairs import free_run, never_reason
-from identify.follow_up.planner import GOOD, MIN_CHI_SQUARE, plan_follow_up, with_follow_up
+from identify.follow_up.planner import plan_follow_up, with_follow_up
 from identify.follow_up.wording import follow_up_yaml
 from identify.results import FollowUp, FollowUpPlan, Identification
 from rig.config.excitation import ExcitationConfig
@@ -39,6 +40,11 @@ NEVER = {
         {"quadratic_stiffness": {"factor": 50.0}}, {"unbalance": {"sine": 1.0, "cosine": -90.0}}
     ),
 }  # fmt: skip
+
+# Each pair is planned once, which takes seconds.
+EACH_PAIR = pytest.mark.parametrize(
+    "rival", [pytest.param("coulomb_friction", marks=pytest.mark.slow), *list(PAIRS)[1:]]
+)
 
 RECORDS = {"cubic_stiffness": (10.0, 40.0, 1.0)}  # torque, frequency, duration: no harmonic of it comes near resonance
 
@@ -72,7 +78,7 @@ def models_of(rival: str) -> tuple[Platform, Platform]:
     return found.final.platform, next(iter(found.verdict.rival_models.values()))[rival]
 
 
-@pytest.mark.parametrize("rival", PAIRS)
+@EACH_PAIR
 def test_a_pair_that_the_record_leaves_alike_gets_a_plan_within_a_minute_of_torque(rival: str) -> None:
     plan = plan_for(rival)
     (parting,) = plan.partings
@@ -81,7 +87,7 @@ def test_a_pair_that_the_record_leaves_alike_gets_a_plan_within_a_minute_of_torq
     assert rival.split("_", maxsplit=1)[0] in plan.why.lower()
 
 
-@pytest.mark.parametrize("rival", PAIRS)
+@EACH_PAIR
 def test_a_rival_fitted_to_all_the_data_misses_them_by_what_was_promised(rival: str) -> None:
     """The promise is kept where it counts: the rival adapts to the old record and the new one, and fails."""
     named, passed = models_of(rival)
@@ -104,7 +110,7 @@ def chi_square(platform: Platform, recording: Recording) -> float:
     return free_run(platform, traces).sigma ** 2 * sum(t.count for t in traces) / NOISE_RAD_S**2
 
 
-@pytest.mark.parametrize("rival", PAIRS)
+@EACH_PAIR
 def test_every_set_stays_within_the_limits_on_both_models(rival: str) -> None:
     for one in sets_of(plan_for(rival)):
         assert all(predict(model, one, ALLOWED).passes for model in models_of(rival))
@@ -194,14 +200,14 @@ def test_the_file_is_an_excitation_that_a_rig_yaml_may_name(tmp_path: Path) -> N
     assert loaded.config.excitation == ExcitationConfig.model_validate(dict(plan.excitation))
 
 
-def test_the_blind_bench_plays_the_same_torque_from_the_file(tmp_path: Path) -> None:
+@EACH_PAIR
+def test_the_blind_bench_plays_the_same_torque_from_the_file(tmp_path: Path, rival: str) -> None:
     path = tmp_path / "follow_up.yaml"
-    for rival in PAIRS:
-        plan = plan_for(rival)
-        path.write_text(follow_up_yaml(plan), encoding="utf-8")
-        theirs, rate_hz = read(path)
-        assert rate_hz == RATE_HZ
-        for mine, other in zip(sets_of(plan), theirs, strict=True):
-            times = np.arange(round(mine.duration_s * rate_hz)) / rate_hz
-            assert mine.name == other.name
-            assert other.torque(times) == pytest.approx(mine.torque(times), rel=2e-3, abs=1e-3)
+    plan = plan_for(rival)
+    path.write_text(follow_up_yaml(plan), encoding="utf-8")
+    theirs, rate_hz = read(path)
+    assert rate_hz == RATE_HZ
+    for mine, other in zip(sets_of(plan), theirs, strict=True):
+        times = np.arange(round(mine.duration_s * rate_hz)) / rate_hz
+        assert mine.name == other.name
+        assert other.torque(times) == pytest.approx(mine.torque(times), rel=2e-3, abs=1e-3)

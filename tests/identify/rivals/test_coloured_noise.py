@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from rig.recording.run import Array, Recording, Run
 from tests.identify.simulated import DECLARED, NOISE_RAD_S, SETS, TRUTH, Effects, sine_run, white
 
 ONCE_MORE = "repeating with coloured noise"
+CUBIC = {"cubic_stiffness": {"factor": 300.0}}
 
 
 def passed(order: int, hertz: float) -> Callable[[Array], Array]:
@@ -49,7 +51,13 @@ def found_in(recording: Recording, candidates: list[str]) -> tuple[Identificatio
     return identify(recording, DECLARED, settings, said.append), said
 
 
-@pytest.mark.parametrize(("order", "hertz"), [(2, 50.0), (1, 60.0)])
+@cache
+def found_without_its_effect() -> tuple[Identification, list[str]]:
+    """Such noise beside a stiffness that no candidate describes."""
+    return found_in(recorded(passed(2, 100.0), CUBIC), [])
+
+
+@pytest.mark.parametrize(("order", "hertz"), [pytest.param(2, 50.0, marks=pytest.mark.slow), (1, 60.0)])
 def test_noise_that_the_gyro_filters_is_no_missing_effect(order: int, hertz: float) -> None:
     found, said = found_in(recorded(passed(order, hertz), duration_s=4.0), [])
     assert found.accepted
@@ -68,7 +76,8 @@ def test_noise_that_the_gyro_filters_is_no_missing_effect(order: int, hertz: flo
     ("order", "hertz", "name", "hidden"),
     [
         (2, 100.0, "cubic_stiffness", {"factor": 300.0}),
-        (8, 100.0, "creep", {"stiffness": 30.0, "time": 0.1}),  # no noise where it is read: the search is far off first
+        # No noise where it is read: the search is far off first.
+        pytest.param(8, 100.0, "creep", {"stiffness": 30.0, "time": 0.1}, marks=pytest.mark.slow),
     ],
 )
 def test_an_effect_beside_such_noise_is_named(order: int, hertz: float, name: str, hidden: dict[str, float]) -> None:
@@ -81,7 +90,7 @@ def test_an_effect_beside_such_noise_is_named(order: int, hertz: float, name: st
 
 
 def test_an_effect_that_is_not_offered_is_no_noise() -> None:
-    found, said = found_in(recorded(passed(2, 100.0), {"cubic_stiffness": {"factor": 300.0}}), [])
+    found, said = found_without_its_effect()
     assert found.verdict.unexplained
     # What is left is 0.4 % of the torque; how far it moves J and K is how far these are off, start angle included.
     assert found.disturbance is not None
@@ -98,6 +107,7 @@ def test_white_noise_needs_no_second_look() -> None:
     assert not any(ONCE_MORE in line for line in said)
 
 
+@pytest.mark.slow
 def test_noise_in_the_recorded_torque_swells_at_the_resonance_and_is_not_the_sensors() -> None:
     runs = recorded(None, duration_s=4.0).runs
     noisy = [
@@ -113,8 +123,9 @@ def test_noise_in_the_recorded_torque_swells_at_the_resonance_and_is_not_the_sen
     assert 0.1 < found.disturbance.torque_rms < 1.0  # of 3 N m a sample: what lies in the band of the motion
 
 
-def test_what_a_clean_torque_leaves_is_not_blamed_on_its_noise() -> None:
-    found, _ = found_in(recorded(None, {"cubic_stiffness": {"factor": 300.0}}), [])
+@pytest.mark.parametrize("filtered", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_what_a_clean_torque_leaves_is_not_blamed_on_its_noise(filtered: bool) -> None:
+    found, _ = found_without_its_effect() if filtered else found_in(recorded(None, CUBIC), [])
     assert found.verdict.unexplained
     assert torque_noise.describe(found) == ""
 
@@ -139,6 +150,7 @@ def test_runs_under_one_and_the_same_sine_do_not_tell_noise_from_what_answers_to
     assert "What is left is noise" not in found.holdout_note
 
 
+@pytest.mark.slow
 def test_a_drive_whose_gain_goes_with_the_angle_is_no_noise_under_multisines() -> None:
     """All bins of a multisine as long as its run answer to it: on a damped platform that had passed for noise."""
     runs = [damped_multisine(seed) for seed in range(2)]
@@ -181,7 +193,7 @@ def damped_multisine(seed: int) -> Run:
 
 
 def test_a_second_look_that_sees_nothing_leaves_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    found, _ = found_in(recorded(passed(2, 100.0), {"cubic_stiffness": {"factor": 300.0}}), [])
+    found, _ = found_without_its_effect()
     monkeypatch.setattr(coloured_noise, "colour_of", lambda seen: Colour(1.0, 1.0, 100.0))
 
     def refused(colour: Colour) -> Identification:
@@ -191,7 +203,7 @@ def test_a_second_look_that_sees_nothing_leaves_the_first(monkeypatch: pytest.Mo
 
 
 def test_who_stops_the_second_look_keeps_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    found, _ = found_in(recorded(passed(2, 100.0), {"cubic_stiffness": {"factor": 300.0}}), [])
+    found, _ = found_without_its_effect()
     monkeypatch.setattr(coloured_noise, "colour_of", lambda seen: Colour(1.0, 1.0, 100.0))
 
     def interrupted(colour: Colour) -> Identification:

@@ -84,6 +84,7 @@ def test_no_other_torque_in_a_few_runs_explains_an_effect_of_the_platform_as_wel
         assert not as_likely(found, named)
 
 
+@pytest.mark.slow
 def test_two_runs_of_which_one_had_more_torque_are_no_second_resonance() -> None:
     """A mode far above all excitation had been accepted, with J half of what it is."""
     two = [sine_run(104.0, 3.0, seed=1, duration_s=6.0), sine_run(42.0, 9.0, seed=2, duration_s=6.0)]

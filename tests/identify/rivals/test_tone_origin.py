@@ -17,7 +17,7 @@ from rig.recording.run import Recording, Run
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, sine_run
 
 HERTZ, TORQUE_NM = 13.37, 0.8
-LASTS_S = 2.5  # 33 periods of the line
+LASTS_S = 1.5  # 20 periods of the line
 SETS = ((67.0, 6.0), (111.0, 1.0), (104.0, 3.0))
 SETTINGS = IdentifyConfig.model_validate({"candidates": ["periodic_disturbance", "coulomb_friction", "cogging"]})
 
@@ -37,9 +37,9 @@ def shaken(torque_nm: float, hertz: float, seed: int, added: float = 0.0, stands
     return replace(run, rate_rad_s=motion.rate_rad_s + noise, added_inertia_kg_m2=added)
 
 
-def heard(torque_nm: float, hertz: float, seed: int, added: float = 0.0) -> Run:
+def heard(torque_nm: float, hertz: float, seed: int, added: float = 0.0, lasts_s: float = LASTS_S) -> Run:
     """A sine set whose gyro shows a vibration that folds back to the same frequency."""
-    run = sine_run(torque_nm, hertz, seed=seed, jck=(TRUTH[0] + added, *TRUTH[1:]), duration_s=LASTS_S)
+    run = sine_run(torque_nm, hertz, seed=seed, jck=(TRUTH[0] + added, *TRUTH[1:]), duration_s=lasts_s)
     assert run.rate_rad_s is not None
     line = 0.09 * np.sin(2.0 * np.pi * (1000.0 - HERTZ) * run.time_s + 1.3 * seed)
     return replace(run, rate_rad_s=run.rate_rad_s + line, added_inertia_kg_m2=added)
@@ -56,7 +56,7 @@ def test_a_torque_that_begins_with_the_runs_is_named() -> None:
     assert not found.verdict.left_open
 
 
-@pytest.mark.parametrize("made", [shaken, heard])
+@pytest.mark.parametrize("made", [pytest.param(shaken, marks=pytest.mark.slow), heard])
 def test_a_line_that_stood_before_the_runs_began_may_be_torque_or_sensor_and_is_left_open(made) -> None:  # type: ignore[no-untyped-def]
     found = found_in([made(*one, seed=k) for k, one in enumerate(SETS)])
     assert found.verdict.effects == ()
@@ -70,12 +70,12 @@ def test_a_line_that_stood_before_the_runs_began_may_be_torque_or_sensor_and_is_
     assert statuses["periodic_disturbance"] == "left open"
 
 
-@pytest.mark.parametrize("made", [shaken, heard])
+@pytest.mark.parametrize("made", [shaken, pytest.param(heard, marks=pytest.mark.slow)])
 def test_records_that_begin_in_motion_do_not_tell_either(made) -> None:  # type: ignore[no-untyped-def]
     runs = []
     for k, one in enumerate(SETS):
         run = made(*one, seed=k)
-        late = run.time_s >= 1.2
+        late = run.time_s >= 0.5
         runs.append(
             replace(
                 run, time_s=run.time_s[late], valid=run.valid[late], rate_rad_s=run.rate_rad_s[late],
@@ -88,7 +88,10 @@ def test_records_that_begin_in_motion_do_not_tell_either(made) -> None:  # type:
 
 
 def test_a_line_in_one_run_is_told_with_that_run_and_its_size_there() -> None:
-    runs = [heard(*one, seed=k) if k == 2 else sine_run(*one, seed=k, duration_s=LASTS_S) for k, one in enumerate(SETS)]
+    runs = [
+        heard(*one, seed=k, lasts_s=2.5) if k == 2 else sine_run(*one, seed=k, duration_s=2.5)
+        for k, one in enumerate(SETS)
+    ]
     found = found_in(runs)
     assert found.verdict.effects == ()
     assert "13.37 Hz (only in 3 Hz) is left open" in found.verdict.left_open
@@ -104,17 +107,24 @@ def test_who_knows_that_it_is_a_torque_declares_it() -> None:
     assert found.before.parameters["inertia"].value == pytest.approx(TRUTH[0], rel=1e-4)
 
 
-def test_a_known_mass_shows_a_torque_and_a_line_of_the_sensor() -> None:
-    loads = [0.0, 0.0, 0.6 * TRUTH[0]]
-    torque = found_in([shaken(*one, seed=k, added=m) for k, (one, m) in enumerate(zip(SETS, loads, strict=True))])
+LOADS = (0.0, 0.0, 0.6 * TRUTH[0])
+
+
+def test_a_known_mass_shows_a_torque() -> None:
+    torque = found_in([shaken(*one, seed=k, added=m) for k, (one, m) in enumerate(zip(SETS, LOADS, strict=True))])
     assert torque.verdict.effects == ("periodic_disturbance",)
-    sensor = found_in([heard(*one, seed=k, added=m) for k, (one, m) in enumerate(zip(SETS, loads, strict=True))])
+
+
+@pytest.mark.slow
+def test_a_known_mass_shows_a_line_of_the_sensor() -> None:
+    sensor = found_in([heard(*one, seed=k, added=m) for k, (one, m) in enumerate(zip(SETS, LOADS, strict=True))])
     assert sensor.verdict.effects == ()
     assert sensor.verdict.unexplained
     assert "comes from the sensor and is no torque" in sensor.verdict.left_open
     assert not any("tell whether" in reason for reason in sensor.reasons)
 
 
+@pytest.mark.slow
 def test_nothing_is_named_that_was_only_found_beside_an_open_line() -> None:
     late = {"torque_delay": {"delay": 0.0013}}
     runs = []
@@ -132,7 +142,10 @@ def test_nothing_is_named_that_was_only_found_beside_an_open_line() -> None:
 
 @pytest.mark.parametrize(
     ("gain", "late", "said"),
-    [(1.01, 0, "was smaller by 0.99 % in 15 Hz"), (1.0, 1, "(only in 15 Hz) is no disturbance")],
+    [
+        pytest.param(1.01, 0, "was smaller by 0.99 % in 15 Hz", marks=pytest.mark.slow),
+        (1.0, 1, "(only in 15 Hz) is no disturbance"),
+    ],
 )
 def test_a_line_at_the_frequency_of_one_runs_own_torque_is_that_torque(gain: float, late: int, said: str) -> None:
     """A drive that gave one percent less in one run; or its rows one sample late, and what was cut off in front."""

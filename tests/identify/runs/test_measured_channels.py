@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -73,6 +74,11 @@ def of_the_magnet() -> Identification:
     return identified(weakening_magnet())
 
 
+@cache
+def of_the_spring() -> Identification:
+    return identified(softening())
+
+
 def assert_terms(found: Identification, relative: float = 0.001) -> None:
     """Within a tenth of a percent (damping: one), and within five standard errors that are not wide either."""
     for term, truth in zip(TERMS, TRUTH, strict=True):
@@ -99,8 +105,11 @@ def test_a_winding_that_warms_is_named_as_what_lowers_the_torque_with_its_slope(
     assert_terms(found)
 
 
-def test_the_verdict_says_at_which_temperature_the_parameters_hold() -> None:
-    said = [s for s in of_the_magnet().verdict.sentences if "is relative to" in s]
+@pytest.mark.parametrize("identification", [of_the_spring, pytest.param(of_the_magnet, marks=pytest.mark.slow)])
+def test_the_verdict_says_at_which_temperature_the_parameters_hold(
+    identification: Callable[[], Identification],
+) -> None:
+    said = [s for s in identification().verdict.sentences if "is relative to" in s]
     assert len(said) == 1
     assert float(said[0].split("is relative to ")[1].split(":")[0]) == pytest.approx(21.0, abs=0.02)
 
@@ -115,7 +124,7 @@ def test_another_axis_that_accelerates_is_named_and_its_coupling_measured() -> N
 
 
 def test_a_spring_that_softens_with_temperature_is_told_from_one_that_drifts() -> None:
-    found = identified(softening())
+    found = of_the_spring()
     assert found.accepted, found.reasons
     assert found.verdict.effects == ("winding_stiffness",)
     assert_number(found, "winding_stiffness", "slope", -0.8)
@@ -140,6 +149,7 @@ def test_the_measured_current_takes_the_place_of_the_torque_asked_of_a_drive_tha
     assert_terms(found)
 
 
+@pytest.mark.slow
 def test_where_channel_and_library_do_as_well_the_library_is_named_and_the_channel_stands_beside_it() -> None:
     """A temperature that rises evenly within one run is time itself."""
     even = lambda t: 21.0 + 0.7 * t  # noqa: E731

@@ -48,6 +48,7 @@ def _between(low_hz: float, high_hz: float, n: int) -> Array:
     return np.fft.irfft(np.where((f > low_hz) & (f < high_hz), spectrum, 0.0), n)
 
 
+@pytest.mark.slow
 def test_a_clean_campaign_with_a_noisy_run_is_accepted_without_it_and_says_so() -> None:
     found = identify(with_noise(1.0, 1.0, 4.0, 1.0, 1.0), DECLARED, IdentifyConfig())
     assert found.accepted

@@ -41,5 +41,5 @@ def test_what_is_declared_and_unseen_is_set_aside_and_the_rest_identified(
 
 
 def test_no_candidates_means_none() -> None:
-    found = identify(campaign({"coulomb_friction": {"level": 1.0}}, sets=TWO, duration_s=2.0), Platform(*TRUTH), NONE)
+    found = identify(campaign({"coulomb_friction": {"level": 1.0}}, sets=TWO, duration_s=1.0), Platform(*TRUTH), NONE)
     assert not found.verdict.candidates and found.verdict.unexplained

@@ -16,7 +16,7 @@ from rig.recording.run import Array, Recording, Run
 from tests.identify.simulated import DECLARED, SETS, TRUTH, Effects, white
 
 STEP_RAD = 2.0 * np.pi / 20000.0
-TIME = np.arange(3001) * 1e-3
+TIME = np.arange(2001) * 1e-3
 
 
 def swing(noise: float = 0.0) -> Array:

@@ -19,8 +19,8 @@ def turned(run: Run) -> Run:
     return replace(run, torque_nm=-run.torque_nm)
 
 
-def with_turned(*numbers: int) -> Recording:
-    right = campaign()
+def with_turned(*numbers: int, duration_s: float = 4.0) -> Recording:
+    right = campaign(duration_s=duration_s)
     return replace(right, runs=tuple(turned(r) if i in numbers else r for i, r in enumerate(right.runs)))
 
 
@@ -59,11 +59,12 @@ def test_a_run_whose_torque_has_nothing_to_do_with_its_motion_is_not_called_turn
 
 
 def test_the_rest_is_identified_without_it_and_the_result_says_so() -> None:
-    found = identify(with_turned(1), DECLARED, IdentifyConfig())
-    name = with_turned(1).runs[1].name
+    recording = with_turned(1, duration_s=2.0)
+    found = identify(recording, DECLARED, IdentifyConfig())
+    name = recording.runs[1].name
     assert found.verdict.effects == ()
     assert found.accepted
-    assert [s.name for s in found.per_set] == [r.name for i, r in enumerate(campaign().runs) if i != 1]
+    assert [s.name for s in found.per_set] == [r.name for i, r in enumerate(recording.runs) if i != 1]
     assert found.final.parameters["inertia"].value == pytest.approx(TRUTH[0], rel=1e-3)
     assert f"Left out: {name}" in found.holdout_note
 

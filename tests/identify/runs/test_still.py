@@ -40,6 +40,7 @@ def test_a_campaign_that_moves_keeps_all_its_runs(effects: dict[str, dict[str, f
     assert still_runs(traces_of(campaign(effects))) == []
 
 
+@pytest.mark.slow
 def test_friction_is_named_from_the_runs_that_moved() -> None:
     """One run below break-away had spoilt the whole campaign: C thirty times too large, and nothing named."""
     sets = ((60.0, 1.0), (60.0, 3.0), (5.0, 9.0))

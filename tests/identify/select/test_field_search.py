@@ -15,9 +15,13 @@ from tests.identify.servo import Servo
 DECLARED = Platform(1e-3, 1e-3, 1.0)
 
 
+FEW = ("coulomb_friction", "torque_offset", "directional_damping", "torque_delay")
+OFFERED = pytest.mark.parametrize("offered", [FEW, pytest.param(None, marks=pytest.mark.slow)])  # None: the library
+
+
 @cache
-def found_in(servo: Servo) -> Identification:
-    return identify(servo.recording(2), DECLARED, IdentifyConfig())
+def found_in(servo: Servo, offered: tuple[str, ...] | None = None) -> Identification:
+    return identify(servo.recording(2), DECLARED, IdentifyConfig(candidates=offered))
 
 
 class Hidden(dict[str, dict[str, float]]):
@@ -39,16 +43,18 @@ def right(found: Identification, servo: Servo) -> None:
     assert found.accepted
 
 
-def test_a_servo_with_nothing_hidden_is_accepted_and_nothing_is_named() -> None:
-    found = found_in(PLAIN)
+@OFFERED
+def test_a_servo_with_nothing_hidden_is_accepted_and_nothing_is_named(offered: tuple[str, ...] | None) -> None:
+    found = found_in(PLAIN, offered)
     assert found.verdict.effects == ()
     assert found.disturbance is not None
     assert found.disturbance.relative == pytest.approx(0.008, rel=0.8)
     right(found, PLAIN)
 
 
-def test_coulomb_friction_of_a_servo_is_named_alone_and_what_is_left_is_told() -> None:
-    found = found_in(RUBBING)
+@OFFERED
+def test_coulomb_friction_of_a_servo_is_named_alone_and_what_is_left_is_told(offered: tuple[str, ...] | None) -> None:
+    found = found_in(RUBBING, offered)
     assert found.verdict.effects == ("coulomb_friction",)
     assert found.final.effect_parameters["coulomb_friction"]["level"].value == pytest.approx(0.02, rel=0.05)
     assert found.final.error.holdout_measure == "holdout_torque_relative"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from tests.identify.simulated import TRUTH, Effects, sine_run, white
 
 SETS = ((67.0, 6.0), (111.0, 1.0), (104.0, 3.0))
 OFFERED = IdentifyConfig.model_validate({"candidates": ["torque_delay", "actuator_lag", "creep", "coulomb_friction"]})
+CUBIC = {"cubic_stiffness": {"factor": 4000.0}}
 
 
 def found(effects: Effects) -> Identification:
@@ -28,15 +30,20 @@ def found(effects: Effects) -> Identification:
     return identify(Recording(tuple(runs)), Platform(*TRUTH), OFFERED)
 
 
+@cache
+def found_beside_a_cube() -> Identification:
+    return found(CUBIC)
+
+
 @pytest.mark.parametrize(
     ("effects", "on"),
     [
-        ({"cubic_stiffness": {"factor": 4000.0}}, "angle"),
-        ({"quadratic_damping": {"factor": 0.05}}, "rate"),
+        (CUBIC, "angle"),
+        pytest.param({"quadratic_damping": {"factor": 0.05}}, "rate", marks=pytest.mark.slow),
     ],
 )
 def test_what_no_effect_on_offer_describes_is_unexplained_and_not_called_a_delay(effects: Effects, on: str) -> None:
-    identification = found(effects)
+    identification = found_beside_a_cube() if effects is CUBIC else found(effects)
     assert identification.verdict.effects == ()
     assert identification.verdict.unexplained
     assert identification.disturbance is not None
@@ -54,7 +61,7 @@ def test_of_a_right_model_no_curve_is_left() -> None:
 
 def test_the_shape_of_what_is_left_is_that_of_the_torque_that_nobody_offered() -> None:
     """Its constant and its straight part are the model's: what is left of a cubic spring is a cubic without them."""
-    left = found({"cubic_stiffness": {"factor": 4000.0}}).disturbance
+    left = found_beside_a_cube().disturbance
     assert left is not None
     curve = next(d for d in left.depends_on if d.on == "angle")
     at, shape = np.array(curve.at), np.array(curve.shape_nm)

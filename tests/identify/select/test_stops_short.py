@@ -18,11 +18,11 @@ SETTINGS = IdentifyConfig.model_validate(
 )
 
 
-@pytest.mark.parametrize("share", [0.003, 0.01])
+@pytest.mark.parametrize("share", [pytest.param(0.003, marks=pytest.mark.slow), 0.01])
 def test_an_effect_is_named_beside_a_small_torque_that_nobody_recorded(share: float) -> None:
     runs = []
     for seed, (torque_nm, hertz) in enumerate(SETS):
-        run = sine_run(torque_nm, hertz, seed=seed, effects={"backlash": {"half_gap": 1e-3}}, duration_s=2.5)
+        run = sine_run(torque_nm, hertz, seed=seed, effects={"backlash": {"half_gap": 1e-3}}, duration_s=1.5)
         assert run.torque_nm is not None
         runs.append(replace(run, torque_nm=run.torque_nm + white(len(run.torque_nm), share * torque_nm, 100 + seed)))
     found = identify(Recording(tuple(runs)), Platform(*TRUTH), SETTINGS)

@@ -47,7 +47,7 @@ def test_a_commanded_torque_is_known_and_stays_as_it_is() -> None:
     assert quieter(traces_of(Recording(held))) is None
 
 
-@pytest.mark.parametrize("share", [0.01, 0.05])
+@pytest.mark.parametrize("share", [0.01, pytest.param(0.05, marks=pytest.mark.slow)])
 def test_noise_in_the_recorded_torque_does_not_pass_for_inertia(share: float) -> None:
     """As it was recorded the likelihood finds five times the inertia."""
     found = identify(Recording(noisy(share)), Platform(*TRUTH), IdentifyConfig())
