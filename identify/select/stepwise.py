@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
@@ -19,6 +20,7 @@ from identify.propose.innovation_score import Score
 from identify.select.evidence import APART, TRUSTED, WEIGHT, Evidence, Weigher, behind, disturbed
 from identify.select.left_over import LeftOver, left_over, needless_beside
 from identify.select.preference import cannot_gain, plainest, prefers_special
+from identify.select.replaced_terms import CERTAIN, in_place_of_terms
 from identify.select.trial_fits import FEW, HOPE, MANY, TrialFits
 from rig import effects
 from rig.platform import TERMS
@@ -27,7 +29,6 @@ from rig.platform import TERMS
 AT_NOISE = 1.1  # times the sensor's variance: a model that predicts as closely leaves no disturbance
 MOST = 6  # effects that one recording is believed to show
 # What only costs time.
-CERTAIN = 30.0  # standard errors beyond which nobody asks whether a term is needed
 PROMISING = 0.1  # of the score of what was added: another with less was no rival then and is not asked again
 FAR_BEHIND = 0.1  # of what an effect explains: another that leaves more than that is no rival
 
@@ -89,7 +90,7 @@ class Stepwise:
     def run(self) -> Fit:
         """Add effects as long as one is worth it; judge each again beside the others; drop what is needless."""
         self._add()
-        for other in (self.in_place_of_terms, self.judged_again):
+        for other in (partial(in_place_of_terms, self), self.judged_again):
             before, self.best = self.best.structure, other(self.best)
             if _key(self.best.structure) != _key(before):  # beside what was replaced, others may have shown nothing
                 self._add()
@@ -125,7 +126,7 @@ class Stepwise:
                 break
             self.dropped.append((name, "beside a curve over what no effect explains, it explains nothing"))
             self.say(f"took {name} back: a curve over what is left explains it")
-            now = self._without(now, name, MANY)
+            now = self.without(now, name, MANY)
         return now
 
     @property
@@ -174,40 +175,7 @@ class Stepwise:
             self.rivals[chosen] = {n: fits[n] for n in alike if n != chosen}
         return now
 
-    def in_place_of_terms(self, now: Fit) -> Fit:
-        """With an effect instead of damping or stiffness, where that is likelier: a drag is no viscous friction.
-
-        Beside the term such an effect explains little, and the other way round.
-        """
-        for term in ("damping", "stiffness"):
-            if term not in now.structure.terms or abs(now.values[(term,)]) >= CERTAIN * now.std_error((term,)):
-                continue
-            rest = self._without(now, term)
-            fits = self.trials.of_a_round(rest)[1]
-            fits = {
-                n: f for n, f in fits.items() if len(f.names) <= len(now.names) and behind(now, f) > APART
-                and set(now.structure.effects) <= set(f.structure.effects)
-            }  # fmt: skip
-            if not fits:
-                continue
-            best = min(fits.values(), key=lambda f: f.penalised)
-            name = plainest(self.weigher, {n: f for n, f in fits.items() if behind(f, best) < APART})
-            evidence = self.weigher.evidence(name, rest, fits[name])
-            if evidence.support < APART or evidence.weight < WEIGHT or self._goes_with(term, now, fits[name]):
-                continue
-            self.dropped.append((term, f"{name} explains more in its place"))
-            self.say(f"replaced {term} by {name}")
-            now, self.inflation[name] = fits[name], evidence.inflation
-        return now
-
-    def _goes_with(self, term: str, now: Fit, instead: Fit) -> bool:
-        """Whether a model with an effect in the place of a term is likelier still with both."""
-        start = {**instead.values, (term,): now.values[(term,)]}
-        structure = now.structure.plus(*(e for e in instead.structure.effects if e not in now.structure.effects))
-        both = self.problem.fit(structure, start, instead.noise, FEW, carry=instead.shots, thorough=False)
-        return behind(instead, both) > APART
-
-    def _without(self, now: Fit, name: str, steps: int = FEW) -> Fit:
+    def without(self, now: Fit, name: str, steps: int = FEW) -> Fit:
         """The same without a term or an effect."""
         return self.problem.fit(
             now.structure.minus(name), now.without(name), now.noise, steps, carry=now.shots, thorough=False
@@ -225,7 +193,7 @@ class Stepwise:
                 return r.now, tried
         rest = self._lacking.get(_key(without))
         if rest is None:
-            rest = self._without(now, name, MANY)
+            rest = self.without(now, name, MANY)
         return rest, self.trials.instead(now, rest, name, self._promising())
 
     def _promising(self) -> set[str]:
@@ -281,7 +249,7 @@ class Stepwise:
             term = len(own) == 1 and own[0][0] in TERMS
             if not self._asked(now, name, own):
                 continue
-            without = self._without(now, name)
+            without = self.without(now, name)
             self._lacking[_key(without.structure)] = without
             evidence = self.weigher.evidence(name, without, now)
             soaks = name == "stiffness" and self._may_soak(now)
@@ -305,7 +273,7 @@ class Stepwise:
         """The same without a spring that only soaks up what is constant: gravity is a spring of its own."""
         if "stiffness" not in now.structure.terms or not self._may_soak(now):
             return now
-        without = self._without(now, "stiffness")
+        without = self.without(now, "stiffness")
         evidence = self.weigher.evidence("stiffness", without, now)
         return without if evidence.support < APART or evidence.weight < WEIGHT else now
 
