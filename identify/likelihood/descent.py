@@ -16,8 +16,8 @@ import numpy as np
 from identify.estimate.output_error import held_still
 from identify.likelihood.derivatives import GAIN_STEP, Derivatives, Standpoint, derivatives
 from identify.likelihood.fit import Columns, Fit, Look, Prediction
-from identify.likelihood.noise_search import likeliest_noise
-from identify.likelihood.normal_equations import Step, changed, logs_of, normal_equations
+from identify.likelihood.normal_equations import DAMPING, ENOUGH, Step, changed, logs_of, normal_equations
+from identify.likelihood.other_noise import noise_alone, other_noise, without_disturbance
 from identify.model.parameters import Name, bounds_of, names_of, ordered
 from identify.model.structure import Structure
 from identify.simulate.all_runs import shots_for
@@ -31,21 +31,10 @@ if TYPE_CHECKING:
     from identify.likelihood.prediction_error import PredictionError
 
 STEP = 1e-6  # relative step of the differences
-ENOUGH = 0.5  # fall of the cost below which a fit has arrived
 TRIALS = 7  # step lengths tried before a direction is given up
-DAMPING = 1e-4
-DOWN = (1e-3, 1e-6, 1e-10)  # times the disturbance: how far below a model is looked at with parameters that follow
-FOLLOWED, CLOSING = 20, 0.7  # steps in which they do, and what each of them leaves of the gap at most
 ROUGHLY = 5e-3  # of the difference to the model it is compared with, that the last step of a fit brings
 IDLE = 2  # steps in a row that bring little, after which a fit has arrived: one alone may have been cut short
 EARLY = 3  # steps after which a model that is right is near enough for it
-FAR = 2.0  # times the sensor's variance: less of a disturbance is found step by step
-FURTHER = (  # times white density, slow variance and time constant: where else a noise is looked for
-    (0.01, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 10.0, 1.0), (1.0, 0.1, 0.1), (1.0, 0.03, 0.01),
-    (1.0, 1.0, 10.0),
-)  # fmt: skip
-WALKS = (1e-6, 1e-5, 1e-4, 1e-3)  # of the rate, that a gyro's bias walks over a run: where else it is looked for
-QUIETER = (1e-4, 1e-3, 1e-2, 0.1)  # times torque and slow error of an encoder together: the rest is read white
 
 
 class Descent:
@@ -89,12 +78,14 @@ class Descent:
         self.weights = [s.weight for s in self.shots]
         self.count = int(sum(w.sum() for w in self.weights)) * p.readings
         self.kinds = self._kinds_of_noise()
-        self.noise = p.within(noise or p.on_grid(lambda q: self._cost(self._looks(self.x, p.within(q), self.shots))))
-        self.looks = self._looks(self.x, self.noise, self.shots)
-        self.cost = self._cost(self.looks)
+        self.noise = p.within(
+            noise or p.on_grid(lambda q: self.cost_of(self.looks_at(self.x, p.within(q), self.shots)))
+        )
+        self.looks = self.looks_at(self.x, self.noise, self.shots)
+        self.cost = self.cost_of(self.looks)
         self.alone = noise is None  # nobody has looked for the noise yet
         if self.alone:
-            self._noise_alone()
+            noise_alone(self)
         self.information: Array = np.zeros((len(self.x), len(self.x)))
         self._informed: tuple[Noise, bytes] | None = None
 
@@ -135,7 +126,7 @@ class Descent:
         for left in range(steps, 0, -1):
             before = self.cost
             if steps - left == EARLY:
-                self._without_disturbance()
+                without_disturbance(self)
                 if self.cost > least:
                     return left
             enough = 0.0 if against is None else ROUGHLY * max(against - self.cost, 0.0)
@@ -143,7 +134,7 @@ class Descent:
             idle = 0 if before - self.cost > enough else idle + 1
             if moved and idle < IDLE:
                 continue
-            if left == 1 or not thorough or not self.other_noise(lower=not looked):
+            if left == 1 or not thorough or not other_noise(self, lower=not looked):
                 return left - 1
             looked = True
         return 0
@@ -151,7 +142,7 @@ class Descent:
     def step(self) -> bool:
         """One step down; False where it has arrived, or none leads there."""
         before = self.cost
-        return bool(np.isfinite(before)) and self._down(True) and before - self.cost > ENOUGH
+        return bool(np.isfinite(before)) and self.try_step(True) and before - self.cost > ENOUGH
 
     def columns(self) -> list[Columns]:
         """Derivatives of every run, where the descent stands."""
@@ -165,12 +156,14 @@ class Descent:
         level = np.sum([d.spread.sum(axis=0) for d in parts], axis=0) / max(self.count, 1)
         return [d.with_variance(level, variance) for d in parts]
 
-    def _looks(self, x: Array, noise: Noise, shots: Sequence[Shots]) -> list[Look]:
+    def looks_at(self, x: Array, noise: Noise, shots: Sequence[Shots]) -> list[Look]:
+        """Every run predicted elsewhere."""
         p = self.problem
         return list(p.workers.map(lambda s: p.look(s, self.structure, self.names, x, noise), shots))
 
     @RUNAWAY
-    def _cost(self, looks: Sequence[Look]) -> float:
+    def cost_of(self, looks: Sequence[Look]) -> float:
+        """Minus twice the log-likelihood of such predictions; infinite where they run away."""
         squares = sum(
             float(np.sum(q.innovations[w] ** 2 / q.variance[w])) for q, w in zip(looks, self.weights, strict=True)
         )
@@ -203,7 +196,7 @@ class Descent:
         self.information, self._informed = found.information, (self.noise, self.x.tobytes())
         return found
 
-    def _down(self, of_noise: bool) -> bool:
+    def try_step(self, of_noise: bool) -> bool:
         """One step of parameters, biases and, if asked for, the noise; False where none leads down."""
         found = self._solvable(of_noise)
         p = len(self.x)
@@ -225,8 +218,8 @@ class Descent:
             shots = [
                 changed(s, taken - across @ change) for s, (across, taken) in zip(self.shots, found.own, strict=True)
             ]
-            looks = self._looks(x, noise, shots)
-            cost = self._cost(looks)
+            looks = self.looks_at(x, noise, shots)
+            cost = self.cost_of(looks)
             if cost < self.cost:
                 self.x, self.shots, self.looks, self.cost, self.noise = x, shots, looks, cost, noise
                 self.damping = max(self.damping / 10.0, 1e-9)
@@ -240,74 +233,15 @@ class Descent:
         }
         return self.problem.within(replace(self.noise, **values))
 
-    def other_noise(self, lower: bool = True) -> bool:
-        """Whether a noise that is quite another one is likelier; if so the descent goes on from there.
-
-        Beside the right one the likelihood is a quadratic in its logarithms; far off it is flat, or has a valley for
-        a disturbance that is slow and another for one that is fast. ``lower``: far below is looked at, too.
-        """
-        before = self.cost
-        wanders = self.problem.wanders and not self.problem.gyro
-        others: list[dict[str, float]] = [
-            {"white": white, "slow": slow, "time_constant_s": time} for white, slow, time in FURTHER
-        ]  # fmt: skip
-        others += [{"white": x, "slow": x, "walk": x} for x in QUIETER if wanders]
-        if "walk" in self.kinds and not wanders:
-            others += [{"walk": self.problem.walk(share) / self.noise.walk} for share in WALKS]
-        for times in others:
-            q = self.noise
-            noise = self.problem.within(replace(q, **{k: x * getattr(q, k) for k, x in times.items()}))
-            looks = self._looks(self.x, noise, self.shots)
-            cost = self._cost(looks)
-            if cost < self.cost - ENOUGH:
-                self.noise, self.looks, self.cost = noise, looks, cost
-        if self.alone:
-            self._noise_alone()
-        if lower:
-            self._without_disturbance()
-        self.damping = DAMPING
-        return self.cost < before - ENOUGH
-
-    def _noise_alone(self) -> None:
-        """The likeliest noise near this one, if it is likelier with the model as it stands."""
-        noise = likeliest_noise(
-            self.problem, self.structure, self.names, self.x, self.shots, self.looks, self.weights, self.noise,
-            self.kinds,
-        )  # fmt: skip
-        looks = self._looks(self.x, noise, self.shots)
-        cost = self._cost(looks)
-        if cost < self.cost - ENOUGH:
-            self.noise, self.looks, self.cost = noise, looks, cost
-
-    def _without_disturbance(self) -> None:
-        """Far less of a disturbance, if that is likelier once the parameters have followed.
-
-        A model that is right may otherwise stay where the disturbance explains all that is left, and the sensor has no
-        noise: between the two lies a ridge.
-        """
-        if self._disturbed() < FAR:
-            return
-        here = self._place()
-        for factor in DOWN:
-            q = here[0]
-            self.noise = self.problem.within(replace(q, white=factor * q.white, slow=factor * q.slow))
-            self.looks = self._looks(self.x, self.noise, self.shots)
-            self.cost, self.damping = self._cost(self.looks), DAMPING
-            for _ in range(FOLLOWED):
-                gap = self.cost - here[-1]
-                if not self._down(False) or self.cost < here[-1] - ENOUGH or self.cost - here[-1] > CLOSING * gap:
-                    break
-            if self.cost < here[-1] - ENOUGH:
-                return
-            self._go(here)
-
-    def _place(self) -> tuple[Noise, Array, list[Shots], list[Look], float]:
+    def place(self) -> tuple[Noise, Array, list[Shots], list[Look], float]:
+        """Where the descent stands, to go back to."""
         return self.noise, self.x, self.shots, self.looks, self.cost
 
-    def _go(self, place: tuple[Noise, Array, list[Shots], list[Look], float]) -> None:
+    def go(self, place: tuple[Noise, Array, list[Shots], list[Look], float]) -> None:
+        """Back to a place."""
         self.noise, self.x, self.shots, self.looks, self.cost = place
 
-    def _disturbed(self) -> float:
+    def disturbed(self) -> float:
         """Median over the samples of the prediction's variance over that without a torque disturbance.
 
         A gyro's walk is left out, too: beside a wrong model it takes what is torque, and would hide it here.
@@ -339,5 +273,5 @@ class Descent:
         )  # fmt: skip
         return Fit(
             self.structure, self.names, self.x, self.noise, tuple(self.shots), self.cost, self.count,
-            squares / max(self.count, 1), self.information, prediction, self._disturbed(),
+            squares / max(self.count, 1), self.information, prediction, self.disturbed(),
         )  # fmt: skip

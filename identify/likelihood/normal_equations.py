@@ -11,6 +11,8 @@ from identify.likelihood.derivatives import Derivatives
 from identify.simulate.shots import Shots, moved
 from rig.arrays import Array
 
+ENOUGH = 0.5  # fall of the cost below which a fit has arrived
+DAMPING = 1e-4  # of a first step
 FARTHEST = 4.0  # by which a logarithm of the noise may fall in one step
 RISE = 1e12  # times itself, that a number of the noise may become in one step
 

@@ -18,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from identify.likelihood.descent import ENOUGH, Descent
+from identify.likelihood.descent import Descent
 from identify.likelihood.fit import Columns, Fit, Look
+from identify.likelihood.normal_equations import ENOUGH
 from identify.model.parameters import Name, equations_of
 from identify.model.structure import Structure
 from identify.signals.trace import MOST_BIAS_RAD_S, Trace
