@@ -16,7 +16,7 @@ from identify.conclude.error_figures import floor_of, in_torque, measure
 from identify.conclude.final_models import FinalModels
 from identify.conclude.next_steps import interrupted_reason
 from identify.diagnose.decay_disturbance import left_of_a_decay
-from identify.estimate.final_fit import Fitted
+from identify.estimate.final_fit import FinalFit
 from identify.estimate.initial_guess import Start, first_guess
 from identify.genetic.per_set import each_set
 from identify.model.structure import Structure, shape_values
@@ -199,7 +199,7 @@ class _Identifier:
         if taken_back := doubts.leave_open(search, after):
             after = models.after(search) if search.best.structure != self.structure else before
         named = [e for e in after.structure.effects if e not in self.structure.effects]
-        base = search.base.values()
+        base = search.base.values
         search.contribution = contributions(doubts.fits, after.structure, after.values, named, base, search.horizon)
         found = self._report(search, before, after)
         if taken_back and self.torque_free:  # how little torque is left says nothing about a swing that goes astray
@@ -255,7 +255,7 @@ class _Identifier:
         return [form for n in names for form in (n, *effects.forms(n))]
 
     def _report(
-        self, search: Search, before: Fitted, after: Fitted, in_full: bool = True,
+        self, search: Search, before: FinalFit, after: FinalFit, in_full: bool = True,
         measured: Found | None = None,
     ) -> Identification:  # fmt: skip
         changed = after.structure != self.structure

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from identify.estimate.final_fit import Fitted
+from identify.estimate.final_fit import FinalFit
 from identify.estimate.output_error import refine
 from identify.model.parameters import Name
 from identify.signals.trace import Trace
@@ -34,7 +34,7 @@ def declared_values(declared: Platform, torque_free: bool) -> dict[Name, float]:
 
 
 def kept_as_declared(
-    traces: Sequence[Trace], use: Sequence[Any], fitted: Fitted, lost: Iterable[Name], declared: Mapping[Name, float]
+    traces: Sequence[Trace], use: Sequence[Any], fitted: FinalFit, lost: Iterable[Name], declared: Mapping[Name, float]
 ) -> dict[Name, float]:
     """The values of a model, those of ``lost`` as declared where that replays the runs; others are fitted beside them.
 
@@ -51,5 +51,5 @@ def kept_as_declared(
         trial = refine(traces, fitted.structure, start, None, STEPS, use, fixed=[*held, name])
         if (trial.sigma**2 - free.sigma**2) * free.count < CHANCE * free.sigma**2:
             held.append(name)
-            values = dict(zip(trial.names, trial.values.tolist(), strict=True))
+            values = dict(trial.values)
     return values

@@ -241,7 +241,7 @@ class Descent:
         """Back to a place."""
         self.noise, self.x, self.shots, self.looks, self.cost = place
 
-    def disturbed(self) -> float:
+    def reduced_chi_square(self) -> float:
         """Median over the samples of the prediction's variance over that without a torque disturbance.
 
         A gyro's walk is left out, too: beside a wrong model it takes what is torque, and would hide it here.
@@ -272,6 +272,6 @@ class Descent:
             [q.innovations[:, 0] for q in self.looks], [q.variance[:, 0] for q in self.looks], disturbance
         )  # fmt: skip
         return Fit(
-            self.structure, self.names, self.x, self.noise, tuple(self.shots), self.cost, self.count,
-            squares / max(self.count, 1), self.information, prediction, self.disturbed(),
+            self.structure, self.names, self.x, self.count, squares / max(self.count, 1), self.cost, self.information,
+            self.noise, tuple(self.shots), prediction, self.reduced_chi_square(),
         )  # fmt: skip

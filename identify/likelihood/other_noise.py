@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 DOWN = (1e-3, 1e-6, 1e-10)  # times the disturbance: how far below a model is looked at with parameters that follow
 FOLLOWED, CLOSING = 20, 0.7  # steps in which they do, and what each of them leaves of the gap at most
-FAR = 2.0  # times the sensor's variance: less of a disturbance is found step by step
+FAR = 2.0  # reduced chi-square: less of a disturbance is found step by step
 FURTHER = (  # times white density, slow variance and time constant: where else a noise is looked for
     (0.01, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 10.0, 1.0), (1.0, 0.1, 0.1), (1.0, 0.03, 0.01),
     (1.0, 1.0, 10.0),
@@ -71,7 +71,7 @@ def without_disturbance(d: Descent) -> None:
     A model that is right may otherwise stay where the disturbance explains all that is left, and the sensor has no
     noise: between the two lies a ridge.
     """
-    if d.disturbed() < FAR:
+    if d.reduced_chi_square() < FAR:
         return
     here = d.place()
     for factor in DOWN:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.likelihood.fit import Fit, apart
+from identify.likelihood.fit import FOLLOWED, Fit, apart
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name, bounds_of, names_of
 from identify.propose.shape_grids import grid_of
@@ -24,7 +24,6 @@ from rig.effects.base import Effect, Place, Scale
 
 LITTLE = 1e-3  # of the torque: how much of a candidate is tried
 SCALED = (0.1, 10.0)  # by how much a score may scale a shape that means "none" at zero
-FOLLOWED = 0.5  # of the inertia: parameters of the model that follow a candidate farther do not
 SHAPES = 3  # of a candidate that are kept to begin a fit from
 SINGULAR = 1e-9  # of the largest eigenvalue
 

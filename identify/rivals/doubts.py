@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from identify.estimate.final_fit import Fitted
-from identify.estimate.judged import Judged
+from identify.estimate.final_fit import FinalFit
+from identify.model.parameter_fit import ParameterFit
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.rivals import run_heterogeneity
@@ -39,9 +39,9 @@ class Doubts:
 
     def other_cause(self, search: Search) -> bool:
         """Whether no effect but a few runs whose torque was another may be what is left."""
-        return self._apart(search, search.best.structure, search.best.values()) is not None
+        return self._apart(search, search.best.structure, search.best.values) is not None
 
-    def leave_open(self, search: Search, after: Fitted) -> bool:
+    def leave_open(self, search: Search, after: FinalFit) -> bool:
         """Take back from a search what may be something else; whether anything was."""
         line = standing_line(after, self.traces) if TONE not in self.structure.effects else None
         apart = self._apart(search, after.structure, after.values) if line is None or line.of_torque else None
@@ -60,19 +60,19 @@ class Doubts:
         return True
 
     def _apart(
-        self, search: Search, structure: Structure, values: dict[Name, float]
+        self, search: Search, structure: Structure, values: Mapping[Name, float]
     ) -> run_heterogeneity.RunsApart | None:  # fmt: skip
         """What would explain all that the declared model leaves, if it is likelier than what was named."""
-        apart = run_heterogeneity.runs_apart(self.fits, self.structure, search.base.values())
+        apart = run_heterogeneity.runs_apart(self.fits, self.structure, search.base.values)
         if apart is None or structure == self.structure:
             return apart
         named = self.fits.fitted(structure, values)
         return apart if named is None or run_heterogeneity.as_likely(apart, named) else None
 
-    def _until(self, search: Search, name: str) -> Judged:
+    def _until(self, search: Search, name: str) -> ParameterFit:
         """The model of what was found before an effect; the declared one where that is nothing."""
         best, base = search.best.structure, search.base.structure
         found = best.effects[: best.effects.index(name)]
-        start = {**search.base.values(), **{n: v for n, v in search.best.values().items() if n[0] in (*TERMS, *found)}}
+        start = {**search.base.values, **{n: v for n, v in search.best.values.items() if n[0] in (*TERMS, *found)}}
         fitted = None if set(found) <= set(base.effects) else self.fits.fitted(replace(base, effects=found), start)
-        return search.base if fitted is None else fitted.judged()
+        return search.base if fitted is None else fitted

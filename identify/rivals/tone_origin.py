@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from identify.estimate.evaluation import settled
-from identify.estimate.final_fit import Fitted
+from identify.estimate.final_fit import FinalFit
 from identify.model.parameters import equations_of
 from identify.signals.trace import UPSAMPLING, Trace, loads_differ
 from identify.simulate.all_runs import shots_for
@@ -81,7 +81,7 @@ class Line:
     of_torque: bool = False
 
 
-def standing_line(fitted: Fitted, traces: Sequence[Trace]) -> Line | None:
+def standing_line(fitted: FinalFit, traces: Sequence[Trace]) -> Line | None:
     """The tone of a fit where it may as well be a line of the sensor; None where it is a torque, or none was fitted.
 
     A torque shows in how the runs begin, or in what a known mass makes of it; where neither tells, it is left open.
@@ -110,7 +110,7 @@ def standing_line(fitted: Fitted, traces: Sequence[Trace]) -> Line | None:
     return None if begun == "at rest" else replace(line, stood=begun == "steady")
 
 
-def _amplitudes(fitted: Fitted, trace: Trace) -> tuple[complex, complex]:
+def _amplitudes(fitted: FinalFit, trace: Trace) -> tuple[complex, complex]:
     """Torque and the rate of its steady motion in one run, complex: the real part of it times exp(i w t)."""
     v, run = fitted.values, str(trace.number)
     torque = -(v[TONE, "cosine", run] - 1j * v[TONE, "sine", run])
@@ -162,7 +162,7 @@ def told(line: Line, axis: str, channel: str = "rate") -> tuple[str, str]:
 
 
 @RUNAWAY
-def _beginning(fitted: Fitted, traces: Sequence[Trace]) -> Literal["at rest", "steady", "unknown"]:
+def _beginning(fitted: FinalFit, traces: Sequence[Trace]) -> Literal["at rest", "steady", "unknown"]:
     """Whether the platform was at rest when the runs began, or in the tone's steady motion.
 
     Without a spring it may have stood anywhere.
@@ -190,7 +190,7 @@ def _beginning(fitted: Fitted, traces: Sequence[Trace]) -> Literal["at rest", "s
         begun.starts[:] = rest if tried[0] < tried[1] else rest + moving
         _, free = settled(begun, fitted.structure, names, x)
         losses += np.array([*tried, float(np.sum(free))])
-    rest_, steady, free_ = losses / fitted.sigma**2
+    rest_, steady, free_ = losses / fitted.fit.variance
     if steady - rest_ > DECISIVE and rest_ - free_ < AS_GOOD * (steady - free_):
         return "at rest"
     return "steady" if rest_ - steady > DECISIVE and steady - free_ < AS_GOOD * (rest_ - free_) else "unknown"

@@ -108,14 +108,14 @@ class Weigher:
             cutoff_hz = self.regression.cutoff_hz
             if now.noise.white * cutoff_hz > SHOWS * in_band(now.noise, cutoff_hz):
                 shares.append(1.0 - new.noise.white * new.variance / (now.noise.white * now.variance))
-        beyond = 1.0 - (disturbed(new) - 1.0) / max(disturbed(now) - 1.0, 1e-300)
+        beyond = 1.0 - (new.reduced_chi_square - 1.0) / max(now.reduced_chi_square - 1.0, 1e-300)
         if beyond > MOST:
             shares.append(beyond)
         return float(max(shares))
 
     def left(self, fit: TorqueFit) -> float:
         """Power of the held-out residual in torque, the sensor's part taken off."""
-        return max(fit.held_nm**2 - self.floor_nm**2, 1e-4 * self.floor_nm**2)
+        return fit.power_above(self.floor_nm)
 
     def in_torque(self, fit: Fit) -> TorqueFit:
         """A model along the measured motion, its gains fitted there."""
@@ -165,23 +165,14 @@ def likely_share(now: Fit, new: Fit, cutoff_hz: float) -> float:
 def along(regression: TorqueRegression, fit: Fit) -> TorqueFit:
     """A model along the measured motion, in torque; without a lag of the sensor, which has no torque there."""
     seen = tuple(e for e in fit.structure.effects if effects.get(e).place is not Place.SENSOR)
+    shapes = fit.structure.shapes_of(fit.values)
     shaft = tuple(e for e in seen if effects.get(e).place is not Place.DRIVE)
     for kept in (seen, shaft, ()):
         # A drive that passes on nothing explains any torque, and a play run along a noisy motion may run away.
-        found = regression.solve(replace(fit.structure, effects=kept), {e: shape_of(fit, e) for e in kept})
+        found = regression.solve(replace(fit.structure, effects=kept), shapes)
         if found.held_nm < regression.torque_nm:
             break
     return found
-
-
-def shape_of(fit: Fit, name: str) -> tuple[float, ...]:
-    """The shapes of an effect as a fit has them."""
-    return tuple(fit.values[(name, p.name)] for p in effects.get(name).parameters if not p.linear)
-
-
-def disturbed(fit: Fit) -> float:
-    """By how much more than the sensor's noise the prediction errs: one where no torque disturbs."""
-    return fit.disturbed
 
 
 def inflation(parts: Sequence[Columns], fit: Fit, names: Sequence[Name]) -> float:

@@ -17,7 +17,7 @@ from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.propose.innovation_score import Score
-from identify.select.evidence import APART, TRUSTED, WEIGHT, Evidence, Weigher, behind, disturbed
+from identify.select.evidence import APART, TRUSTED, WEIGHT, Evidence, Weigher, behind
 from identify.select.left_over import LeftOver, left_over, needless_beside
 from identify.select.preference import cannot_gain, plainest, prefers_special
 from identify.select.replaced_terms import CERTAIN, in_place_of_terms
@@ -26,7 +26,7 @@ from rig import effects
 from rig.platform import TERMS
 
 # What decides a name. All in units of the cost (minus twice the log-likelihood) or as shares.
-AT_NOISE = 1.1  # times the sensor's variance: a model that predicts as closely leaves no disturbance
+AT_NOISE = 1.1  # reduced chi-square: a model that predicts as closely leaves no disturbance
 MOST = 6  # effects that one recording is believed to show
 # What only costs time.
 PROMISING = 0.1  # of the score of what was added: another with less was no rival then and is not asked again
@@ -267,7 +267,7 @@ class Stepwise:
     def _may_soak(self, now: Fit) -> bool:
         """Whether the spring is so weak that it may only soak up what is constant over a run, or pushes."""
         pull = now.values.get(("stiffness",), 0.0) * self.problem.angle_rad
-        return disturbed(now) > AT_NOISE and pull < WEIGHT * self.problem.torque_nm
+        return now.reduced_chi_square > AT_NOISE and pull < WEIGHT * self.problem.torque_nm
 
     def _without_soaking(self, now: Fit) -> Fit:
         """The same without a spring that only soaks up what is constant: gravity is a spring of its own."""

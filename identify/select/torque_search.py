@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
 from identify.propose.torque_looks import torque_looks
-from identify.select.evidence import WEIGHT
+from identify.select.evidence import APART, WEIGHT
 from rig import effects
 from rig.effects.base import Place
 
@@ -20,7 +20,6 @@ SURE = 4.0  # standard errors, over blocks of the held-out samples, by which the
 RICHER = 0.6  # share of what its special case leaves that a richer effect has to take away to be named in its place
 AS_HEAVY = 0.05  # of what is left: candidates that differ by less carry the same torque
 RIVAL = 0.02  # of what is left: rivals carry as much as what was taken, to that
-TOLD_APART = 10.0  # fall of the penalised cost that parts two candidates (Kass and Raftery 1995: very strong)
 INERTIA_MATTERS = 0.2  # of the torque: below, the motion hardly shows the inertia
 POLISHED = 8  # candidates whose shapes are searched for beside those of a grid
 MOST = 6  # effects that one recording is believed to show
@@ -96,7 +95,7 @@ class TorqueSearch:
 
     def left(self, fit: TorqueFit) -> float:
         """Held-out power of the residual above the sensor's."""
-        return max(fit.held_nm**2 - self.floor_nm**2, 1e-4 * self.floor_nm**2)
+        return fit.power_above(self.floor_nm)
 
     def weighed(self, name: str, now: TorqueFit, fit: TorqueFit) -> Weighed:
         """A candidate's weight and evidence on top of a model."""
@@ -158,7 +157,7 @@ class TorqueSearch:
     @staticmethod
     def as_good(look: Weighed, chosen: Weighed) -> bool:
         """Whether a candidate carried as much as the one that was taken and is as likely: the data do not decide."""
-        return look.counts and look.weight > chosen.weight - RIVAL and look.evidence > chosen.evidence - TOLD_APART
+        return look.counts and look.weight > chosen.weight - RIVAL and look.evidence > chosen.evidence - APART
 
     def pruned(self, now: TorqueFit) -> TorqueFit:
         """The same without the effects that no longer carry anything beside the others."""

@@ -18,7 +18,7 @@ from identify.model.structure import Structure
 from identify.propose.innovation_score import InnovationScores, Score
 from identify.propose.torque_looks import TorqueLook, torque_looks
 from identify.runs.measured_channels import simplicity
-from identify.select.evidence import WEIGHT, Weigher, disturbed
+from identify.select.evidence import WEIGHT, Weigher
 from identify.signals.spectral_lines import foreign_lines_hz, ringing_hz, rings_hz
 from rig import effects
 from rig.effects.base import Place, Scale
@@ -32,7 +32,7 @@ FEW, MANY = 14, 25  # steps of a fit that is compared, and of one that is kept
 NEAR = 0.9  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
 BEHIND = 0.3  # of the best fall of the cost so far: what has less after a few steps is not followed
 COMPARABLE = 0.3  # of the score of an effect, that another has in its place: with less it is no rival
-FOLLOWS = 1.1  # times the sensor's variance: where a prediction errs by less, no disturbance follows the readings
+FOLLOWS = 1.1  # reduced chi-square: where a prediction errs by less, no disturbance follows the readings
 OTHER_START = 1.5  # times the power in torque that a look leaves: a fit that leaves more is begun from there, too
 
 
@@ -102,7 +102,7 @@ class TrialFits:
         """Lags of the gyro, of a model without one: where a large disturbance follows every reading, their scores are
         small however long they are, and no torque goes with them.
         """
-        if disturbed(now) < FOLLOWS:
+        if now.reduced_chi_square < FOLLOWS:
             return []
         lags = [n for n in (*now.structure.effects, *names) if effects.get(n).lag is not None]
         return [] if set(lags) & set(now.structure.effects) else lags

@@ -36,7 +36,7 @@ def test_it_is_the_held_out_error_without_the_effect_once_the_rest_has_made_up_f
         start = {n: v for n, v in VALUES.items() if n[0] != name}
         best = fits.fitted(structure.minus(name), start, steps=30)
         assert best is not None
-        left = float(np.sqrt(best.held / np.sum(best.counts))) * fits.noise
+        left = float(np.sqrt(best.held_out_chi_square / np.sum(best.held_out_counts))) * fits.noise
         assert found[name] == pytest.approx(left / NOISE_RAD_S, rel=0.1)
 
 
@@ -50,7 +50,7 @@ def test_a_declared_term_that_an_effect_made_needless_comes_back_without_it() ->
     found = contributions(fits, structure, held, tuple(level), base)
     damped = fits.fitted(Structure(), base)
     assert damped is not None
-    left = float(np.sqrt(damped.held / np.sum(damped.counts)))
+    left = float(np.sqrt(damped.held_out_chi_square / np.sum(damped.held_out_counts)))
     assert found["coulomb_friction"] == pytest.approx(left, rel=0.1)
 
 
