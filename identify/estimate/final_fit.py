@@ -18,7 +18,7 @@ from identify.estimate.output_error import OutputErrorFit, refine
 from identify.estimate.profile_likelihood import settled, widened
 from identify.estimate.regression import Regression, Solution, residuals
 from identify.estimate.starting_point import start_values
-from identify.model.parameter_fit import NOTHING, ParameterFit, std_error_of
+from identify.model.parameter_fit import ZERO_INFORMATION, ParameterFit, std_error_of
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.signals.trace import Trace
@@ -179,7 +179,7 @@ def _inverse(information: Array) -> tuple[Array, tuple[bool, ...]]:
     empty = power < SINGULAR * max(power[-1], 1e-300)
     inverse = axes[:, ~empty] @ np.diag(1.0 / power[~empty]) @ axes[:, ~empty].T
     touched = np.any(np.abs(axes[:, empty]) > 0.05, axis=1) if np.any(empty) else np.zeros(len(scale), dtype=bool)
-    dead = np.diag(information) <= NOTHING
+    dead = np.diag(information) <= ZERO_INFORMATION
     return inverse / np.outer(scale, scale), tuple(bool(x) for x in ~(touched | dead))
 
 

@@ -10,14 +10,14 @@ import numpy as np
 from identify.estimate.final_fit import FinalFit, free_run_of
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
-from identify.model.parameter_fit import NOTHING
+from identify.model.parameter_fit import ZERO_INFORMATION
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.runs.reduced import thinned
 from identify.signals.trace import Trace
 
-MOST_SAMPLES = 60_000  # of the final fit: longer recordings are filtered and decimated, all of them
-STEPS = 25
+MAX_SAMPLES = 60_000  # of the final fit: longer recordings are filtered and decimated, all of them
+MAX_ITERATIONS = 25
 
 
 def by_prediction_error(
@@ -33,11 +33,11 @@ def by_prediction_error(
     like
         A fit to the same recording whose noise to begin from.
     """
-    few, masks = thinned(traces, use, MOST_SAMPLES)
+    few, masks = thinned(traces, use, MAX_SAMPLES)
     problem = PredictionError(few, masks)
-    fit = problem.fit(structure, start, problem.noise_of(like) if like else None, STEPS)
+    fit = problem.fit(structure, start, problem.noise_of(like) if like else None, MAX_ITERATIONS)
     held = free_run_of(traces, structure, fit.values, everything)
     told = [i for i, n in enumerate(fit.names) if n != ("inertia",) or not problem.torque_free]
-    determined = tuple(bool(x > NOTHING) for x in np.diag(fit.information)[told])
+    determined = tuple(bool(x > ZERO_INFORMATION) for x in np.diag(fit.information)[told])
     names, covariance = tuple(fit.names[i] for i in told), fit.covariance[np.ix_(told, told)]
     return FinalFit(fit, fit.values, names, covariance, held, False, determined, "prediction error")

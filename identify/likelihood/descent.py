@@ -16,7 +16,14 @@ import numpy as np
 from identify.estimate.output_error import held_still
 from identify.likelihood.derivatives import GAIN_STEP, Derivatives, Standpoint, derivatives
 from identify.likelihood.fit import Columns, Fit, Look, Prediction
-from identify.likelihood.normal_equations import DAMPING, ENOUGH, Step, changed, logs_of, normal_equations
+from identify.likelihood.normal_equations import (
+    COST_TOLERANCE,
+    LEVENBERG_DAMPING,
+    Step,
+    changed,
+    logs_of,
+    normal_equations,
+)
 from identify.likelihood.other_noise import noise_alone, other_noise, without_disturbance
 from identify.model.parameters import Name, bounds_of, names_of, ordered
 from identify.model.structure import Structure
@@ -30,11 +37,11 @@ from rig.effects.base import Place
 if TYPE_CHECKING:
     from identify.likelihood.prediction_error import PredictionError
 
-STEP = 1e-6  # relative step of the differences
-TRIALS = 7  # step lengths tried before a direction is given up
-ROUGHLY = 5e-3  # of the difference to the model it is compared with, that the last step of a fit brings
-IDLE = 2  # steps in a row that bring little, after which a fit has arrived: one alone may have been cut short
-EARLY = 3  # steps after which a model that is right is near enough for it
+DIFFERENCE_STEP = 1e-6  # relative step of the differences
+MAX_STEP_TRIALS = 7  # step lengths tried before a direction is given up
+COARSE_TOLERANCE = 5e-3  # of the difference to the model it is compared with, that the last step of a fit brings
+STALLED_STEPS = 2  # steps in a row that bring little, after which a fit has arrived: one alone may have been cut short
+EARLY_STEPS = 3  # steps after which a model that is right is near enough for it
 
 
 class Descent:
@@ -74,7 +81,7 @@ class Descent:
             s.bias = earlier.bias
             if p.fits_starts and np.array_equal(earlier.first, s.first):
                 s.starts = earlier.starts.copy()
-        self.damping = DAMPING
+        self.damping = LEVENBERG_DAMPING
         self.weights = [s.weight for s in self.shots]
         self.count = int(sum(w.sum() for w in self.weights)) * p.readings
         self.kinds = self._kinds_of_noise()
@@ -116,7 +123,7 @@ class Descent:
         """Whether the model has dry friction."""
         return any(effects.get(e).place is Place.FRICTION for e in self.structure.effects)
 
-    def down(self, steps: int, thorough: bool, against: float | None = None, least: float = np.inf) -> int:
+    def minimise(self, steps: int, thorough: bool, against: float | None = None, least: float = np.inf) -> int:
         """Steps until it has arrived; how many are left. A thorough fit then looks at other noises.
 
         ``against`` is the cost of the model that it is compared with: then it need not arrive closer than to a small
@@ -125,14 +132,14 @@ class Descent:
         looked, idle = False, 0
         for left in range(steps, 0, -1):
             before = self.cost
-            if steps - left == EARLY:
+            if steps - left == EARLY_STEPS:
                 without_disturbance(self)
                 if self.cost > least:
                     return left
-            enough = 0.0 if against is None else ROUGHLY * max(against - self.cost, 0.0)
+            enough = 0.0 if against is None else COARSE_TOLERANCE * max(against - self.cost, 0.0)
             moved = self.step()
             idle = 0 if before - self.cost > enough else idle + 1
-            if moved and idle < IDLE:
+            if moved and idle < STALLED_STEPS:
                 continue
             if left == 1 or not thorough or not other_noise(self, lower=not looked):
                 return left - 1
@@ -142,7 +149,7 @@ class Descent:
     def step(self) -> bool:
         """One step down; False where it has arrived, or none leads there."""
         before = self.cost
-        return bool(np.isfinite(before)) and self.try_step(True) and before - self.cost > ENOUGH
+        return bool(np.isfinite(before)) and self.try_step(True) and before - self.cost > COST_TOLERANCE
 
     def columns(self) -> list[Columns]:
         """Derivatives of every run, where the descent stands."""
@@ -182,7 +189,9 @@ class Descent:
             return {k: float(size[k]) for k in places}
 
         shaping = [k for k in free if of_gains and self._shapes_gains(self.names[k])]
-        return derivatives(there, steps(STEP, free), self.kinds if of_noise else [], steps(GAIN_STEP, shaping))
+        return derivatives(
+            there, steps(DIFFERENCE_STEP, free), self.kinds if of_noise else [], steps(GAIN_STEP, shaping)
+        )
 
     @staticmethod
     def _shapes_gains(name: Name) -> bool:
@@ -206,9 +215,9 @@ class Descent:
         size: Array = np.sqrt(np.maximum(np.diag(found.matrix), 1e-300))
         free = (np.diag(found.matrix) > 0.0) & np.concatenate([~self.still, np.ones(len(size) - p, dtype=bool)])
         scaled, right = (found.matrix / np.outer(size, size))[np.ix_(free, free)], (found.right / size)[free]
-        if float(right @ np.linalg.lstsq(scaled, right, rcond=1e-9)[0]) < 0.2 * ENOUGH:
+        if float(right @ np.linalg.lstsq(scaled, right, rcond=1e-9)[0]) < 0.2 * COST_TOLERANCE:
             return False  # what a step promises is not worth taking
-        for _ in range(TRIALS):
+        for _ in range(MAX_STEP_TRIALS):
             d = np.zeros(len(size))
             d[free] = np.linalg.lstsq(scaled + self.damping * np.eye(len(right)), right, rcond=1e-14)[0]
             d = d / size

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify.model.parameter_fit import SINGULAR, ParameterFit
+from identify.model.parameter_fit import MIN_EIGENVALUE_RATIO, ParameterFit
 from identify.model.parameters import Name
 from identify.simulate.shots import Shots
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.gains import Gains, Noise
 
-FOLLOWED = 0.5  # of the inertia: farther than that no first order tells how the gains follow
+MAX_LINEAR_INERTIA_CHANGE = 0.5  # of the inertia: farther than that no first order tells how the gains follow
 
 
 def _is_gain(name: Name) -> bool:
@@ -52,7 +52,7 @@ class Columns:
     variance: Array
 
 
-def apart(own: Array, values: Array) -> Array:
+def orthogonal_part(own: Array, values: Array) -> Array:
     """Columns (n, m) without what a run's own unknowns, (n, k), can follow."""
     size: Array = np.linalg.norm(own, axis=0)
     told = size > 0.0
@@ -112,9 +112,9 @@ class Fit(ParameterFit):
         scaled = self.information / np.outer(size, size)
         if not (gone and rest and np.all(np.isfinite(scaled))):
             return there
-        inverse = np.linalg.pinv(scaled[np.ix_(rest, rest)], rcond=SINGULAR, hermitian=True)
+        inverse = np.linalg.pinv(scaled[np.ix_(rest, rest)], rcond=MIN_EIGENVALUE_RATIO, hermitian=True)
         moved = inverse @ scaled[np.ix_(rest, gone)] @ (self.vector[gone] * size[gone]) / size[rest]
         new = {self.names[i]: float(self.vector[i] + d) for i, d in zip(rest, moved, strict=True)}
         inertia = there.get(("inertia",), 0.0)
-        far = abs(new.get(("inertia",), inertia) - inertia) > FOLLOWED * inertia
+        far = abs(new.get(("inertia",), inertia) - inertia) > MAX_LINEAR_INERTIA_CHANGE * inertia
         return there if far else there | new

@@ -13,7 +13,7 @@ from rig.arrays import Array
 from rig.dynamics.gains import Gains, Noise, Sensing, gains_of
 
 SAME_STEP = 1e-5  # relative: what steps of runs differ by and are the same to a gain
-KEPT_GAINS = 12  # of runs that were sampled alike
+GAIN_CACHE_SIZE = 12  # of runs that were sampled alike
 
 
 class KeptGains:
@@ -35,7 +35,7 @@ class KeptGains:
         self, trace: Trace, jck: Array, noise: Noise, sensing: Sensing, spans: list[tuple[int, int]]
     ) -> Gains:  # fmt: skip
         """A run's gains; the last few are kept, because most looks change an effect and not the linear part."""
-        keep, spans, group = self._alike(trace, spans)
+        keep, spans, group = self._same_sampling(trace, spans)
         even = abs(trace.step_s / self.step_s - 1.0) < SAME_STEP
         step_s = self.step_s if even else trace.step_s
         key = (*jck.tolist(), noise, sensing, step_s, *spans)
@@ -44,13 +44,13 @@ class KeptGains:
             found = kept.get(key)
             if found is None:
                 found = gains_of(jck, noise, step_s, sensing, keep, spans, self.start_variance)
-                for old in list(kept)[: max(0, len(kept) + 1 - KEPT_GAINS)]:
+                for old in list(kept)[: max(0, len(kept) + 1 - GAIN_CACHE_SIZE)]:
                     kept.pop(old, None)
                 kept[key] = found
         n = len(trace.measured)
         return found if n == len(found.gain) else replace(found, gain=found.gain[:n], variance=found.variance[:n])
 
-    def _alike(
+    def _same_sampling(
         self, trace: Trace, spans: list[tuple[int, int]]
     ) -> tuple[Any, list[tuple[int, int]], tuple[object, ...]]:
         """Samples, spans and a name for runs that have the same gains, as far as they go.

@@ -9,20 +9,23 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from identify.likelihood.noise_search import likeliest_noise
-from identify.likelihood.normal_equations import DAMPING, ENOUGH
+from identify.likelihood.normal_equations import COST_TOLERANCE, LEVENBERG_DAMPING
 
 if TYPE_CHECKING:
     from identify.likelihood.descent import Descent
 
-DOWN = (1e-3, 1e-6, 1e-10)  # times the disturbance: how far below a model is looked at with parameters that follow
-FOLLOWED, CLOSING = 20, 0.7  # steps in which they do, and what each of them leaves of the gap at most
-FAR = 2.0  # reduced chi-square: less of a disturbance is found step by step
-FURTHER = (  # times white density, slow variance and time constant: where else a noise is looked for
+# Times the disturbance: how far below a model is looked at with parameters that follow.
+CONTINUATION_LEVELS = (1e-3, 1e-6, 1e-10)
+CONTINUATION_STEPS, MAX_GAP_RATIO = 20, 0.7  # steps in which they do, and what each of them leaves of the gap at most
+LARGE_DISTURBANCE = 2.0  # reduced chi-square: less of a disturbance is found step by step
+NOISE_START_FACTORS = (  # times white density, slow variance and time constant: where else a noise is looked for
     (0.01, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 10.0, 1.0), (1.0, 0.1, 0.1), (1.0, 0.03, 0.01),
     (1.0, 1.0, 10.0),
 )  # fmt: skip
-WALKS = (1e-6, 1e-5, 1e-4, 1e-3)  # of the rate, that a gyro's bias walks over a run: where else it is looked for
-QUIETER = (1e-4, 1e-3, 1e-2, 0.1)  # times torque and slow error of an encoder together: the rest is read white
+# Of the rate, that a gyro's bias walks over a run: where else it is looked for.
+BIAS_WALK_STARTS = (1e-6, 1e-5, 1e-4, 1e-3)
+# Times torque and slow error of an encoder together: the rest is read white.
+DISTURBANCE_START_FACTORS = (1e-4, 1e-3, 1e-2, 0.1)
 
 
 def other_noise(d: Descent, lower: bool = True) -> bool:
@@ -34,24 +37,24 @@ def other_noise(d: Descent, lower: bool = True) -> bool:
     before = d.cost
     wanders = d.problem.wanders and not d.problem.gyro
     others: list[dict[str, float]] = [
-        {"white": white, "slow": slow, "time_constant_s": time} for white, slow, time in FURTHER
+        {"white": white, "slow": slow, "time_constant_s": time} for white, slow, time in NOISE_START_FACTORS
     ]  # fmt: skip
-    others += [{"white": x, "slow": x, "walk": x} for x in QUIETER if wanders]
+    others += [{"white": x, "slow": x, "walk": x} for x in DISTURBANCE_START_FACTORS if wanders]
     if "walk" in d.kinds and not wanders:
-        others += [{"walk": d.problem.walk(share) / d.noise.walk} for share in WALKS]
+        others += [{"walk": d.problem.walk(share) / d.noise.walk} for share in BIAS_WALK_STARTS]
     for times in others:
         q = d.noise
         noise = d.problem.within(replace(q, **{k: x * getattr(q, k) for k, x in times.items()}))
         looks = d.looks_at(d.x, noise, d.shots)
         cost = d.cost_of(looks)
-        if cost < d.cost - ENOUGH:
+        if cost < d.cost - COST_TOLERANCE:
             d.noise, d.looks, d.cost = noise, looks, cost
     if d.alone:
         noise_alone(d)
     if lower:
         without_disturbance(d)
-    d.damping = DAMPING
-    return d.cost < before - ENOUGH
+    d.damping = LEVENBERG_DAMPING
+    return d.cost < before - COST_TOLERANCE
 
 
 def noise_alone(d: Descent) -> None:
@@ -61,7 +64,7 @@ def noise_alone(d: Descent) -> None:
     )  # fmt: skip
     looks = d.looks_at(d.x, noise, d.shots)
     cost = d.cost_of(looks)
-    if cost < d.cost - ENOUGH:
+    if cost < d.cost - COST_TOLERANCE:
         d.noise, d.looks, d.cost = noise, looks, cost
 
 
@@ -71,18 +74,18 @@ def without_disturbance(d: Descent) -> None:
     A model that is right may otherwise stay where the disturbance explains all that is left, and the sensor has no
     noise: between the two lies a ridge.
     """
-    if d.reduced_chi_square() < FAR:
+    if d.reduced_chi_square() < LARGE_DISTURBANCE:
         return
     here = d.place()
-    for factor in DOWN:
+    for factor in CONTINUATION_LEVELS:
         q = here[0]
         d.noise = d.problem.within(replace(q, white=factor * q.white, slow=factor * q.slow))
         d.looks = d.looks_at(d.x, d.noise, d.shots)
-        d.cost, d.damping = d.cost_of(d.looks), DAMPING
-        for _ in range(FOLLOWED):
+        d.cost, d.damping = d.cost_of(d.looks), LEVENBERG_DAMPING
+        for _ in range(CONTINUATION_STEPS):
             gap = d.cost - here[-1]
-            if not d.try_step(False) or d.cost < here[-1] - ENOUGH or d.cost - here[-1] > CLOSING * gap:
+            if not d.try_step(False) or d.cost < here[-1] - COST_TOLERANCE or d.cost - here[-1] > MAX_GAP_RATIO * gap:
                 break
-        if d.cost < here[-1] - ENOUGH:
+        if d.cost < here[-1] - COST_TOLERANCE:
             return
         d.go(here)

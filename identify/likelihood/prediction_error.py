@@ -21,7 +21,7 @@ import numpy as np
 from identify.likelihood.descent import Descent
 from identify.likelihood.fit import Columns, Fit, Look
 from identify.likelihood.kept_gains import KeptGains
-from identify.likelihood.normal_equations import ENOUGH
+from identify.likelihood.normal_equations import COST_TOLERANCE
 from identify.model.parameters import Name, equations_of
 from identify.model.structure import Structure
 from identify.signals.trace import MOST_BIAS_RAD_S, Trace
@@ -35,13 +35,14 @@ from rig.dynamics.predictor import predict_ahead
 
 LONGEST_SHARE = 0.2  # of the longest run: a disturbance slower than that is a constant
 SHORTEST_SAMPLES = 4.0  # time constant of a disturbance, in samples: a faster one is white
-LEAST_TORQUE, MOST_TORQUE = 1e-7, 10.0  # of the torque: how large a disturbance may be
-LEAST_WALK, LITTLE_WALK, MOST_WALK = 1e-7, 1e-5, 0.01  # of the rate, that a gyro's bias walks over a run
-MOST_ERROR = 1.0  # of the angle, that an encoder's slow error takes over a run
-LEAST_AHEAD, MOST_AHEAD = 1e-3, 1e8  # times the variance of one reading, of a gyro's noise ahead of its low-pass
+MIN_DISTURBANCE, MAX_DISTURBANCE = 1e-7, 10.0  # of the torque: how large a disturbance may be
+MIN_BIAS_WALK, INITIAL_BIAS_WALK, MAX_BIAS_WALK = 1e-7, 1e-5, 0.01  # of the rate, that a gyro's bias walks over a run
+MAX_ENCODER_ERROR = 1.0  # of the angle, that an encoder's slow error takes over a run
+# Times the variance of one reading, of a gyro's noise ahead of its low-pass.
+MIN_PREFILTER_NOISE, MAX_PREFILTER_NOISE = 1e-3, 1e8
 # Of the motion, root mean square, by which a start state may be off: the smoothed motion is worst where a run begins.
 START_RATE, START_ANGLE, UNKNOWN_ANGLE = 0.1, 0.05, 1.0
-KEPT_SLOPES = 100  # of effects, along all runs
+SLOPE_CACHE_SIZE = 100  # of effects, along all runs
 
 
 class PredictionError:
@@ -102,14 +103,14 @@ class PredictionError:
 
     def within(self, noise: Noise) -> Noise:
         """The nearest noise that is neither absurdly large nor without effect."""
+        walks = MAX_BIAS_WALK if self.gyro else MAX_ENCODER_ERROR
+        ahead = float(np.clip(noise.ahead, MIN_PREFILTER_NOISE * self.step_s, MAX_PREFILTER_NOISE * self.step_s))
         return Noise(
-            float(np.clip(noise.white, self.white(LEAST_TORQUE), self.white(MOST_TORQUE))),
-            float(np.clip(noise.slow, self.slow(LEAST_TORQUE), self.slow(MOST_TORQUE))),
+            float(np.clip(noise.white, self.white(MIN_DISTURBANCE), self.white(MAX_DISTURBANCE))),
+            float(np.clip(noise.slow, self.slow(MIN_DISTURBANCE), self.slow(MAX_DISTURBANCE))),
             float(np.clip(noise.time_constant_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
-            float(np.clip(noise.walk, self.walk(LEAST_WALK), self.walk(MOST_WALK if self.gyro else MOST_ERROR)))
-            if self.wanders
-            else 0.0,
-            float(np.clip(noise.ahead, LEAST_AHEAD * self.step_s, MOST_AHEAD * self.step_s)) if self.gyro else 0.0,
+            float(np.clip(noise.walk, self.walk(MIN_BIAS_WALK), self.walk(walks))) if self.wanders else 0.0,
+            ahead if self.gyro else 0.0,
             np.inf if self.gyro else float(np.clip(noise.walk_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
         )
 
@@ -152,14 +153,14 @@ class PredictionError:
         """
         with np.errstate(all="ignore"):
             descent = Descent(self, structure, start, noise, carry, fixed)
-            left = descent.down(iterations, thorough, against, least)
+            left = descent.minimise(iterations, thorough, against, least)
             while (
                 left > 0 and descent.sticks and descent.cost < least
             ):  # where a run begins stuck is another place with another friction
                 values = dict(zip(descent.names, descent.x.tolist(), strict=True))
                 again = Descent(self, structure, values, descent.noise, descent.found().shots, fixed)
-                left = again.down(left, thorough, against, least)
-                if not again.cost < descent.cost - ENOUGH:
+                left = again.minimise(left, thorough, against, least)
+                if not again.cost < descent.cost - COST_TOLERANCE:
                     break
                 descent = again
             return descent.found()
@@ -206,7 +207,7 @@ class PredictionError:
                 found = np.array(
                     [inertia, damping + max(damps, 0.0), max(stiffness + pulls, min(stiffness, 0.0))]
                 )  # fmt: skip
-                if len(self._slopes) > KEPT_SLOPES:
+                if len(self._slopes) > SLOPE_CACHE_SIZE:
                     self._slopes.clear()
                 self._slopes[key] = found
         return found
@@ -252,7 +253,7 @@ class PredictionError:
         """The best of a coarse grid of noises: white alone first, then a slow part beside it."""
         tau = np.geomspace(20.0 * self.step_s, 0.3 * self.slowest_s, 3).tolist()
         little = self.slow(1e-6)
-        gyro = (self.walk(LITTLE_WALK), self.step_s, np.inf if self.gyro else 30.0 * self.step_s)
+        gyro = (self.walk(INITIAL_BIAS_WALK), self.step_s, np.inf if self.gyro else 30.0 * self.step_s)
         shares = (1.0, 0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)
         best = min((Noise(self.white(share), little, tau[1], *gyro) for share in shares), key=cost)
         slow = [

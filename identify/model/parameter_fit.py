@@ -15,8 +15,8 @@ from rig.platform import Platform
 
 # Smallest over largest eigenvalue of the scaled information that still determines a direction: rounding of normal
 # equations made of some 1e5 samples. By derivation; set by hand within a factor of ten.
-SINGULAR = 1e-12
-NOTHING = 1e-290  # of information: what a parameter without any influence leaves of rounding, at the end of float64
+MIN_EIGENVALUE_RATIO = 1e-12
+ZERO_INFORMATION = 1e-290  # what a parameter without any influence leaves of rounding, at the end of float64
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class ParameterFit:
             scaled = self.information / np.outer(scale, scale)
             if not np.all(np.isfinite(scaled)):
                 return np.full_like(scaled, np.inf)
-            inverse = np.linalg.pinv(scaled, rcond=SINGULAR, hermitian=True)
+            inverse = np.linalg.pinv(scaled, rcond=MIN_EIGENVALUE_RATIO, hermitian=True)
             return np.asarray(inverse / np.outer(scale, scale) * self.variance)
 
     def std_error(self, name: Name) -> float:
@@ -87,7 +87,7 @@ class ParameterFit:
     def std_errors(self) -> dict[Name, float]:
         """Standard error of every parameter; infinite where the fit ran away or the data hold nothing of it."""
         size = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        size[~(np.diag(self.information) > NOTHING)] = np.inf  # a limit that nothing reaches
+        size[~(np.diag(self.information) > ZERO_INFORMATION)] = np.inf  # a limit that nothing reaches
         return dict(zip(self.names, size.tolist(), strict=True))
 
     def platform(self, run: int = 0, added: float = 0.0) -> Platform:

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
-from identify.likelihood.fit import Columns, Fit, apart
+from identify.likelihood.fit import Columns, Fit, orthogonal_part
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from rig import effects
@@ -181,8 +181,8 @@ def inflation(parts: Sequence[Columns], fit: Fit, names: Sequence[Name]) -> floa
     The other parameters and the runs' own unknowns are projected out. Blocks of the record show what is coloured or
     comes in bursts; whole runs, where there are several, show what differs between them.
     """
-    columns = [apart(p.own, p.columns) for p in parts]
-    scaled = [apart(p.own, p.scaled[:, None])[:, 0] for p in parts]
+    columns = [orthogonal_part(p.own, p.columns) for p in parts]
+    scaled = [orthogonal_part(p.own, p.scaled[:, None])[:, 0] for p in parts]
     information = np.sum([x.T @ x for x in columns], axis=0)
     mine = [fit.names.index(n) for n in names if information[(i := fit.names.index(n)), i] > 0.0]
     others = [i for i in range(len(fit.names)) if i not in mine and information[i, i] > 0.0]
