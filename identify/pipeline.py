@@ -38,12 +38,12 @@ from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_without_motion
 from identify.runs.usable import runs_used
-from identify.select.field_search import Found, search_in_torque, with_curve
-from identify.select.left_over import dependence_on, most_moving
+from identify.select.field_search import Found, search_in_torque, with_free_form
+from identify.select.free_form_residual import dependence_on, most_moving
 from identify.select.likelihood_search import LikelihoodSearch
 from identify.select.search_state import Search
 from identify.select.stepwise import Stepwise
-from identify.select.torque_choice import begun
+from identify.select.torque_choice import start_search
 from identify.signals.prepare import channels_of, prepare
 from identify.signals.trace import Trace, release
 from rig import effects
@@ -52,9 +52,11 @@ from rig.errors import Aborted
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
-TAKEN_BACK = "rejected: together the effects found still do not explain the data, and neither does the declared model"
+REJECTED_TOGETHER = (
+    "rejected: together the effects found still do not explain the data, and neither does the declared model"
+)
 
-NOTHING_YET = (
+INTERRUPTED_NOTE = (
     "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
 )
 
@@ -178,7 +180,7 @@ class _Identifier:
                 self._allowed(), self.say,
             )  # fmt: skip
 
-        search, cutoff_hz = begun(self.traces, begin)
+        search, cutoff_hz = start_search(self.traces, begin)
         if cutoff_hz is None:
             return search
         self.traces, self.torque_noise_above_hz = list(search.traces), cutoff_hz
@@ -196,7 +198,7 @@ class _Identifier:
         models, changed = self._models(), search.best.structure != self.structure
         before = models.before(search)
         after = models.after(search) if changed else before
-        if taken_back := doubts.leave_open(search, after):
+        if taken_back := doubts.mark_undetermined(search, after):
             after = models.after(search) if search.best.structure != self.structure else before
         named = [e for e in after.structure.effects if e not in self.structure.effects]
         base = search.base.values
@@ -204,7 +206,7 @@ class _Identifier:
         found = self._report(search, before, after)
         if taken_back and self.torque_free:  # how little torque is left says nothing about a swing that goes astray
             verdict = replace(found.verdict, unexplained=True)
-            found = replace(found, accepted=False, reasons=(*found.reasons, TAKEN_BACK), verdict=verdict)
+            found = replace(found, accepted=False, reasons=(*found.reasons, REJECTED_TOGETHER), verdict=verdict)
         return found
 
     def _stopped(self, search: Search) -> Identification:
@@ -213,7 +215,7 @@ class _Identifier:
         models = self._models()
         found = self._report(search, models.regressed(search.base), models.regressed(search.best), in_full=False)
         if not found.verdict.effects:  # the search may have been about to name what this model lacks
-            found = replace(found, verdict=replace(found.verdict, sentences=(NOTHING_YET,)))
+            found = replace(found, verdict=replace(found.verdict, sentences=(INTERRUPTED_NOTE,)))
         return replace(found, aborted=True, accepted=False, reasons=(interrupted_reason(found.verdict.effects),))
 
     def _in_torque(
@@ -230,9 +232,10 @@ class _Identifier:
         gyro = all(t.channel == "rate" and t.beside is None for t in self.traces)  # an encoder has no line of its own
         line = standing_line(after, self.traces) if gyro and TONE in found.named else None
         if line is not None:
-            found.search.leave_open(TONE, told(line, self.recording.axis, self.traces[0].channel), found.search.base)
+            words = told(line, self.recording.axis, self.traces[0].channel)
+            found.search.mark_undetermined(TONE, words, found.search.base)
             self.say(f"not named: {TONE}; the line may come from the sensor itself")
-            found, after = found.taken_back(), found.before
+            found, after = found.rejected(), found.before
         return self._report(found.search, found.before, after, measured=found)
 
     def _curves(self, search: Stepwise) -> list[tuple[Dependence, dict[str, float]]]:
@@ -286,7 +289,7 @@ class _Identifier:
         if self.torque_free:
             left = left_of_a_decay(self.traces, self.split, after, self.start, self.recording.axis)
             if self.curve is not None and after.structure != self.structure:
-                left = with_curve(left, *self.curve)
+                left = with_free_form(left, *self.curve)
         case = Case(
             self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
             self.declared, self.left_out, self.colour, left,

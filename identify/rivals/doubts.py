@@ -41,19 +41,19 @@ class Doubts:
         """Whether no effect but a few runs whose torque was another may be what is left."""
         return self._apart(search, search.best.structure, search.best.values) is not None
 
-    def leave_open(self, search: Search, after: FinalFit) -> bool:
+    def mark_undetermined(self, search: Search, after: FinalFit) -> bool:
         """Take back from a search what may be something else; whether anything was."""
         line = standing_line(after, self.traces) if TONE not in self.structure.effects else None
         apart = self._apart(search, after.structure, after.values) if line is None or line.of_torque else None
         if apart is not None:
-            search.leave_open("", run_heterogeneity.told(apart, self.axis == "linear"), search.base)
+            search.mark_undetermined("", run_heterogeneity.told(apart, self.axis == "linear"), search.base)
             self.say("no effect is named: the runs disagree with each other, and that alone explains as much")
         elif line is not None:
             words = told(line, self.axis, self.traces[0].channel)
-            search.leave_open(TONE, words, self._until(search, TONE))
+            search.mark_undetermined(TONE, words, self._until(search, TONE))
             self.say(f"not named: {TONE}; the line may come from the sensor itself")
         elif too_much_for(after, self.structure.effects):
-            search.take_all_back()
+            search.reject_all()
             self.say("no effect is named: three flexible effects still leave more than noise")
         else:
             return False

@@ -31,11 +31,12 @@ from rig.platform import TERMS
 
 BLOCKS = 30  # of all runs together, over which scores scatter: their ratio is then known to a quarter
 CHANCE = 0.95  # quantile of a ratio of variances: what chance alone reaches is no sign of a wrong likelihood
-FEWEST_RUNS = 4  # whose scores show whether runs differ
+MIN_RUNS = 4  # whose scores show whether runs differ
 ALONE = 1e-3  # of a parameter's influence, that the others leave: of less only rounding is seen
-APART = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
+STRONG_SUPPORT = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
 WEIGHT = 0.20  # share of the disturbance that an effect takes away to be named: below, it is true but small
-MOST = 0.5  # of what a prediction errs by beyond the sensor's noise
+MAX_EFFECTS = 6  # that one recording is believed to show
+MAX_UNFOLLOWED_SHARE = 0.5  # of what a prediction errs by beyond the sensor's noise
 TRUSTED = 1.5  # inflation up to which what the likelihood takes the disturbance for is believed
 SHOWS = 0.1  # of the disturbance in the band, that its white part is: what becomes of less is chance
 
@@ -69,7 +70,7 @@ class Evidence:
         return self.gain / self.inflation - self.price
 
 
-class Weigher:
+class EvidenceModel:
     """Weighs models of one recording against each other.
 
     Parameters
@@ -90,11 +91,11 @@ class Weigher:
         added = [n for n in new.names if n not in now.names]
         inflated = inflation(self.problem.columns_at(new, with_variance=True), new, added)
         torqueless = effect not in TERMS and effects.get(effect).place is Place.SENSOR
-        weight = 1.0 if torqueless else self.weight(now, new, inflated < TRUSTED)
+        weight = 1.0 if torqueless else self.explained_share(now, new, inflated < TRUSTED)
         price = (new.penalised - new.cost) - (now.penalised - now.cost)
         return Evidence(effect, new, now.cost - new.cost, inflated, price, weight)
 
-    def weight(self, now: Fit, new: Fit, trusted: bool) -> float:
+    def explained_share(self, now: Fit, new: Fit, trusted: bool) -> float:
         """Share of the disturbance that goes: of its power in the band of the motion, or of its white part.
 
         The power in the band is what the residual in torque has on held-out samples, and what the likelihood takes the
@@ -109,7 +110,7 @@ class Weigher:
             if now.noise.white * cutoff_hz > SHOWS * in_band(now.noise, cutoff_hz):
                 shares.append(1.0 - new.noise.white * new.variance / (now.noise.white * now.variance))
         beyond = 1.0 - (new.reduced_chi_square - 1.0) / max(now.reduced_chi_square - 1.0, 1e-300)
-        if beyond > MOST:
+        if beyond > MAX_UNFOLLOWED_SHARE:
             shares.append(beyond)
         return float(max(shares))
 
@@ -119,10 +120,10 @@ class Weigher:
 
     def in_torque(self, fit: Fit) -> TorqueFit:
         """A model along the measured motion, its gains fitted there."""
-        return along(self.regression, fit)
+        return torque_fit_of(self.regression, fit)
 
 
-def behind(one: Fit, other: Fit) -> float:
+def support_difference(one: Fit, other: Fit) -> float:
     """By how much another model on the same samples is likelier, as far as that can be believed; zero if it is not.
 
     The smaller of two numbers: the fall of the penalised cost, and the square of its standard errors, read off how it
@@ -162,7 +163,7 @@ def likely_share(now: Fit, new: Fit, cutoff_hz: float) -> float:
     return 1.0 - after / max(before, 1e-300)
 
 
-def along(regression: TorqueRegression, fit: Fit) -> TorqueFit:
+def torque_fit_of(regression: TorqueRegression, fit: Fit) -> TorqueFit:
     """A model along the measured motion, in torque; without a lag of the sensor, which has no torque there."""
     seen = tuple(e for e in fit.structure.effects if effects.get(e).place is not Place.SENSOR)
     shapes = fit.structure.shapes_of(fit.values)
@@ -207,7 +208,7 @@ def inflation(parts: Sequence[Columns], fit: Fit, names: Sequence[Name]) -> floa
         for x, z in zip(own, scaled, strict=True) for rows in np.array_split(np.arange(len(z)), each)
     ]  # fmt: skip
     found = [1.0, ratio(blocks)]
-    if len(parts) >= FEWEST_RUNS:
+    if len(parts) >= MIN_RUNS:
         found.append(ratio([x.T @ z for x, z in zip(own, scaled, strict=True)]))
     return max(x for x in found if np.isfinite(x))
 

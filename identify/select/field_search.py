@@ -18,9 +18,9 @@ from identify.model.structure import Structure
 from identify.results import Candidate, Dependence, Disturbance
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
-from identify.select.evidence import along, in_band
+from identify.select.evidence import in_band, torque_fit_of
 from identify.select.search_state import Search
-from identify.select.torque_search import TorqueSearch, Weighed
+from identify.select.torque_search import TorqueCandidate, TorqueSearch
 from identify.signals.trace import Trace
 from rig import effects
 from rig.effects.base import Place
@@ -58,7 +58,7 @@ class Found:
     in_torque: tuple[TorqueErrors, TorqueErrors]
     left_before: Callable[[], Disturbance]  # what the declared model leaves
 
-    def taken_back(self) -> Found:
+    def rejected(self) -> Found:
         """The same with the declared model as the final one."""
         return replace(
             self, after=self.before, in_torque=(self.in_torque[0],) * 2, disturbance=self.left_before()
@@ -123,7 +123,7 @@ def search_in_torque(
 
     highest = HIGHEST / few[0].step_s
     search = at(min(start.cutoff_hz, highest))
-    trial = along(search.regression, known[0])
+    trial = torque_fit_of(search.regression, known[0])
     by_likelihood: tuple[Fit, Search] | None = known
     best = trial
     size_nm = float(np.sqrt(in_band(known[0].noise, search.regression.cutoff_hz) * known[0].variance))
@@ -161,13 +161,13 @@ def search_in_torque(
         disturbance = Disturbance(size_nm, unit, size_nm / regression.torque_nm, (), {})
     if set(final.effects) <= set(known[0].structure.effects):
         for curve in curves:
-            disturbance = with_curve(disturbance, *curve)
+            disturbance = with_free_form(disturbance, *curve)
 
     def errors(fit: TorqueFit) -> TorqueErrors:
         size = regression.torque_nm
         return TorqueErrors(fit.sigma, fit.sigma / size, fit.held_nm / size, floor, cutoff)
 
-    told = _told(search, structure, base, best)
+    told = _as_search(search, structure, base, best)
     if by_likelihood:
         told = replace(by_likelihood[1], contribution=told.contribution)
     return Found(
@@ -176,7 +176,7 @@ def search_in_torque(
     )  # fmt: skip
 
 
-def with_curve(left: Disturbance, curve: Dependence, moves: Mapping[str, float]) -> Disturbance:
+def with_free_form(left: Disturbance, curve: Dependence, moves: Mapping[str, float]) -> Disturbance:
     """The same with a curve that the likelihood asks for; of two that go with the same, the larger."""
     same = [d for d in left.depends_on if d.on == curve.on and d.torque_rms > curve.torque_rms]
     most = {t: max(left.moves_percent.get(t, 0.0), moves.get(t, 0.0)) for t in {*left.moves_percent, *moves}}
@@ -233,12 +233,12 @@ def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace]
     )  # fmt: skip
 
 
-def _told(search: TorqueSearch, structure: Structure, base: TorqueFit, best: TorqueFit) -> Search:
+def _as_search(search: TorqueSearch, structure: Structure, base: TorqueFit, best: TorqueFit) -> Search:
     """What was looked at, as the report tells it."""
     found = Search(base, best, 0.0, search.floor_nm)
     named = [e for e in best.structure.effects if e not in structure.effects]
     for number, looks in enumerate(search.rounds, 1):
-        chosen = search.choice(looks)
+        chosen = search.best_candidate(looks)
         for look in looks:
             found.candidates.append(Candidate(look.effect, number, -look.evidence, None, _status(look, chosen, named)))
         if chosen is not None and chosen.effect in named:
@@ -256,10 +256,10 @@ def _told(search: TorqueSearch, structure: Structure, base: TorqueFit, best: Tor
     return found
 
 
-def _status(look: Weighed, chosen: Weighed | None, named: Sequence[str]) -> str:
+def _status(look: TorqueCandidate, chosen: TorqueCandidate | None, named: Sequence[str]) -> str:
     if chosen is not None and look.effect == chosen.effect:
         return "added" if look.effect in named else "added, then no longer needed"
-    if look.counts:
+    if look.is_significant:
         return "carries less than what was added"
     if look.sureness >= 4.0 and look.weight > 0.0:
         return f"proven but small: {PERCENT * look.weight:.0f} % of what is left"

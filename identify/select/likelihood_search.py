@@ -18,7 +18,7 @@ from identify.results import Candidate
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
 from identify.runs.reduced import reduced
-from identify.select.evidence import Weigher
+from identify.select.evidence import EvidenceModel
 from identify.select.search_state import Search
 from identify.select.stepwise import AT_NOISE, Stepwise
 from identify.signals.trace import Trace, pooled_noise
@@ -76,7 +76,7 @@ class LikelihoodSearch:
         cutoff_hz = min(start.cutoff_hz, HIGHEST / few[0].step_s)
         regression = TorqueRegression(few, parts, cutoff_hz, scale_of(few, start.platform, ()))
         floor = regression.noise_floor_nm(base.values)
-        weigher = Weigher(problem, regression, floor)
+        weigher = EvidenceModel(problem, regression, floor)
         return cls(Stepwise(problem, base, offered, weigher, say, whole, count), traces, structure)
 
     def run(self) -> bool:

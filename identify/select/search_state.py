@@ -45,7 +45,7 @@ class Search:
         """Of what one of its models leaves on samples held out."""
         return reduced_chi_square(fit.held_out_error, self.floor)
 
-    def take_all_back(self) -> None:
+    def reject_all(self) -> None:
         """Name nothing: the declared model is what there is."""
         kept = self.base.structure.effects
         self.candidates = [
@@ -54,7 +54,7 @@ class Search:
         ]  # fmt: skip
         self.best, self.rivals, self.rival_models, self.dropped = self.base, {}, {}, []
 
-    def leave_open(self, name: str, told: tuple[str, str], without: ParameterFit) -> None:
+    def mark_undetermined(self, name: str, sentences: tuple[str, str], without: ParameterFit) -> None:
         """Take an effect back that may as well be something no library has, and what was found beside it.
 
         ``without`` is the model of what was found before it.
@@ -69,4 +69,4 @@ class Search:
             self.rivals.pop(effect, None)
             self.rival_models.pop(effect, None)
         self.best, self.dropped = without, []
-        self.left_open, self.tells_apart = told
+        self.left_open, self.tells_apart = sentences
