@@ -26,10 +26,10 @@ from identify.results import (
     Identification,
     SetResult,
 )
+from identify.rivals.alternative_causes import AlternativeCauses
 from identify.rivals.coloured_noise import Colour, with_noise_known
-from identify.rivals.doubts import Doubts
-from identify.rivals.tone_origin import TONE, standing_line, told
-from identify.rivals.whole_runs import WholeRuns
+from identify.rivals.tone_origin import TONE, describe, standing_line
+from identify.rivals.whole_runs import FreeRunFitter
 from identify.runs.clipping import full_scale_of
 from identify.runs.excerpts import describe_excerpts
 from identify.runs.holdout import Split, split
@@ -148,9 +148,9 @@ class _Identifier:
             at_noise = search.run() or self.colour is not None
             found, fits = (
                 search.found,
-                WholeRuns(*(reduced(self.traces, self.split) if self.torque_free else (self.traces, self.split))),
+                FreeRunFitter(*(reduced(self.traces, self.split) if self.torque_free else (self.traces, self.split))),
             )
-            doubts = Doubts(self.traces, fits, self.structure, self.recording.axis, self.say)
+            causes = AlternativeCauses(self.traces, fits, self.structure, self.recording.axis, self.say)
             both = all(t.beside is not None for t in self.traces)
             behind_a_lag = any(effects.get(e).lag is not None for e in found.best.structure.effects)
             noisy = self.torque_noise_above_hz is not None  # some of which is left in the band of the motion
@@ -159,10 +159,10 @@ class _Identifier:
             if self.torque_free:
                 left = search.stepwise.left
                 self.curve = dependence_on(search.stepwise, left) if left is not None else None
-                return self._concluded(found, doubts)
-            if (white and nothing_left) or doubts.other_cause(found):
+                return self._concluded(found, causes)
+            if (white and nothing_left) or causes.other_cause(found):
                 release(search.stepwise.problem.traces)
-                return self._concluded(found, doubts)
+                return self._concluded(found, causes)
             self.say("the residual holds a torque that was not recorded, in addition to the sensor's noise")
             self.more_than_noise = True
             return self._in_torque(shapes, search, found)
@@ -193,16 +193,16 @@ class _Identifier:
         self.say(told)
         return search
 
-    def _concluded(self, search: Search, doubts: Doubts) -> Identification:
+    def _concluded(self, search: Search, causes: AlternativeCauses) -> Identification:
         """Final fits, what else might pass for what was found, and the report."""
         models, changed = self._models(), search.best.structure != self.structure
         before = models.before(search)
         after = models.after(search) if changed else before
-        if taken_back := doubts.mark_undetermined(search, after):
+        if taken_back := causes.mark_undetermined(search, after):
             after = models.after(search) if search.best.structure != self.structure else before
         named = [e for e in after.structure.effects if e not in self.structure.effects]
         base = search.base.values
-        search.contribution = contributions(doubts.fits, after.structure, after.values, named, base, search.horizon)
+        search.contribution = contributions(causes.fits, after.structure, after.values, named, base, search.horizon)
         found = self._report(search, before, after)
         if taken_back and self.torque_free:  # how little torque is left says nothing about a swing that goes astray
             verdict = replace(found.verdict, unexplained=True)
@@ -232,7 +232,7 @@ class _Identifier:
         gyro = all(t.channel == "rate" and t.beside is None for t in self.traces)  # an encoder has no line of its own
         line = standing_line(after, self.traces) if gyro and TONE in found.named else None
         if line is not None:
-            words = told(line, self.recording.axis, self.traces[0].channel)
+            words = describe(line, self.recording.axis, self.traces[0].channel)
             found.search.mark_undetermined(TONE, words, found.search.base)
             self.say(f"not named: {TONE}; the line may come from the sensor itself")
             found, after = found.rejected(), found.before

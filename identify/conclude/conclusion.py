@@ -143,7 +143,7 @@ def _note(case: Case, after: FinalFit) -> str:
     torn = glitches.told([(t.run.name, t.glitches_s) for t in case.traces])
     beyond = clipping.told([(t.run.name, *t.clipped) for t in case.traces], case.recording.axis)
     uneven = resampling.told([(t.run.name, *t.scatter) for t in case.traces])
-    filtered = coloured_noise.told(case.colour, case.recording.axis, case.traces[0].channel)
+    filtered = coloured_noise.describe_colour(case.colour, case.recording.axis, case.traces[0].channel)
     return ". ".join(
         capital(note) for note in (case.split.note, resting, filtered, *case.left_out, torn, beyond, uneven) if note
     )

@@ -11,14 +11,14 @@ from identify.estimate.output_error import OutputErrorFit
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.rivals import whole_runs
-from identify.rivals.whole_runs import WholeRuns
+from identify.rivals.whole_runs import FreeRunFitter
 from rig.platform import TERMS
 
 STEPS = 4  # of a fit that begins where the rest stands: the ratio to a few percent is what is asked for
 
 
 def contributions(
-    fits: WholeRuns,
+    fits: FreeRunFitter,
     structure: Structure,
     values: Mapping[Name, float],
     named: Sequence[str],
@@ -45,7 +45,7 @@ def contributions(
 
 
 def _without(
-    fits: WholeRuns, structure: Structure, rest: Mapping[Name, float], base: Mapping[Name, float], horizon_s: float
+    fits: FreeRunFitter, structure: Structure, rest: Mapping[Name, float], base: Mapping[Name, float], horizon_s: float
 ) -> OutputErrorFit | None:
     """The model without an effect, with every term that was declared."""
     gone: dict[Name, float] = {n: v for n, v in base.items() if len(n) == 1 and n not in rest}
@@ -59,5 +59,5 @@ def _without(
     return min((w for w in tried if w is not None), key=lambda w: w.cost, default=None)
 
 
-def _steps(fits: WholeRuns) -> int:
-    return whole_runs.STEPS if fits.torque_free else STEPS
+def _steps(fits: FreeRunFitter) -> int:
+    return whole_runs.MAX_ITERATIONS if fits.torque_free else STEPS

@@ -18,7 +18,7 @@ from identify.estimate.output_error import OutputErrorFit, refine
 from identify.model.parameter_fit import reduced_chi_square
 from identify.model.parameters import Name
 from identify.model.structure import Structure
-from identify.rivals.whole_runs import STEPS, TOLERANCE, WholeRuns
+from identify.rivals.whole_runs import MAX_ITERATIONS, TOLERANCE, FreeRunFitter
 from identify.signals.trace import Trace
 from identify.simulate.sensitivities import sensitivities
 from identify.wording import joined, number
@@ -32,7 +32,7 @@ GONE = (
 AT_NOISE = 1.05  # reduced chi-square: the noise is known to a percent or two
 AT_FLOOR = 1.1  # the same: what is there has found what there is
 ROUNDS = 3  # the change is small, but not infinitely so
-LARGEST = 0.3  # of the torque; a run that differs by more is another campaign
+MAX_GAIN_CHANGE = 0.3  # of the torque; a run that differs by more is another campaign
 LATEST_S = 0.05
 
 
@@ -45,7 +45,7 @@ class Change(NamedTuple):
 
 
 @dataclass(frozen=True)
-class RunsApart:
+class Heterogeneity:
     """Changes of a few runs' torque with which the declared model reaches the noise.
 
     Attributes
@@ -60,7 +60,7 @@ class RunsApart:
     penalised: float
 
 
-def runs_apart(fits: WholeRuns, declared: Structure, start: Mapping[Name, float]) -> RunsApart | None:
+def heterogeneity_of(fits: FreeRunFitter, declared: Structure, start: Mapping[Name, float]) -> Heterogeneity | None:
     """The few runs whose torque, a little larger or later, would explain all that the declared model leaves.
 
     None where there is nothing to explain, or where that does not do it.
@@ -71,7 +71,7 @@ def runs_apart(fits: WholeRuns, declared: Structure, start: Mapping[Name, float]
     base = fits.fitted(declared, start)
     if base is None or base.reduced_chi_square < AT_NOISE:
         return None
-    chosen = _foretold(fits, base)
+    chosen = _predicted_changes(fits, base)
     if not chosen or len({c.run for c in chosen}) == len(moved):
         return None  # of all runs alike it would be an effect
     traces, fit, total = fits.fitting, base, dict.fromkeys([(c.run, c.kind) for c in chosen], 0.0)
@@ -80,12 +80,12 @@ def runs_apart(fits: WholeRuns, declared: Structure, start: Mapping[Name, float]
         wanted = [_items(len(fits.fitting)).index(key) for key in total]
         step = _solved(np.column_stack([columns[0], columns[1][:, wanted]]), rests)[columns[0].shape[1] :]
         total = {key: value + float(d) for (key, value), d in zip(total.items(), step, strict=True)}
-        if any(abs(v) > (LARGEST if kind == "gain" else LATEST_S) for (_, kind), v in total.items()):
+        if any(abs(v) > (MAX_GAIN_CHANGE if kind == "gain" else LATEST_S) for (_, kind), v in total.items()):
             return None
         traces = [_changed(t, i, total) for i, t in enumerate(fits.fitting)]
         before = fit.sigma
         fit = refine(
-            traces, declared, fit.values, None, STEPS, fits.use, fit.shots, fits.fixed, TOLERANCE, coarse=True
+            traces, declared, fit.values, None, MAX_ITERATIONS, fits.use, fit.shots, fits.fixed, TOLERANCE, coarse=True
         )  # fmt: skip
         if not fit.sigma < 0.999 * before:
             break
@@ -94,15 +94,15 @@ def runs_apart(fits: WholeRuns, declared: Structure, start: Mapping[Name, float]
     squares = fit.sigma**2 * fit.count / fits.noise**2
     penalty = (len(fit.names) + len(total)) * float(np.log(max(fit.count, 2)))
     named = tuple((fits.fitting[i].run.name, kind, v) for (i, kind), v in total.items())
-    return RunsApart(named, squares + penalty)
+    return Heterogeneity(named, squares + penalty)
 
 
-def as_likely(apart: RunsApart, named: OutputErrorFit) -> bool:
+def explains_as_much(apart: Heterogeneity, named: OutputErrorFit) -> bool:
     """Whether another torque in some runs is likelier than the effects of a model."""
     return apart.penalised < named.penalised
 
 
-def told(apart: RunsApart, linear: bool) -> tuple[str, str]:
+def describe(apart: Heterogeneity, linear: bool) -> tuple[str, str]:
     """What would explain it all, in words, and what would tell."""
     what = "force" if linear else "torque"
     parts = [
@@ -162,7 +162,7 @@ def _solved(columns: Array, residual: Array) -> Array:
     return np.asarray(np.linalg.lstsq(columns / size, residual, rcond=1e-12)[0] / size)
 
 
-def _foretold(fits: WholeRuns, base: OutputErrorFit) -> list[Change]:
+def _predicted_changes(fits: FreeRunFitter, base: OutputErrorFit) -> list[Change]:
     """As few changes as are foretold to leave only noise; none where no few do."""
     residual, (columns, own) = _columns(base, fits.use)
     basis = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]

@@ -21,7 +21,7 @@ ABOVE = (0.5, 0.98)  # of Nyquist: where it does not
 COLOURED = 5.0  # standard errors by which a band may stand out
 
 
-def too_much_for(fitted: FinalFit, declared: Sequence[str]) -> bool:
+def fails_whiteness_test(fitted: FinalFit, declared: Sequence[str]) -> bool:
     """Whether what was found beside the declared effects is more than a residual like this one supports."""
     found = [e for e in fitted.structure.effects if e not in declared]
     if len(found) < SO_MANY or not any(effects.get(e).resembles_much for e in found):

@@ -15,10 +15,10 @@ from identify.runs.holdout import Split
 from identify.signals.trace import Trace, pooled_noise
 
 TOLERANCE = 3e-4
-STEPS = 15
+MAX_ITERATIONS = 15
 
 
-class WholeRuns:
+class FreeRunFitter:
     """Fits to the samples of one recording that fit, compared on equal terms.
 
     Parameters
@@ -36,8 +36,9 @@ class WholeRuns:
         self.fixed: list[Name] = [("inertia",)] if self.torque_free else []
 
     def fitted(
-        self, structure: Structure, start: Mapping[Name, float], steps: int = STEPS, horizon_s: float | None = None
-    ) -> OutputErrorFit | None:
+        self, structure: Structure, start: Mapping[Name, float], steps: int = MAX_ITERATIONS,
+        horizon_s: float | None = None,
+    ) -> OutputErrorFit | None:  # fmt: skip
         """A structure fitted from a start; None where it runs away.
 
         ``horizon_s``: by way of a fit over short spans, whose error has fewer false minima.

@@ -15,7 +15,7 @@ from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameter_fit import ParameterFit, reduced_chi_square
 from identify.model.parameters import Name, names_of
 from identify.model.structure import Structure
-from identify.rivals.whole_runs import WholeRuns
+from identify.rivals.whole_runs import FreeRunFitter
 from identify.runs.holdout import split
 from identify.signals.trace import pooled_noise
 from rig.platform import TERMS
@@ -68,7 +68,7 @@ def test_whatever_fits_a_linear_platform_at_the_noise_says_so_on_one_scale_and_w
     simulated = refine(traces, Structure(), JCK)
     predicted = PredictionError(traces).fit(Structure(), JCK)
     regressed = best_rho(traces, Structure(), {}, replace(start, rho=0.0))
-    whole = WholeRuns(traces, split(traces)).fitted(Structure(), JCK)
+    whole = FreeRunFitter(traces, split(traces)).fitted(Structure(), JCK)
     assert whole is not None
     chi_square = (
         simulated.reduced_chi_square, predicted.reduced_chi_square, whole.reduced_chi_square,

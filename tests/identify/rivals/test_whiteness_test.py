@@ -9,7 +9,7 @@ import pytest
 
 from identify.estimate.final_fit import FinalFit, by_output_error
 from identify.model.structure import Structure
-from identify.rivals.whiteness_test import COLOURED, coloured, too_much_for
+from identify.rivals.whiteness_test import COLOURED, coloured, fails_whiteness_test
 from rig.platform import TERMS
 from rig.recording.run import Array, Recording
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
@@ -50,5 +50,5 @@ def test_white_noise_is_not_coloured_and_a_twentieth_of_its_power_low_down_is() 
 def test_only_three_of_which_one_follows_anything_are_asked(
     names: tuple[str, ...], declared: tuple[str, ...], too_much: bool
 ) -> None:
-    assert too_much_for(named(fitted(LINE), *names), declared) == too_much
-    assert not too_much_for(named(fitted(), *names), declared)
+    assert fails_whiteness_test(named(fitted(LINE), *names), declared) == too_much
+    assert not fails_whiteness_test(named(fitted(), *names), declared)
