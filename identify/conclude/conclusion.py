@@ -41,8 +41,8 @@ from identify.wording import capital
 from rig import effects
 from rig.effects.base import Place
 
-STRAYED = 3.0**2  # reduced chi-square: a free run with friction may have gone astray
-ROUNDING = 1e-6  # of the torque: what a model leaves where neither noise nor an effect is
+DIVERGED = 3.0**2  # reduced chi-square: a free run with friction may have gone astray
+ROUNDING_FLOOR = 1e-6  # of the torque: what a model leaves where neither noise nor an effect is
 UNEXPLAINED = 1.1**2  # reduced chi-square in free run: above it, something is left that no effect here explains
 
 
@@ -66,7 +66,7 @@ def conclude(
     chi_square = _reduced_chi_square(case, after, search)
     measured = case.disturbance  # of runs that a torque limits; else the sensor's noise does
     left = measured_after.errors.holdout_torque_relative
-    exact = left is not None and left < ROUNDING  # as in a file that has no noise
+    exact = left is not None and left < ROUNDING_FLOOR  # as in a file that has no noise
     unexplained = chi_square > UNEXPLAINED and not exact if measured is None else bool(measured.depends_on)
     verdict = Verdict(
         effects=tuple(
@@ -158,7 +158,7 @@ def _reduced_chi_square(case: Case, after: FinalFit, search: Search) -> float:
     short = search.reduced_chi_square(search.best) / _share_of_white(case) ** 2
     frictions = [e for e in after.structure.effects if effects.get(e).place is Place.FRICTION]
     # One wrong standstill throws a free run off for good; else what a free run leaves is what is missing.
-    return free if np.isfinite(free) and (free < STRAYED or not frictions) else min(free, short)
+    return free if np.isfinite(free) and (free < DIVERGED or not frictions) else min(free, short)
 
 
 def _share_of_white(case: Case) -> float:

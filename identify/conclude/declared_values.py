@@ -17,8 +17,8 @@ from identify.signals.trace import Trace
 from rig import effects
 from rig.platform import TERMS, Platform
 
-STEPS = 12
-CHANCE = 9.0  # rise of chi square, three standard errors, by which a declared number does not contradict the runs
+MAX_ITERATIONS = 12
+MAX_CHI_SQUARE_RISE = 9.0  # three standard errors, by which a declared number does not contradict the runs
 
 
 def declared_values(declared: Platform, torque_free: bool) -> dict[Name, float]:
@@ -45,11 +45,11 @@ def kept_as_declared(
     if not asked or not fitted.sensor_limited:
         return values
     held: list[Name] = [("inertia",)] if all(t.torque is None for t in traces) else []
-    free = refine(traces, fitted.structure, values, None, STEPS, use, fixed=held)
+    free = refine(traces, fitted.structure, values, None, MAX_ITERATIONS, use, fixed=held)
     for name in asked:
         start = {**values, name: declared[name]}
-        trial = refine(traces, fitted.structure, start, None, STEPS, use, fixed=[*held, name])
-        if (trial.sigma**2 - free.sigma**2) * free.count < CHANCE * free.sigma**2:
+        trial = refine(traces, fitted.structure, start, None, MAX_ITERATIONS, use, fixed=[*held, name])
+        if (trial.sigma**2 - free.sigma**2) * free.count < MAX_CHI_SQUARE_RISE * free.sigma**2:
             held.append(name)
             values = dict(trial.values)
     return values

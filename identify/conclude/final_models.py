@@ -21,7 +21,7 @@ from rig.effects.base import Place
 from rig.platform import TERMS, Platform
 
 RUNS_FREE = 2.0**2  # reduced chi-square up to which the declared model is fitted by its free run
-SHOWS = 5.0  # standard errors from zero at which whole runs show damping
+SIGNIFICANT_SIGMAS = 5.0  # standard errors from zero at which whole runs show damping
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class FinalModels:
         )  # fmt: skip
         damping, error = fuller.values[("damping",)], fuller.std_error(("damping",))
         late = any(effects.get(e).place in (Place.DRIVE, Place.SENSOR) for e in fitted.structure.effects)
-        shows = damping > 0.0 if late else damping > SHOWS * error
+        shows = damping > 0.0 if late else damping > SIGNIFICANT_SIGMAS * error
         if not fuller.sensor_limited:
             return fitted
         if not shows:

@@ -89,8 +89,9 @@ REPEAT = "Play the campaign again and compare the results; `rig check` predicts 
 RECORD_AGAIN = "Record the campaign again and compare the results."
 INTERRUPTED = "the search was interrupted"
 IDENTIFY_AGAIN = "Identify this recording again and let the search come to its end; nothing has to be played for it."
-NEAR_FLOOR = 4.0**2  # reduced chi-square
-FIRST_SAMPLES, MOVING = 3, 0.1  # first samples of a run, and the share of its largest rate that they may have
+NOISE_LIMITED = 4.0**2  # reduced chi-square
+START_SAMPLES = 3  # of a run: the first ones
+MAX_START_RATE_SHARE = 0.1  # of its largest rate, that they may have
 
 
 def next_steps(found: Identification) -> tuple[str, ...]:
@@ -201,7 +202,7 @@ def _to_explain(found: Identification) -> list[str]:
 def _coloured(found: Identification) -> list[str]:
     """A residual little above an estimated floor may be noise that is slower than what the estimate looks at."""
     error, floor = found.final.error.holdout_rate_rms, found.noise_floor
-    near = error is not None and reduced_chi_square(error, floor.holdout_rate_rms) < NEAR_FLOOR
+    near = error is not None and reduced_chi_square(error, floor.holdout_rate_rms) < NOISE_LIMITED
     return [COLOURED] if near and floor.source == "estimated" else []
 
 
@@ -265,7 +266,7 @@ def _begun_in_motion(traces: Sequence[RunTraces]) -> list[str]:
     return [
         t.name for t in traces
         if t.torque_nm is not None
-        and float(np.median(np.abs(t.rate_rad_s[:FIRST_SAMPLES]))) > MOVING * float(np.max(np.abs(t.rate_rad_s)))
+        and np.median(np.abs(t.rate_rad_s[:START_SAMPLES])) > MAX_START_RATE_SHARE * np.max(np.abs(t.rate_rad_s))
     ]  # fmt: skip
 
 

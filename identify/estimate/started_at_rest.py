@@ -21,7 +21,7 @@ from identify.simulate.shots import Shots, may_rest
 from rig.dynamics import Equations
 
 WEAK = 1e-3  # relative standard error of the inertia beyond which a ring of noise may decide it
-NOISE_LIMITED_RATIO = 2.0  # reduced chi-square up to which the noise, not the model, is in the way
+NOISE_LIMITED = 2.0  # reduced chi-square up to which the noise, not the model, is in the way
 BY_CHANCE = 15.0  # fall of chi square that two start values a run make of noise, their ring free to find its place
 ROUNDS = 3  # the place of rest moves with the model
 SETTLED = 0.1  # of chi square, between rounds
@@ -79,7 +79,7 @@ def depends_on_ringing(fit: OutputErrorFit) -> bool:
 
 def near(fit: OutputErrorFit) -> bool:
     """Whether the noise, not the model, is in the way."""
-    return fit.reduced_chi_square < NOISE_LIMITED_RATIO
+    return fit.reduced_chi_square < NOISE_LIMITED
 
 
 def is_quasi_static(fit: OutputErrorFit) -> bool:
