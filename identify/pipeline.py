@@ -55,7 +55,6 @@ from rig.recording.run import Recording
 REJECTED_TOGETHER = (
     "rejected: together the effects found still do not explain the data, and neither does the declared model"
 )
-
 INTERRUPTED_NOTE = (
     "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
 )
@@ -146,10 +145,8 @@ class _Identifier:
             self.say("fitting the declared model")
             search = self._begun()
             at_noise = search.run() or self.colour is not None
-            found, fits = (
-                search.found,
-                FreeRunFitter(*(reduced(self.traces, self.split) if self.torque_free else (self.traces, self.split))),
-            )
+            found = search.found
+            fits = FreeRunFitter(*(reduced(self.traces, self.split) if self.torque_free else (self.traces, self.split)))
             causes = AlternativeCauses(self.traces, fits, self.structure, self.recording.axis, self.say)
             both = all(t.beside is not None for t in self.traces)
             behind_a_lag = any(effects.get(e).lag is not None for e in found.best.structure.effects)

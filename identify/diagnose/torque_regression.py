@@ -9,8 +9,7 @@ The residual is coloured: its likelihood is that of an autoregression fitted bes
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,8 +17,8 @@ from scipy.linalg import block_diag
 
 from identify.diagnose.coloured_residual import bounded, coloured_cost, lines, rms, standard_errors, strongest
 from identify.diagnose.torque_band import TorqueBand
+from identify.diagnose.torque_fit import TorqueFit
 from identify.model.effect_torque import feeds_on_torque
-from identify.model.parameter_fit import ParameterFit
 from identify.model.parameters import Name
 from identify.model.structure import Shapes, Structure
 from rig import effects
@@ -28,44 +27,6 @@ from rig.arrays import Array
 BLOCK, BLOCKS_A_RUN, MIN_BLOCKS = 8, 24, 8  # samples behind the low-pass in a block, and how many blocks
 RIDGE = 1e-9  # of their own size, on the gains of free-form columns: two of them may be alike
 MIN_FOR_LINES, MIN_TRAVEL_RAD = 64, 0.5  # samples, and travel to show a line against the angle
-
-
-@dataclass(frozen=True)
-class TorqueFit(ParameterFit):
-    """One structure fitted in torque; its cost counts a coloured residual.
-
-    Attributes
-    ----------
-    count
-        Samples behind the low-pass.
-    information
-        Of the gains; of shapes, at which the gains are solved for, none.
-    held_nm
-        Root mean square residual on the samples held out, N m.
-    residuals, held
-        Of every run, (n,) each: by this fit, and by fits that did not see the samples.
-    filters
-        Of the autoregression.
-    """
-
-    held_nm: float
-    residuals: list[Array]
-    held: list[Array]
-    filters: Array
-
-    @property
-    def held_out_error(self) -> float:
-        """Root mean square residual on the samples held out, N m."""
-        return self.held_nm
-
-    def power_above(self, floor_nm: float) -> float:
-        """Mean square of the residual held out, the sensor's part taken off."""
-        return max(self.held_nm**2 - floor_nm**2, 1e-4 * floor_nm**2)
-
-    @cached_property
-    def shapes(self) -> dict[str, tuple[float, ...]]:
-        """Shape parameters of every effect."""
-        return self.structure.shapes_of(self.values)
 
 
 class _Stacked(NamedTuple):

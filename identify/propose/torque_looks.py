@@ -14,7 +14,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 from identify.diagnose.coloured_residual import bounded
-from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
+from identify.diagnose.torque_fit import TorqueFit
+from identify.diagnose.torque_regression import TorqueRegression
 from identify.model.parameters import Name, gains_at_zero, in_order
 from identify.propose.shape_grids import grid_of
 from rig import effects

@@ -19,7 +19,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.stats import chi2
 
-from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
+from identify.diagnose.torque_fit import TorqueFit
+from identify.diagnose.torque_regression import TorqueRegression
 from identify.likelihood.fit import Columns, Fit, orthogonal_part
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name

@@ -9,7 +9,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from identify.diagnose.disturbance import disturbance_of
-from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
+from identify.diagnose.torque_fit import TorqueFit
+from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.final_fit import FinalFit, covariance_of, free_run_of
 from identify.estimate.initial_guess import Start, scale_of
 from identify.likelihood.by_prediction_error import by_prediction_error

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
+from identify.diagnose.torque_fit import TorqueFit
+from identify.diagnose.torque_regression import TorqueRegression
 from identify.propose.torque_looks import candidate_torques
 from identify.select.evidence import MAX_EFFECTS, STRONG_SUPPORT, WEIGHT
 from rig import effects
