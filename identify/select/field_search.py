@@ -180,7 +180,8 @@ def search_in_torque(
 def with_free_form(left: Disturbance, curve: Dependence, moves: Mapping[str, float]) -> Disturbance:
     """The same with a curve that the likelihood asks for; of two that go with the same, the larger."""
     same = [d for d in left.depends_on if d.on == curve.on and d.torque_rms > curve.torque_rms]
-    most = {t: max(left.moves_percent.get(t, 0.0), moves.get(t, 0.0)) for t in {*left.moves_percent, *moves}}
+    terms = dict.fromkeys((*left.moves_percent, *moves))  # in an order: a sentence lists them
+    most = {t: max(left.moves_percent.get(t, 0.0), moves.get(t, 0.0)) for t in terms}
     depends = (*(d for d in left.depends_on if d.on != curve.on), *(same or [curve]))
     size = max(left.torque_rms, curve.torque_rms)
     return replace(
