@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from identify.estimate.initial_guess import best_rho, first_guess
-from identify.estimate.judged import start_values
-from identify.estimate.output_error import Estimate, refine
+from identify.estimate.output_error import OutputErrorFit, refine
+from identify.estimate.starting_point import start_values
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.signals.prepare import LEAD_IN_S, prepare
@@ -100,6 +100,6 @@ def alone(trace: Trace) -> list[Trace]:
     return [prepare(trace.run, 0, trace.noise)]
 
 
-def fitted(traces: Sequence[Trace], structure: Structure, start: Mapping[Name, float]) -> Estimate:
+def fitted(traces: Sequence[Trace], structure: Structure, start: Mapping[Name, float]) -> OutputErrorFit:
     """Output error over whole runs."""
     return refine(traces, structure, start)

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks.campaigns import DELAY, DELAY_NAME, TRUTH, clean_rates, structure_with, traces_from, white
 from identify.estimate.final_fit import by_output_error
 from identify.estimate.initial_guess import best_rho, first_guess
-from identify.estimate.judged import horizon_s, start_values
+from identify.estimate.starting_point import horizon_s, start_values
 
 DELAYS_MS = (0.0, 0.137, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 FIRST_LOOKS_S = (1e-4, 3e-4, 1e-3, 3e-3)  # the delay's own starting values at 1 kHz and one below
@@ -43,7 +43,7 @@ def measure(delay_ms: float, runs: int, seed: int = 0) -> Row:
         traces = traces_from(rates, white(np.random.default_rng([seed, round(1e3 * delay_ms), run])))
         guess = first_guess(traces, structure.minus(DELAY))
         looks = [({DELAY: (d,)}, best_rho(traces, structure, {DELAY: (d,)}, guess)) for d in FIRST_LOOKS_S]
-        shapes, best = min(looks, key=lambda look: look[1].sigma)
+        shapes, best = min(looks, key=lambda look: look[1].cost)
         use = [t.keep for t in traces]
         horizon = horizon_s(guess.platform, traces)
         values = by_output_error(traces, structure, start_values(best, shapes, len(traces)), horizon, use, use).values
@@ -51,7 +51,7 @@ def measure(delay_ms: float, runs: int, seed: int = 0) -> Row:
         errors.append([100.0 * abs(values[(n,)] / v - 1.0) for n, v in TRUTH.items()])
         if run == 0:
             bare = best_rho(traces, structure_with(False), {}, guess)
-            plain = 100.0 * (bare.platform[1] / TRUTH["damping"] - 1.0)
+            plain = 100.0 * (bare.jck[1] / TRUTH["damping"] - 1.0)
     worst = dict(zip(TRUTH, np.max(errors, axis=0).tolist(), strict=True))
     return Row(delay_ms, float(np.sqrt(np.mean(np.square(off)))), worst, plain)
 

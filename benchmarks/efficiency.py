@@ -82,7 +82,7 @@ def errors(delay: bool, runs: int, seed: int) -> Array:
         for several in fits:
             found = fitted(several, structure, start)
             true = truth_of(found.names)
-            rows.append(found.values / true - 1.0)
+            rows.append(found.vector / true - 1.0)
         out.append(rows)
         print(f"\r{run + 1} of {runs} campaigns", end="", file=sys.stderr, flush=True)
     return np.array(out)

@@ -28,7 +28,7 @@ from benchmarks.campaigns import (
     white,
 )
 from identify.estimate.final_fit import by_output_error
-from identify.estimate.judged import horizon_s
+from identify.estimate.starting_point import horizon_s
 from rig.arrays import Array
 
 GYRO_ARRAY = "gyro_counts"

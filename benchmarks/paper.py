@@ -203,7 +203,7 @@ def equation_error(effects: Mapping[str, Mapping[str, float]]) -> tuple[float, f
     # A disturbance that outweighs the sensor up to 120 Hz makes the filter a low-pass of the torque residual.
     rho = PLATFORM.inertia_kg_m2 * 2 * math.pi * 120.0
     solution = fit(Regression(traces, Structure()), {}, (0.02, 0.045, 677.3), rho)
-    return solution.platform
+    return solution.jck
 
 
 def page(results: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:

@@ -88,9 +88,8 @@ def ours(traces: Sequence[Trace], start: Array) -> Array:
     """This project: regression, then output error; takes no start."""
     structure = structure_with(len(start) > 3)
     found = fitted(traces, structure, regression_start(traces, structure))
-    values = dict(zip(found.names, found.values.tolist(), strict=True))
     names = [(n,) for n in TRUTH] + ([DELAY_NAME] if len(start) > 3 else [])
-    return np.array([values[n] for n in names])
+    return np.array([found.values[n] for n in names])
 
 
 def scipy_least_squares(traces: Sequence[Trace], start: Array) -> Array:

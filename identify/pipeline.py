@@ -16,7 +16,7 @@ from identify.conclude.error_figures import floor_of, in_torque, measure
 from identify.conclude.final_models import FinalModels
 from identify.conclude.next_steps import interrupted_reason
 from identify.diagnose.decay_disturbance import left_of_a_decay
-from identify.estimate.final_fit import Fitted
+from identify.estimate.final_fit import FinalFit
 from identify.estimate.initial_guess import Start, first_guess
 from identify.genetic.per_set import each_set
 from identify.model.structure import Structure, shape_values
@@ -26,10 +26,10 @@ from identify.results import (
     Identification,
     SetResult,
 )
+from identify.rivals.alternative_causes import AlternativeCauses
 from identify.rivals.coloured_noise import Colour, with_noise_known
-from identify.rivals.doubts import Doubts
-from identify.rivals.tone_origin import TONE, standing_line, told
-from identify.rivals.whole_runs import WholeRuns
+from identify.rivals.tone_origin import TONE, describe, standing_line
+from identify.rivals.whole_runs import FreeRunFitter
 from identify.runs.clipping import full_scale_of
 from identify.runs.excerpts import describe_excerpts
 from identify.runs.holdout import Split, split
@@ -38,12 +38,12 @@ from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_without_motion
 from identify.runs.usable import runs_used
-from identify.select.field_search import Found, search_in_torque, with_curve
-from identify.select.left_over import dependence_on, most_moving
+from identify.select.field_search import Found, search_in_torque, with_free_form
+from identify.select.free_form_residual import dependence_on, most_moving
 from identify.select.likelihood_search import LikelihoodSearch
 from identify.select.search_state import Search
 from identify.select.stepwise import Stepwise
-from identify.select.torque_choice import begun
+from identify.select.torque_choice import start_search
 from identify.signals.prepare import channels_of, prepare
 from identify.signals.trace import Trace, release
 from rig import effects
@@ -52,9 +52,10 @@ from rig.errors import Aborted
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
 
-TAKEN_BACK = "rejected: together the effects found still do not explain the data, and neither does the declared model"
-
-NOTHING_YET = (
+REJECTED_TOGETHER = (
+    "rejected: together the effects found still do not explain the data, and neither does the declared model"
+)
+INTERRUPTED_NOTE = (
     "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
 )
 
@@ -144,11 +145,9 @@ class _Identifier:
             self.say("fitting the declared model")
             search = self._begun()
             at_noise = search.run() or self.colour is not None
-            found, fits = (
-                search.found,
-                WholeRuns(*(reduced(self.traces, self.split) if self.torque_free else (self.traces, self.split))),
-            )
-            doubts = Doubts(self.traces, fits, self.structure, self.recording.axis, self.say)
+            found = search.found
+            fits = FreeRunFitter(*(reduced(self.traces, self.split) if self.torque_free else (self.traces, self.split)))
+            causes = AlternativeCauses(self.traces, fits, self.structure, self.recording.axis, self.say)
             both = all(t.beside is not None for t in self.traces)
             behind_a_lag = any(effects.get(e).lag is not None for e in found.best.structure.effects)
             noisy = self.torque_noise_above_hz is not None  # some of which is left in the band of the motion
@@ -157,10 +156,10 @@ class _Identifier:
             if self.torque_free:
                 left = search.stepwise.left
                 self.curve = dependence_on(search.stepwise, left) if left is not None else None
-                return self._concluded(found, doubts)
-            if (white and nothing_left) or doubts.other_cause(found):
+                return self._concluded(found, causes)
+            if (white and nothing_left) or causes.other_cause(found):
                 release(search.stepwise.problem.traces)
-                return self._concluded(found, doubts)
+                return self._concluded(found, causes)
             self.say("the residual holds a torque that was not recorded, in addition to the sensor's noise")
             self.more_than_noise = True
             return self._in_torque(shapes, search, found)
@@ -178,7 +177,7 @@ class _Identifier:
                 self._allowed(), self.say,
             )  # fmt: skip
 
-        search, cutoff_hz = begun(self.traces, begin)
+        search, cutoff_hz = start_search(self.traces, begin)
         if cutoff_hz is None:
             return search
         self.traces, self.torque_noise_above_hz = list(search.traces), cutoff_hz
@@ -191,20 +190,20 @@ class _Identifier:
         self.say(told)
         return search
 
-    def _concluded(self, search: Search, doubts: Doubts) -> Identification:
+    def _concluded(self, search: Search, causes: AlternativeCauses) -> Identification:
         """Final fits, what else might pass for what was found, and the report."""
         models, changed = self._models(), search.best.structure != self.structure
         before = models.before(search)
         after = models.after(search) if changed else before
-        if taken_back := doubts.leave_open(search, after):
+        if taken_back := causes.mark_undetermined(search, after):
             after = models.after(search) if search.best.structure != self.structure else before
         named = [e for e in after.structure.effects if e not in self.structure.effects]
-        base = search.base.values()
-        search.contribution = contributions(doubts.fits, after.structure, after.values, named, base, search.horizon)
+        base = search.base.values
+        search.contribution = contributions(causes.fits, after.structure, after.values, named, base, search.horizon)
         found = self._report(search, before, after)
         if taken_back and self.torque_free:  # how little torque is left says nothing about a swing that goes astray
             verdict = replace(found.verdict, unexplained=True)
-            found = replace(found, accepted=False, reasons=(*found.reasons, TAKEN_BACK), verdict=verdict)
+            found = replace(found, accepted=False, reasons=(*found.reasons, REJECTED_TOGETHER), verdict=verdict)
         return found
 
     def _stopped(self, search: Search) -> Identification:
@@ -213,7 +212,7 @@ class _Identifier:
         models = self._models()
         found = self._report(search, models.regressed(search.base), models.regressed(search.best), in_full=False)
         if not found.verdict.effects:  # the search may have been about to name what this model lacks
-            found = replace(found, verdict=replace(found.verdict, sentences=(NOTHING_YET,)))
+            found = replace(found, verdict=replace(found.verdict, sentences=(INTERRUPTED_NOTE,)))
         return replace(found, aborted=True, accepted=False, reasons=(interrupted_reason(found.verdict.effects),))
 
     def _in_torque(
@@ -230,9 +229,10 @@ class _Identifier:
         gyro = all(t.channel == "rate" and t.beside is None for t in self.traces)  # an encoder has no line of its own
         line = standing_line(after, self.traces) if gyro and TONE in found.named else None
         if line is not None:
-            found.search.leave_open(TONE, told(line, self.recording.axis, self.traces[0].channel), found.search.base)
+            words = describe(line, self.recording.axis, self.traces[0].channel)
+            found.search.mark_undetermined(TONE, words, found.search.base)
             self.say(f"not named: {TONE}; the line may come from the sensor itself")
-            found, after = found.taken_back(), found.before
+            found, after = found.rejected(), found.before
         return self._report(found.search, found.before, after, measured=found)
 
     def _curves(self, search: Stepwise) -> list[tuple[Dependence, dict[str, float]]]:
@@ -255,7 +255,7 @@ class _Identifier:
         return [form for n in names for form in (n, *effects.forms(n))]
 
     def _report(
-        self, search: Search, before: Fitted, after: Fitted, in_full: bool = True,
+        self, search: Search, before: FinalFit, after: FinalFit, in_full: bool = True,
         measured: Found | None = None,
     ) -> Identification:  # fmt: skip
         changed = after.structure != self.structure
@@ -286,7 +286,7 @@ class _Identifier:
         if self.torque_free:
             left = left_of_a_decay(self.traces, self.split, after, self.start, self.recording.axis)
             if self.curve is not None and after.structure != self.structure:
-                left = with_curve(left, *self.curve)
+                left = with_free_form(left, *self.curve)
         case = Case(
             self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
             self.declared, self.left_out, self.colour, left,

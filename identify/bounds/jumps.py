@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.estimate.final_fit import Fitted
+from identify.estimate.final_fit import FinalFit
 from identify.model.effect_torque import torque_along
 from identify.model.parameters import Name
 from identify.signals.trace import Trace
@@ -26,7 +26,7 @@ POINTS = 400  # of the measured motion at which the torque is looked at
 JUMP = "jumps"
 
 
-def why_of_a_jump(fitted: Fitted, name: Name, traces: Sequence[Trace]) -> str:
+def why_of_a_jump(fitted: FinalFit, name: Name, traces: Sequence[Trace]) -> str:
     """Why the data give no interval of a parameter whose effect jumps there, with the cure; empty for any other.
 
     Parameters
@@ -48,7 +48,7 @@ def why_of_a_jump(fitted: Fitted, name: Name, traces: Sequence[Trace]) -> str:
     )
 
 
-def _jumps(fitted: Fitted, name: Name, traces: Sequence[Trace]) -> bool:
+def _jumps(fitted: FinalFit, name: Name, traces: Sequence[Trace]) -> bool:
     """Whether a small change leaves every torque as it was, bit for bit, and a larger one does not."""
     effect = effects.get(name[0])
     if effect.kernel is None or effect.states:

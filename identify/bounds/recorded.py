@@ -51,5 +51,5 @@ def silent(run: Run) -> Run:
 def _quick(traces: Sequence[Trace], structure: Structure) -> tuple[float, float, float] | None:
     start: Start = first_guess(traces, structure)
     solution = fit(Regression(traces, structure), {}, start.platform, start.rho)
-    j, c, k = solution.platform
+    j, c, k = solution.jck
     return (j, c, k) if j > 0.0 and c >= 0.0 and k >= 0.0 else None

@@ -6,7 +6,7 @@ from collections.abc import Set
 
 import numpy as np
 
-from identify.estimate.final_fit import Fitted
+from identify.estimate.final_fit import FinalFit
 from identify.model.parameters import Name
 from identify.wording import number
 
@@ -15,7 +15,7 @@ OPEN_RAD = 0.5  # standard error of a phase beyond which it is open
 WIDE = 0.5  # of its value: a standard error that says nothing of a term
 
 
-def undetermined(fitted: Fitted, runs: Set[int], alone: bool) -> dict[Name, str]:
+def undetermined(fitted: FinalFit, runs: Set[int], alone: bool) -> dict[Name, str]:
     """Parameters of a fit that its data do not determine, and why; in the order of the fit.
 
     ``runs`` are the numbers of those that the fit looked at, ``alone`` says that there is no other run.
@@ -34,7 +34,7 @@ def undetermined(fitted: Fitted, runs: Set[int], alone: bool) -> dict[Name, str]
     return out
 
 
-def open_phases(fitted: Fitted) -> dict[Name, float]:
+def open_phases(fitted: FinalFit) -> dict[Name, float]:
     """Standard errors of sine and cosine gains whose phase the data do not tell: their amplitude at least.
 
     Beside a phase that may be anything the errors of a fit hold at the one phase where it stopped.
@@ -68,7 +68,7 @@ def _why(value: float, error: float, determined: bool) -> str:
     )
 
 
-def _undetermined_partner(fitted: Fitted, i: int, alone: bool) -> str:
+def _undetermined_partner(fitted: FinalFit, i: int, alone: bool) -> str:
     """A term that the data do not determine and that drags this one along; empty where there is none.
 
     In a single run (``alone``) inertia and stiffness are one number at each frequency.

@@ -10,7 +10,7 @@ from identify.wording import SYMBOLS, depends_on, joined, number
 from rig.config.identify import AcceptConfig
 from rig.platform import TERMS
 
-GROWN = 1.02  # times the declared model's error: less is chance
+MAX_ERROR_GROWTH = 1.02  # times the declared model's error: less is chance
 
 
 def of_reported(left: Disturbance, model: ModelResult) -> Disturbance:
@@ -47,7 +47,7 @@ def grown(before: ModelResult, after: ModelResult | None) -> str:
     if after is None:
         return ""
     old, new = before.error.holdout_rate_rms, after.error.holdout_rate_rms
-    if old is None or new is None or new <= GROWN * old:
+    if old is None or new is None or new <= MAX_ERROR_GROWTH * old:
         return ""
     return (
         "The final model's held-out error in free run is larger than the declared model's. Over a whole run, a torque "

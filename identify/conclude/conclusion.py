@@ -15,7 +15,8 @@ from identify.conclude.model_result import model_of, to_build_on
 from identify.conclude.next_steps import opposite_signs, unexplained_reason
 from identify.conclude.verdict import sentences_of
 from identify.diagnose.diagnosis import with_diagnosis
-from identify.estimate.final_fit import Fitted, noise_of_all
+from identify.estimate.final_fit import FinalFit
+from identify.model.parameter_fit import reduced_chi_square
 from identify.model.structure import Structure
 from identify.residual import Disturbance
 from identify.results import (
@@ -35,18 +36,18 @@ from identify.runs import clipping
 from identify.runs.sign_convention import SENTENCE
 from identify.select.search_state import Search
 from identify.signals import glitches, resampling
-from identify.signals.trace import UPSAMPLING, loads_differ
+from identify.signals.trace import UPSAMPLING, loads_differ, pooled_noise
 from identify.wording import capital
 from rig import effects
 from rig.effects.base import Place
 
-STRAYED = 3.0  # times the sensor's noise: a free run with friction may have gone astray
-ROUNDING = 1e-6  # of the torque: what a model leaves where neither noise nor an effect is
-UNEXPLAINED = 1.1  # times the noise floor in free run: above it, something is left that no effect here explains
+DIVERGED = 3.0**2  # reduced chi-square: a free run with friction may have gone astray
+ROUNDING_FLOOR = 1e-6  # of the torque: what a model leaves where neither noise nor an effect is
+UNEXPLAINED = 1.1**2  # reduced chi-square in free run: above it, something is left that no effect here explains
 
 
 def conclude(
-    case: Case, search: Search, before: Fitted, after: Fitted, measured_before: Measured, measured_after: Measured,
+    case: Case, search: Search, before: FinalFit, after: FinalFit, measured_before: Measured, measured_after: Measured,
     floor: NoiseFloor, per_set: tuple[SetResult, ...], joint: GeneticRun | None,
     torque_scale: ParameterEstimate | None = None,
 ) -> Identification:  # fmt: skip
@@ -62,11 +63,11 @@ def conclude(
     else:
         result_before = to_build_on(case, before, result_before)
     final = result_after or result_before
-    ratio = _ratio(case, after, search)
+    chi_square = _reduced_chi_square(case, after, search)
     measured = case.disturbance  # of runs that a torque limits; else the sensor's noise does
     left = measured_after.errors.holdout_torque_relative
-    exact = left is not None and left < ROUNDING  # as in a file that has no noise
-    unexplained = ratio > UNEXPLAINED and not exact if measured is None else bool(measured.depends_on)
+    exact = left is not None and left < ROUNDING_FLOOR  # as in a file that has no noise
+    unexplained = chi_square > UNEXPLAINED and not exact if measured is None else bool(measured.depends_on)
     verdict = Verdict(
         effects=tuple(
             dict.fromkeys(effects.first_of(e) for e in search.best.structure.effects if e not in case.structure.effects)
@@ -103,7 +104,7 @@ def conclude(
         note=grown(result_before, result_after),
     )  # fmt: skip
     if material:
-        reasons.insert(0, unexplained_reason(ratio, found))
+        reasons.insert(0, unexplained_reason(chi_square, found))
     if opposite_signs(found):
         reasons.insert(0, SENTENCE)
     found = replace(found, accepted=not reasons, reasons=tuple(reasons))
@@ -123,7 +124,7 @@ def _at_the_sensor(case: Case, measured: Measured, floor: NoiseFloor) -> Disturb
     return Disturbance(size, UNITS[case.recording.axis]["torque"], size * relative / left)
 
 
-def _about_damping(case: Case, after: Fitted, final: ModelResult) -> tuple[str, ...]:
+def _about_damping(case: Case, after: FinalFit, final: ModelResult) -> tuple[str, ...]:
     """What C may be instead; nothing where C is not reported."""
     name = ("inertia",)
     if final.platform is None or name not in after.names or "damping" not in final.parameters:
@@ -133,7 +134,7 @@ def _about_damping(case: Case, after: Fitted, final: ModelResult) -> tuple[str, 
     return (told,) if told else ()
 
 
-def _note(case: Case, after: Fitted) -> str:
+def _note(case: Case, after: FinalFit) -> str:
     """What was held out, what was left out, and what was taken for granted."""
     rests = after.free_run is not None and any(s.rests for s in after.free_run.shots)
     resting = (
@@ -142,22 +143,22 @@ def _note(case: Case, after: Fitted) -> str:
     torn = glitches.told([(t.run.name, t.glitches_s) for t in case.traces])
     beyond = clipping.told([(t.run.name, *t.clipped) for t in case.traces], case.recording.axis)
     uneven = resampling.told([(t.run.name, *t.scatter) for t in case.traces])
-    filtered = coloured_noise.told(case.colour, case.recording.axis, case.traces[0].channel)
+    filtered = coloured_noise.describe_colour(case.colour, case.recording.axis, case.traces[0].channel)
     return ". ".join(
         capital(note) for note in (case.split.note, resting, filtered, *case.left_out, torn, beyond, uneven) if note
     )
 
 
-def _ratio(case: Case, after: Fitted, search: Search) -> float:
-    """Residual over sensor noise: in free run where the model can run free, else over the horizon."""
-    noise = noise_of_all(case.traces) * _share_of_white(case)
+def _reduced_chi_square(case: Case, after: FinalFit, search: Search) -> float:
+    """Of what is left: in free run where the model can run free, else over the horizon."""
+    noise = pooled_noise(case.traces) * _share_of_white(case)
     if after.free_run is not None and after.sensor_limited:
-        return after.sigma / noise
-    free = after.free_run.sigma / noise if after.free_run is not None else np.inf
-    short = search.best.sigma / (search.floor * _share_of_white(case))
+        return reduced_chi_square(after.fit.sigma, noise)
+    free = reduced_chi_square(after.free_run.sigma, noise) if after.free_run is not None else np.inf
+    short = search.reduced_chi_square(search.best) / _share_of_white(case) ** 2
     frictions = [e for e in after.structure.effects if effects.get(e).place is Place.FRICTION]
     # One wrong standstill throws a free run off for good; else what a free run leaves is what is missing.
-    return float(free) if np.isfinite(free) and (free < STRAYED or not frictions) else float(min(free, short))
+    return free if np.isfinite(free) and (free < DIVERGED or not frictions) else min(free, short)
 
 
 def _share_of_white(case: Case) -> float:

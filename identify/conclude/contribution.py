@@ -7,17 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from identify.estimate.output_error import OutputErrorFit
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.rivals import whole_runs
-from identify.rivals.whole_runs import WholeFit, WholeRuns
+from identify.rivals.whole_runs import FreeRunFitter
 from rig.platform import TERMS
 
-STEPS = 4  # of a fit that begins where the rest stands: the ratio to a few percent is what is asked for
+MAX_ITERATIONS = 4  # of a fit that begins where the rest stands: the ratio to a few percent is what is asked for
 
 
 def contributions(
-    fits: WholeRuns,
+    fits: FreeRunFitter,
     structure: Structure,
     values: Mapping[Name, float],
     named: Sequence[str],
@@ -31,7 +32,7 @@ def contributions(
     away has no number.
     """
     full = fits.fitted(structure, values, steps=_steps(fits)) if named else None
-    if full is None or full.held <= 0.0:
+    if full is None or full.held_out_chi_square <= 0.0:
         return {}
     out = {}
     for name in named:
@@ -39,13 +40,13 @@ def contributions(
             fits, structure.minus(name), {n: v for n, v in values.items() if n[0] != name}, base, horizon_s
         )
         if without is not None:
-            out[name] = float(np.sqrt(without.held / full.held))
+            out[name] = float(np.sqrt(without.held_out_chi_square / full.held_out_chi_square))
     return out
 
 
 def _without(
-    fits: WholeRuns, structure: Structure, rest: Mapping[Name, float], base: Mapping[Name, float], horizon_s: float
-) -> WholeFit | None:
+    fits: FreeRunFitter, structure: Structure, rest: Mapping[Name, float], base: Mapping[Name, float], horizon_s: float
+) -> OutputErrorFit | None:
     """The model without an effect, with every term that was declared."""
     gone: dict[Name, float] = {n: v for n, v in base.items() if len(n) == 1 and n not in rest}
     structure = replace(structure, terms=tuple(t for t in TERMS if t in structure.terms or (t,) in gone))
@@ -55,8 +56,8 @@ def _without(
     # A decay that loses step with the data is in a false minimum: a short horizon leads out, from either end.
     ends = [start, {**rest, **gone}] if gone else [start]
     tried = [fits.fitted(structure, values, horizon_s=horizon_s) for values in ends]
-    return min((w for w in tried if w is not None), key=lambda w: w.squares, default=None)
+    return min((w for w in tried if w is not None), key=lambda w: w.cost, default=None)
 
 
-def _steps(fits: WholeRuns) -> int:
-    return whole_runs.STEPS if fits.torque_free else STEPS
+def _steps(fits: FreeRunFitter) -> int:
+    return whole_runs.MAX_ITERATIONS if fits.torque_free else MAX_ITERATIONS

@@ -10,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from identify.estimate.final_fit import Fitted
+from identify.estimate.final_fit import FinalFit
 from identify.estimate.output_error import refine
 from identify.model.parameters import Name
 from identify.signals.trace import Trace
 from rig import effects
 from rig.platform import TERMS, Platform
 
-STEPS = 12
-CHANCE = 9.0  # rise of chi square, three standard errors, by which a declared number does not contradict the runs
+MAX_ITERATIONS = 12
+MAX_CHI_SQUARE_RISE = 9.0  # three standard errors, by which a declared number does not contradict the runs
 
 
 def declared_values(declared: Platform, torque_free: bool) -> dict[Name, float]:
@@ -34,7 +34,7 @@ def declared_values(declared: Platform, torque_free: bool) -> dict[Name, float]:
 
 
 def kept_as_declared(
-    traces: Sequence[Trace], use: Sequence[Any], fitted: Fitted, lost: Iterable[Name], declared: Mapping[Name, float]
+    traces: Sequence[Trace], use: Sequence[Any], fitted: FinalFit, lost: Iterable[Name], declared: Mapping[Name, float]
 ) -> dict[Name, float]:
     """The values of a model, those of ``lost`` as declared where that replays the runs; others are fitted beside them.
 
@@ -45,11 +45,11 @@ def kept_as_declared(
     if not asked or not fitted.sensor_limited:
         return values
     held: list[Name] = [("inertia",)] if all(t.torque is None for t in traces) else []
-    free = refine(traces, fitted.structure, values, None, STEPS, use, fixed=held)
+    free = refine(traces, fitted.structure, values, None, MAX_ITERATIONS, use, fixed=held)
     for name in asked:
         start = {**values, name: declared[name]}
-        trial = refine(traces, fitted.structure, start, None, STEPS, use, fixed=[*held, name])
-        if (trial.sigma**2 - free.sigma**2) * free.count < CHANCE * free.sigma**2:
+        trial = refine(traces, fitted.structure, start, None, MAX_ITERATIONS, use, fixed=[*held, name])
+        if (trial.sigma**2 - free.sigma**2) * free.count < MAX_CHI_SQUARE_RISE * free.sigma**2:
             held.append(name)
-            values = dict(zip(trial.names, trial.values.tolist(), strict=True))
+            values = dict(trial.values)
     return values

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from identify.diagnose.torque_residual import TorqueResidual, relative, torque_noise_floor, torque_residual
-from identify.estimate.final_fit import Fitted, noise_of_all
+from identify.estimate.final_fit import FinalFit
 from identify.genetic.linear_traces import linear_traces
 from identify.model.structure import Structure
 from identify.results import Errors, NoiseFloor
 from identify.runs.holdout import Split
 from identify.select.field_search import TorqueErrors
-from identify.signals.trace import Trace
+from identify.signals.trace import Trace, pooled_noise
 from rig.recording.run import Array
 
 EDGE_PERIODS = 3.0  # of the cut-off, left out at both ends of a run
@@ -30,7 +30,7 @@ class Measured:
     simulated: list[Array]
 
 
-def measure(traces: Sequence[Trace], split: Split, fitted: Fitted, cutoff_hz: float) -> Measured:
+def measure(traces: Sequence[Trace], split: Split, fitted: FinalFit, cutoff_hz: float) -> Measured:
     """Errors of a fitted model on the samples of the final fit and on the held-out ones."""
     structure, along = fitted.structure, traces
     if fitted.sensor_limited:  # friction along the model's own motion knows when it sticks; a noisy sign does not
@@ -88,12 +88,12 @@ def _free_run(traces: Sequence[Trace], split: Split, simulated: Sequence[Array])
     )
 
 
-def floor_of(traces: Sequence[Trace], split: Split, fitted: Fitted, cutoff_hz: float, given: bool) -> NoiseFloor:
+def floor_of(traces: Sequence[Trace], split: Split, fitted: FinalFit, cutoff_hz: float, given: bool) -> NoiseFloor:
     """What the sensor's noise alone leaves."""
     masks = split.everything
     torque = torque_noise_floor(traces, fitted.values, cutoff_hz, masks)
     return NoiseFloor(
         residual_rms_torque=None if np.isnan(torque) else torque,
-        holdout_rate_rms=noise_of_all(traces),
+        holdout_rate_rms=pooled_noise(traces),
         source="given" if given else "estimated",
     )

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.estimate.final_fit import Fitted, by_output_error, by_regression
+from identify.estimate.final_fit import FinalFit, by_output_error, by_regression
 from identify.estimate.initial_guess import Start
-from identify.estimate.judged import Judged
 from identify.likelihood.by_prediction_error import by_prediction_error
+from identify.model.parameter_fit import ParameterFit
 from identify.model.structure import Structure
 from identify.results import ParameterEstimate
 from identify.runs.holdout import Split
@@ -20,7 +20,8 @@ from rig import effects
 from rig.effects.base import Place
 from rig.platform import TERMS, Platform
 
-SHOWS = 5.0  # standard errors from zero at which whole runs show damping
+RUNS_FREE = 2.0**2  # reduced chi-square up to which the declared model is fitted by its free run
+SIGNIFICANT_SIGMAS = 5.0  # standard errors from zero at which whole runs show damping
 
 
 @dataclass(frozen=True)
@@ -40,17 +41,17 @@ class FinalModels:
     start: Start
     say: Callable[[str], None]
 
-    def before(self, search: Search) -> Fitted:
+    def before(self, search: Search) -> FinalFit:
         """The declared model."""
         # A decay is judged by its free run, which the regression does not look at.
-        if all(t.torque is None for t in self.traces) or search.base.sigma < 2.0 * search.floor:
+        if all(t.torque is None for t in self.traces) or search.reduced_chi_square(search.base) < RUNS_FREE:
             return by_output_error(
-                self.traces, self.structure, search.base.values(), search.horizon,
+                self.traces, self.structure, search.base.values, search.horizon,
                 self.split.final, self.split.everything,
             )  # fmt: skip
         return self.regressed(search.base)
 
-    def after(self, search: Search) -> Fitted:
+    def after(self, search: Search) -> FinalFit:
         """Output error where the model runs free at the sensor's noise; else prediction error with its disturbance.
 
         A decay is told by how it swings on, whatever disturbs it.
@@ -58,7 +59,7 @@ class FinalModels:
         structure = search.best.structure
         self.say(f"final fit with {', '.join(structure.effects) or 'fewer terms'}")
         fitted = by_output_error(
-            self.traces, structure, search.best.values(), search.horizon,
+            self.traces, structure, search.best.values, search.horizon,
             self.split.final, self.split.everything,
         )  # fmt: skip
         if fitted.sensor_limited:
@@ -67,20 +68,19 @@ class FinalModels:
             return fitted
         return self._predicted(search.best)
 
-    def regressed(self, best: Judged) -> Fitted:
+    def regressed(self, best: ParameterFit) -> FinalFit:
         """A model by regression alone: where there is no time for more."""
         return by_regression(
-            self.traces, best.structure, best.shapes(), self.start, self.split.final, self.split.everything,
-            best.std_errors(),
+            self.traces, best.structure, best.structure.shapes_of(best.values), self.start,
+            self.split.final, self.split.everything, best.std_errors(),
         )  # fmt: skip
 
-    def _predicted(self, best: Judged) -> Fitted:
-        fitted, _ = by_prediction_error(
-            self.traces, best.structure, best.values(), self.split.final, self.split.everything
+    def _predicted(self, best: ParameterFit) -> FinalFit:
+        return by_prediction_error(
+            self.traces, best.structure, best.values, self.split.final, self.split.everything
         )  # fmt: skip
-        return fitted
 
-    def _with_dropped_damping(self, search: Search, fitted: Fitted) -> Fitted:
+    def _with_dropped_damping(self, search: Search, fitted: FinalFit) -> FinalFit:
         """The same with damping, where whole runs show what a few periods of the held-out part could not.
 
         Beside a lag or a delay always: at a few tones below the resonance both turn the phase alike, and without the
@@ -96,7 +96,7 @@ class FinalModels:
         )  # fmt: skip
         damping, error = fuller.values[("damping",)], fuller.std_error(("damping",))
         late = any(effects.get(e).place in (Place.DRIVE, Place.SENSOR) for e in fitted.structure.effects)
-        shows = damping > 0.0 if late else damping > SHOWS * error
+        shows = damping > 0.0 if late else damping > SIGNIFICANT_SIGMAS * error
         if not fuller.sensor_limited:
             return fitted
         if not shows:
@@ -105,7 +105,7 @@ class FinalModels:
         self.say(f"restored damping: {damping:.4g} +- {error:.2g} over whole runs")
         return fuller
 
-    def torque_scale(self, fitted: Fitted) -> ParameterEstimate | None:
+    def torque_scale(self, fitted: FinalFit) -> ParameterEstimate | None:
         """The shaft's torque over the recorded one, where a known inertia was added for some of the runs."""
         name = ("torque_scale", "scale")
         if not fitted.sensor_limited or not loads_differ(self.traces):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from identify.conclude.next_steps import opposite_signs
+from identify.model.parameter_fit import reduced_chi_square
 from identify.results import Identification
 from identify.runs.sign_convention import SENTENCE
 from identify.wording import (
@@ -20,9 +21,9 @@ from identify.wording import (
     value_of,
 )
 
-REASONS = 2  # of a result that is not accepted; the list below has all
-AT_FLOOR = 1.05  # times the noise floor, which is known to a few percent
-WORTH_PERCENT = 1.0  # of a parameter: less is in the table
+MAX_REASONS = 2  # of a result that is not accepted; the list below has all
+AT_NOISE = 1.05**2  # reduced chi-square; the noise floor is known to a few percent
+MIN_CHANGE_PERCENT = 1.0  # of a parameter: less is in the table
 UNITS = {("rotary", "rate"): "rad/s", ("rotary", "angle"): "rad", ("linear", "rate"): "m/s", ("linear", "angle"): "m"}
 
 
@@ -69,7 +70,7 @@ def _error(found: Identification) -> str:
     old, new, floor, its_unit = error_before_and_after(found)
     if new is None:
         return "No error could be measured on held-out data."
-    at_floor = floor and new < AT_FLOOR * floor
+    at_floor = floor and reduced_chi_square(new, floor) < AT_NOISE
     times = ", the noise floor" if at_floor else f", {number(new / floor, 2)} times the noise floor" if floor else ""
     if found.after is None or old is None:
         return f"Its error on held-out data is {number(new, 3)} {its_unit}{times}."
@@ -81,7 +82,7 @@ def _error(found: Identification) -> str:
     moved = [
         f"{SYMBOLS.get(name, plain(name))} would be {off_by(1.0 + percent / 100.0)}"
         for name, percent in bias_percent(found).items()
-        if abs(percent) >= WORTH_PERCENT and name in final
+        if abs(percent) >= MIN_CHANGE_PERCENT and name in final
     ]
     return f"{text}{times}{'; without it, ' + joined(moved) if moved else ''}."
 
@@ -89,7 +90,7 @@ def _error(found: Identification) -> str:
 def acceptance(found: Identification) -> str:
     """Accepted or not, and why, in one sentence."""
     if not found.accepted:
-        shown, more = list(found.reasons[:REASONS]), len(found.reasons) - REASONS
+        shown, more = list(found.reasons[:MAX_REASONS]), len(found.reasons) - MAX_REASONS
         rest = f" ({more} more reason{'s' if more > 1 else ''} below)" if more > 0 else ""
         why = f"{'; '.join(shown).rstrip(' .')}{rest}." if shown else ""
         return f"{'Aborted' if found.aborted else 'Not accepted'}: {why}" if why else "Not accepted."

@@ -12,7 +12,7 @@ from identify.bounds.undetermined import of_another_run, open_phases, undetermin
 from identify.conclude.case import Case, runs_fitted
 from identify.conclude.declared_values import declared_values, kept_as_declared
 from identify.conclude.error_figures import Measured
-from identify.estimate.final_fit import Fitted
+from identify.estimate.final_fit import FinalFit
 from identify.model.parameters import Name, platform_of
 from identify.results import UNITS, ModelResult, NotReported, ParameterEstimate
 from rig import effects
@@ -21,7 +21,7 @@ from rig.platform import Platform
 TORQUE_FREE = {"damping": ("damping_over_inertia", "1/s"), "stiffness": ("stiffness_over_inertia", "1/s^2")}
 
 
-def model_of(case: Case, fitted: Fitted, measured: Measured, dropped: tuple[NotReported, ...]) -> ModelResult:
+def model_of(case: Case, fitted: FinalFit, measured: Measured, dropped: tuple[NotReported, ...]) -> ModelResult:
     """What a fit tells of its model: numbers with intervals, errors, and what is not determined."""
     parameters: dict[str, ParameterEstimate] = {}
     of_effects: dict[str, dict[str, ParameterEstimate]] = {
@@ -44,13 +44,13 @@ def model_of(case: Case, fitted: Fitted, measured: Measured, dropped: tuple[NotR
     return ModelResult(parameters, of_effects, measured.errors, dropped, missing, _correlation(fitted), platform)
 
 
-def _platform(case: Case, fitted: Fitted, values: Mapping[Name, float]) -> Platform:
+def _platform(case: Case, fitted: FinalFit, values: Mapping[Name, float]) -> Platform:
     """As it stood in the first run that a fit looked at."""
     run = min(runs_fitted(case), default=0)
     return platform_of(fitted.structure, tuple(values), np.array(list(values.values())), run)
 
 
-def _lost(case: Case, fitted: Fitted) -> dict[Name, str]:
+def _lost(case: Case, fitted: FinalFit) -> dict[Name, str]:
     alone = len(case.traces) == 1 and case.disturbance is None  # a measured run is no single tone
     lost = undetermined(fitted, runs_fitted(case), alone)
     return {name: why_of_a_jump(fitted, name, case.traces) or why for name, why in lost.items()}
@@ -74,7 +74,7 @@ def _unit(case: Case, name: Name) -> str:
     return unit
 
 
-def to_build_on(case: Case, fitted: Fitted, model: ModelResult) -> ModelResult:
+def to_build_on(case: Case, fitted: FinalFit, model: ModelResult) -> ModelResult:
     """The final model with declared numbers where the data say nothing, as far as it replays the runs with them."""
     lost, declared = _lost(case, fitted), declared_values(case.declared, case.torque_free)
     values = kept_as_declared(case.traces, case.split.final, fitted, lost, declared)
@@ -85,7 +85,7 @@ def to_build_on(case: Case, fitted: Fitted, model: ModelResult) -> ModelResult:
     return replace(model, not_determined=missing, platform=_platform(case, fitted, values))
 
 
-def _correlation(fitted: Fitted) -> dict[str, float]:
+def _correlation(fitted: FinalFit) -> dict[str, float]:
     size = np.sqrt(np.maximum(np.diag(fitted.covariance), 1e-300))
     if not np.all(np.isfinite(fitted.covariance)):
         return {}

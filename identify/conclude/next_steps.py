@@ -11,6 +11,7 @@ from identify.bounds.jumps import JUMP
 from identify.diagnose import torque_noise
 from identify.diagnose.torque_residual import dependence
 from identify.diagnose.wording import is_significant
+from identify.model.parameter_fit import reduced_chi_square
 from identify.results import GeneticRun, Identification, ResidualDiagnosis, RunTraces, follow_up_file_name
 from identify.runs.sign_convention import SENTENCE, signs
 from identify.wording import capital, joined, number, percent, plain
@@ -88,8 +89,9 @@ REPEAT = "Play the campaign again and compare the results; `rig check` predicts 
 RECORD_AGAIN = "Record the campaign again and compare the results."
 INTERRUPTED = "the search was interrupted"
 IDENTIFY_AGAIN = "Identify this recording again and let the search come to its end; nothing has to be played for it."
-NEAR_FLOOR = 4.0  # times the noise floor
-FIRST_SAMPLES, MOVING = 3, 0.1  # first samples of a run, and the share of its largest rate that they may have
+NOISE_LIMITED = 4.0**2  # reduced chi-square
+START_SAMPLES = 3  # of a run: the first ones
+MAX_START_RATE_SHARE = 0.1  # of its largest rate, that they may have
 
 
 def next_steps(found: Identification) -> tuple[str, ...]:
@@ -135,10 +137,10 @@ def opposite_signs(found: Identification) -> bool:
     return seen is not None and seen.opposite
 
 
-def unexplained_reason(ratio: float, found: Identification) -> str:
+def unexplained_reason(chi_square: float, found: Identification) -> str:
     """Why a residual that stays is no matter of noise: in units of the sensor's noise, and of the signal.
 
-    ``ratio`` is the residual over the sensor's noise.
+    ``chi_square`` is the reduced one of the residual.
     """
     error, share = found.final.error, ""
     force = "force" if found.axis == "linear" else "torque"
@@ -147,7 +149,7 @@ def unexplained_reason(ratio: float, found: Identification) -> str:
         share = f"{percent(100.0 * relative).lstrip('+')} of the {force}"
     elif error.holdout_fit_percent is not None and math.isfinite(error.holdout_fit_percent):
         share = f"{percent(100.0 - error.holdout_fit_percent).lstrip('+')} of the motion"
-    size = f"{number(ratio, 3)} times the sensor's noise"
+    size = f"{number(math.sqrt(chi_square), 3)} times the sensor's noise"
     amount = f"{share} ({size})" if share else size
     acts = "no effect that was tried describes it"
     if found.verdict.left_open:
@@ -200,7 +202,7 @@ def _to_explain(found: Identification) -> list[str]:
 def _coloured(found: Identification) -> list[str]:
     """A residual little above an estimated floor may be noise that is slower than what the estimate looks at."""
     error, floor = found.final.error.holdout_rate_rms, found.noise_floor
-    near = error is not None and error < NEAR_FLOOR * floor.holdout_rate_rms
+    near = error is not None and reduced_chi_square(error, floor.holdout_rate_rms) < NOISE_LIMITED
     return [COLOURED] if near and floor.source == "estimated" else []
 
 
@@ -264,7 +266,7 @@ def _begun_in_motion(traces: Sequence[RunTraces]) -> list[str]:
     return [
         t.name for t in traces
         if t.torque_nm is not None
-        and float(np.median(np.abs(t.rate_rad_s[:FIRST_SAMPLES]))) > MOVING * float(np.max(np.abs(t.rate_rad_s)))
+        and np.median(np.abs(t.rate_rad_s[:START_SAMPLES])) > MAX_START_RATE_SHARE * np.max(np.abs(t.rate_rad_s))
     ]  # fmt: skip
 
 

@@ -17,10 +17,11 @@ from identify.results import Identification, Implausible
 from identify.wording import SYMBOLS, half_interval, joined, number
 from rig.platform import TERMS
 
-WITHIN = math.log(1.15)  # of a factor, either way: what a declared number is good for
-SHARED = math.log(1.02)  # of two declared numbers that share a factor: a computed inertia is good for a percent or two
-LEAST_SCALE, MOST_SCALE = math.log(1.05), math.log(2.0)  # a torque constant's tolerance; beyond, it is no calibration
-KNOWN_TO = 0.1  # half the 95 % interval over the value: worse says nothing of a factor
+DECLARED_TOLERANCE = math.log(1.15)  # of a factor, either way: what a declared number is good for
+# Of two declared numbers that share a factor: a computed inertia is good for a percent or two.
+COMMON_FACTOR_TOLERANCE = math.log(1.02)
+MIN_SCALE, MAX_SCALE = math.log(1.05), math.log(2.0)  # a torque constant's tolerance; beyond, it is no calibration
+MAX_RELATIVE_INTERVAL = 0.1  # half the 95 % interval over the value: worse says nothing of a factor
 DEGREES, TURN, RPM, GRAVITY, THOUSAND = 180.0 / math.pi, 2.0 * math.pi, 30.0 / math.pi, 9.80665, 1e3
 FREQUENCY = TURN**2
 Channel = Literal["rate", "angle"]
@@ -127,7 +128,7 @@ def implausible(found: Identification) -> tuple[Implausible, ...]:
     ratios = {
         name: estimate.value / found.declared[name]
         for name, estimate in found.final.parameters.items()
-        if found.declared.get(name) and half_interval(estimate) <= KNOWN_TO * abs(estimate.value)
+        if found.declared.get(name) and half_interval(estimate) <= MAX_RELATIVE_INTERVAL * abs(estimate.value)
     }
     if found.torque_free:
         return _without_torque(ratios)
@@ -143,7 +144,7 @@ def implausible(found: Identification) -> tuple[Implausible, ...]:
 
 
 def _is(ratio: float, factor: float) -> bool:
-    return ratio * factor > 0.0 and abs(math.log(ratio / factor)) < WITHIN
+    return ratio * factor > 0.0 and abs(math.log(ratio / factor)) < DECLARED_TOLERANCE
 
 
 def _alike(jck: Mapping[str, float], causes: tuple[Cause, ...]) -> tuple[Implausible, ...]:
@@ -163,7 +164,7 @@ def _of_torque_scale(jck: Mapping[str, float], linear: bool) -> tuple[Implausibl
         return ()
     apart = abs(math.log(jck["inertia"] / jck["stiffness"]))
     factor = math.sqrt(jck["inertia"] * jck["stiffness"])
-    if apart > SHARED or not LEAST_SCALE < abs(math.log(factor)) < MOST_SCALE:
+    if apart > COMMON_FACTOR_TOLERANCE or not MIN_SCALE < abs(math.log(factor)) < MAX_SCALE:
         return ()
     torque, kind = ("force", "mass") if linear else ("torque", "inertia")
     words = (
@@ -232,6 +233,6 @@ def _implausible(names: tuple[str, ...], ratios: Mapping[str, float], words: str
 
 
 def _times(factor: float) -> str:
-    if abs(factor) < 1.0 - WITHIN and factor > 0.0:
+    if abs(factor) < 1.0 - DECLARED_TOLERANCE and factor > 0.0:
         return f"about 1/{number(1.0 / factor, 2)} of"
     return "the opposite of" if _is(factor, -1.0) else f"about {number(factor, 2)} times"

@@ -26,8 +26,8 @@ from identify.wording import (
 )  # fmt: skip
 from rig import effects
 
-SHOWN = 4  # numbers of an effect in a sentence
-SHOWN_PERCENT = 0.05  # a change below that is not worth a sentence
+MAX_SHOWN_PARAMETERS = 4  # numbers of an effect in a sentence
+MIN_SHOWN_PERCENT = 0.05  # a change below that is not worth a sentence
 
 
 def sentences_of(found: Identification, damping_said: bool = False) -> tuple[str, ...]:
@@ -110,7 +110,7 @@ def _poorly_determined(found: Identification, damping_said: bool) -> list[str]:
 def _named(found: Identification, name: str) -> str:
     values = (found.after or found.before).effect_parameters.get(name, {})
     ordered = sorted(values.items(), key=lambda item: "_run_" in item[0])  # what every run has of its own comes last
-    shown = {k.replace("_", " "): readable(v) for k, v in ordered[:SHOWN]}
+    shown = {k.replace("_", " "): readable(v) for k, v in ordered[:MAX_SHOWN_PARAMETERS]}
     numbers = ", ".join(f"{k} {value_of(v)} {unit(v.unit)}".removesuffix(" 1") for k, v in shown.items())
     rivals = found.verdict.confusable_with.get(name, ())
     text = f"The model lacked {plain(name)} ({numbers})."
@@ -133,7 +133,7 @@ def _parameter_bias(found: Identification) -> list[str]:
         if after is None or after.value == 0.0:
             continue
         ratio = before.value / after.value
-        if abs(100.0 * (ratio - 1.0)) >= SHOWN_PERCENT:
+        if abs(100.0 * (ratio - 1.0)) >= MIN_SHOWN_PERCENT:
             moved.append(f"{title(name, found.axis)} is {off_by(ratio)}")
     return [f"{_change(found)}, {joined(moved)}."] if moved else []
 

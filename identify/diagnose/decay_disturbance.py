@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from identify.diagnose.disturbance import disturbance_of
 from identify.diagnose.torque_regression import TorqueRegression
-from identify.estimate.final_fit import Fitted
+from identify.estimate.final_fit import FinalFit
 from identify.estimate.initial_guess import Start, scale_of
 from identify.model.structure import shape_values
 from identify.residual import Disturbance
@@ -16,7 +16,7 @@ from identify.signals.trace import Trace
 from rig import effects
 
 
-def left_of_a_decay(traces: Sequence[Trace], split: Split, fitted: Fitted, start: Start, axis: str) -> Disturbance:
+def left_of_a_decay(traces: Sequence[Trace], split: Split, fitted: FinalFit, start: Start, axis: str) -> Disturbance:
     """The disturbance that a final model leaves of runs without torque, in rad/s^2 (m/s^2 on a linear axis)."""
     few, parts = reduced(traces, split)
     regression = TorqueRegression(few, parts, start.cutoff_hz, scale_of(few, start.platform, ()))

@@ -14,7 +14,8 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.stats import norm
 
-from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
+from identify.diagnose.torque_fit import TorqueFit
+from identify.diagnose.torque_regression import TorqueRegression
 from identify.model.parameters import Name
 from identify.results import Dependence, Disturbance
 from rig.arrays import Array

@@ -9,13 +9,15 @@ The residual is coloured: its likelihood is that of an autoregression fitted bes
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from identify.diagnose.coloured_residual import bounded, coloured_cost, lines, rms, standard_errors, strongest
 from identify.diagnose.torque_band import TorqueBand
+from identify.diagnose.torque_fit import TorqueFit
 from identify.model.effect_torque import feeds_on_torque
 from identify.model.parameters import Name
 from identify.model.structure import Shapes, Structure
@@ -25,39 +27,6 @@ from rig.arrays import Array
 BLOCK, BLOCKS_A_RUN, MIN_BLOCKS = 8, 24, 8  # samples behind the low-pass in a block, and how many blocks
 RIDGE = 1e-9  # of their own size, on the gains of free-form columns: two of them may be alike
 MIN_FOR_LINES, MIN_TRAVEL_RAD = 64, 0.5  # samples, and travel to show a line against the angle
-
-
-@dataclass(frozen=True)
-class TorqueFit:
-    """One structure fitted in torque.
-
-    Attributes
-    ----------
-    values
-        Parameters by name, shapes included.
-    fitted_nm, held_nm
-        Root mean square residual on the samples fitted and on those held out, N m.
-    cost
-        Minus twice the logarithm of the likelihood with a coloured residual, on all samples.
-    count
-        Samples behind the low-pass.
-    """
-
-    structure: Structure
-    shapes: dict[str, tuple[float, ...]]
-    values: dict[Name, float]
-    fitted_nm: float
-    held_nm: float
-    cost: float
-    count: int
-    residuals: list[Array]
-    held: list[Array]  # residuals of samples by a fit that did not see them
-    filters: Array  # of the autoregression
-
-    @property
-    def penalised(self) -> float:
-        """The cost with every parameter paid for."""
-        return self.cost + len(self.values) * float(np.log(max(self.count, 2)))
 
 
 class _Stacked(NamedTuple):
@@ -93,7 +62,7 @@ class TorqueRegression(TorqueBand):
         left = r - columns @ g
         ends = np.cumsum([len(x) for x in fit.residuals])[:-1]
         return replace(
-            fit, fitted_nm=rms(left[used]), held_nm=rms(held[self._judged]), residuals=np.split(left, ends),
+            fit, variance=rms(left[used]) ** 2, held_nm=rms(held[self._judged]), residuals=np.split(left, ends),
             held=np.split(held, ends),
         ), g  # fmt: skip
 
@@ -114,14 +83,14 @@ class TorqueRegression(TorqueBand):
         ridge[a.shape[1] :] = RIDGE * float(np.mean(np.sum(columns * columns, axis=0)))
         own = np.arange(wide.shape[1])
         free = (own >= len(names)) & (own < a.shape[1])
-        x, held = self._with_folds(wide, y, low, self._folds(names, extra), free, ridge)
+        x, held, _ = self._with_folds(wide, y, low, self._folds(names, extra), free, ridge)
         scale = self.torque_nm / max(rms(y - self._taken(names, x[: a.shape[1]], a)), 1e-300)
         r, held = scale * (y - wide @ x), scale * held
         ends = np.cumsum([len(rows) for rows in self._rows])[:-1]
+        values = {**fit.values, **dict(zip(names, x[: len(names)].tolist(), strict=True))}
         return replace(
-            fit, values={**fit.values, **dict(zip(names, x[: len(names)].tolist(), strict=True))},
-            fitted_nm=rms(r[self._fitted]), held_nm=rms(held[self._judged]), residuals=np.split(r, ends),
-            held=np.split(held, ends),
+            fit, vector=np.array([values[n] for n in fit.names]), variance=rms(r[self._fitted]) ** 2,
+            held_nm=rms(held[self._judged]), residuals=np.split(r, ends), held=np.split(held, ends),
         ), x[a.shape[1] :]  # fmt: skip
 
     def _folds(self, names: Sequence[Name], extra: int) -> list[Any]:
@@ -130,26 +99,28 @@ class TorqueRegression(TorqueBand):
 
     def _with_folds(
         self, a: Array, y: Array, low: Array, folds: Sequence[Any], free: Any, ridge: Any = 0.0
-    ) -> tuple[Array, Array]:
-        """Least squares, and the residual where every fold was left out of its own fit.
+    ) -> tuple[Array, Array, Array]:
+        """Least squares, the residual where every fold was left out of its own fit, and the normal matrix.
 
         What is ``free`` in each run, (columns,) boolean, is no part of the model: it is fitted to held-out samples too.
         """
 
-        def solved(rows: Any) -> Array:
-            return bounded(a[rows].T @ a[rows] + np.diag(np.broadcast_to(ridge, a.shape[1])), a[rows].T @ y[rows], low)
+        def normal(rows: Any) -> Array:
+            return np.asarray(a[rows].T @ a[rows] + np.diag(np.broadcast_to(ridge, a.shape[1])))
 
-        x = solved(self._fitted)
+        fitted = normal(self._fitted)
+        x = bounded(fitted, a[self._fitted].T @ y[self._fitted], low)
         held = y - a @ x
         used = self._used
         for fold in folds:
-            gains = solved(used & ~fold)
+            rest = used & ~fold
+            gains = bounded(normal(rest), a[rest].T @ y[rest], low)
             left = y - a[:, ~free] @ gains[~free]
             if np.any(free):
                 own = a[used][:, free]
                 left = left - a[:, free] @ bounded(own.T @ own, own.T @ left[used], np.full(own.shape[1], -np.inf))
             held[fold] = left[fold]
-        return x, held
+        return x, held, fitted
 
     def left_by(self, structure: Structure, values: Mapping[Name, float]) -> float:
         """Root mean square residual at given parameters, biases fitted, N m."""
@@ -160,9 +131,7 @@ class TorqueRegression(TorqueBand):
         self, structure: Structure, values: Mapping[Name, float]
     ) -> tuple[list[Array], list[Array], list[Name]]:  # fmt: skip
         """Columns and residual of every run at given parameters, biases projected out, and the columns' names."""
-        shapes = {
-            n: tuple(values[(n, p.name)] for p in effects.get(n).parameters if not p.linear) for n in structure.effects
-        }
+        shapes = structure.shapes_of(values)
         parts = [self._columns(i, structure, shapes) for i in range(len(self.traces))]
         names: list[Name] = list(dict.fromkeys(n for _, own, _ in parts for n in own))
         used = np.split(self._used, np.cumsum([len(r) for r in self._rows])[:-1])
@@ -220,7 +189,8 @@ class TorqueRegression(TorqueBand):
         a, y, names, extra = self._over_all_runs(structure, shapes)
         low = np.array([self._low(n) for n in names] + [-np.inf] * extra)
         used, fitting = self._used, self._fitted
-        x, held = self._with_folds(a, y, low, self._folds(names, extra), np.arange(a.shape[1]) >= len(names))
+        own = np.arange(a.shape[1]) >= len(names)
+        x, held, normal = self._with_folds(a, y, low, self._folds(names, extra), own)
         r = y - a @ x
         # A drive that passes on little of the torque leaves little of it unexplained: what counts is the share.
         scale = self.torque_nm / max(rms(y - self._taken(names, x, a)), 1e-300)
@@ -232,9 +202,12 @@ class TorqueRegression(TorqueBand):
         ends = np.cumsum([len(r) for r in self._rows])[:-1]
         run = np.concatenate([np.full(len(r), i) for i, r in enumerate(self._rows)])
         cost, filters = coloured_cost(scale * a[used], scale * y[used], run[used], x, filters)
+        cross = normal[np.ix_(~own, own)]
+        linear = scale**2 * (normal[np.ix_(~own, ~own)] - cross @ np.linalg.pinv(normal[np.ix_(own, own)]) @ cross.T)
+        information = block_diag(linear, np.zeros((len(values) - len(names),) * 2))
         return TorqueFit(
-            structure, {k: tuple(v) for k, v in shapes.items()}, values, rms(r[fitting]), rms(held[self._judged]), cost,
-            int(used.sum()), np.split(r, ends), np.split(held, ends), filters,
+            structure, tuple(values), np.array(list(values.values())), int(used.sum()), rms(r[fitting]) ** 2, cost,
+            information, rms(held[self._judged]), np.split(r, ends), np.split(held, ends), filters,
         )  # fmt: skip
 
     @staticmethod

@@ -7,7 +7,7 @@ angle and rate bias are unknown: a constant and a ramp are fitted to each run's 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,7 +54,7 @@ class TorqueResidual:
 
 
 def torque_residual(
-    trace: Trace, structure: Structure, values: dict[Name, float], cutoff_hz: float
+    trace: Trace, structure: Structure, values: Mapping[Name, float], cutoff_hz: float
 ) -> TorqueResidual | None:
     """M - J a - C w - K th - effects; None for a run without torque."""
     if trace.torque is None:
@@ -99,7 +99,7 @@ def torque_residual(
     return TorqueResidual(residual, torque)
 
 
-def _value(values: dict[Name, float], effect: str, parameter: str, run: int) -> float:
+def _value(values: Mapping[Name, float], effect: str, parameter: str, run: int) -> float:
     return values.get((effect, parameter), values.get((effect, parameter, str(run)), 0.0))
 
 
@@ -127,7 +127,7 @@ def relative(parts: Sequence[TorqueResidual | None], masks: Sequence[Any]) -> tu
 
 
 def torque_noise_floor(
-    traces: Sequence[Trace], values: dict[Name, float], cutoff_hz: float, masks: Sequence[Any]
+    traces: Sequence[Trace], values: Mapping[Name, float], cutoff_hz: float, masks: Sequence[Any]
 ) -> float:
     """What sensor noise alone leaves in the torque residual, root mean square, from simulated noise."""
     rng = np.random.default_rng(1)

@@ -8,7 +8,7 @@ from identify.results import FreeLine, Harmonics, Moment, ResidualDiagnosis, Sha
 from identify.wording import joined, number, unit
 
 WORTH, WORTH_OF_PAST = 0.02, 0.1  # shares of the residual's power below which nothing is said
-NOISE_LEVEL = 1.3  # times the noise floor
+NOISE_LEVEL = 1.3**2  # reduced chi-square
 TWIN = {"angle": "position", "rate": "speed", "torque": "force"}  # on a linear axis
 LINEAR = (
     "a residual at the excitation frequency alone has a linear cause: "
@@ -40,7 +40,7 @@ def _level(found: ResidualDiagnosis, more: bool) -> str:
     over, what = found.over_floor, "The torque residual" if found.quantity == "torque" else "The error in free run"
     if over is None:
         return ""
-    if not more and over < NOISE_LEVEL:
+    if not more and over**2 < NOISE_LEVEL:
         return f"{what} is at the level of the sensor's noise ({number(over, 3)} times) and shows no structure."
     looked_for = "harmonics, free lines, direction or memory" if found.direction is not None else "free lines"
     rest = "" if more else f"; it shows no {looked_for}"

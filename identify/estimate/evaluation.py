@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from identify.estimate.output_error import Estimate, refine
+from identify.estimate.output_error import OutputErrorFit, refine
 from identify.model.parameters import Name, equations_of, names_of
 from identify.model.structure import Structure
-from identify.signals.trace import Trace
+from identify.signals.trace import Trace, pooled_noise
 from identify.simulate.all_runs import shots_for
 from identify.simulate.sensitivities import linearise
 from identify.simulate.shots import RUNAWAY, Shots, losses_of, moved, predict
@@ -26,54 +26,54 @@ OWN_STEPS = 6  # in which the gains that a run has of its own are fitted at fixe
 
 
 def evaluate(
-    estimate: Estimate,
+    fit: OutputErrorFit,
     traces: Sequence[Trace],
     use: Sequence[Any] | None = None,
     shot_s: float | None = None,
     coarse: bool = False,
     finer: int = 1,
     own_gains: bool = True,
-) -> Estimate:
+) -> OutputErrorFit:
     """The same parameters on other samples: start states and biases are fitted there, and what a run has of its own.
 
     ``own_gains`` False takes gains that no fit knows for nothing, which a tone pays for that fits one run alone.
     """
     if own_gains:
-        estimate = _with_own_gains(estimate, traces, use, shot_s, coarse, finer)
-    names, x, structure = estimate.names, estimate.values, estimate.structure
+        fit = _with_own_gains(fit, traces, use, shot_s, coarse, finer)
+    names, x, structure = fit.names, fit.vector, fit.structure
     shots = shots_for(traces, structure, names, x, shot_s, use, None, coarse, finer)
     with ThreadPoolExecutor(2) as workers:
         fitted = list(workers.map(lambda s: settled(s, structure, names, x), shots))
-    rss = sum(float(np.sum(losses)) for _, losses in fitted)
+    squares = sum(float(np.sum(losses)) for _, losses in fitted)
     count = sum(int(np.sum(s.weight)) for s, _ in fitted)
-    sigma = float(np.sqrt(rss / max(count, 1)))
-    return Estimate(structure, names, x, sigma, count, np.zeros((len(x),) * 2), tuple(s for s, _ in fitted), True)
+    looked_at = replace(fit, information=np.zeros((len(x),) * 2), shots=tuple(s for s, _ in fitted))
+    return looked_at.with_residual(squares, count, pooled_noise(traces))
 
 
 def _with_own_gains(
-    estimate: Estimate, traces: Sequence[Trace], use: Sequence[Any] | None, shot_s: float | None, coarse: bool,
+    fit: OutputErrorFit, traces: Sequence[Trace], use: Sequence[Any] | None, shot_s: float | None, coarse: bool,
     finer: int,
-) -> Estimate:  # fmt: skip
+) -> OutputErrorFit:  # fmt: skip
     """The same, with the gains that runs have of their own (a disturbance's phase) fitted where no fit knew them.
 
     A run that was held out has them as it has a start state: a model without them would be judged by its luck.
     """
-    structure = estimate.structure
-    values = dict(zip(estimate.names, estimate.values.tolist(), strict=True))
+    structure = fit.structure
+    values = dict(fit.values)
     runs = {str(t.number) for t in traces}
     unknown = runs - {n[2] for n, v in values.items() if len(n) == 3 and v != 0.0}
     names = names_of(structure, 1 + max(t.number for t in traces))
     own = [n for n in names if len(n) == 3 and n[2] in unknown]
     if not own:
-        return estimate
+        return fit
     asked = [i for i, t in enumerate(traces) if str(t.number) in unknown]
     fixed = [n for n in names if n not in own]
     few = None if use is None else [use[i] for i in asked]
     fitted = refine(
         [traces[i] for i in asked], structure, values, shot_s, OWN_STEPS, few, fixed=fixed, coarse=coarse, finer=finer
     )  # fmt: skip
-    values |= {n: v for n, v in zip(fitted.names, fitted.values.tolist(), strict=True) if n in own}
-    return replace(estimate, names=tuple(values), values=np.array(list(values.values())))
+    values |= {n: v for n, v in fitted.values.items() if n in own}
+    return replace(fit, names=tuple(values), vector=np.array(list(values.values())))
 
 
 @RUNAWAY

@@ -14,10 +14,11 @@ from identify.estimate.evaluation import evaluate
 from identify.estimate.grid_refinement import sharpened
 from identify.estimate.initial_guess import Start, best_rho
 from identify.estimate.initial_state_sensitivity import least_std_errors
-from identify.estimate.judged import start_values
-from identify.estimate.output_error import Estimate, refine
+from identify.estimate.output_error import OutputErrorFit, refine
 from identify.estimate.profile_likelihood import settled, widened
 from identify.estimate.regression import Regression, Solution, residuals
+from identify.estimate.starting_point import start_values
+from identify.model.parameter_fit import ZERO_INFORMATION, ParameterFit, std_error_of
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.signals.trace import Trace
@@ -25,23 +26,27 @@ from identify.simulate.sensitivities import jacobian
 from identify.simulate.shots import Shots
 from rig.recording.run import Array
 
-NEAR_FLOOR = 1.3  # times the sensor's noise: close enough for a free run over the whole set
-FEW_NOISES = 5.0  # times the noise that a free run leaves: disturbed moments, not a wrong model
+NEAR_FLOOR = 1.3**2  # reduced chi-square: close enough for a free run over the whole set
+FEW_NOISES = 5.0**2  # reduced chi-square of a free run: disturbed moments, not a wrong model
 STEPS = 12  # of a fit
-FREER = 0.95  # of the free-run error
+FREER = 0.95**2  # of the mean square of the free run
 BLOCKS_PER_RUN = 20
 SEGMENT = 256  # samples of a stretch whose spectrum is averaged
 SINGULAR = 1e-11  # smallest over largest eigenvalue of the scaled information
 
 
 @dataclass(frozen=True)
-class Fitted:
-    """One model with its uncertainty.
+class FinalFit:
+    """One model as it is reported, with its uncertainty.
 
     Attributes
     ----------
-    sigma
-        Root mean square residual of the fit, in units of the measured channel.
+    fit
+        What the model was fitted by.
+    values
+        All parameters, those too that were held still (the inertia of a decay) or that the free run found.
+    names, covariance
+        Parameters that have an uncertainty, and their covariance, for a coloured residual, too, (p, p).
     free_run
         The model simulated over the whole of each run, start states fitted; None where it runs away.
     sensor_limited
@@ -50,22 +55,25 @@ class Fitted:
         Parameters that the data determine (False along directions of the information that are empty).
     """
 
-    structure: Structure
-    values: dict[Name, float]
-    covariance: Array
+    fit: ParameterFit
+    values: Mapping[Name, float]
     names: tuple[Name, ...]
-    sigma: float
-    free_run: Estimate | None
+    covariance: Array
+    free_run: OutputErrorFit | None
     sensor_limited: bool
     determined: tuple[bool, ...]
     method: str
 
-    def std_error(self, name: Name) -> float:
-        """One standard error."""
-        i = self.names.index(name)
-        return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+    @property
+    def structure(self) -> Structure:
+        """Its terms and effects."""
+        return self.fit.structure
 
-    def as_uncertain_as(self, fuller: Fitted) -> Fitted:
+    def std_error(self, name: Name) -> float:
+        """One standard error of a parameter."""
+        return std_error_of(name, self.names, self.covariance)
+
+    def as_uncertain_as(self, fuller: FinalFit) -> FinalFit:
         """The same where a term was left out that may be there: as uncertain as the fit that has it, if that is more.
 
         A platform without damping rings on, and follows the noise closely with any inertia.
@@ -81,15 +89,10 @@ class Fitted:
         return replace(self, covariance=self.covariance + more * np.outer(size, size), determined=told)
 
 
-def noise_of_all(traces: Sequence[Trace]) -> float:
-    """The sensor's noise, pooled over the runs."""
-    return float(np.sqrt(np.mean([t.noise**2 for t in traces])))
-
-
 def by_regression(
     traces: Sequence[Trace], structure: Structure, shapes: Mapping[str, tuple[float, ...]], start: Start,
     use: Sequence[Any], everything: Sequence[Any], shape_errors: Mapping[Name, float],
-) -> Fitted:  # fmt: skip
+) -> FinalFit:  # fmt: skip
     """A model that stays far from the data: white-residual regression at its best filter.
 
     ``shape_errors`` are the standard errors of shape parameters, which the regression takes as given.
@@ -100,78 +103,73 @@ def by_regression(
     covariance, determined = _regression_covariance(traces, solution, use)
     free = free_run_of(traces, structure, values, everything)
     values = _own_gains_of(free, values)
-    limited = free is not None and free.sigma < NEAR_FLOOR * noise_of_all(traces)
-    found = [n for n in values if len(n) > 1 and n not in solution.labels and n in shape_errors]
-    names = (*solution.labels, *found)
+    limited = free is not None and free.reduced_chi_square < NEAR_FLOOR
+    found = [n for n in values if len(n) > 1 and n not in solution.names and n in shape_errors]
+    names = (*solution.names, *found)
     covariance = block_diag(covariance, np.diag([shape_errors[n] ** 2 for n in found])) if found else covariance
     determined = (*determined, *(bool(np.isfinite(shape_errors[n])) for n in found))
-    return Fitted(structure, values, covariance, names, solution.rms, free, limited, determined, "regression")
+    return FinalFit(solution, values, names, covariance, free, limited, determined, "regression")
 
 
 def free_run_of(
     traces: Sequence[Trace], structure: Structure, values: Mapping[Name, float], use: Sequence[Any]
-) -> Estimate | None:
+) -> OutputErrorFit | None:
     """The model simulated over the whole of each run, start states fitted; None where it runs away."""
-    names = tuple(values)
-    held = Estimate(structure, names, np.array(list(values.values())), np.inf, 0, np.zeros((0, 0)), (), True)
+    held = OutputErrorFit.unfitted(structure, tuple(values), np.array(list(values.values())))
     free = evaluate(held, traces, use)
     return free if np.isfinite(free.sigma) else None
 
 
-def _own_gains_of(free: Estimate | None, values: Mapping[Name, float]) -> dict[Name, float]:
+def _own_gains_of(free: OutputErrorFit | None, values: Mapping[Name, float]) -> dict[Name, float]:
     """Values with the gains that runs have of their own as the free run found them: no fit knew those held out."""
     if free is None:
         return dict(values)
-    return {**values, **{n: v for n, v in zip(free.names, free.values.tolist(), strict=True) if len(n) == 3}}
+    return {**values, **{n: v for n, v in free.values.items() if len(n) == 3}}
 
 
 def by_output_error(
     traces: Sequence[Trace], structure: Structure, start: Mapping[Name, float], horizon: float,
     use: Sequence[Any], everything: Sequence[Any],
-) -> Fitted:  # fmt: skip
+) -> FinalFit:  # fmt: skip
     """Output error from a short horizon to the whole run, as far as the model can be trusted."""
     torque_free = all(t.torque is None for t in traces)
     fixed = [("inertia",)] if torque_free else []
-    noise = noise_of_all(traces)
 
     def refit(
         values: Mapping[Name, float], *, rests: bool = False, held: Sequence[Name] = (),
         carry: Sequence[Shots] | None = None,
-    ) -> Estimate:  # fmt: skip
+    ) -> OutputErrorFit:  # fmt: skip
         return refine(traces, structure, values, None, STEPS, use, carry, [*fixed, *held], rests=rests)
 
-    at_once, valley = settled(refit(start), noise, refit)
+    at_once, valley = settled(refit(start), refit)
     best = at_once
-    straight = best.sigma <= NEAR_FLOOR * noise  # the search came close enough: no ladder of horizons needed
+    straight = best.reduced_chi_square <= NEAR_FLOOR  # the search came close enough: no ladder of horizons needed
     if not straight:
         best = refine(traces, structure, start, horizon, STEPS, use, fixed=fixed)
     whole_runs = [at_once]
     for longer in () if straight else (4.0 * horizon, None):
-        values = dict(zip(best.names, best.values.tolist(), strict=True))
-        trial = refine(traces, structure, values, longer, STEPS, use, fixed=fixed)
+        trial = refine(traces, structure, best.values, longer, STEPS, use, fixed=fixed)
         whole_runs += [trial] if longer is None else []
-        if trial.sigma <= NEAR_FLOOR * noise:
+        if trial.reduced_chi_square <= NEAR_FLOOR:
             best = trial
     # Only the model itself leads a decay astray, and near the noise a few disturbed moments do: whole runs decide.
-    if not straight and (torque_free or at_once.sigma < FEW_NOISES * noise):
-        held = free_run_of(traces, structure, dict(zip(best.names, best.values.tolist(), strict=True)), use)
-        if held is None or at_once.sigma < FREER * held.sigma:
+    if not straight and (torque_free or at_once.reduced_chi_square < FEW_NOISES):
+        held = free_run_of(traces, structure, best.values, use)
+        if held is None or at_once.variance < FREER * held.variance:
             best = at_once
-    values = dict(zip(best.names, best.values.tolist(), strict=True))
     whole = best if any(best is w for w in whole_runs) else None
     free_names = tuple(n for n in best.names if n not in fixed)
     covariance, determined = _output_covariance(best, free_names)
     if valley is not None and best is at_once:
         covariance = widened(covariance, free_names, best, valley)
-    if whole is not None and whole.sigma <= NEAR_FLOOR * noise:
+    if whole is not None and whole.reduced_chi_square <= NEAR_FLOOR:
         best = whole = sharpened(whole, traces, use, fixed)
-        values = dict(zip(best.names, best.values.tolist(), strict=True))
     same = all(np.array_equal(u, e) for u, e in zip(use, everything, strict=True))
-    free = whole if whole is not None and same else free_run_of(traces, structure, values, everything)
-    values = _own_gains_of(free, values)
-    limited = whole is not None and whole.sigma <= NEAR_FLOOR * noise
+    free = whole if whole is not None and same else free_run_of(traces, structure, best.values, everything)
+    values = _own_gains_of(free, best.values)
+    limited = whole is not None and whole.reduced_chi_square <= NEAR_FLOOR
     method = "output error over whole runs" if whole is not None else f"output error over {horizon:.3g} s"
-    return Fitted(structure, values, covariance, free_names, best.sigma, free, limited, determined, method)
+    return FinalFit(best, values, free_names, covariance, free, limited, determined, method)
 
 
 def _inverse(information: Array) -> tuple[Array, tuple[bool, ...]]:
@@ -181,7 +179,7 @@ def _inverse(information: Array) -> tuple[Array, tuple[bool, ...]]:
     empty = power < SINGULAR * max(power[-1], 1e-300)
     inverse = axes[:, ~empty] @ np.diag(1.0 / power[~empty]) @ axes[:, ~empty].T
     touched = np.any(np.abs(axes[:, empty]) > 0.05, axis=1) if np.any(empty) else np.zeros(len(scale), dtype=bool)
-    dead = np.diag(information) <= 1e-290
+    dead = np.diag(information) <= ZERO_INFORMATION
     return inverse / np.outer(scale, scale), tuple(bool(x) for x in ~(touched | dead))
 
 
@@ -239,20 +237,20 @@ def is_white(series: Sequence[Array]) -> bool:
     return bool(np.all(np.abs(rho) < 4.0 / np.sqrt(max(count, 1)) + 0.01))
 
 
-def _output_covariance(estimate: Estimate, names: tuple[Name, ...]) -> tuple[Array, tuple[bool, ...]]:
-    keep = [estimate.names.index(n) for n in names]
+def _output_covariance(fit: OutputErrorFit, names: tuple[Name, ...]) -> tuple[Array, tuple[bool, ...]]:
+    keep = [fit.names.index(n) for n in names]
     parts = []
-    for shots in estimate.shots:
+    for shots in fit.shots:
         if not np.any(shots.weight):
             continue
-        columns, residual = jacobian(shots, estimate.structure, estimate.names, estimate.values)
+        columns, residual = jacobian(shots, fit.structure, fit.names, fit.vector)
         parts.append((columns[:, keep], residual))
-    sigma = _rms(parts, len(names) + 2 * sum(len(s.first) for s in estimate.shots))
+    sigma = _rms(parts, len(names) + 2 * sum(len(s.first) for s in fit.shots))
     covariance, determined = _sandwich(parts, sigma)
-    if len(estimate.shots) > 1:
+    if len(fit.shots) > 1:
         return covariance, determined
     # A single run has nothing beside it that tells what its ring may only seem to tell.
-    least = least_std_errors(estimate.shots[0], estimate, names, sigma)
+    least = least_std_errors(fit.shots[0], fit, names, sigma)
     wider = np.maximum(1.0, least / np.sqrt(np.maximum(np.diag(covariance), 1e-300)))
     return covariance * np.outer(wider, wider), determined
 
@@ -262,9 +260,9 @@ def _regression_covariance(
 ) -> tuple[Array, tuple[bool, ...]]:
     regression = Regression(traces, solution.structure)
     blocks = regression.blocks(solution.denominator, solution.shapes)
-    p = len(solution.labels)
+    p = len(solution.names)
     parts = []
-    for block, whole in zip(blocks, residuals(blocks, solution.values), strict=True):
+    for block, whole in zip(blocks, residuals(blocks, solution.vector), strict=True):
         mask = use[block.trace][block.rows]
         if not np.any(mask):
             continue

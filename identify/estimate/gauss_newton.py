@@ -64,8 +64,6 @@ class GaussNewton:
         self.damping = 1e-6
         self.counts = np.concatenate([s.counts for s in shots])
         self.count = int(np.sum(self.counts))
-        self.once = float(sum(s.grid.n for s in shots))  # fine steps of one simulation of every run
-        self.work = self.once
         found = list(workers.map(lambda s: residual_at(s, structure, names, x), shots))
         self.residuals = [r for r, _ in found]
         self.outlier = _outlier(np.concatenate([each for _, each in found]), self.counts)
@@ -80,7 +78,6 @@ class GaussNewton:
             )
         )
         self.fresh = True
-        self.work += (1 + int(np.sum(~self.still)) + 2) * self.once
         self._add_up()
 
     def keep(self) -> None:
@@ -119,7 +116,6 @@ class GaussNewton:
             new = ordered(self.names, np.clip(self.x + dx / size, self.low, self.high))
             steps = [q.back(new - self.x) for q in self.parts]
             trial = [moved(s, m) for s, m in zip(self.shots, steps, strict=True)]
-            self.work += self.once
             found = list(self.workers.map(lambda s, new=new: residual_at(s, self.structure, self.names, new), trial))
             losses = np.concatenate([each for _, each in found])
             after = _cost(losses, self.counts, self.outlier)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from identify.estimate.output_error import Estimate, held_still
+from identify.estimate.output_error import OutputErrorFit, held_still
 from identify.model.parameters import Name, bounds_of, ordered
 from identify.signals.trace import Trace
 from identify.simulate.all_runs import shots_for
@@ -28,7 +28,9 @@ NOTHING = 0.05  # standard errors: by less than that nothing is changed
 
 
 @RUNAWAY
-def sharpened(estimate: Estimate, traces: Sequence[Trace], use: Sequence[Any], fixed: Sequence[Name]) -> Estimate:
+def sharpened(
+    fit: OutputErrorFit, traces: Sequence[Trace], use: Sequence[Any], fixed: Sequence[Name]
+) -> OutputErrorFit:
     """A fit over whole runs, brought to where a finer simulation would have led it.
 
     Parameters
@@ -38,10 +40,10 @@ def sharpened(estimate: Estimate, traces: Sequence[Trace], use: Sequence[Any], f
 
     Returns
     -------
-    The estimate itself where that is nearer than a twentieth of a standard error, or where the finer simulation fits
+    The fit itself where that is nearer than a twentieth of a standard error, or where the finer simulation fits
     no better after the step.
     """
-    structure, names = estimate.structure, estimate.names
+    structure, names = fit.structure, fit.names
     still = held_still(names, traces, use, fixed)
     low, high = (np.array([bounds_of(n)[i] for n in names]) for i in (0, 1))
     with ThreadPoolExecutor(2) as workers:
@@ -50,12 +52,10 @@ def sharpened(estimate: Estimate, traces: Sequence[Trace], use: Sequence[Any], f
             found = list(workers.map(lambda s: residual_at(s, structure, names, x), shots))
             return [r for r, _ in found], float(sum(np.sum(losses) for _, losses in found))
 
-        x = estimate.values
+        x = fit.vector
         scale = np.where(np.abs(x) > 0, np.abs(x), 1.0)
-        shots = shots_for(traces, structure, names, x, None, use, estimate.shots, coarse=False, finer=FINER)
-        parts = list(
-            workers.map(lambda s: linearise(s, structure, names, estimate.values, scale, still, np.inf), estimate.shots)
-        )
+        shots = shots_for(traces, structure, names, x, None, use, fit.shots, coarse=False, finer=FINER)
+        parts = list(workers.map(lambda s: linearise(s, structure, names, fit.vector, scale, still, np.inf), fit.shots))
         left, begun = residuals(shots, x)
         cost = begun
         for number in range(STEPS):
@@ -65,18 +65,17 @@ def sharpened(estimate: Estimate, traces: Sequence[Trace], use: Sequence[Any], f
             if dx is None:
                 break
             new = ordered(names, np.clip(x + dx, low, high))
-            size = np.sqrt(np.maximum(np.diag(a), 0.0)) / max(estimate.sigma, 1e-300)
+            size = np.sqrt(np.maximum(np.diag(a), 0.0)) / max(fit.sigma, 1e-300)
             if number == 0 and float(np.max(np.abs(new - x) * size, initial=0.0)) < NOTHING:
-                return estimate
+                return fit
             trial = [moved(s, q.back(new - x)) for s, q in zip(shots, parts, strict=True)]
             after, lower = residuals(trial, new)
             if not lower < cost:
                 break
             x, shots, left, cost = new, trial, after, lower
     if not cost < begun:
-        return estimate
-    sigma = float(np.sqrt(cost / max(estimate.count, 1)))
-    return replace(estimate, values=x, sigma=sigma, shots=tuple(shots))
+        return fit
+    return replace(fit, vector=x, shots=tuple(shots)).with_residual(cost, fit.count, fit.noise)
 
 
 def _solved(a: Array, b: Array, free: Any) -> Array | None:

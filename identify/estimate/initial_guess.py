@@ -11,7 +11,7 @@ import numpy as np
 from identify.estimate.regression import Regression, Solution, fit, normal, solve
 from identify.model.structure import Shapes, Structure
 from identify.signals.prefilter import Denominator
-from identify.signals.trace import Trace
+from identify.signals.trace import Trace, pooled_noise
 from rig.effects.base import Scale
 
 RHO_STEPS = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)  # of the largest rho that the sensor's noise allows
@@ -46,7 +46,7 @@ def first_guess(traces: Sequence[Trace], structure: Structure) -> Start:
     inertia = 1.0 if regression.torque_free else abs(float(found.get(("inertia",), 1.0)))
     platform = (inertia, float(found.get(("damping",), 0.0)), float(found.get(("stiffness",), 0.0)))
     size = _torque_size(traces, inertia)
-    noise = float(np.sqrt(np.mean([t.noise**2 for t in traces])))
+    noise = pooled_noise(traces)
     cutoff = highest
     for f in np.geomspace(highest, 0.01 * highest, 60):
         w, share = 2.0 * np.pi * f, np.sqrt(2.0 * f * trace.step_s)
@@ -77,8 +77,8 @@ def best_rho(
     for step in reversed(RHO_STEPS):  # from the safest filter to the sharpest
         solution = fit(regression, shapes, platform, step * start.rho, use=use)
         solutions.append(solution)
-        platform = solution.platform
-    return min(solutions, key=lambda s: s.sigma)
+        platform = solution.jck
+    return min(solutions, key=lambda s: s.cost)
 
 
 def scale_of(

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.estimate.output_error import Estimate
+from identify.estimate.output_error import OutputErrorFit
 from identify.model.parameters import Name
 from identify.simulate.sensitivities import jacobian, sensitivities
 from identify.simulate.shots import Shots
@@ -23,7 +23,7 @@ DOUBT = 4.0  # standard errors by which a start state may be off
 GRID = 25  # points across the ellipse, either way
 
 
-def least_std_errors(shots: Shots, estimate: Estimate, names: Sequence[Name], sigma: float) -> Array:
+def least_std_errors(shots: Shots, fit: OutputErrorFit, names: Sequence[Name], sigma: float) -> Array:
     """Standard errors of ``names`` where the start state of one run tells least, (p,).
 
     Parameters
@@ -33,14 +33,14 @@ def least_std_errors(shots: Shots, estimate: Estimate, names: Sequence[Name], si
     sigma
         One standard deviation of the measured channel's noise.
     """
-    keep = [estimate.names.index(n) for n in names]
+    keep = [fit.names.index(n) for n in names]
     which = int(np.argmax(shots.counts))
-    along = _directions(shots, estimate, which) * sigma
+    along = _directions(shots, fit, which) * sigma
 
     def columns(by: Array) -> Array:
         starts = shots.starts.copy()
         starts[which] += by
-        return jacobian(replace(shots, starts=starts), estimate.structure, estimate.names, estimate.values)[0][:, keep]
+        return jacobian(replace(shots, starts=starts), fit.structure, fit.names, fit.vector)[0][:, keep]
 
     here = columns(np.zeros(2))
     parts = [here, *(columns(d) - here for d in along.T)]  # the motion is linear in its start state, nearly
@@ -55,12 +55,10 @@ def least_std_errors(shots: Shots, estimate: Estimate, names: Sequence[Name], si
     return np.asarray(np.sqrt(np.max(np.diagonal(inverses, axis1=1, axis2=2), axis=0)) * sigma / size)
 
 
-def _directions(shots: Shots, estimate: Estimate, which: int) -> Array:
+def _directions(shots: Shots, fit: OutputErrorFit, which: int) -> Array:
     """Axes of the start state's uncertainty for unit noise, one a column, (2, 2)."""
-    p = len(estimate.names)
-    _, state, _ = sensitivities(
-        shots, estimate.structure, estimate.names, estimate.values, np.ones(p), np.ones(p, dtype=bool)
-    )
+    p = len(fit.names)
+    _, state, _ = sensitivities(shots, fit.structure, fit.names, fit.vector, np.ones(p), np.ones(p, dtype=bool))
     begin, end = shots.edges[which]
     z = state[begin:end][shots.weight[begin:end]]
     square = z.T @ z

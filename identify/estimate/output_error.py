@@ -9,52 +9,77 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from identify.estimate.gauss_newton import GaussNewton, Step
-from identify.model.parameters import Name, names_of, platform_of
+from identify.model.parameter_fit import ParameterFit, reduced_chi_square
+from identify.model.parameters import Name, names_of
 from identify.model.structure import Structure
-from identify.signals.trace import Trace
+from identify.signals.trace import Trace, pooled_noise
 from identify.simulate.all_runs import shots_for
 from identify.simulate.shots import Shots, predict
 from rig import effects
 from rig.dynamics import Equations
-from rig.platform import Platform
 from rig.recording.run import Array
 
 KEPT = 3  # steps with the same sensitivities
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """A fitted output-error model.
+class OutputErrorFit(ParameterFit):
+    """A model fitted by output error; its cost is chi square.
 
     Attributes
     ----------
-    sigma
-        Root mean square of measured minus simulated over the samples that count.
-    information
-        Normal matrix of the global parameters, start states and bias eliminated, for unit noise.
-    work
-        Fine steps that were simulated on the way, each parameter's sensitivity counted as a simulation.
+    noise
+        One standard deviation of the measured channel, pooled over the runs.
+    shots
+        The runs with their start states and biases.
+    held_out_squares, held_out_counts
+        Squares of every run's held-out samples, in units of the channel squared, and how many those are, (runs,); empty
+        where nobody has looked.
     """
 
-    structure: Structure
-    names: tuple[Name, ...]
-    values: Array
-    sigma: float
-    count: int
-    information: Array
+    noise: float
     shots: tuple[Shots, ...]
-    converged: bool
-    work: float = 0.0
+    held_out_squares: Array = field(default_factory=lambda: np.zeros(0))
+    held_out_counts: Array = field(default_factory=lambda: np.zeros(0))
 
-    def platform(self, run: int = 0, added: float = 0.0) -> Platform:
-        """The fitted platform, as it stood in one run."""
-        return platform_of(self.structure, self.names, self.values, run, added)
+    @classmethod
+    def unfitted(cls, structure: Structure, names: tuple[Name, ...], vector: Array) -> OutputErrorFit:
+        """Parameters that nothing was fitted with yet."""
+        nothing = np.zeros((0, 0))
+        return cls(structure, names, vector, 0, np.inf, np.inf, nothing, np.nan, ())
+
+    def with_residual(self, squares: float, count: int, noise: float) -> OutputErrorFit:
+        """The same with the squares that it leaves on so many samples."""
+        variance = squares / max(count, 1)
+        return replace(self, count=count, noise=noise, variance=variance, cost=chi_square(variance, count, noise))
+
+    @property
+    def reduced_chi_square(self) -> float:
+        """Mean square of the residual over the noise's variance; one at the noise."""
+        return reduced_chi_square(self.sigma, self.noise)
+
+    @property
+    def held_out_chi_square(self) -> float:
+        """Squares of the held-out samples in units of the noise's variance."""
+        return float(np.sum(self.held_out_squares)) / self.noise**2
+
+    @property
+    def held_out_error(self) -> float:
+        """The geometric mean over runs of their root mean square on held-out samples; of all where none were held out.
+
+        One that begins next to a standstill can go the wrong way whatever the model; it must not outweigh all others,
+        and quiet ones, where friction shows, must count.
+        """
+        if not len(self.held_out_squares):
+            return self.sigma
+        mean_square = np.maximum(self.held_out_squares, 1e-300) / np.maximum(self.held_out_counts, 1.0)
+        return float(np.exp(0.5 * np.mean(np.log(mean_square))))
 
     def simulated(self) -> list[Array]:
         """The measured channel as the model gives it, one array a run."""
@@ -63,6 +88,11 @@ class Estimate:
     def residuals(self) -> list[Array]:
         """Measured minus simulated, one array a run."""
         return [s.trace.measured - y for s, y in zip(self.shots, self.simulated(), strict=True)]
+
+
+def chi_square(variance: float, count: int, noise: float) -> float:
+    """Of a residual's mean square; infinite where the model ran away, or nothing is known of the noise."""
+    return variance * count / noise**2 if np.isfinite(variance) and noise > 0.0 else np.inf
 
 
 def refine(
@@ -79,7 +109,7 @@ def refine(
     hopeless: float = np.inf,
     finer: int = 1,
     rests: bool = False,
-) -> Estimate:
+) -> OutputErrorFit:
     """Fit all parameters of a structure by output error.
 
     Parameters
@@ -131,21 +161,21 @@ def held_still(names: Sequence[Name], traces: Sequence[Trace], use: Sequence[Any
     return np.array([name in fixed or name in held or (len(name) == 3 and name[2] not in seen) for name in names])
 
 
-def _levenberg(descent: GaussNewton, iterations: int, tolerance: float, hopeless: float, coarse: bool) -> Estimate:
-    d, converged, left, age = descent, False, iterations, 0
+def _levenberg(
+    descent: GaussNewton, iterations: int, tolerance: float, hopeless: float, coarse: bool
+) -> OutputErrorFit:
+    d, left, age = descent, iterations, 0
     while left > 0 and not d.lost:
         if iterations - left >= 3 and d.cost > hopeless**2 * d.count:
             break
         step = d.step()
         left -= step is not None
         if step is None and d.fresh:
-            converged = True
             break
         # Sensitivities from elsewhere lead beside the minimum, the further the more the model leaves.
         arrived = step is not None and _arrived(step, tolerance)
         age += 1
         if step is not None and d.fresh and arrived:
-            converged = True
             d.keep() if coarse else d.renew()
             break
         if step is not None and step.foretold and not arrived and age <= KEPT:
@@ -153,8 +183,10 @@ def _levenberg(descent: GaussNewton, iterations: int, tolerance: float, hopeless
             continue
         age = 0
         d.renew()
-    sigma = float(np.sqrt(d.cost / max(d.count, 1)))
-    return Estimate(d.structure, d.names, d.x, sigma, d.count, d.a, tuple(d.shots), converged, d.work)
+    noise = pooled_noise([s.trace for s in d.shots])
+    variance = d.cost / max(d.count, 1)
+    cost = chi_square(variance, d.count, noise)
+    return OutputErrorFit(d.structure, d.names, d.x, d.count, variance, cost, d.a, noise, tuple(d.shots))
 
 
 def _arrived(step: Step, tolerance: float) -> bool:

@@ -13,16 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identify.estimate.output_error import Estimate
+from identify.estimate.output_error import OutputErrorFit
 from identify.estimate.started_at_rest import (
     INERTIA,
     Refit,
-    chi_square,
     depends_on_ringing,
     inertia_std_error,
     is_quasi_static,
     near,
-    values_of,
     with_fixed_initial_state,
 )
 from identify.model.parameters import Name, bounds_of, ordered
@@ -59,30 +57,28 @@ class ProfileLikelihood(NamedTuple):
     slope: Array
 
 
-def settled(free: Estimate, noise: float, refit: Refit) -> tuple[Estimate, ProfileLikelihood | None]:
+def settled(free: OutputErrorFit, refit: Refit) -> tuple[OutputErrorFit, ProfileLikelihood | None]:
     """A fit over whole runs, at the bottom of the valley where its inertia hangs on rings.
 
     Parameters
     ----------
     free
         The fit with its start states fitted.
-    noise
-        One standard deviation of the measured channel.
 
     Returns
     -------
     The fit, and the valley: ``free`` itself and None where the inertia is known well, or far from the noise; None also
     where the torque makes the platform ring, which tells the inertia.
     """
-    held = with_fixed_initial_state(free, noise, refit)
-    fit = _out_of_a_dent(held, noise, refit)
-    if fit is held and not depends_on_ringing(fit, noise):
+    held = with_fixed_initial_state(free, refit)
+    fit = _out_of_a_dent(held, refit)
+    if fit is held and not depends_on_ringing(fit):
         return fit, None
-    bottom, valley = _bottom(fit, noise, refit)
+    bottom, valley = _bottom(fit, refit)
     return bottom if bottom is fit else _informed(bottom), valley
 
 
-def widened(covariance: Array, names: tuple[Name, ...], fit: Estimate, valley: ProfileLikelihood) -> Array:
+def widened(covariance: Array, names: tuple[Name, ...], fit: OutputErrorFit, valley: ProfileLikelihood) -> Array:
     """A covariance of ``names`` with the inertia as uncertain as its valley is wide, and the others along it."""
     at = names.index(INERTIA)
     slope = valley.slope[[fit.names.index(n) for n in names]]
@@ -90,84 +86,83 @@ def widened(covariance: Array, names: tuple[Name, ...], fit: Estimate, valley: P
     return covariance + max(more, 0.0) * np.outer(slope, slope)
 
 
-def _out_of_a_dent(fit: Estimate, noise: float, refit: Refit) -> Estimate:
+def _out_of_a_dent(fit: OutputErrorFit, refit: Refit) -> OutputErrorFit:
     """The fit, or one far up the valley from it where nothing but a dent that chance can make held it.
 
     Shaken far below its resonance a platform of too little inertia and no damping rings on and on, however small the
     ring: in that it follows the noise, and knows its inertia to a thousandth of a percent.
     """
-    if not (_rests(fit) and near(fit, noise) and is_quasi_static(fit)):
+    if not (_rests(fit) and near(fit) and is_quasi_static(fit)):
         return fit
     fastest = 2.0 * np.pi * max(highest_torque_hz(s.trace) for s in fit.shots)
     if not fastest > 0.0:
         return fit
-    values = values_of(fit)
+    values = fit.values
     inertia = values[INERTIA]
     most = values[("stiffness",)] / fastest**2  # it would resonate with the torque
     looks = inertia * np.exp2(np.arange(1.0, np.log2(most / inertia)))
     seen = [refit({**values, INERTIA: float(x)}, rests=True, held=[INERTIA], carry=fit.shots) for x in looks]
-    best = min(seen, key=lambda e: chi_square(e, noise), default=fit)
-    return _informed(best) if chi_square(best, noise) < chi_square(fit, noise) + DEEP else fit
+    best = min(seen, key=lambda e: e.cost, default=fit)
+    return _informed(best) if best.cost < fit.cost + DEEP else fit
 
 
-def _informed(fit: Estimate) -> Estimate:
+def _informed(fit: OutputErrorFit) -> OutputErrorFit:
     """A fit whose inertia was held, of which it has no information of its own, with that of all its parameters."""
-    columns = [jacobian(s, fit.structure, fit.names, fit.values)[0] for s in fit.shots if np.any(s.weight)]
+    columns = [jacobian(s, fit.structure, fit.names, fit.vector)[0] for s in fit.shots if np.any(s.weight)]
     return replace(fit, information=np.sum([x.T @ x for x in columns], axis=0))
 
 
-def _bottom(fit: Estimate, noise: float, refit: Refit) -> tuple[Estimate, ProfileLikelihood | None]:
-    at, rests = fit.names.index(INERTIA), _rests(fit)
+def _bottom(fit: OutputErrorFit, refit: Refit) -> tuple[OutputErrorFit, ProfileLikelihood | None]:
+    rests = _rests(fit)
 
-    def beside(e: Estimate, inertia: float) -> Estimate:
-        value = max(inertia, MIN_INERTIA_SHARE * float(fit.values[at]))
-        return refit({**values_of(e), INERTIA: value}, rests=rests, held=[INERTIA], carry=e.shots)
+    def beside(e: OutputErrorFit, inertia: float) -> OutputErrorFit:
+        value = max(inertia, MIN_INERTIA_SHARE * fit.values[INERTIA])
+        return refit({**e.values, INERTIA: value}, rests=rests, held=[INERTIA], carry=e.shots)
 
-    error, inertia = inertia_std_error(fit), float(fit.values[at])
+    error, inertia = inertia_std_error(fit), fit.values[INERTIA]
     looks = [times * inertia for times in COARSE if abs(times - 1.0) * inertia < REACH * error]
-    centre = min((fit, *(beside(fit, look) for look in looks)), key=lambda e: chi_square(e, noise))
+    centre = min((fit, *(beside(fit, look) for look in looks)), key=lambda e: e.cost)
     step = INITIAL_STEP_SIGMAS * error
     least = MIN_INERTIA_SHARE * inertia
     for _ in range(MAX_DOUBLINGS):
-        middle = float(centre.values[at])
+        middle = centre.values[INERTIA]
         sides = [beside(centre, middle + move) for move in (-step, step)]
-        rises = [chi_square(s, noise) - chi_square(centre, noise) for s in sides]
+        rises = [s.cost - centre.cost for s in sides]
         at_the_end = middle - step <= least and rises[1] > RISE  # lighter than nothing it is not
         if min(rises) > RISE or at_the_end:
             break
         lowest = sides[int(np.argmin(rises))]
-        if chi_square(lowest, noise) < chi_square(centre, noise):
+        if lowest.cost < centre.cost:
             centre = lowest
         step *= 2.0  # over the dents, and faster where the bottom is far
-    slope = (sides[1].values - sides[0].values) / float(sides[1].values[at] - sides[0].values[at])
+    slope = (sides[1].vector - sides[0].vector) / (sides[1].values[INERTIA] - sides[0].values[INERTIA])
     if not min(rises) > BOUND:
-        return centre, ProfileLikelihood(float(centre.values[at]), slope)  # open on one side: nothing is known of it
-    centre, std_error = _vertex(centre, [beside(centre, look) for look in _between(sides, at)], sides, noise, beside)
-    found = _where_it_rings(centre, slope, noise, refit) if rests else None
+        return centre, ProfileLikelihood(centre.values[INERTIA], slope)  # open on one side: nothing is known of it
+    centre, std_error = _vertex(centre, [beside(centre, look) for look in _between(sides)], sides, beside)
+    found = _where_it_rings(centre, slope, refit) if rests else None
     if found is not None:
         return found, None
     return centre, ProfileLikelihood(std_error, slope)
 
 
-def _between(sides: Sequence[Estimate], at: int) -> list[float]:
-    below, above = (float(s.values[at]) for s in sides)
+def _between(sides: Sequence[OutputErrorFit]) -> list[float]:
+    below, above = (s.values[INERTIA] for s in sides)
     return np.linspace(below, above, LOOKS + 2)[1:-1].tolist()
 
 
 def _vertex(
-    centre: Estimate, looks: Sequence[Estimate], sides: Sequence[Estimate], noise: float,
-    beside: Callable[[Estimate, float], Estimate],
-) -> tuple[Estimate, float]:  # fmt: skip
+    centre: OutputErrorFit, looks: Sequence[OutputErrorFit], sides: Sequence[OutputErrorFit],
+    beside: Callable[[OutputErrorFit, float], OutputErrorFit],
+) -> tuple[OutputErrorFit, float]:  # fmt: skip
     """The fit at the vertex of the parabola through all that was looked at, and the standard error of its width.
 
     What noise does to a start state makes the squares a little smaller at every inertia, here more and there less:
     the lowest point is the luckiest one.
     """
-    at = centre.names.index(INERTIA)
     seen = [e for e in (*sides, *looks) if np.isfinite(e.sigma)]
-    x = np.array([float(e.values[at]) for e in seen])
-    middle, half = float(centre.values[at]), 0.5 * float(np.ptp(x))
-    a, b, _ = np.polyfit((x - middle) / half, [chi_square(e, noise) - chi_square(centre, noise) for e in seen], 2)
+    x = np.array([e.values[INERTIA] for e in seen])
+    middle, half = centre.values[INERTIA], 0.5 * float(np.ptp(x))
+    a, b, _ = np.polyfit((x - middle) / half, [e.cost - centre.cost for e in seen], 2)
     if not a > 0.0:
         return centre, half
     vertex = middle - half * float(b / (2.0 * a))
@@ -175,14 +170,14 @@ def _vertex(
     return beside(centre, inside), half / float(np.sqrt(a))
 
 
-def _where_it_rings(centre: Estimate, slope: Array, noise: float, refit: Refit) -> Estimate | None:
+def _where_it_rings(centre: OutputErrorFit, slope: Array, refit: Refit) -> OutputErrorFit | None:
     """The fit in the one deep dent that a ring of the platform makes, if there is one; it is as narrow as the ring.
 
     Runs that are held to rest have no rings but those which their torque makes: a soft start leaves a small one, of
     which the valley's bottom knows nothing. Chance makes no dent that deep.
     """
-    names = centre.names
-    inertia, damping, stiffness = (centre.values[names.index((t,))] if (t,) in names else 0.0 for t in TERMS)
+    names, noise = centre.names, centre.noise
+    inertia, damping, stiffness = (centre.values.get((t,), 0.0) for t in TERMS)
     if not (damping > 0.0 and stiffness > 0.0):
         return None
     ratio = float(damping / (2.0 * np.sqrt(stiffness * inertia)))
@@ -190,17 +185,17 @@ def _where_it_rings(centre: Estimate, slope: Array, noise: float, refit: Refit) 
     if not 1 < len(looks) < MAX_GRID_POINTS:
         return None
     low, high = (np.array([bounds_of(n)[i] for n in names]) for i in (0, 1))
-    moved = [ordered(names, np.clip(centre.values + slope * (look - inertia), low, high)) for look in looks]
+    moved = [ordered(names, np.clip(centre.vector + slope * (look - inertia), low, high)) for look in looks]
     squares = [_squares_along(centre, x) / noise**2 for x in moved]
     best = int(np.argmin(squares))
-    if squares[best] > _squares_along(centre, centre.values) / noise**2 - DEEP / 2.0:
+    if squares[best] > _squares_along(centre, centre.vector) / noise**2 - DEEP / 2.0:
         return None  # between two looks it may be twice as deep
     found = refit(dict(zip(names, moved[best].tolist(), strict=True)), rests=True)
-    return found if chi_square(found, noise) < chi_square(centre, noise) - DEEP else None
+    return found if found.cost < centre.cost - DEEP else None
 
 
 @RUNAWAY
-def _squares_along(fit: Estimate, x: Array) -> float:
+def _squares_along(fit: OutputErrorFit, x: Array) -> float:
     """Squares of the runs at other parameters, their biases fitted."""
     total = 0.0
     for s in fit.shots:
@@ -209,5 +204,5 @@ def _squares_along(fit: Estimate, x: Array) -> float:
     return total if np.isfinite(total) else np.inf
 
 
-def _rests(fit: Estimate) -> bool:
+def _rests(fit: OutputErrorFit) -> bool:
     return any(s.rests for s in fit.shots)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from identify.model.parameter_fit import ParameterFit
 from identify.model.structure import UNIT, Label, Shapes, Structure
 from identify.signals.prefilter import Denominator, Prefilter
 from identify.signals.trace import UPSAMPLING, Trace
@@ -157,33 +158,26 @@ class Regression:
 
 
 @dataclass(frozen=True)
-class Solution:
+class Solution(ParameterFit):
     """A solved regression.
+
+    Its residual is prefiltered. The cost counts the gain of the prefilter (its logarithmic mean over frequency): so
+    solutions with different rho compare.
 
     Attributes
     ----------
-    values
-        Linear parameters by label.
-    sigma
-        Root mean square of the residual in units of the measured channel, divided by the gain of the
-        prefilter (its logarithmic mean over frequency), so that solutions with different rho compare.
+    names, vector
+        Linear parameters, (p,): what is solved for.
+    shapes
+        Shape parameters that it was solved at.
+    jck
+        Inertia (one where no torque was measured), damping and stiffness.
     """
 
-    structure: Structure
     shapes: Shapes
-    labels: tuple[Label, ...]
-    values: Array
     denominator: Denominator
     rho: float
-    sigma: float
-    rms: float
-    count: int
-    information: Array
-    platform: tuple[float, float, float]
-
-    def value(self, *label: str) -> float:
-        """One linear parameter; zero where the model does not have it."""
-        return float(self.values[self.labels.index(label)]) if label in self.labels else 0.0
+    jck: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -288,9 +282,10 @@ def fit(
     if rss < 1e-6 * equations.c:  # the difference of two large numbers: take it from the residual itself
         parts = zip(blocks, residuals(blocks, x), strict=True)
         rss = sum(float(np.sum((r if use is None else r[use[b.trace][b.rows]]) ** 2)) for b, r in parts)
-    rms = float(np.sqrt(rss / max(n, 1)))
+    variance = rss / max(n, 1)
     gain = log_gain(platform, denominator, regression.traces[0].step_s)
+    cost = n * (float(np.log(max(variance, 1e-300))) - 2.0 * gain)
     return Solution(
-        regression.structure, dict(shapes), regression.labels, x, denominator, rho,
-        rms / np.exp(gain), rms, n, equations.a, platform,
+        regression.structure, regression.labels, x, n, variance, cost, equations.a, dict(shapes), denominator, rho,
+        platform,
     )  # fmt: skip

@@ -14,14 +14,14 @@ from typing import Protocol
 
 import numpy as np
 
-from identify.estimate.output_error import Estimate
+from identify.estimate.output_error import OutputErrorFit
 from identify.model.parameters import Name
 from identify.signals.torque_band import highest_torque_hz
 from identify.simulate.shots import Shots, may_rest
 from rig.dynamics import Equations
 
 WEAK = 1e-3  # relative standard error of the inertia beyond which a ring of noise may decide it
-NOISE_LIMITED_RATIO = 2.0  # mean square over the noise's variance up to which the noise, not the model, is in the way
+NOISE_LIMITED = 2.0  # reduced chi-square up to which the noise, not the model, is in the way
 BY_CHANCE = 15.0  # fall of chi square that two start values a run make of noise, their ring free to find its place
 ROUNDS = 3  # the place of rest moves with the model
 SETTLED = 0.1  # of chi square, between rounds
@@ -35,71 +35,67 @@ class Refit(Protocol):
     def __call__(
         self, values: Mapping[Name, float], *, rests: bool, held: Sequence[Name] = (),
         carry: Sequence[Shots] | None = None,
-    ) -> Estimate:  # fmt: skip
+    ) -> OutputErrorFit:  # fmt: skip
         """From given values; ``rests`` holds runs to the rest they begin at, ``held`` parameters to their values.
 
         ``carry`` are the shots of an earlier fit, whose start states to begin with.
         """
 
 
-def with_fixed_initial_state(free: Estimate, noise: float, refit: Refit) -> Estimate:
+def with_fixed_initial_state(free: OutputErrorFit, refit: Refit) -> OutputErrorFit:
     """A fit over whole runs, anew with the runs held to the rest they begin at, where that decides the inertia.
 
     Parameters
     ----------
     free
         The fit with its start states fitted.
-    noise
-        One standard deviation of the measured channel.
 
     Returns
     -------
     ``free`` itself where the inertia does not hang on rings, where no run begins at rest, or where rest does not
     describe the runs: where they fit worse by more than the start states' share in the noise.
     """
-    if not (depends_on_ringing(free, noise) or (near(free, noise) and is_quasi_static(free))):
+    if not (depends_on_ringing(free) or (near(free) and is_quasi_static(free))):
         return free
     resting = sum(may_rest(s.trace, Equations(free.platform(s.number, s.added))) for s in free.shots)
     best, before = free, np.inf
     for _ in range(ROUNDS if resting else 0):
-        held = refit(values_of(best), rests=True)
-        squares = chi_square(held, noise)
-        if not squares <= chi_square(free, noise) + BY_CHANCE * resting:
+        held = refit(best.values, rests=True)
+        if not held.cost <= free.cost + BY_CHANCE * resting:
             break
         best = held
-        if before - squares < SETTLED:
+        if before - held.cost < SETTLED:
             break
-        before = squares
+        before = held.cost
     return best
 
 
-def depends_on_ringing(fit: Estimate, noise: float) -> bool:
+def depends_on_ringing(fit: OutputErrorFit) -> bool:
     """Whether the inertia is known so little, beside the noise, that a ring of noise may decide it."""
-    if INERTIA not in fit.names or not near(fit, noise):
+    if INERTIA not in fit.names or not near(fit):
         return False
-    return inertia_std_error(fit) > WEAK * abs(float(fit.values[fit.names.index(INERTIA)]))
+    return inertia_std_error(fit) > WEAK * abs(fit.values[INERTIA])
 
 
-def near(fit: Estimate, noise: float) -> bool:
+def near(fit: OutputErrorFit) -> bool:
     """Whether the noise, not the model, is in the way."""
-    return bool(fit.sigma**2 < NOISE_LIMITED_RATIO * noise**2)
+    return fit.reduced_chi_square < NOISE_LIMITED
 
 
-def is_quasi_static(fit: Estimate) -> bool:
+def is_quasi_static(fit: OutputErrorFit) -> bool:
     """Whether all torque is far below the natural frequency: a ring of noise looks like knowledge there.
 
     One that does not decay goes along with the noise of a whole run, at a frequency that tells the inertia to a
     thousandth of a percent.
     """
-    values = values_of(fit)
-    inertia, stiffness = values.get(INERTIA, 0.0), values.get(("stiffness",), 0.0)
+    inertia, stiffness = fit.values.get(INERTIA, 0.0), fit.values.get(("stiffness",), 0.0)
     if not (inertia > 0.0 and stiffness > 0.0) or not inertia_std_error(fit) > 0.0:
         return False
     natural_hz = float(np.sqrt(stiffness / inertia)) / (2.0 * np.pi)
     return all(highest_torque_hz(s.trace) < QUASI_STATIC_RATIO * natural_hz for s in fit.shots)
 
 
-def inertia_std_error(fit: Estimate) -> float:
+def inertia_std_error(fit: OutputErrorFit) -> float:
     """One standard error of the inertia for a white residual; zero where it was held still."""
     at = fit.names.index(INERTIA)
     size = np.sqrt(np.maximum(np.diag(fit.information), 0.0))
@@ -110,13 +106,3 @@ def inertia_std_error(fit: Estimate) -> float:
     inverse = np.linalg.pinv(scaled, hermitian=True)
     i = int(np.sum(shown[:at]))
     return float(np.sqrt(max(inverse[i, i], 0.0))) * fit.sigma / float(size[at])
-
-
-def chi_square(fit: Estimate, noise: float) -> float:
-    """Squares of a fit in units of the noise's variance; infinite where it ran away."""
-    return fit.sigma**2 * fit.count / noise**2 if np.isfinite(fit.sigma) else np.inf
-
-
-def values_of(fit: Estimate) -> dict[Name, float]:
-    """Parameter values by name."""
-    return dict(zip(fit.names, fit.values.tolist(), strict=True))

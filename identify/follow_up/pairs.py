@@ -9,7 +9,7 @@ import numpy as np
 
 from identify.bounds.identifiability import vector_of
 from identify.estimate.evaluation import evaluate
-from identify.estimate.output_error import Estimate, refine
+from identify.estimate.output_error import OutputErrorFit, refine
 from identify.follow_up.separation import Way, prior_of
 from identify.results import Identification, Unparted
 from identify.signals.trace import Trace
@@ -111,9 +111,9 @@ def _sigma(platform: Platform, traces: Sequence[Trace]) -> float:
     return free_run(platform, traces).sigma
 
 
-def free_run(platform: Platform, traces: Sequence[Trace]) -> Estimate:
+def free_run(platform: Platform, traces: Sequence[Trace]) -> OutputErrorFit:
     """A platform in free run over recorded runs: start states and bias fitted, and what belongs to single runs."""
     structure, names, values = vector_of(platform, 1 + max(t.number for t in traces))
     shared = [i for i, n in enumerate(names) if len(n) < 3]
     names, values = tuple(names[i] for i in shared), values[shared]
-    return evaluate(Estimate(structure, names, values, np.inf, 0, np.zeros((0, 0)), (), True), traces)
+    return evaluate(OutputErrorFit.unfitted(structure, names, values), traces)

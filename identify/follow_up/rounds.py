@@ -11,7 +11,7 @@ from identify.bounds.achieved import usable_traces
 from identify.bounds.identifiability import vector_of
 from identify.conclude.error_figures import measure
 from identify.conclude.next_steps import USUAL_CUTOFF_HZ
-from identify.estimate.final_fit import NEAR_FLOOR, Fitted, noise_of_all
+from identify.estimate.final_fit import NEAR_FLOOR, FinalFit
 from identify.follow_up.pairs import free_run
 from identify.results import Errors, FollowUp, FollowUpRound, Identification
 from identify.runs.holdout import Split, split
@@ -62,13 +62,12 @@ def promises_more(found: Identification) -> bool:
 def errors_on(platform: Platform, found: Identification, recording: Recording) -> Errors | None:
     """The errors of a model on the samples that ``found`` was judged on; None where it cannot be simulated there."""
     traces = usable_traces(recording)
-    structure, names, values = vector_of(platform, 1 + max(t.number for t in traces))
+    _, names, values = vector_of(platform, 1 + max(t.number for t in traces))
     free = free_run(platform, traces)
-    limited = math.isfinite(free.sigma) and free.sigma < NEAR_FLOOR * noise_of_all(traces)
-    held = dict(zip(names, values.tolist(), strict=True))
-    fitted = Fitted(
-        structure, held, np.zeros((len(names),) * 2), names, free.sigma, free if math.isfinite(free.sigma) else None,
-        limited, (True,) * len(names), "as it stood",
+    runs, held = math.isfinite(free.sigma), dict(zip(names, values.tolist(), strict=True))
+    fitted = FinalFit(
+        free, held, names, np.zeros((len(names),) * 2), free if runs else None,
+        runs and free.reduced_chi_square < NEAR_FLOOR, (True,) * len(names), "as it stood",
     )  # fmt: skip
     cutoff = found.final.error.lowpass_hz or found.before.error.lowpass_hz or USUAL_CUTOFF_HZ
     return measure(traces, _judged_as(found, split(traces)), fitted, cutoff).errors

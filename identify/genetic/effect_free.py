@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.estimate.output_error import Estimate
+from identify.estimate.output_error import OutputErrorFit
 from identify.model.parameters import equations_of
 from identify.signals.trace import Trace
 from identify.simulate.shots import Shots, make_shots
@@ -16,12 +16,12 @@ from rig.dynamics.equations import MAX_SUBSTEPS
 FINER = 4  # times the simulator's steps: a jump's mean over its step must still ring the platform as the jump did
 
 
-def effect_free(trace: Trace, shots: Shots, estimate: Estimate) -> Trace:
+def effect_free(trace: Trace, shots: Shots, fit: OutputErrorFit) -> Trace:
     """The run with the torque that the model leaves for its linear part, along the model's own motion.
 
     Along that motion friction knows when it sticks; a noisy measured rate does not.
     """
-    equations = equations_of(estimate.structure, estimate.names, estimate.values, shots.number, shots.added)
+    equations = equations_of(fit.structure, fit.names, fit.vector, shots.number, shots.added)
     substeps = min(MAX_SUBSTEPS, FINER * equations.substeps(trace.step_s))
     fine_shots = make_shots(trace, substeps, None, None, equations)
     if np.array_equal(fine_shots.first, shots.first):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from identify.estimate.final_fit import Fitted
+from identify.estimate.final_fit import FinalFit
 from identify.genetic.effect_free import effect_free
 from identify.model.parameters import platform_of
 from identify.signals.trace import UPSAMPLING, Trace
@@ -18,7 +18,7 @@ from rig.dynamics.low_pass import low_pass_kernel, smoothed
 from rig.effects.base import Place
 
 
-def linear_traces(traces: Sequence[Trace], fitted: Fitted) -> list[Trace]:
+def linear_traces(traces: Sequence[Trace], fitted: FinalFit) -> list[Trace]:
     """The runs with the torque that is left for J a + C w + K th once the model's effects are taken off."""
     if not fitted.structure.effects:
         left = list(traces)
@@ -46,7 +46,7 @@ def _as_the_gyro_sees(trace: Trace, sensor: Any) -> Trace:
     return replace(trace, torque=TorqueSignal(time, mean, "zero_order"), _series={})
 
 
-def _along_measured(trace: Trace, fitted: Fitted) -> Trace:
+def _along_measured(trace: Trace, fitted: FinalFit) -> Trace:
     """A run less its effects' torque along the measured motion, as means over each upsampled step."""
     n = (len(trace.measured) - 1) * UPSAMPLING
     drive = []

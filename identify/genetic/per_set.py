@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.bounds.identifiability import information_of
-from identify.estimate.final_fit import Fitted, _regression_covariance
+from identify.estimate.final_fit import FinalFit, _regression_covariance
 from identify.estimate.initial_guess import Start
 from identify.estimate.initial_state_sensitivity import least_std_errors
 from identify.estimate.output_error import refine
@@ -128,13 +128,13 @@ def search_range(
     return np.array(low), np.array(high)
 
 
-def _platform(fitted: Fitted) -> tuple[float, float, float]:
+def _platform(fitted: FinalFit) -> tuple[float, float, float]:
     inertia, damping, stiffness = (fitted.values.get((t,), 0.0) for t in TERMS)
     return inertia, damping, stiffness
 
 
 def each_set(
-    traces: Sequence[Trace], fitted: Fitted, start: Start, centre: Mapping[str, float],
+    traces: Sequence[Trace], fitted: FinalFit, start: Start, centre: Mapping[str, float],
     settings: IdentifyConfig, axis: str,
 ) -> tuple[tuple[SetResult, ...], GeneticRun | None]:  # fmt: skip
     """Every run fitted for itself, and all of them together; nothing where no torque was measured."""
@@ -176,8 +176,8 @@ def _by_motion(trace: Trace, values: Mapping[str, float], labels: Sequence[Name]
     found = refine([replace(trace, number=0)], structure, start, None, SIMULATED, coarse=True)
     if not np.isfinite(found.sigma):
         return lost
-    there = dict(zip(found.names, found.values.tolist(), strict=True))
-    return np.array([there[label] for label in labels]), least_std_errors(found.shots[0], found, labels, trace.noise)
+    errors = least_std_errors(found.shots[0], found, labels, trace.noise)
+    return np.array([found.values[label] for label in labels]), errors
 
 
 def _is_known(value: float, error: float) -> bool:
@@ -207,7 +207,7 @@ def _tied(
     return out
 
 
-def _bounds(traces: Sequence[Trace], fitted: Fitted) -> list[dict[str, float]]:
+def _bounds(traces: Sequence[Trace], fitted: FinalFit) -> list[dict[str, float]]:
     """Standard errors of J, C, K that each set allows where its effects are not known better than it tells."""
     values = np.array(list(fitted.values.values()))
     out = []
@@ -224,14 +224,14 @@ def _result(
 ) -> SetResult:  # fmt: skip
     mask = [trace.keep]
     covariance, determined = _regression_covariance([trace], solution, mask)
-    simulated, least = _by_motion(trace, run.parameters, solution.labels)
+    simulated, least = _by_motion(trace, run.parameters, solution.names)
     errors = np.maximum(np.sqrt(np.maximum(np.diag(covariance), 0.0)), least)
-    errors = np.maximum(errors, [bound.get(term, 0.0) for (term,) in solution.labels])
-    apart = np.abs(simulated - [run.parameters[term] for (term,) in solution.labels])
+    errors = np.maximum(errors, [bound.get(term, 0.0) for (term,) in solution.names])
+    apart = np.abs(simulated - [run.parameters[term] for (term,) in solution.names])
     errors = np.where(apart > MAX_SIGMAS * errors, apart, errors)
-    errors = _tied(trace, errors, solution.labels, run.parameters, platform)
+    errors = _tied(trace, errors, solution.names, run.parameters, platform)
     parameters, identifiable = {}, []
-    for i, (term,) in enumerate(solution.labels):
+    for i, (term,) in enumerate(solution.names):
         value, error = run.parameters[term], float(errors[i])
         if not (determined[i] and _is_known(value, error)):
             continue

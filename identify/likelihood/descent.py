@@ -16,8 +16,15 @@ import numpy as np
 from identify.estimate.output_error import held_still
 from identify.likelihood.derivatives import GAIN_STEP, Derivatives, Standpoint, derivatives
 from identify.likelihood.fit import Columns, Fit, Look, Prediction
-from identify.likelihood.noise_search import likeliest_noise
-from identify.likelihood.normal_equations import Step, changed, logs_of, normal_equations
+from identify.likelihood.normal_equations import (
+    COST_TOLERANCE,
+    LEVENBERG_DAMPING,
+    Step,
+    changed,
+    logs_of,
+    normal_equations,
+)
+from identify.likelihood.other_noise import noise_alone, other_noise, without_disturbance
 from identify.model.parameters import Name, bounds_of, names_of, ordered
 from identify.model.structure import Structure
 from identify.simulate.all_runs import shots_for
@@ -30,22 +37,11 @@ from rig.effects.base import Place
 if TYPE_CHECKING:
     from identify.likelihood.prediction_error import PredictionError
 
-STEP = 1e-6  # relative step of the differences
-ENOUGH = 0.5  # fall of the cost below which a fit has arrived
-TRIALS = 7  # step lengths tried before a direction is given up
-DAMPING = 1e-4
-DOWN = (1e-3, 1e-6, 1e-10)  # times the disturbance: how far below a model is looked at with parameters that follow
-FOLLOWED, CLOSING = 20, 0.7  # steps in which they do, and what each of them leaves of the gap at most
-ROUGHLY = 5e-3  # of the difference to the model it is compared with, that the last step of a fit brings
-IDLE = 2  # steps in a row that bring little, after which a fit has arrived: one alone may have been cut short
-EARLY = 3  # steps after which a model that is right is near enough for it
-FAR = 2.0  # times the sensor's variance: less of a disturbance is found step by step
-FURTHER = (  # times white density, slow variance and time constant: where else a noise is looked for
-    (0.01, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 10.0, 1.0), (1.0, 0.1, 0.1), (1.0, 0.03, 0.01),
-    (1.0, 1.0, 10.0),
-)  # fmt: skip
-WALKS = (1e-6, 1e-5, 1e-4, 1e-3)  # of the rate, that a gyro's bias walks over a run: where else it is looked for
-QUIETER = (1e-4, 1e-3, 1e-2, 0.1)  # times torque and slow error of an encoder together: the rest is read white
+DIFFERENCE_STEP = 1e-6  # relative step of the differences
+MAX_STEP_TRIALS = 7  # step lengths tried before a direction is given up
+COARSE_TOLERANCE = 5e-3  # of the difference to the model it is compared with, that the last step of a fit brings
+STALLED_STEPS = 2  # steps in a row that bring little, after which a fit has arrived: one alone may have been cut short
+EARLY_STEPS = 3  # steps after which a model that is right is near enough for it
 
 
 class Descent:
@@ -85,16 +81,18 @@ class Descent:
             s.bias = earlier.bias
             if p.fits_starts and np.array_equal(earlier.first, s.first):
                 s.starts = earlier.starts.copy()
-        self.damping = DAMPING
+        self.damping = LEVENBERG_DAMPING
         self.weights = [s.weight for s in self.shots]
         self.count = int(sum(w.sum() for w in self.weights)) * p.readings
         self.kinds = self._kinds_of_noise()
-        self.noise = p.within(noise or p.on_grid(lambda q: self._cost(self._looks(self.x, p.within(q), self.shots))))
-        self.looks = self._looks(self.x, self.noise, self.shots)
-        self.cost = self._cost(self.looks)
+        self.noise = p.within(
+            noise or p.on_grid(lambda q: self.cost_of(self.looks_at(self.x, p.within(q), self.shots)))
+        )
+        self.looks = self.looks_at(self.x, self.noise, self.shots)
+        self.cost = self.cost_of(self.looks)
         self.alone = noise is None  # nobody has looked for the noise yet
         if self.alone and not structure.bends:  # else every look is a prediction
-            self._noise_alone()
+            noise_alone(self)
         self.information: Array = np.zeros((len(self.x), len(self.x)))
         self._informed: tuple[Noise, bytes] | None = None
 
@@ -125,7 +123,7 @@ class Descent:
         """Whether the model has dry friction."""
         return any(effects.get(e).place is Place.FRICTION for e in self.structure.effects)
 
-    def down(self, steps: int, thorough: bool, against: float | None = None, least: float = np.inf) -> int:
+    def minimise(self, steps: int, thorough: bool, against: float | None = None, least: float = np.inf) -> int:
         """Steps until it has arrived; how many are left. A thorough fit then looks at other noises.
 
         ``against`` is the cost of the model that it is compared with: then it need not arrive closer than to a small
@@ -134,16 +132,16 @@ class Descent:
         looked, idle = False, 0
         for left in range(steps, 0, -1):
             before = self.cost
-            if steps - left == EARLY:
-                self._without_disturbance()
+            if steps - left == EARLY_STEPS:
+                without_disturbance(self)
                 if self.cost > least:
                     return left
-            enough = 0.0 if against is None else ROUGHLY * max(against - self.cost, 0.0)
+            enough = 0.0 if against is None else COARSE_TOLERANCE * max(against - self.cost, 0.0)
             moved = self.step()
             idle = 0 if before - self.cost > enough else idle + 1
-            if moved and idle < IDLE:
+            if moved and idle < STALLED_STEPS:
                 continue
-            if left == 1 or not thorough or not self.other_noise(lower=not looked):
+            if left == 1 or not thorough or not other_noise(self, lower=not looked):
                 return left - 1
             looked = True
         return 0
@@ -151,7 +149,7 @@ class Descent:
     def step(self) -> bool:
         """One step down; False where it has arrived, or none leads there."""
         before = self.cost
-        return bool(np.isfinite(before)) and self._down(True) and before - self.cost > ENOUGH
+        return bool(np.isfinite(before)) and self.try_step(True) and before - self.cost > COST_TOLERANCE
 
     def columns(self) -> list[Columns]:
         """Derivatives of every run, where the descent stands."""
@@ -165,12 +163,14 @@ class Descent:
         level = np.sum([d.spread.sum(axis=0) for d in parts], axis=0) / max(self.count, 1)
         return [d.with_variance(level, variance) for d in parts]
 
-    def _looks(self, x: Array, noise: Noise, shots: Sequence[Shots]) -> list[Look]:
+    def looks_at(self, x: Array, noise: Noise, shots: Sequence[Shots]) -> list[Look]:
+        """Every run predicted elsewhere."""
         p = self.problem
         return list(p.workers.map(lambda s: p.look(s, self.structure, self.names, x, noise), shots))
 
     @RUNAWAY
-    def _cost(self, looks: Sequence[Look]) -> float:
+    def cost_of(self, looks: Sequence[Look]) -> float:
+        """Minus twice the log-likelihood of such predictions; infinite where they run away."""
         squares = sum(
             float(np.sum(q.innovations[w] ** 2 / q.variance[w])) for q, w in zip(looks, self.weights, strict=True)
         )
@@ -189,7 +189,9 @@ class Descent:
             return {k: float(size[k]) for k in places}
 
         shaping = [k for k in free if of_gains and self._shapes_gains(self.names[k])]
-        return derivatives(there, steps(STEP, free), self.kinds if of_noise else [], steps(GAIN_STEP, shaping))
+        return derivatives(
+            there, steps(DIFFERENCE_STEP, free), self.kinds if of_noise else [], steps(GAIN_STEP, shaping)
+        )
 
     @staticmethod
     def _shapes_gains(name: Name) -> bool:
@@ -203,7 +205,7 @@ class Descent:
         self.information, self._informed = found.information, (self.noise, self.x.tobytes())
         return found
 
-    def _down(self, of_noise: bool) -> bool:
+    def try_step(self, of_noise: bool) -> bool:
         """One step of parameters, biases and, if asked for, the noise; False where none leads down."""
         found = self._solvable(of_noise)
         p = len(self.x)
@@ -213,9 +215,9 @@ class Descent:
         size: Array = np.sqrt(np.maximum(np.diag(found.matrix), 1e-300))
         free = (np.diag(found.matrix) > 0.0) & np.concatenate([~self.still, np.ones(len(size) - p, dtype=bool)])
         scaled, right = (found.matrix / np.outer(size, size))[np.ix_(free, free)], (found.right / size)[free]
-        if float(right @ np.linalg.lstsq(scaled, right, rcond=1e-9)[0]) < 0.2 * ENOUGH:
+        if float(right @ np.linalg.lstsq(scaled, right, rcond=1e-9)[0]) < 0.2 * COST_TOLERANCE:
             return False  # what a step promises is not worth taking
-        for _ in range(TRIALS):
+        for _ in range(MAX_STEP_TRIALS):
             d = np.zeros(len(size))
             d[free] = np.linalg.lstsq(scaled + self.damping * np.eye(len(right)), right, rcond=1e-14)[0]
             d = d / size
@@ -225,8 +227,8 @@ class Descent:
             shots = [
                 changed(s, taken - across @ change) for s, (across, taken) in zip(self.shots, found.own, strict=True)
             ]
-            looks = self._looks(x, noise, shots)
-            cost = self._cost(looks)
+            looks = self.looks_at(x, noise, shots)
+            cost = self.cost_of(looks)
             if cost < self.cost:
                 self.x, self.shots, self.looks, self.cost, self.noise = x, shots, looks, cost, noise
                 self.damping = max(self.damping / 10.0, 1e-9)
@@ -240,74 +242,15 @@ class Descent:
         }
         return self.problem.within(replace(self.noise, **values))
 
-    def other_noise(self, lower: bool = True) -> bool:
-        """Whether a noise that is quite another one is likelier; if so the descent goes on from there.
-
-        Beside the right one the likelihood is a quadratic in its logarithms; far off it is flat, or has a valley for
-        a disturbance that is slow and another for one that is fast. ``lower``: far below is looked at, too.
-        """
-        before = self.cost
-        wanders = self.problem.wanders and not self.problem.gyro
-        others: list[dict[str, float]] = [
-            {"white": white, "slow": slow, "time_constant_s": time} for white, slow, time in FURTHER
-        ]  # fmt: skip
-        others += [{"white": x, "slow": x, "walk": x} for x in QUIETER if wanders]
-        if "walk" in self.kinds and not wanders:
-            others += [{"walk": self.problem.walk(share) / self.noise.walk} for share in WALKS]
-        for times in others:
-            q = self.noise
-            noise = self.problem.within(replace(q, **{k: x * getattr(q, k) for k, x in times.items()}))
-            looks = self._looks(self.x, noise, self.shots)
-            cost = self._cost(looks)
-            if cost < self.cost - ENOUGH:
-                self.noise, self.looks, self.cost = noise, looks, cost
-        if self.alone:
-            self._noise_alone()
-        if lower:
-            self._without_disturbance()
-        self.damping = DAMPING
-        return self.cost < before - ENOUGH
-
-    def _noise_alone(self) -> None:
-        """The likeliest noise near this one, if it is likelier with the model as it stands."""
-        noise = likeliest_noise(
-            self.problem, self.structure, self.names, self.x, self.shots, self.looks, self.weights, self.noise,
-            self.kinds,
-        )  # fmt: skip
-        looks = self._looks(self.x, noise, self.shots)
-        cost = self._cost(looks)
-        if cost < self.cost - ENOUGH:
-            self.noise, self.looks, self.cost = noise, looks, cost
-
-    def _without_disturbance(self) -> None:
-        """Far less of a disturbance, if that is likelier once the parameters have followed.
-
-        A model that is right may otherwise stay where the disturbance explains all that is left, and the sensor has no
-        noise: between the two lies a ridge.
-        """
-        if self._disturbed() < FAR:
-            return
-        here = self._place()
-        for factor in DOWN:
-            q = here[0]
-            self.noise = self.problem.within(replace(q, white=factor * q.white, slow=factor * q.slow))
-            self.looks = self._looks(self.x, self.noise, self.shots)
-            self.cost, self.damping = self._cost(self.looks), DAMPING
-            for _ in range(FOLLOWED):
-                gap = self.cost - here[-1]
-                if not self._down(False) or self.cost < here[-1] - ENOUGH or self.cost - here[-1] > CLOSING * gap:
-                    break
-            if self.cost < here[-1] - ENOUGH:
-                return
-            self._go(here)
-
-    def _place(self) -> tuple[Noise, Array, list[Shots], list[Look], float]:
+    def place(self) -> tuple[Noise, Array, list[Shots], list[Look], float]:
+        """Where the descent stands, to go back to."""
         return self.noise, self.x, self.shots, self.looks, self.cost
 
-    def _go(self, place: tuple[Noise, Array, list[Shots], list[Look], float]) -> None:
+    def go(self, place: tuple[Noise, Array, list[Shots], list[Look], float]) -> None:
+        """Back to a place."""
         self.noise, self.x, self.shots, self.looks, self.cost = place
 
-    def _disturbed(self) -> float:
+    def reduced_chi_square(self) -> float:
         """Median over the samples of the prediction's variance over that without a torque disturbance.
 
         A gyro's walk is left out, too: beside a wrong model it takes what is torque, and would hide it here.
@@ -338,6 +281,6 @@ class Descent:
             [q.innovations[:, 0] for q in self.looks], [q.variance[:, 0] for q in self.looks], disturbance
         )  # fmt: skip
         return Fit(
-            self.structure, self.names, self.x, self.noise, tuple(self.shots), self.cost, self.count,
-            squares / max(self.count, 1), self.information, prediction, self._disturbed(),
+            self.structure, self.names, self.x, self.count, squares / max(self.count, 1), self.cost, self.information,
+            self.noise, tuple(self.shots), prediction, self.reduced_chi_square(),
         )  # fmt: skip

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from identify.model.parameters import Name, platform_of
-from identify.model.structure import Structure
+from identify.model.parameter_fit import MIN_EIGENVALUE_RATIO, ParameterFit
+from identify.model.parameters import Name
 from identify.simulate.shots import Shots
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.gains import Gains, Noise
-from rig.platform import Platform
 
-FOLLOWED = 0.5  # of the inertia: farther than that no first order tells how the gains follow
-SINGULAR = 1e-12  # smallest over largest eigenvalue of the scaled information that still determines a direction
+MAX_LINEAR_INERTIA_CHANGE = 0.5  # of the inertia: farther than that no first order tells how the gains follow
 
 
 def _is_gain(name: Name) -> bool:
@@ -55,7 +52,7 @@ class Columns:
     variance: Array
 
 
-def apart(own: Array, values: Array) -> Array:
+def orthogonal_part(own: Array, values: Array) -> Array:
     """Columns (n, m) without what a run's own unknowns, (n, k), can follow."""
     size: Array = np.linalg.norm(own, axis=0)
     told = size > 0.0
@@ -86,65 +83,25 @@ class Prediction:
 
 
 @dataclass(frozen=True)
-class Fit:
+class Fit(ParameterFit):
     """A model fitted by prediction error.
 
     Attributes
     ----------
-    names, vector
-        Parameters in a fixed order and their values, (p,).
+    variance
+        Of one reading's noise, as the innovations show it.
     noise
         Torque disturbance in relation to the sensor's noise.
     shots
         The runs with their start states and biases.
-    cost
-        Minus twice the logarithm of the likelihood, up to a constant of the samples.
-    count
-        Samples that were fitted.
-    variance
-        Of one reading's noise, as the innovations show it.
-    information
-        Of the parameters, start states and biases eliminated, for readings of unit variance, (p, p).
-    disturbed
-        Variance of the prediction over what it were without a torque disturbance: one where the sensor alone limits it.
+    reduced_chi_square
+        Variance of the prediction over what it were without a torque disturbance: one at the noise of the sensor.
     """
 
-    structure: Structure
-    names: tuple[Name, ...]
-    vector: Array
     noise: Noise
     shots: tuple[Shots, ...]
-    cost: float
-    count: int
-    variance: float
-    information: Array
     prediction: Prediction
-    disturbed: float
-
-    @cached_property
-    def values(self) -> dict[Name, float]:
-        """Parameters by name."""
-        return dict(zip(self.names, self.vector.tolist(), strict=True))
-
-    @property
-    def penalised(self) -> float:
-        """The cost with every parameter paid for (Schwarz 1978)."""
-        return self.cost + len(self.vector) * float(np.log(max(self.count, 2)))
-
-    @cached_property
-    def covariance(self) -> Array:
-        """Covariance of the parameters, (p, p); directions that the data leave open are left out."""
-        scale = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
-        scaled = self.information / np.outer(scale, scale)
-        if not np.all(np.isfinite(scaled)):
-            return np.full_like(scaled, np.inf)
-        inverse = np.linalg.pinv(scaled, rcond=SINGULAR, hermitian=True)
-        return np.asarray(inverse / np.outer(scale, scale) * self.variance)
-
-    def std_error(self, name: Name) -> float:
-        """One standard error of a parameter."""
-        i = self.names.index(name)
-        return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+    reduced_chi_square: float
 
     def without(self, name: str) -> dict[Name, float]:
         """All other parameters, gains as they follow to first order where those of a term or an effect become zero."""
@@ -155,13 +112,9 @@ class Fit:
         scaled = self.information / np.outer(size, size)
         if not (gone and rest and np.all(np.isfinite(scaled))):
             return there
-        inverse = np.linalg.pinv(scaled[np.ix_(rest, rest)], rcond=SINGULAR, hermitian=True)
+        inverse = np.linalg.pinv(scaled[np.ix_(rest, rest)], rcond=MIN_EIGENVALUE_RATIO, hermitian=True)
         moved = inverse @ scaled[np.ix_(rest, gone)] @ (self.vector[gone] * size[gone]) / size[rest]
         new = {self.names[i]: float(self.vector[i] + d) for i, d in zip(rest, moved, strict=True)}
         inertia = there.get(("inertia",), 0.0)
-        far = abs(new.get(("inertia",), inertia) - inertia) > FOLLOWED * inertia
+        far = abs(new.get(("inertia",), inertia) - inertia) > MAX_LINEAR_INERTIA_CHANGE * inertia
         return there if far else there | new
-
-    def platform(self, run: int = 0, added: float = 0.0) -> Platform:
-        """The fitted platform, as it stood in one run."""
-        return platform_of(self.structure, self.names, self.vector, run, added)

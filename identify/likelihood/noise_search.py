@@ -25,10 +25,10 @@ from rig.dynamics.gains import Noise, innovations_with
 if TYPE_CHECKING:
     from identify.likelihood.prediction_error import PredictionError
 
-WORST = 1e300
-STEP = 0.02  # of a logarithm, in differences
-STEPS = 20
-ENOUGH = 1.0  # slope of the cost, a unit of a logarithm, at which it has arrived
+INFEASIBLE_COST = 1e300
+LOG_STEP = 0.02  # of a logarithm, in differences
+MAX_ITERATIONS = 20
+GRADIENT_TOLERANCE = 1.0  # slope of the cost, a unit of a logarithm, at which it has arrived
 
 
 @RUNAWAY
@@ -63,7 +63,9 @@ def likeliest_noise(
             squares += float(np.sum(e * e / v))
             spread += float(np.sum(np.log(v)))
         value = count * np.log(squares / count) + spread if squares > 0.0 else np.inf
-        return float(value) if np.isfinite(value) else WORST
+        return float(value) if np.isfinite(value) else INFEASIBLE_COST
 
-    found = minimize(cost, begun, method="BFGS", options={"maxiter": STEPS, "gtol": ENOUGH, "eps": STEP})
+    found = minimize(
+        cost, begun, method="BFGS", options={"maxiter": MAX_ITERATIONS, "gtol": GRADIENT_TOLERANCE, "eps": LOG_STEP}
+    )
     return of(found.x)

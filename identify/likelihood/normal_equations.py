@@ -11,8 +11,10 @@ from identify.likelihood.derivatives import Derivatives
 from identify.simulate.shots import Shots, moved
 from rig.arrays import Array
 
-FARTHEST = 4.0  # by which a logarithm of the noise may fall in one step
-RISE = 1e12  # times itself, that a number of the noise may become in one step
+COST_TOLERANCE = 0.5  # fall of the cost below which a fit has arrived
+LEVENBERG_DAMPING = 1e-4  # of a first step
+MAX_LOG_STEP = 4.0  # by which a logarithm of the noise may fall in one step
+MAX_NOISE_FACTOR = 1e12  # times itself, that a number of the noise may become in one step
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ def logs_of(step: Array, level: Array, ratios: Sequence[bool]) -> Array:
 
 
 def _stepped(step: Array) -> Array:
-    return np.where(step > 0.0, np.log1p(np.clip(step, 0.0, RISE)), np.maximum(step, -FARTHEST))
+    return np.where(step > 0.0, np.log1p(np.clip(step, 0.0, MAX_NOISE_FACTOR)), np.maximum(step, -MAX_LOG_STEP))
 
 
 def changed(s: Shots, own: Array) -> Shots:

@@ -18,8 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from identify.likelihood.descent import ENOUGH, Descent
+from identify.likelihood.descent import Descent
 from identify.likelihood.fit import Columns, Fit, Look
+from identify.likelihood.kept_gains import KeptGains
+from identify.likelihood.normal_equations import COST_TOLERANCE
 from identify.model.parameters import Name, equations_of
 from identify.model.structure import Structure
 from identify.signals.trace import MOST_BIAS_RAD_S, Trace
@@ -28,20 +30,19 @@ from identify.simulate.shots import RUNAWAY, Shots
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.equations import Equations
-from rig.dynamics.gains import Gains, Noise, Sensing, gains_of
+from rig.dynamics.gains import Gains, Noise, Sensing
 from rig.dynamics.predictor import predict_ahead
 
 LONGEST_SHARE = 0.2  # of the longest run: a disturbance slower than that is a constant
 SHORTEST_SAMPLES = 4.0  # time constant of a disturbance, in samples: a faster one is white
-LEAST_TORQUE, MOST_TORQUE = 1e-7, 10.0  # of the torque: how large a disturbance may be
-LEAST_WALK, LITTLE_WALK, MOST_WALK = 1e-7, 1e-5, 0.01  # of the rate, that a gyro's bias walks over a run
-MOST_ERROR = 1.0  # of the angle, that an encoder's slow error takes over a run
-LEAST_AHEAD, MOST_AHEAD = 1e-3, 1e8  # times the variance of one reading, of a gyro's noise ahead of its low-pass
+MIN_DISTURBANCE, MAX_DISTURBANCE = 1e-7, 10.0  # of the torque: how large a disturbance may be
+MIN_BIAS_WALK, INITIAL_BIAS_WALK, MAX_BIAS_WALK = 1e-7, 1e-5, 0.01  # of the rate, that a gyro's bias walks over a run
+MAX_ENCODER_ERROR = 1.0  # of the angle, that an encoder's slow error takes over a run
+# Times the variance of one reading, of a gyro's noise ahead of its low-pass.
+MIN_PREFILTER_NOISE, MAX_PREFILTER_NOISE = 1e-3, 1e8
 # Of the motion, root mean square, by which a start state may be off: the smoothed motion is worst where a run begins.
 START_RATE, START_ANGLE, UNKNOWN_ANGLE = 0.1, 0.05, 1.0
-SAME_STEP = 1e-5  # relative: what steps of runs differ by and are the same to a gain
-KEPT_GAINS = 12  # of runs that were sampled alike
-KEPT_SLOPES = 100  # of effects, along all runs
+SLOPE_CACHE_SIZE = 100  # of effects, along all runs
 
 
 class PredictionError:
@@ -78,14 +79,13 @@ class PredictionError:
         # where a small friction is to be seen in how a long decay keeps its phase.
         self.wanders = self.gyro or self.torque_free
         self.workers = ThreadPoolExecutor(2)
-        self.longest = max(len(t.measured) for t in traces)
-        self._gains: dict[tuple[object, ...], tuple[dict[tuple[object, ...], Gains], Lock]] = {}
         self._slopes: dict[tuple[object, ...], Array] = {}
         self._slopes_lock = Lock()
         # A decay shows nothing but how it began and how it swings on, far beyond what is linear about its prediction:
         # where it began is fitted, and not corrected as the readings come in.
         self.fits_starts = self.torque_free
-        self.start_variance = (0.0, 0.0, 0.0) if self.fits_starts else self._start_variance()
+        start_variance = (0.0, 0.0, 0.0) if self.fits_starts else self._start_variance()
+        self._gains = KeptGains(self.step_s, max(len(t.measured) for t in traces), start_variance)
 
     def columns_at(self, fit: Fit, with_variance: bool = False) -> list[Columns]:
         """Derivatives of every run's innovations where a fit stands; ``with_variance``, of their whole likelihood."""
@@ -103,14 +103,14 @@ class PredictionError:
 
     def within(self, noise: Noise) -> Noise:
         """The nearest noise that is neither absurdly large nor without effect."""
+        walks = MAX_BIAS_WALK if self.gyro else MAX_ENCODER_ERROR
+        ahead = float(np.clip(noise.ahead, MIN_PREFILTER_NOISE * self.step_s, MAX_PREFILTER_NOISE * self.step_s))
         return Noise(
-            float(np.clip(noise.white, self.white(LEAST_TORQUE), self.white(MOST_TORQUE))),
-            float(np.clip(noise.slow, self.slow(LEAST_TORQUE), self.slow(MOST_TORQUE))),
+            float(np.clip(noise.white, self.white(MIN_DISTURBANCE), self.white(MAX_DISTURBANCE))),
+            float(np.clip(noise.slow, self.slow(MIN_DISTURBANCE), self.slow(MAX_DISTURBANCE))),
             float(np.clip(noise.time_constant_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
-            float(np.clip(noise.walk, self.walk(LEAST_WALK), self.walk(MOST_WALK if self.gyro else MOST_ERROR)))
-            if self.wanders
-            else 0.0,
-            float(np.clip(noise.ahead, LEAST_AHEAD * self.step_s, MOST_AHEAD * self.step_s)) if self.gyro else 0.0,
+            float(np.clip(noise.walk, self.walk(MIN_BIAS_WALK), self.walk(walks))) if self.wanders else 0.0,
+            ahead if self.gyro else 0.0,
             np.inf if self.gyro else float(np.clip(noise.walk_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
         )
 
@@ -153,14 +153,14 @@ class PredictionError:
         """
         with np.errstate(all="ignore"):
             descent = Descent(self, structure, start, noise, carry, fixed)
-            left = descent.down(iterations, thorough, against, least)
+            left = descent.minimise(iterations, thorough, against, least)
             while (
                 left > 0 and descent.sticks and descent.cost < least
             ):  # where a run begins stuck is another place with another friction
                 values = dict(zip(descent.names, descent.x.tolist(), strict=True))
                 again = Descent(self, structure, values, descent.noise, descent.found().shots, fixed)
-                left = again.down(left, thorough, against, least)
-                if not again.cost < descent.cost - ENOUGH:
+                left = again.minimise(left, thorough, against, least)
+                if not again.cost < descent.cost - COST_TOLERANCE:
                     break
                 descent = again
             return descent.found()
@@ -174,7 +174,7 @@ class PredictionError:
         trace = s.trace
         spans = [(a, b - 1) for a, b in s.edges]
         sensing = self._sensing(trace, equations)
-        gains = kept or self._gains_of(s, self._linear_part(equations), noise, sensing, spans)
+        gains = kept or self._gains.of(s.trace, self._linear_part(equations), noise, sensing, spans)
         measured = self._readings(trace)
         predicted, state = predict_ahead(
             equations, s.grid.shaft_torque(equations), s.grid.step_s, round(trace.step_s / s.grid.step_s), spans,
@@ -187,7 +187,7 @@ class PredictionError:
         equations = equations_of(structure, names, x, s.number, s.added)
         spans = [(a, b - 1) for a, b in s.edges]
         linear = self._linear_part(equations)
-        return self._gains_of(s, linear, noise, self._sensing(s.trace, equations), spans)
+        return self._gains.of(s.trace, linear, noise, self._sensing(s.trace, equations), spans)
 
     def _linear_part(self, equations: Equations) -> Array:
         """Inertia, damping and stiffness as the motion meets them, (3,): the effects' mean slopes along it included.
@@ -207,7 +207,7 @@ class PredictionError:
                 found = np.array(
                     [inertia, damping + max(damps, 0.0), max(stiffness + pulls, min(stiffness, 0.0))]
                 )  # fmt: skip
-                if len(self._slopes) > KEPT_SLOPES:
+                if len(self._slopes) > SLOPE_CACHE_SIZE:
                     self._slopes.clear()
                 self._slopes[key] = found
         return found
@@ -240,40 +240,6 @@ class PredictionError:
         gyro, encoder = self._noises(trace)
         return Sensing(True, (encoder / gyro) ** 2, (first, second), (MOST_BIAS_RAD_S / gyro) ** 2)
 
-    def _gains_of(
-        self, s: Shots, jck: Array, noise: Noise, sensing: Sensing, spans: list[tuple[int, int]]
-    ) -> Gains:  # fmt: skip
-        """A run's gains; the last few are kept, because most looks change an effect and not the linear part."""
-        keep, spans, group = self._alike(s.trace, spans)
-        even = abs(s.trace.step_s / self.step_s - 1.0) < SAME_STEP
-        step_s = self.step_s if even else s.trace.step_s
-        key = (*jck.tolist(), noise, sensing, step_s, *spans)
-        kept, lock = self._gains.setdefault(group, ({}, Lock()))
-        with lock:
-            found = kept.get(key)
-            if found is None:
-                found = gains_of(jck, noise, step_s, sensing, keep, spans, self.start_variance)
-                for old in list(kept)[: max(0, len(kept) + 1 - KEPT_GAINS)]:
-                    kept.pop(old, None)
-                kept[key] = found
-        n = len(s.trace.measured)
-        return found if n == len(found.gain) else replace(found, gain=found.gain[:n], variance=found.variance[:n])
-
-    def _alike(
-        self, trace: Trace, spans: list[tuple[int, int]]
-    ) -> tuple[Any, list[tuple[int, int]], tuple[object, ...]]:
-        """Samples, spans and a name for runs that have the same gains, as far as they go.
-
-        Gains know nothing of what was measured: runs of one piece without a lost sample differ in their length alone.
-        """
-        keep = np.asarray(trace.keep, dtype=bool)
-        seen = np.flatnonzero(keep)
-        told = [(a, b) for a, b in spans if np.any(keep[a : b + 1])]
-        if len(told) == 1 and seen[-1] - seen[0] + 1 == len(seen):
-            n, lead = self.longest, int(seen[0])
-            return np.arange(n) >= lead, [(told[0][0], n - 1)], (lead,)
-        return keep, spans, (keep.tobytes(),)
-
     def _start_variance(self) -> tuple[float, float, float]:
         """Of angle and rate at the start of a stretch, read off the smoothed motion, and of the acceleration there, of
         which nothing is assumed but its size; over that of one reading.
@@ -289,7 +255,7 @@ class PredictionError:
         """The best of a coarse grid of noises: white alone first, then a slow part beside it."""
         tau = np.geomspace(20.0 * self.step_s, 0.3 * self.slowest_s, 3).tolist()
         little = self.slow(1e-6)
-        gyro = (self.walk(LITTLE_WALK), self.step_s, np.inf if self.gyro else 30.0 * self.step_s)
+        gyro = (self.walk(INITIAL_BIAS_WALK), self.step_s, np.inf if self.gyro else 30.0 * self.step_s)
         shares = (1.0, 0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)
         best = min((Noise(self.white(share), little, tau[1], *gyro) for share in shares), key=cost)
         slow = [

@@ -38,6 +38,13 @@ class Structure:
             effects=tuple(e for e in self.effects if e != name),
         )
 
+    def shapes_of(self, values: Mapping[Label, float]) -> dict[str, tuple[float, ...]]:
+        """Shape parameters of every effect, of parameters by name."""
+        return {
+            name: tuple(values[(name, p.name)] for p in effects.get(name).parameters if not p.linear)
+            for name in self.effects
+        }
+
     def labels(self, runs: int) -> tuple[Label, ...]:
         """What the columns of the regression are called; a gain per run has the run's number behind it."""
         out: list[Label] = [(t,) for t in TERMS if t in self.terms]

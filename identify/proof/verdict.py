@@ -21,8 +21,8 @@ from rig.recording.run import Recording
 CONFIRMED = 0.10
 # Times the share that the model announces: its parameters, on which what is left depends, are estimates.
 AS_ANNOUNCED = 1.5
-# Root mean square over noise at which what is left is noise.
-AT_NOISE = 1.2
+# Reduced chi-square at which what is left is noise.
+AT_NOISE = 1.2**2
 # Share left, beyond the one announced, from which a name explains less than half of the error's power.
 REFUTED = 0.7
 # Times the error of another name by which it is no better and no worse: less than the models' own numbers move it.
@@ -102,7 +102,7 @@ def _effect(plan: ProofPlan, variant: str, sets: list[str], found: Found) -> Eff
     share = share_left(pairs) if pairs else None
     announced = _announced(rows)
     times = _over_announced(rows) if pair_of(variant)[0] == PLAIN else 1.0
-    status, why = status_of(share, announced, _over_noise(rows), times)
+    status, why = status_of(share, announced, _reduced_chi_square(rows), times)
     return EffectProof(status, why, share, announced, tuple(rows))
 
 
@@ -119,14 +119,14 @@ def _over_announced(rows: list[ProofSet]) -> float:
     return float(np.sqrt(before / told)) if told > 0.0 else np.inf
 
 
-def _over_noise(rows: Sequence[ProofSet]) -> float:
+def _reduced_chi_square(rows: Sequence[ProofSet]) -> float:
     after = sum(r.error_compensated**2 for r in rows)
     noise = sum(r.noise**2 for r in rows)
-    return float(np.sqrt(after / noise)) if noise > 0.0 else np.inf
+    return float(after / noise) if noise > 0.0 else np.inf
 
 
 def status_of(
-    share: Share | None, announced: float, over_noise: float, over_announced: float = 1.0
+    share: Share | None, announced: float, chi_square: float, over_announced: float = 1.0
 ) -> tuple[ProofStatus, str]:
     """The verdict on a share that is left, and why in a sentence.
 
@@ -134,8 +134,8 @@ def status_of(
     ----------
     announced
         The share that the model itself said would be left.
-    over_noise
-        What is left over the noise of the sensor.
+    chi_square
+        The reduced one of what is left.
     over_announced
         The error without compensation over that which the model announces: a name that makes less than half of it
         explains nothing, whatever is left.
@@ -147,7 +147,7 @@ def status_of(
     near = max(CONFIRMED, AS_ANNOUNCED * announced)
     if announced > REFUTED:
         return _of_little(announced, over_announced, told)
-    if share.left <= near or over_noise <= AT_NOISE:
+    if share.left <= near or chi_square <= AT_NOISE:
         return "confirmed", told
     far = max(REFUTED, AS_ANNOUNCED * announced)
     if share.ci95[0] > far:
@@ -232,9 +232,8 @@ def _compared(
 
 def _material(ratio: float, rival: EffectProof, name: EffectProof) -> bool:
     """Whether what the two leave differs by more than a tenth, and the worse of them leaves more than noise."""
-    return (
-        abs(np.log(ratio)) > np.log(MIN_ERROR_RATIO) and _over_noise((rival if ratio > 1.0 else name).sets) > AT_NOISE
-    )
+    worse = rival if ratio > 1.0 else name
+    return abs(np.log(ratio)) > np.log(MIN_ERROR_RATIO) and _reduced_chi_square(worse.sets) > AT_NOISE
 
 
 def _ratio(plan: ProofPlan, pair: str, sets: list[str], found: Found) -> tuple[float, float, float]:

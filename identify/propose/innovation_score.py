@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.likelihood.fit import Fit, apart
+from identify.likelihood.fit import MAX_LINEAR_INERTIA_CHANGE, Fit, orthogonal_part
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name, bounds_of, names_of
 from identify.propose.shape_grids import grid_of
@@ -24,7 +24,6 @@ from rig.effects.base import Effect, Place, Scale
 
 LITTLE = 1e-3  # of the torque: how much of a candidate is tried
 SCALED = (0.1, 10.0)  # by how much a score may scale a shape that means "none" at zero
-FOLLOWED = 0.5  # of the inertia: parameters of the model that follow a candidate farther do not
 SHAPES = 3  # of a candidate that are kept to begin a fit from
 SYNERGY = 2.0  # times what both are worth alone, that two at once are worth: else one leads to the other
 SINGULAR = 1e-9  # of the largest eigenvalue
@@ -99,8 +98,8 @@ class InnovationScores:
         self.own = [p.own for p in parts]
         self.base = [p.scaled for p in parts]
         self.variance = [p.variance for p in parts]
-        columns = np.concatenate([apart(p.own, p.columns) for p in parts])
-        rest = np.concatenate([apart(p.own, p.scaled[:, None])[:, 0] for p in parts])
+        columns = np.concatenate([orthogonal_part(p.own, p.columns) for p in parts])
+        rest = np.concatenate([orthogonal_part(p.own, p.scaled[:, None])[:, 0] for p in parts])
         self.lost = not (np.all(np.isfinite(columns)) and np.all(np.isfinite(rest)))  # the model runs away
         if self.lost:
             return
@@ -190,7 +189,7 @@ class InnovationScores:
             if linear:
                 there[name] = float(np.clip(value + change, *bounds_of(name)))
         kept = self.fit.values.get(("inertia",), 0.0)
-        near = abs(there.get(("inertia",), kept) - kept) <= FOLLOWED * abs(kept)
+        near = abs(there.get(("inertia",), kept) - kept) <= MAX_LINEAR_INERTIA_CHANGE * abs(kept)
         return there if near and all(np.isfinite(list(there.values()))) else {}
 
     def _gain(self, fall: float) -> float:
@@ -252,7 +251,10 @@ class InnovationScores:
                 return None
         level = np.exp(0.5 * spread / len(self.residual))  # the scale of all variances is free
         return np.concatenate(
-            [apart(own, (b - level * m)[:, None])[:, 0] for own, b, m in zip(self.own, self.base, moved, strict=True)]
+            [
+                orthogonal_part(own, (b - level * m)[:, None])[:, 0]
+                for own, b, m in zip(self.own, self.base, moved, strict=True)
+            ]
         )
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 from identify.diagnose.coloured_residual import bounded
-from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
+from identify.diagnose.torque_fit import TorqueFit
+from identify.diagnose.torque_regression import TorqueRegression
 from identify.model.parameters import Name, gains_at_zero, in_order
 from identify.propose.shape_grids import grid_of
 from rig import effects
@@ -25,7 +26,7 @@ BEYOND = 4.0  # times the outermost starting values: how far a shape may wander
 
 
 @dataclass(frozen=True)
-class TorqueLook:
+class CandidateTorque:
     """One candidate on top of a model.
 
     Attributes
@@ -48,9 +49,9 @@ class TorqueLook:
         return dict(self.fit.values)
 
 
-def torque_looks(
+def candidate_torques(
     regression: TorqueRegression, now: TorqueFit, names: Sequence[str], most: int, polish: bool = False
-) -> list[TorqueLook]:  # fmt: skip
+) -> list[CandidateTorque]:  # fmt: skip
     """The candidates that leave least on top of a model, what leaves least first; none that was fitted to nothing.
 
     Parameters
@@ -77,7 +78,7 @@ def torque_looks(
         best = beside.polished(name, shape) if polish else shape
         fit = regression.solve(now.structure.plus(name), {**now.shapes, name: best})
         if in_order(fit.values, name) and not gains_at_zero(fit.values, name):
-            looks.append(TorqueLook(name, fit))
+            looks.append(CandidateTorque(name, fit))
     return sorted(looks, key=lambda w: w.left_nm)
 
 

@@ -24,17 +24,19 @@ from rig.errors import Aborted, RecordingError
 from rig.recording.run import Array
 
 TOP = 0.98  # of Nyquist
-LEAST_BINS = 8  # of an octave
+MIN_BINS = 8  # of an octave
 REPEATS = 8  # of the torque in a run, so that there are bins between its harmonics
-BESIDE = 2.5  # bins from a harmonic, which a window spreads that far
-ELSE = 0.05  # of a period, by which another run's has to differ: what answers to a torque is alike under the same one
+HARMONIC_GUARD_BINS = 2.5  # bins from a harmonic, which a window spreads that far
+# Of a period, by which another run's has to differ: what answers to a torque is alike under the same one.
+MIN_PERIOD_DIFFERENCE = 0.05
 SCATTER = 1.52  # of a band's density over the root of its bins, as a share of itself
-ALIKE, CLOSE = 4.0, 0.15  # standard errors, and share beyond that, by which two readings of one density may differ
-PASSED = 0.3  # of the density: what the sensor has to pass still where the platform moves
-FALLS = 1.5  # times the density at the top
+# Standard errors, and share beyond that, by which two readings of one density may differ.
+AGREEMENT_SIGMAS, AGREEMENT_SHARE = 4.0, 0.15
+MIN_PASSBAND_RATIO = 0.3  # of the density: what the sensor has to pass still where the platform moves
+MIN_ROLL_OFF = 1.5  # times the density at the top
 NO_FLOOR = 1e3  # the same, where a model is far off: nothing but a filter leaves so little there
 MOVES = 1.3  # times the natural frequency or the torque's
-LEAST_SAMPLES = 512
+MIN_SAMPLES = 512
 
 
 class Colour(NamedTuple):
@@ -103,12 +105,12 @@ def colour_of(found: Identification) -> Colour | None:
 
     Lines are nothing of it: they may stand beside, for the search that is made anew with the noise known.
     """
-    seen = _seen(found)
-    if seen is None or not (np.all(_alike(seen)) and np.all(_falling(seen))):
+    seen = _spectrum_of(found)
+    if seen is None or not (np.all(_is_common_to_runs(seen)) and np.all(_is_low_passed(seen))):
         return None
     level = float(np.max(seen.pooled[seen.moving]))
-    passed = seen.pooled > PASSED * level
-    if not np.all(passed[seen.moving]) or not np.all(seen.pooled[seen.moving] > FALLS * seen.pooled[0]):
+    passed = seen.pooled > MIN_PASSBAND_RATIO * level
+    if not np.all(passed[seen.moving]) or not np.all(seen.pooled[seen.moving] > MIN_ROLL_OFF * seen.pooled[0]):
         return None
     return Colour(float(np.sqrt(level)), _rms(seen), float(np.max(seen.top_hz[passed])))
 
@@ -118,18 +120,19 @@ def guess_of(found: Identification) -> Colour | None:
 
     A guess to search with; what it finds has to leave noise by :func:`colour_of`.
     """
-    seen = _seen(found)
+    seen = _spectrum_of(found)
     if seen is None:
         return None
     above = ~seen.moving
     level = float(np.max(seen.pooled[above]))
-    if not np.all(_alike(seen)[:, above]) or not np.all(_falling(seen)[above[1:]]) or level < NO_FLOOR * seen.pooled[0]:
+    low_passed = np.all(_is_common_to_runs(seen)[:, above]) and np.all(_is_low_passed(seen)[above[1:]])
+    if not low_passed or level < NO_FLOOR * seen.pooled[0]:
         return None
-    flat_to_hz = float(np.max(seen.top_hz[seen.pooled > PASSED * level]))
+    flat_to_hz = float(np.max(seen.top_hz[seen.pooled > MIN_PASSBAND_RATIO * level]))
     return Colour(float(np.sqrt(level)), _rms(seen._replace(pooled=np.minimum(seen.pooled, level))), flat_to_hz)
 
 
-class _Seen(NamedTuple):
+class _Spectrum(NamedTuple):
     """Densities of all runs, (runs, octaves) and pooled, (octaves,), and the octaves in which the platform moves."""
 
     top_hz: Array
@@ -139,13 +142,13 @@ class _Seen(NamedTuple):
     moving: Any
 
 
-def _seen(found: Identification) -> _Seen | None:
+def _spectrum_of(found: Identification) -> _Spectrum | None:
     """None where too little is seen: no two sines, or motion up to where noise was read."""
     platform, periods = found.final.platform, [torque_period_s(t) for t in found.traces]
     runs = [(p, _bands(t, p)) for t, p in zip(found.traces, periods, strict=True) if p is not None]
     each = [r for _, r in runs if r is not None]
     known = [p for p, r in runs if r is not None]
-    if platform is None or found.torque_free or not known or max(known) < (1.0 + ELSE) * min(known):
+    if platform is None or found.torque_free or not known or max(known) < (1.0 + MIN_PERIOD_DIFFERENCE) * min(known):
         return None
     several = min(len(r.bins) for r in each)
     if several < 2 or any(not np.allclose(r.top_hz[:several], each[0].top_hz[:several], rtol=0.01) for r in each):
@@ -158,25 +161,26 @@ def _seen(found: Identification) -> _Seen | None:
     moving = top_hz < 2.0 * MOVES * fastest_hz  # the octaves that begin below that
     if not np.any(moving) or np.all(moving) or not np.all(pooled > 0.0):
         return None
-    return _Seen(top_hz, density, bins, pooled, moving)
+    return _Spectrum(top_hz, density, bins, pooled, moving)
 
 
-def _alike(seen: _Seen) -> Any:
-    return np.abs(seen.density / seen.pooled - 1.0) < ALIKE * SCATTER / np.sqrt(seen.bins) + CLOSE
+def _is_common_to_runs(seen: _Spectrum) -> Any:
+    return np.abs(seen.density / seen.pooled - 1.0) < AGREEMENT_SIGMAS * SCATTER / np.sqrt(seen.bins) + AGREEMENT_SHARE
 
 
-def _falling(seen: _Seen) -> Any:
+def _is_low_passed(seen: _Spectrum) -> Any:
     """Whether an octave is no denser than the one below it, (octaves - 1,)."""
     chance = SCATTER / np.sqrt(np.sum(seen.bins, axis=0))
-    return seen.pooled[:-1] < seen.pooled[1:] * (1.0 + ALIKE * np.hypot(chance[:-1], chance[1:]) + CLOSE)
+    margin = AGREEMENT_SIGMAS * np.hypot(chance[:-1], chance[1:])
+    return seen.pooled[:-1] < seen.pooled[1:] * (1.0 + margin + AGREEMENT_SHARE)
 
 
-def _rms(seen: _Seen) -> float:
+def _rms(seen: _Spectrum) -> float:
     widths = np.append(seen.top_hz[:-1] - seen.top_hz[1:], seen.top_hz[-1])  # as dense below the lowest as in it
     return float(np.sqrt(np.sum(seen.pooled * widths) / seen.top_hz[0]))
 
 
-def told(colour: Colour | None, axis: str, channel: str) -> str:
+def describe_colour(colour: Colour | None, axis: str, channel: str) -> str:
     """One sentence on it, empty where there is none.
 
     Parameters
@@ -213,16 +217,16 @@ def _bands(trace: RunTraces, period_s: float) -> _Bands | None:
     first, last = _longest((trace.keep > 0.0) & np.isfinite(left))
     n = last - first
     step = float(np.median(np.diff(trace.time_s)))
-    if n < LEAST_SAMPLES or n * step < REPEATS * period_s:
+    if n < MIN_SAMPLES or n * step < REPEATS * period_s:
         return None
     part, window = left[first:last], np.hanning(n)
     power = np.abs(np.fft.rfft((part - np.mean(part)) * window)) ** 2 / float(np.sum(window**2))
     hertz = np.fft.rfftfreq(n, step)
-    between = np.abs(hertz - np.rint(hertz * period_s) / period_s) > BESIDE / (n * step)
+    between = np.abs(hertz - np.rint(hertz * period_s) / period_s) > HARMONIC_GUARD_BINS / (n * step)
     top = TOP * 0.5 / step
     tops = top * np.exp2(-np.arange(int(np.log2(n))))
     inside = [np.sort(power[between & (hertz > 0.5 * t) & (hertz <= t)]) for t in tops]
-    enough = int(np.sum(np.cumprod([len(p) >= LEAST_BINS for p in inside])))
+    enough = int(np.sum(np.cumprod([len(p) >= MIN_BINS for p in inside])))
     density = [float(np.mean(p[: round(LOWER * len(p))])) / LOWER_MEAN for p in inside[:enough]]
     return _Bands(tops[:enough], np.array(density), np.array([len(p) for p in inside[:enough]]))
 

@@ -8,16 +8,17 @@ as it takes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from identify.estimate.output_error import Estimate, refine
+from identify.estimate.output_error import OutputErrorFit, refine
+from identify.model.parameter_fit import reduced_chi_square
 from identify.model.parameters import Name
 from identify.model.structure import Structure
-from identify.rivals.whole_runs import STEPS, TOLERANCE, WholeFit, WholeRuns
+from identify.rivals.whole_runs import MAX_ITERATIONS, TOLERANCE, FreeRunFitter
 from identify.signals.trace import Trace
 from identify.simulate.sensitivities import sensitivities
 from identify.wording import joined, number
@@ -28,10 +29,10 @@ from rig.recording.run import Array
 GONE = (
     0.95  # of the excess over the noise: less is foretold of what is no such run, and of a delay that is no small one
 )
-AT_NOISE = 1.05  # mean square over the noise's variance: the noise is known to a percent or two
+AT_NOISE = 1.05  # reduced chi-square: the noise is known to a percent or two
 AT_FLOOR = 1.1  # the same: what is there has found what there is
 ROUNDS = 3  # the change is small, but not infinitely so
-LARGEST = 0.3  # of the torque; a run that differs by more is another campaign
+MAX_GAIN_CHANGE = 0.3  # of the torque; a run that differs by more is another campaign
 LATEST_S = 0.05
 
 
@@ -44,7 +45,7 @@ class Change(NamedTuple):
 
 
 @dataclass(frozen=True)
-class RunsApart:
+class Heterogeneity:
     """Changes of a few runs' torque with which the declared model reaches the noise.
 
     Attributes
@@ -59,7 +60,7 @@ class RunsApart:
     penalised: float
 
 
-def runs_apart(fits: WholeRuns, declared: Structure, start: dict[Name, float]) -> RunsApart | None:
+def heterogeneity_of(fits: FreeRunFitter, declared: Structure, start: Mapping[Name, float]) -> Heterogeneity | None:
     """The few runs whose torque, a little larger or later, would explain all that the declared model leaves.
 
     None where there is nothing to explain, or where that does not do it.
@@ -68,41 +69,40 @@ def runs_apart(fits: WholeRuns, declared: Structure, start: dict[Name, float]) -
     if len(moved) < 2 or not set(TERMS[:1]) <= set(declared.terms):
         return None
     base = fits.fitted(declared, start)
-    if base is None or base.level < AT_NOISE:
+    if base is None or base.reduced_chi_square < AT_NOISE:
         return None
-    chosen = _foretold(fits, base.estimate, base)
+    chosen = _predicted_changes(fits, base)
     if not chosen or len({c.run for c in chosen}) == len(moved):
         return None  # of all runs alike it would be an effect
-    traces, estimate, total = fits.fitting, base.estimate, dict.fromkeys([(c.run, c.kind) for c in chosen], 0.0)
+    traces, fit, total = fits.fitting, base, dict.fromkeys([(c.run, c.kind) for c in chosen], 0.0)
     for _ in range(ROUNDS):
-        rests, columns = _columns(estimate, fits.use)
+        rests, columns = _columns(fit, fits.use)
         wanted = [_items(len(fits.fitting)).index(key) for key in total]
         step = _solved(np.column_stack([columns[0], columns[1][:, wanted]]), rests)[columns[0].shape[1] :]
         total = {key: value + float(d) for (key, value), d in zip(total.items(), step, strict=True)}
-        if any(abs(v) > (LARGEST if kind == "gain" else LATEST_S) for (_, kind), v in total.items()):
+        if any(abs(v) > (MAX_GAIN_CHANGE if kind == "gain" else LATEST_S) for (_, kind), v in total.items()):
             return None
         traces = [_changed(t, i, total) for i, t in enumerate(fits.fitting)]
-        before = estimate.sigma
-        estimate = refine(
-            traces, declared, dict(zip(estimate.names, estimate.values.tolist(), strict=True)), None, STEPS, fits.use,
-            estimate.shots, fits.fixed, TOLERANCE, coarse=True,
+        before = fit.sigma
+        fit = refine(
+            traces, declared, fit.values, None, MAX_ITERATIONS, fits.use, fit.shots, fits.fixed, TOLERANCE, coarse=True
         )  # fmt: skip
-        if not estimate.sigma < 0.999 * before:
+        if not fit.sigma < 0.999 * before:
             break
-    squares = estimate.sigma**2 * estimate.count / fits.noise**2
-    if not squares < AT_FLOOR * estimate.count:
+    if not reduced_chi_square(fit.sigma, fits.noise) < AT_FLOOR:
         return None
-    penalty = (len(estimate.names) + len(total)) * float(np.log(max(estimate.count, 2)))
+    squares = fit.sigma**2 * fit.count / fits.noise**2
+    penalty = (len(fit.names) + len(total)) * float(np.log(max(fit.count, 2)))
     named = tuple((fits.fitting[i].run.name, kind, v) for (i, kind), v in total.items())
-    return RunsApart(named, squares + penalty)
+    return Heterogeneity(named, squares + penalty)
 
 
-def as_likely(apart: RunsApart, named: WholeFit) -> bool:
+def explains_as_much(apart: Heterogeneity, named: OutputErrorFit) -> bool:
     """Whether another torque in some runs is likelier than the effects of a model."""
     return apart.penalised < named.penalised
 
 
-def told(apart: RunsApart, linear: bool) -> tuple[str, str]:
+def describe(apart: Heterogeneity, linear: bool) -> tuple[str, str]:
     """What would explain it all, in words, and what would tell."""
     what = "force" if linear else "torque"
     parts = [
@@ -126,19 +126,19 @@ def _items(runs: int) -> list[tuple[int, Literal["gain", "delay"]]]:
     return [(i, kind) for i in range(runs) for kind in ("gain", "delay")]
 
 
-def _columns(estimate: Estimate, use: Sequence[Array]) -> tuple[Array, tuple[Array, Array]]:
+def _columns(fit: OutputErrorFit, use: Sequence[Array]) -> tuple[Array, tuple[Array, Array]]:
     """Residual, and the sensitivities to all parameters and to every run's own gain and delay; nuisances gone.
 
     A linear platform under a torque larger by g is one with J, C and K smaller by g. Torque later than the motion is
     motion earlier than the torque.
     """
     rows, own, rests = [], [], []
-    for i, s in enumerate(estimate.shots):
-        scale = np.where(np.abs(estimate.values) > 0, np.abs(estimate.values), 1.0)
-        still = np.zeros(len(estimate.names), dtype=bool)
-        columns, state, residual = sensitivities(s, estimate.structure, estimate.names, estimate.values, scale, still)
-        terms = [k for k, n in enumerate(estimate.names) if n[0] in TERMS]
-        whole = estimate.values + np.array([s.added if n == ("inertia",) else 0.0 for n in estimate.names])
+    for i, s in enumerate(fit.shots):
+        scale = np.where(np.abs(fit.vector) > 0, np.abs(fit.vector), 1.0)
+        still = np.zeros(len(fit.names), dtype=bool)
+        columns, state, residual = sensitivities(s, fit.structure, fit.names, fit.vector, scale, still)
+        terms = [k for k, n in enumerate(fit.names) if n[0] in TERMS]
+        whole = fit.vector + np.array([s.added if n == ("inertia",) else 0.0 for n in fit.names])
         gain = -columns[:, terms] @ whole[terms]
         moving, delay = s.trace.measured - residual, np.zeros(len(residual))
         for begin, end in s.edges:  # at which it jumps
@@ -150,7 +150,7 @@ def _columns(estimate: Estimate, use: Sequence[Array]) -> tuple[Array, tuple[Arr
         both = np.column_stack([columns, gain, delay, residual])[mask]
         both = both - q @ (q.T @ both)
         rows.append(both[:, :-3])
-        wide = np.zeros((len(both), 2 * len(estimate.shots)))
+        wide = np.zeros((len(both), 2 * len(fit.shots)))
         wide[:, 2 * i : 2 * i + 2] = both[:, -3:-1]
         own.append(wide)
         rests.append(both[:, -1])
@@ -162,12 +162,12 @@ def _solved(columns: Array, residual: Array) -> Array:
     return np.asarray(np.linalg.lstsq(columns / size, residual, rcond=1e-12)[0] / size)
 
 
-def _foretold(fits: WholeRuns, estimate: Estimate, base: WholeFit) -> list[Change]:
+def _predicted_changes(fits: FreeRunFitter, base: OutputErrorFit) -> list[Change]:
     """As few changes as are foretold to leave only noise; none where no few do."""
-    residual, (columns, own) = _columns(estimate, fits.use)
+    residual, (columns, own) = _columns(base, fits.use)
     basis = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]
     residual, own = residual - basis @ (basis.T @ residual), own - basis @ (basis.T @ own)
-    items, chosen = _items(len(estimate.shots)), list[int]()
+    items, chosen = _items(len(base.shots)), list[int]()
     size = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
     scaled = own / size
     # A campaign of fifty runs asks for thousands of these small fits: from the normal equations, made once.
@@ -179,7 +179,7 @@ def _foretold(fits: WholeRuns, estimate: Estimate, base: WholeFit) -> list[Chang
 
     aim = base.count * fits.noise**2
     enough = aim + (1.0 - GONE) * max(total - aim, 0.0)
-    while len({items[k][0] for k in chosen}) < len(estimate.shots) - 1 or len(chosen) < 1:
+    while len({items[k][0] for k in chosen}) < len(base.shots) - 1 or len(chosen) < 1:
         left = {k: fitted([*chosen, k])[1] for k in range(len(items)) if k not in chosen}
         best = min(left, key=lambda k: left[k])
         chosen.append(best)

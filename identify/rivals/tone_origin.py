@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from identify.estimate.evaluation import settled
-from identify.estimate.final_fit import Fitted
+from identify.estimate.final_fit import FinalFit
 from identify.model.parameters import equations_of
 from identify.signals.trace import UPSAMPLING, Trace, loads_differ
 from identify.simulate.all_runs import shots_for
@@ -29,7 +29,7 @@ DECISIVE = 25.0  # times the noise's variance by which one beginning has to fit 
 AS_GOOD = 0.25  # of what the other beginning loses: losses that the platform's other effects may cost a steady one
 FAINT = 0.1  # of the amplitude in the loudest run: below, a run is not said to have the line
 MOVED = 0.05  # relative: by which the mass has to change how far the line's torque moves the platform
-ALIKE = 0.3  # of the scatter of the other: amplitudes that are the same in every run
+MAX_AMPLITUDE_SCATTER = 0.3  # of the scatter of the other: amplitudes that are the same in every run
 SOON_S = 0.1  # a run whose first sample that counts comes later does not show how it began
 
 
@@ -52,7 +52,7 @@ TELLS = (
 
 
 @dataclass(frozen=True)
-class Line:
+class SpectralLine:
     """A line whose origin a recording does not tell.
 
     Attributes
@@ -81,7 +81,7 @@ class Line:
     of_torque: bool = False
 
 
-def standing_line(fitted: Fitted, traces: Sequence[Trace]) -> Line | None:
+def standing_line(fitted: FinalFit, traces: Sequence[Trace]) -> SpectralLine | None:
     """The tone of a fit where it may as well be a line of the sensor; None where it is a torque, or none was fitted.
 
     A torque shows in how the runs begin, or in what a known mass makes of it; where neither tells, it is left open.
@@ -96,21 +96,21 @@ def standing_line(fitted: Fitted, traces: Sequence[Trace]) -> Line | None:
     torque_nm, rate_rad_s = (float(np.median(s)) for s in sizes[heard].T)
     some = [t.run.name for t, yes in zip(fitted_in, heard, strict=True) if yes]
     only = () if np.all(heard) else tuple(some)
-    line = Line(fitted.values[TONE, "frequency"], torque_nm, rate_rad_s, only, loads_differ(traces))
-    if only and all(_shaken_at(t, line.frequency_hz) == yes for t, yes in zip(fitted_in, heard, strict=True)):
+    line = SpectralLine(fitted.values[TONE, "frequency"], torque_nm, rate_rad_s, only, loads_differ(traces))
+    if only and all(_is_excited_at(t, line.frequency_hz) == yes for t, yes in zip(fitted_in, heard, strict=True)):
         return replace(line, of_torque=True)
     mobility = sizes[:, 1] / np.maximum(sizes[:, 0], 1e-300)
     if line.loaded and np.ptp(mobility) > MOVED * np.mean(mobility):
         torque, rate = np.std(sizes, axis=0) / np.mean(sizes, axis=0)
-        if torque < ALIKE * rate:
+        if torque < MAX_AMPLITUDE_SCATTER * rate:
             return None
-        if rate < ALIKE * torque:
+        if rate < MAX_AMPLITUDE_SCATTER * torque:
             return replace(line, in_sensor=True)
     begun = _beginning(fitted, traces)
     return None if begun == "at rest" else replace(line, stood=begun == "steady")
 
 
-def _amplitudes(fitted: Fitted, trace: Trace) -> tuple[complex, complex]:
+def _amplitudes(fitted: FinalFit, trace: Trace) -> tuple[complex, complex]:
     """Torque and the rate of its steady motion in one run, complex: the real part of it times exp(i w t)."""
     v, run = fitted.values, str(trace.number)
     torque = -(v[TONE, "cosine", run] - 1j * v[TONE, "sine", run])
@@ -119,7 +119,7 @@ def _amplitudes(fitted: Fitted, trace: Trace) -> tuple[complex, complex]:
     return torque, torque * s / ((j + trace.run.added_inertia_kg_m2) * s * s + c * s + k)
 
 
-def _shaken_at(trace: Trace, hertz: float) -> bool:
+def _is_excited_at(trace: Trace, hertz: float) -> bool:
     """Whether a run's own torque has a line there."""
     if trace.torque is None:
         return False
@@ -129,7 +129,7 @@ def _shaken_at(trace: Trace, hertz: float) -> bool:
     return bool(there > FAINT * np.sqrt(2.0) * np.std(torque))
 
 
-def told(line: Line, axis: str, channel: str = "rate") -> tuple[str, str]:
+def describe(line: SpectralLine, axis: str, channel: str = "rate") -> tuple[str, str]:
     """The line in words, of the channel that was measured, and what would tell where it comes from."""
     linear = axis == "linear"
     torque = f"{number(line.torque_nm, 3)} {'N' if linear else 'N m'}"
@@ -162,7 +162,7 @@ def told(line: Line, axis: str, channel: str = "rate") -> tuple[str, str]:
 
 
 @RUNAWAY
-def _beginning(fitted: Fitted, traces: Sequence[Trace]) -> Literal["at rest", "steady", "unknown"]:
+def _beginning(fitted: FinalFit, traces: Sequence[Trace]) -> Literal["at rest", "steady", "unknown"]:
     """Whether the platform was at rest when the runs began, or in the tone's steady motion.
 
     Without a spring it may have stood anywhere.
@@ -190,7 +190,7 @@ def _beginning(fitted: Fitted, traces: Sequence[Trace]) -> Literal["at rest", "s
         begun.starts[:] = rest if tried[0] < tried[1] else rest + moving
         _, free = settled(begun, fitted.structure, names, x)
         losses += np.array([*tried, float(np.sum(free))])
-    rest_, steady, free_ = losses / fitted.sigma**2
+    rest_, steady, free_ = losses / fitted.fit.variance
     if steady - rest_ > DECISIVE and rest_ - free_ < AS_GOOD * (steady - free_):
         return "at rest"
     return "steady" if rest_ - steady > DECISIVE and steady - free_ < AS_GOOD * (rest_ - free_) else "unknown"

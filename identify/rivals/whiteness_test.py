@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.estimate.final_fit import Fitted
+from identify.estimate.final_fit import FinalFit
 from rig import effects
 
 SO_MANY = 3  # effects beside those declared
@@ -21,7 +21,7 @@ ABOVE = (0.5, 0.98)  # of Nyquist: where it does not
 COLOURED = 5.0  # standard errors by which a band may stand out
 
 
-def too_much_for(fitted: Fitted, declared: Sequence[str]) -> bool:
+def fails_whiteness_test(fitted: FinalFit, declared: Sequence[str]) -> bool:
     """Whether what was found beside the declared effects is more than a residual like this one supports."""
     found = [e for e in fitted.structure.effects if e not in declared]
     if len(found) < SO_MANY or not any(effects.get(e).resembles_much for e in found):
@@ -29,7 +29,7 @@ def too_much_for(fitted: Fitted, declared: Sequence[str]) -> bool:
     return not fitted.sensor_limited or coloured(fitted) > COLOURED
 
 
-def coloured(fitted: Fitted) -> float:
+def coloured(fitted: FinalFit) -> float:
     """By how many standard errors the power of the free run's residual stands out low in the spectrum."""
     if fitted.free_run is None:
         return float("inf")

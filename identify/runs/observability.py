@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from identify.signals.trace import Trace
+from identify.signals.trace import Trace, loads_differ
 from rig import effects
 from rig.effects.base import Place
 
@@ -22,3 +22,8 @@ def why_unseen(name: str, traces: Sequence[Trace]) -> str:
     if effects.get(name).place is Place.DRIVE and all(t.torque is None for t in traces):
         return "no torque was applied, so effects of the drive do not show"
     return ""
+
+
+def can_show(name: str, traces: Sequence[Trace]) -> bool:
+    """Whether an effect is worth a search: the sensors can show it, and there is what it needs."""
+    return not why_unseen(name, traces) and (not effects.get(name).needs_added_inertia or loads_differ(traces))

@@ -15,7 +15,9 @@ import numpy as np
 from identify.likelihood.fit import Fit
 from identify.propose.free_forms import fitted, ranges
 from identify.propose.innovation_score import InnovationScores
-from identify.select.evidence import APART, behind, shape_of
+from identify.select.evidence import STRONG_SUPPORT, support_difference
+from identify.select.free_form_residual import ON
+from identify.select.trial_fits import TRIAL_ITERATIONS
 from rig import effects
 
 if TYPE_CHECKING:
@@ -30,7 +32,20 @@ CURVES: Mapping[str, Sequence[str]] = {
 }  # fmt: skip
 
 
-def beaten_by_a_curve(search: Stepwise, now: Fit) -> tuple[list[str], str, Fit] | None:
+def against_curves(search: Stepwise, now: Fit) -> Fit:
+    """A model without names that a curve in their place beats; what else is there is judged beside that curve next."""
+    if search.trials.added(now):
+        search.say("comparing what was found with curves in its place")
+    found = _beaten(search, now)
+    if found is None:
+        return now
+    names, curve, rest = found
+    search.dropped += [(n, f"a curve over the {ON[curve]} explains clearly more in its place") for n in names]
+    search.say(f"took {' and '.join(names)} back: a curve over the {ON[curve]} explains clearly more")
+    return rest
+
+
+def _beaten(search: Stepwise, now: Fit) -> tuple[list[str], str, Fit] | None:
     """Names that a curve in their place beats, the curve, and the model without them; None where none does.
 
     Several effects of one kind (two waves over the angle) are judged together.
@@ -43,9 +58,9 @@ def beaten_by_a_curve(search: Stepwise, now: Fit) -> tuple[list[str], str, Fit] 
         curves = [*CURVES.get(effect.family, ()), *(("free_memory",) if effect.states else ())]
         if not curves:
             continue
-        rest = search.without(now, names)
+        rest = _without(search, now, names)
         curve = _in_place(search, now, rest, names, curves)
-        if curve is not None and behind(now, curve[1]) > APART:
+        if curve is not None and support_difference(now, curve[1]) > STRONG_SUPPORT:
             return names, curve[0], rest
     return None
 
@@ -60,7 +75,7 @@ def _in_place(
         return None
     at = ranges(problem, rest)
     with np.errstate(all="ignore"):
-        own = [tests.score(effects.get(n), shape_of(now, n)) for n in names]
+        own = [tests.score(effects.get(n), now.structure.shapes_of(now.values)[n]) for n in names]
         found = [tests.score(effects.get(c), at[c]) for c in curves if c in at]
     score = max((s.gain for s in own if s is not None), default=0.0)
     best = max((s for s in found if s is not None), key=lambda s: s.gain, default=None)
@@ -68,3 +83,15 @@ def _in_place(
         return None
     fit = fitted(problem, rest, best, STEPS, rest.cost - NEAR * (rest.cost - now.cost))
     return (best.effect, fit) if np.isfinite(fit.cost) else None
+
+
+def _without(search: Stepwise, now: Fit, names: Sequence[str]) -> Fit:
+    """A model without some effects: as it was in the search, or fitted."""
+    structure = now.structure
+    for name in names:
+        structure = structure.minus(name)
+    known = search.known(structure)
+    if known is not None:
+        return known
+    values = {k: v for k, v in now.values.items() if k[0] not in names}
+    return search.problem.fit(structure, values, now.noise, TRIAL_ITERATIONS, carry=now.shots, thorough=False)

@@ -19,8 +19,9 @@ from functools import lru_cache
 import numpy as np
 from scipy.stats import chi2
 
-from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
-from identify.likelihood.fit import Columns, Fit, apart
+from identify.diagnose.torque_fit import TorqueFit
+from identify.diagnose.torque_regression import TorqueRegression
+from identify.likelihood.fit import Columns, Fit, orthogonal_part
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from rig import effects
@@ -31,11 +32,12 @@ from rig.platform import TERMS
 
 BLOCKS = 30  # of all runs together, over which scores scatter: their ratio is then known to a quarter
 CHANCE = 0.95  # quantile of a ratio of variances: what chance alone reaches is no sign of a wrong likelihood
-FEWEST_RUNS = 4  # whose scores show whether runs differ
+MIN_RUNS = 4  # whose scores show whether runs differ
 ALONE = 1e-3  # of a parameter's influence, that the others leave: of less only rounding is seen
-APART = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
+STRONG_SUPPORT = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
 WEIGHT = 0.20  # share of the disturbance that an effect takes away to be named: below, it is true but small
-MOST = 0.5  # of what a prediction errs by beyond the sensor's noise
+MAX_EFFECTS = 6  # that one recording is believed to show
+MAX_UNFOLLOWED_SHARE = 0.5  # of what a prediction errs by beyond the sensor's noise
 TRUSTED = 1.5  # inflation up to which what the likelihood takes the disturbance for is believed
 SHOWS = 0.1  # of the disturbance in the band, that its white part is: what becomes of less is chance
 
@@ -54,7 +56,7 @@ class Evidence:
         Penalty for the parameters that were added (Schwarz 1978).
     weight
         Share of the disturbance's power that goes with the model; one for an effect in the sensor, which is no torque.
-    beyond
+    unfollowed_share
         Share that goes of what predictions err by beyond the sensor's noise.
     """
 
@@ -64,7 +66,7 @@ class Evidence:
     inflation: float
     price: float
     weight: float
-    beyond: float = 0.0
+    unfollowed_share: float = 0.0
 
     @property
     def support(self) -> float:
@@ -72,7 +74,7 @@ class Evidence:
         return self.gain / self.inflation - self.price
 
 
-class Weigher:
+class EvidenceModel:
     """Weighs models of one recording against each other.
 
     Parameters
@@ -93,11 +95,11 @@ class Weigher:
         added = [n for n in new.names if n not in now.names]
         inflated = inflation(self.problem.columns_at(new, with_variance=True), new, added)
         torqueless = effect not in TERMS and effects.get(effect).place is Place.SENSOR
-        weight = 1.0 if torqueless else self.weight(now, new, inflated < TRUSTED)
+        weight = 1.0 if torqueless else self.explained_share(now, new, inflated < TRUSTED)
         price = (new.penalised - new.cost) - (now.penalised - now.cost)
-        return Evidence(effect, new, now.cost - new.cost, inflated, price, weight, beyond(now, new))
+        return Evidence(effect, new, now.cost - new.cost, inflated, price, weight, unfollowed_share(now, new))
 
-    def weight(self, now: Fit, new: Fit, trusted: bool) -> float:
+    def explained_share(self, now: Fit, new: Fit, trusted: bool) -> float:
         """Share of the disturbance that goes: of its power in the band of the motion, or of its white part.
 
         The power in the band is what the residual in torque has on held-out samples, and what the likelihood takes the
@@ -111,20 +113,20 @@ class Weigher:
             cutoff_hz = self.regression.cutoff_hz
             if now.noise.white * cutoff_hz > SHOWS * in_band(now.noise, cutoff_hz):
                 shares.append(1.0 - new.noise.white * new.variance / (now.noise.white * now.variance))
-        if (share := beyond(now, new)) > MOST:
+        if (share := unfollowed_share(now, new)) > MAX_UNFOLLOWED_SHARE:
             shares.append(share)
         return float(max(shares))
 
     def left(self, fit: TorqueFit) -> float:
         """Power of the held-out residual in torque, the sensor's part taken off."""
-        return max(fit.held_nm**2 - self.floor_nm**2, 1e-4 * self.floor_nm**2)
+        return fit.power_above(self.floor_nm)
 
     def in_torque(self, fit: Fit) -> TorqueFit:
         """A model along the measured motion, its gains fitted there."""
-        return along(self.regression, fit)
+        return torque_fit_of(self.regression, fit)
 
 
-def behind(one: Fit, other: Fit) -> float:
+def support_difference(one: Fit, other: Fit) -> float:
     """By how much another model on the same samples is likelier, as far as that can be believed; zero if it is not.
 
     The smaller of two numbers: the fall of the penalised cost, and the square of its standard errors, read off how it
@@ -164,31 +166,22 @@ def likely_share(now: Fit, new: Fit, cutoff_hz: float) -> float:
     return 1.0 - after / max(before, 1e-300)
 
 
-def along(regression: TorqueRegression, fit: Fit) -> TorqueFit:
+def torque_fit_of(regression: TorqueRegression, fit: Fit) -> TorqueFit:
     """A model along the measured motion, in torque; without a lag of the sensor, which has no torque there."""
     seen = tuple(e for e in fit.structure.effects if effects.get(e).place is not Place.SENSOR)
+    shapes = fit.structure.shapes_of(fit.values)
     shaft = tuple(e for e in seen if effects.get(e).place is not Place.DRIVE)
     for kept in (seen, shaft, ()):
         # A drive that passes on nothing explains any torque, and a play run along a noisy motion may run away.
-        found = regression.solve(replace(fit.structure, effects=kept), {e: shape_of(fit, e) for e in kept})
+        found = regression.solve(replace(fit.structure, effects=kept), shapes)
         if found.held_nm < regression.torque_nm:
             break
     return found
 
 
-def shape_of(fit: Fit, name: str) -> tuple[float, ...]:
-    """The shapes of an effect as a fit has them."""
-    return tuple(fit.values[(name, p.name)] for p in effects.get(name).parameters if not p.linear)
-
-
-def disturbed(fit: Fit) -> float:
-    """By how much more than the sensor's noise the prediction errs: one where no torque disturbs."""
-    return fit.disturbed
-
-
-def beyond(now: Fit, new: Fit) -> float:
+def unfollowed_share(now: Fit, new: Fit) -> float:
     """Share that goes of what predictions err by beyond the sensor's noise."""
-    return 1.0 - (disturbed(new) - 1.0) / max(disturbed(now) - 1.0, 1e-300)
+    return 1.0 - (new.reduced_chi_square - 1.0) / max(now.reduced_chi_square - 1.0, 1e-300)
 
 
 def inflation(parts: Sequence[Columns], fit: Fit, names: Sequence[Name]) -> float:
@@ -197,8 +190,8 @@ def inflation(parts: Sequence[Columns], fit: Fit, names: Sequence[Name]) -> floa
     The other parameters and the runs' own unknowns are projected out. Blocks of the record show what is coloured or
     comes in bursts; whole runs, where there are several, show what differs between them.
     """
-    columns = [apart(p.own, p.columns) for p in parts]
-    scaled = [apart(p.own, p.scaled[:, None])[:, 0] for p in parts]
+    columns = [orthogonal_part(p.own, p.columns) for p in parts]
+    scaled = [orthogonal_part(p.own, p.scaled[:, None])[:, 0] for p in parts]
     information = np.sum([x.T @ x for x in columns], axis=0)
     mine = [fit.names.index(n) for n in names if information[(i := fit.names.index(n)), i] > 0.0]
     others = [i for i in range(len(fit.names)) if i not in mine and information[i, i] > 0.0]
@@ -223,7 +216,7 @@ def inflation(parts: Sequence[Columns], fit: Fit, names: Sequence[Name]) -> floa
         for x, z in zip(own, scaled, strict=True) for rows in np.array_split(np.arange(len(z)), each)
     ]  # fmt: skip
     found = [1.0, ratio(blocks)]
-    if len(parts) >= FEWEST_RUNS:
+    if len(parts) >= MIN_RUNS:
         found.append(ratio([x.T @ z for x, z in zip(own, scaled, strict=True)]))
     return max(x for x in found if np.isfinite(x))
 

@@ -9,22 +9,20 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from identify.diagnose.disturbance import disturbance_of
-from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
-from identify.estimate.final_fit import Fitted, covariance_of, free_run_of
+from identify.diagnose.torque_fit import TorqueFit
+from identify.diagnose.torque_regression import TorqueRegression
+from identify.estimate.final_fit import FinalFit, covariance_of, free_run_of
 from identify.estimate.initial_guess import Start, scale_of
-from identify.estimate.judged import Judged
-from identify.estimate.output_error import Estimate
 from identify.likelihood.by_prediction_error import by_prediction_error
 from identify.likelihood.fit import Fit
-from identify.model.parameters import names_of
 from identify.model.structure import Structure
 from identify.results import Candidate, Dependence, Disturbance
 from identify.runs.holdout import Split
-from identify.runs.observability import why_unseen
-from identify.select.evidence import along, in_band
+from identify.runs.observability import can_show
+from identify.select.evidence import in_band, torque_fit_of
 from identify.select.search_state import Search
-from identify.select.torque_search import TorqueSearch, Weighed
-from identify.signals.trace import Trace, loads_differ
+from identify.select.torque_search import TorqueCandidate, TorqueSearch
+from identify.signals.trace import Trace
 from rig import effects
 from rig.effects.base import Place
 
@@ -55,13 +53,13 @@ class Found:
     """
 
     search: Search
-    before: Fitted
-    after: Fitted
+    before: FinalFit
+    after: FinalFit
     disturbance: Disturbance
     in_torque: tuple[TorqueErrors, TorqueErrors]
     left_before: Callable[[], Disturbance]  # what the declared model leaves
 
-    def taken_back(self) -> Found:
+    def rejected(self) -> Found:
         """The same with the declared model as the final one."""
         return replace(
             self, after=self.before, in_torque=(self.in_torque[0],) * 2, disturbance=self.left_before()
@@ -114,7 +112,7 @@ def search_in_torque(
     """
     few, parts = along_few.traces, along_few.split
     scale = scale_of(few, start.platform, ())
-    offered = [n for n in allowed if n not in structure.effects and _possible(n, traces)]
+    offered = [n for n in allowed if n not in structure.effects and can_show(n, traces)]
 
     def at(cutoff_hz: float) -> TorqueSearch:
         same = cutoff_hz == along_few.cutoff_hz
@@ -126,7 +124,7 @@ def search_in_torque(
 
     highest = HIGHEST / few[0].step_s
     search = at(min(start.cutoff_hz, highest))
-    trial = along(search.regression, known[0])
+    trial = torque_fit_of(search.regression, known[0])
     by_likelihood: tuple[Fit, Search] | None = known
     best = trial
     size_nm = float(np.sqrt(in_band(known[0].noise, search.regression.cutoff_hz) * known[0].variance))
@@ -153,7 +151,7 @@ def search_in_torque(
     if final == structure:
         after = before
     elif by_likelihood:
-        after, _ = by_prediction_error(
+        after = by_prediction_error(
             traces, final, by_likelihood[0].values, split.final, split.everything, like=by_likelihood[0]
         )  # fmt: skip
     else:
@@ -164,28 +162,26 @@ def search_in_torque(
         disturbance = Disturbance(size_nm, unit, size_nm / regression.torque_nm, (), {})
     if set(final.effects) <= set(known[0].structure.effects):
         for curve in curves:
-            disturbance = with_curve(disturbance, *curve)
+            disturbance = with_free_form(disturbance, *curve)
 
     def errors(fit: TorqueFit) -> TorqueErrors:
         size = regression.torque_nm
-        return TorqueErrors(fit.fitted_nm, fit.fitted_nm / size, fit.held_nm / size, floor, cutoff)
+        return TorqueErrors(fit.sigma, fit.sigma / size, fit.held_nm / size, floor, cutoff)
 
-    told = _told(search, structure, base, best)
+    told = _as_search(search, structure, base, best)
     if by_likelihood:
-        told = replace(
-            by_likelihood[1], base=told.base, best=replace(told.best, structure=final), contribution=told.contribution
-        )
-        told.horizon, told.floor, told.free_running = 0.0, floor, False
+        told = replace(by_likelihood[1], contribution=told.contribution)
     return Found(
         told, before, after, disturbance, (errors(base), errors(best)),
         lambda: disturbance_of(regression, base, floor, unit),
     )  # fmt: skip
 
 
-def with_curve(left: Disturbance, curve: Dependence, moves: Mapping[str, float]) -> Disturbance:
+def with_free_form(left: Disturbance, curve: Dependence, moves: Mapping[str, float]) -> Disturbance:
     """The same with a curve that the likelihood asks for; of two that go with the same, the larger."""
     same = [d for d in left.depends_on if d.on == curve.on and d.torque_rms > curve.torque_rms]
-    most = {t: max(left.moves_percent.get(t, 0.0), moves.get(t, 0.0)) for t in {*left.moves_percent, *moves}}
+    terms = dict.fromkeys((*left.moves_percent, *moves))  # in an order: a sentence lists them
+    most = {t: max(left.moves_percent.get(t, 0.0), moves.get(t, 0.0)) for t in terms}
     depends = (*(d for d in left.depends_on if d.on != curve.on), *(same or [curve]))
     size = max(left.torque_rms, curve.torque_rms)
     return replace(
@@ -216,16 +212,16 @@ def _more_flexible(best: TorqueFit, trial: TorqueFit) -> bool:
     return any(e.place is Place.DRIVE or (bool(found) and e.resembles_much) for e in added)
 
 
-def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> Fitted:
+def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> FinalFit:
     """The final fit by prediction error, or in torque where that leaves clearly less of it.
 
     Prediction error is the better estimate as long as what is left is a disturbance. Where it is a torque that goes
     with something, prediction error weighs the frequencies at which the model happens to be right and gives the rest
     away; least squares in torque does the least harm to the parameters.
     """
-    fitted, _ = by_prediction_error(traces, fit.structure, fit.values, split.final, split.everything)
+    fitted = by_prediction_error(traces, fit.structure, fit.values, split.final, split.everything)
     left = regression.left_by(fit.structure, fitted.values)
-    if left <= NO_WORSE * fit.fitted_nm:
+    if left <= NO_WORSE * fit.sigma:
         return fitted
     columns, residuals, names = regression.linear_parts(fit.structure, fit.values)
     covariance, determined = covariance_of(list(zip(columns, residuals, strict=True)), len(names))
@@ -233,33 +229,18 @@ def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace]
     covariance = block_diag(covariance, np.diag([fitted.std_error(n) ** 2 for n in shapes])) if shapes else covariance
     values = {n: fit.values[n] for n in (*names, *shapes)}
     free = free_run_of(traces, fit.structure, values, split.everything)
-    return Fitted(
-        fit.structure, values, covariance, (*names, *shapes), fit.fitted_nm, free, False,
-        (*determined, *(True for _ in shapes)), "least squares in torque",
+    return FinalFit(
+        fit, values, (*names, *shapes), covariance, free, False, (*determined, *(True for _ in shapes)),
+        "least squares in torque",
     )  # fmt: skip
 
 
-def _possible(name: str, traces: Sequence[Trace]) -> bool:
-    needs = effects.get(name).needs_added_inertia
-    return not why_unseen(name, traces) and (not needs or loads_differ(traces))
-
-
-def _judged(fit: TorqueFit, runs: int) -> Judged:
-    names = names_of(fit.structure, runs)
-    values = np.array([fit.values.get(n, 0.0) for n in names])
-    estimate = Estimate(
-        fit.structure, names, values, fit.fitted_nm, fit.count, np.zeros((len(names),) * 2), (), True
-    )  # fmt: skip
-    return Judged(fit.structure, estimate, np.array([fit.held_nm**2]), np.ones(1))
-
-
-def _told(search: TorqueSearch, structure: Structure, base: TorqueFit, best: TorqueFit) -> Search:
+def _as_search(search: TorqueSearch, structure: Structure, base: TorqueFit, best: TorqueFit) -> Search:
     """What was looked at, as the report tells it."""
-    runs = search.regression.runs
-    found = Search(_judged(base, runs), _judged(best, runs), 0.0, search.floor_nm)
+    found = Search(base, best, 0.0, search.floor_nm)
     named = [e for e in best.structure.effects if e not in structure.effects]
     for number, looks in enumerate(search.rounds, 1):
-        chosen = search.choice(looks)
+        chosen = search.best_candidate(looks)
         for look in looks:
             found.candidates.append(Candidate(look.effect, number, -look.evidence, None, _status(look, chosen, named)))
         if chosen is not None and chosen.effect in named:
@@ -277,10 +258,10 @@ def _told(search: TorqueSearch, structure: Structure, base: TorqueFit, best: Tor
     return found
 
 
-def _status(look: Weighed, chosen: Weighed | None, named: Sequence[str]) -> str:
+def _status(look: TorqueCandidate, chosen: TorqueCandidate | None, named: Sequence[str]) -> str:
     if chosen is not None and look.effect == chosen.effect:
         return "added" if look.effect in named else "added, then no longer needed"
-    if look.counts:
+    if look.is_significant:
         return "carries less than what was added"
     if look.sureness >= 4.0 and look.weight > 0.0:
         return f"proven but small: {PERCENT * look.weight:.0f} % of what is left"

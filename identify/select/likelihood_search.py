@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.initial_guess import Start, scale_of
-from identify.estimate.judged import Judged, horizon_s
-from identify.estimate.output_error import Estimate
+from identify.estimate.starting_point import horizon_s
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.results import Candidate
 from identify.runs.holdout import Split
-from identify.runs.observability import why_unseen
+from identify.runs.observability import can_show
 from identify.runs.reduced import reduced
-from identify.select.evidence import Weigher, disturbed
+from identify.select.evidence import EvidenceModel
 from identify.select.search_state import Search
 from identify.select.stepwise import AT_NOISE, Stepwise
-from identify.signals.trace import Trace, loads_differ
-from rig import effects
+from identify.signals.trace import Trace, pooled_noise
 from rig.platform import TERMS
 
 SAMPLES = 10_000  # that the search looks at
@@ -67,23 +65,23 @@ class LikelihoodSearch:
         guessed: dict[Name, float] = {(k,): v for k, v in zip(TERMS, start.platform, strict=True)}
         first = {**declared, **guessed}
         base = problem.fit(structure, first)
-        if disturbed(base) > AT_NOISE:  # of two minima this may be the other
+        if base.reduced_chi_square > AT_NOISE:  # of two minima this may be the other
             twin = problem.fit(structure, {**guessed, **declared})
             base = min((base, twin), key=lambda f: f.cost)
         count = sum(t.count for t in traces)
         whole = None
         if count > MORE * base.count:
             whole = PredictionError(reduced(traces, split, ALL)[0])
-        offered = [n for n in allowed if n not in structure.effects and _possible(n, traces)]
+        offered = [n for n in allowed if n not in structure.effects and can_show(n, traces)]
         cutoff_hz = min(start.cutoff_hz, HIGHEST / few[0].step_s)
         regression = TorqueRegression(few, parts, cutoff_hz, scale_of(few, start.platform, ()))
         floor = regression.noise_floor_nm(base.values)
-        weigher = Weigher(problem, regression, floor)
+        weigher = EvidenceModel(problem, regression, floor)
         return cls(Stepwise(problem, base, offered, weigher, say, whole, count), traces, structure)
 
     def run(self) -> bool:
         """Search; whether the last model predicts down to the sensor's noise."""
-        return disturbed(self.stepwise.run()) < AT_NOISE
+        return self.stepwise.run().reduced_chi_square < AT_NOISE
 
     @property
     def found(self) -> Search:
@@ -95,8 +93,8 @@ class LikelihoodSearch:
         s = self.stepwise
         base = s.base
         horizon = horizon_s(tuple(base.values.get((t,), 0.0) for t in TERMS), self.traces)  # type: ignore[arg-type]
-        noise = float(np.sqrt(np.mean([t.noise**2 for t in self.traces])))
-        found = Search(_judged(base, noise), _judged(best, noise), horizon, noise, free_running=True)
+        noise = pooled_noise(self.traces)
+        found = Search(_with_disturbance(base, noise), _with_disturbance(best, noise), horizon, noise)
         named = [e for e in best.structure.effects if e not in base.structure.effects]
         for r in s.rounds:
             for score in r.scores:
@@ -121,21 +119,12 @@ def _status(name: str, added: Sequence[str], named: Sequence[str], fit: Fit | No
     return "no better" if added else "not worth it"
 
 
-def _judged(fit: Fit, noise: float) -> Judged:
-    """A fit as the final fits and the report see it; ``noise`` is the sensor's, as the runs show it.
+def _with_disturbance(fit: Fit, noise: float) -> Fit:
+    """A fit that leaves what its disturbance moves, too; ``noise`` is the sensor's, as the runs show it.
 
     A large disturbance that follows every reading leaves a fit no noise of the sensor to tell. Where the sensor's noise
     is known to be more than all that is predicted wrongly, nothing disturbs.
     """
     wrong = np.concatenate([e[s.weight] for e, s in zip(fit.prediction.innovations, fit.shots, strict=True)])
     rms = float(np.sqrt(np.mean(wrong**2)))
-    noise = rms if rms < noise else float(np.sqrt(max(fit.variance, noise**2) * disturbed(fit)))
-    estimate = Estimate(
-        fit.structure, fit.names, fit.vector, noise, fit.count, fit.information, fit.shots, True
-    )  # fmt: skip
-    return Judged(fit.structure, estimate, np.array([noise**2]), np.ones(1))
-
-
-def _possible(name: str, traces: Sequence[Trace]) -> bool:
-    needs = effects.get(name).needs_added_inertia
-    return not why_unseen(name, traces) and (not needs or loads_differ(traces))
+    return replace(fit, variance=rms**2 if rms < noise else max(fit.variance, noise**2) * fit.reduced_chi_square)

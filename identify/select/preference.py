@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from identify.likelihood.fit import Fit
 from identify.runs.measured_channels import simplicity
-from identify.select.evidence import TRUSTED, Evidence, Weigher
+from identify.select.evidence import TRUSTED, Evidence, EvidenceModel
 from rig import effects
 from rig.effects.base import Place
 
@@ -14,7 +14,7 @@ AS_HEAVY = 0.05  # of the disturbance: what a richer effect carries besides, to 
 SPECIAL = 0.8  # of the fall of the cost with a richer effect, parameters paid for: its special case is preferred
 
 
-def plainest(weigher: Weigher, fits: Mapping[str, Fit]) -> str:
+def simplest(weigher: EvidenceModel, fits: Mapping[str, Fit]) -> str:
     """Of candidates that do as well: no channel, fewest parameters, least torque left on held-out samples.
 
     Torque cannot judge a lag of the sensor, which has none: among such the likelier goes first.
@@ -28,7 +28,7 @@ def plainest(weigher: Weigher, fits: Mapping[str, Fit]) -> str:
     return min(fits, key=lambda n: (simplicity(n), len(fits[n].names), left(n), n))
 
 
-def cannot_gain(seen: Mapping[str, Evidence], rich: str, close: Sequence[str], more: float) -> bool:
+def no_possible_gain(seen: Mapping[str, Evidence], rich: str, close: Sequence[str], more: float) -> bool:
     """Whether an effect holds a simpler one and is no likelier, nor will be with ``more`` times the samples."""
     return any(
         (seen[rich].gain - seen[n].gain) * more < seen[rich].price - seen[n].price
@@ -36,16 +36,16 @@ def cannot_gain(seen: Mapping[str, Evidence], rich: str, close: Sequence[str], m
     )  # fmt: skip
 
 
-def prefers_special(special: Evidence, rich: Evidence) -> bool:
+def prefers_special_case(special: Evidence, rich: Evidence) -> bool:
     """Whether a special case is taken before the richer effect that holds it.
 
     It is if most of the fall of the cost is its own; and where the likelihood cannot be trusted, if it carries as much
     torque. Inflations are left out: those of two that are nearly alike differ by chance.
     """
     as_heavy = rich.inflation >= TRUSTED and special.weight > rich.weight - AS_HEAVY
-    return takes_most(special, rich) or as_heavy
+    return explains_most(special, rich) or as_heavy
 
 
-def takes_most(special: Evidence, rich: Evidence) -> bool:
+def explains_most(special: Evidence, rich: Evidence) -> bool:
     """Whether most of the fall of the cost with an effect is that of its special case."""
     return special.gain - special.price > SPECIAL * (rich.gain - rich.price)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from identify.estimate.judged import Judged, share_explained
+from identify.model.parameter_fit import ParameterFit, reduced_chi_square
 from identify.results import Candidate
 from rig.platform import Platform
 
@@ -23,33 +23,29 @@ class Search:
         Effect -> rival -> the platform fitted with the rival in its place.
     dropped
         Terms of the declared model and effects that the data do not support, with the reason.
-    free_running
-        Whether ``best`` was judged over whole runs, by a search that believed it there.
     contribution
         Effect -> held-out error without it over the one with it, once the search is through.
     left_open, tells_apart
         In words, an effect that was found and may be something else as well, and what would tell which.
     """
 
-    base: Judged
-    best: Judged
+    base: ParameterFit
+    best: ParameterFit
     horizon: float
     floor: float
     candidates: list[Candidate] = field(default_factory=list)
     rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
     rival_models: dict[str, dict[str, Platform]] = field(default_factory=dict)
     dropped: list[tuple[str, str]] = field(default_factory=list)
-    free_running: bool = False
     contribution: dict[str, float] = field(default_factory=dict)
     left_open: str = ""
     tells_apart: str = ""
 
-    @property
-    def share(self) -> float:
-        """Share of the excess over the noise floor that the effects found take away, held-out squares."""
-        return share_explained(self.base, self.best, self.floor)
+    def reduced_chi_square(self, fit: ParameterFit) -> float:
+        """Of what one of its models leaves on samples held out."""
+        return reduced_chi_square(fit.held_out_error, self.floor)
 
-    def take_all_back(self) -> None:
+    def reject_all(self) -> None:
         """Name nothing: the declared model is what there is."""
         kept = self.base.structure.effects
         self.candidates = [
@@ -57,9 +53,8 @@ class Search:
             for c in self.candidates
         ]  # fmt: skip
         self.best, self.rivals, self.rival_models, self.dropped = self.base, {}, {}, []
-        self.free_running = False
 
-    def leave_open(self, name: str, told: tuple[str, str], without: Judged) -> None:
+    def mark_undetermined(self, name: str, sentences: tuple[str, str], without: ParameterFit) -> None:
         """Take an effect back that may as well be something no library has, and what was found beside it.
 
         ``without`` is the model of what was found before it.
@@ -73,5 +68,5 @@ class Search:
         for effect in gone:
             self.rivals.pop(effect, None)
             self.rival_models.pop(effect, None)
-        self.best, self.dropped, self.free_running = without, [], False
-        self.left_open, self.tells_apart = told
+        self.best, self.dropped = without, []
+        self.left_open, self.tells_apart = sentences

@@ -10,46 +10,38 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.propose.innovation_score import Score
-from identify.select.curve_rivals import beaten_by_a_curve
-from identify.select.evidence import APART, TRUSTED, WEIGHT, Evidence, Weigher, behind, disturbed
-from identify.select.left_over import ON, LeftOver, left_over, needless_beside
-from identify.select.preference import cannot_gain, plainest, prefers_special
-from identify.select.trial_fits import FEW, HOPE, MANY, TrialFits
+from identify.select.curve_rivals import against_curves
+from identify.select.evidence import (
+    STRONG_SUPPORT,
+    TRUSTED,
+    WEIGHT,
+    Evidence,
+    EvidenceModel,
+    support_difference,
+)
+from identify.select.forward_selection import Round, add_effects
+from identify.select.free_form_residual import FreeFormFit, fit_free_forms, redundant_given
+from identify.select.preference import no_possible_gain, prefers_special_case, simplest
+from identify.select.replaced_terms import CERTAIN, replace_linear_terms
+from identify.select.trial_fits import FULL_ITERATIONS, HOPE, TRIAL_ITERATIONS, TrialFits
 from rig import effects
 from rig.platform import TERMS
 
 # What decides a name. All in units of the cost (minus twice the log-likelihood) or as shares.
-AT_NOISE = 1.1  # times the sensor's variance: a model that predicts as closely leaves no disturbance
-MOST = 6  # effects that one recording is believed to show
+AT_NOISE = 1.1  # reduced chi-square: a model that predicts as closely leaves no disturbance
 # What only costs time.
-CERTAIN = 30.0  # standard errors beyond which nobody asks whether a term is needed
 PROMISING = 0.1  # of the score of what was added: another with less was no rival then and is not asked again
-FAR_BEHIND = 0.1  # of what an effect explains: another that leaves more than that is no rival
+MIN_RIVAL_SHARE = 0.1  # of what an effect explains: another that leaves more than that is no rival
 
 
 _Key = tuple[frozenset[str], frozenset[str]]
-
-
-@dataclass(frozen=True)
-class Round:
-    """What was tried in one round: every candidate's score, the evidence of those fitted, and which was taken."""
-
-    number: int
-    now: Fit
-    scores: tuple[Score, ...]
-    tried: Mapping[str, Evidence]
-    added: tuple[str, ...]
-
-    @property
-    def chosen(self) -> str | None:
-        """The effect that was taken alone."""
-        return self.added[0] if len(self.added) == 1 else None
 
 
 @dataclass
@@ -73,7 +65,7 @@ class Stepwise:
     problem: PredictionError
     base: Fit
     allowed: Sequence[str]
-    weigher: Weigher
+    weigher: EvidenceModel
     say: Callable[[str], None] = lambda text: None
     whole: PredictionError | None = None
     samples: int = 0
@@ -82,8 +74,8 @@ class Stepwise:
     dropped: list[tuple[str, str]] = field(default_factory=list)
     best: Fit = None  # type: ignore[assignment]
     inflation: dict[str, float] = field(default_factory=dict)  # of every effect that was added, beside all others
-    left: LeftOver | None = None  # a curve that belongs beside the model, though no effect of that kind is known
-    doubtful: list[LeftOver] = field(default_factory=list)  # curves beside the model that are hardly chance
+    left: FreeFormFit | None = None  # a curve that belongs beside the model, though no effect of that kind is known
+    doubtful: list[FreeFormFit] = field(default_factory=list)  # curves beside the model that are hardly chance
     _on_all: dict[_Key, Fit] = field(default_factory=dict)
     _lacking: dict[_Key, Fit] = field(default_factory=dict)  # fits with one effect less than one that was tried
     _needed: dict[str, float] = field(default_factory=dict)  # support of an effect beside all others
@@ -94,115 +86,34 @@ class Stepwise:
 
     def run(self) -> Fit:
         """Add effects as long as one is worth it; judge each again beside the others; drop what is needless."""
-        self._add()
-        for other in (self.in_place_of_terms, self.judged_again):
+        add_effects(self)
+        for other in (partial(replace_linear_terms, self), self.re_evaluate):
             before, self.best = self.best.structure, other(self.best)
             if _key(self.best.structure) != _key(before):  # beside what was replaced, others may have shown nothing
-                self._add()
-        self.best = self.pruned(self.best, [*self.best.structure.terms, *self.trials.added(self.best)])
-        self.best = self.beside_what_is_left(self.against_curves(self.best))
+                add_effects(self)
+        self.best = self.backward_elimination(self.best, [*self.best.structure.terms, *self.trials.added(self.best)])
+        self.best = self.compare_with_free_form(against_curves(self, self.best))
         return self.best
 
-    def _add(self) -> None:
-        """Effects one at a time as long as one is worth it, and two at once where neither shows alone.
+    def known(self, structure: Structure) -> Fit | None:
+        """A structure as the search has fitted it, on the way or to ask what is needed; None where it has not."""
+        on_the_way = [r.now for r in self.rounds if _key(r.now.structure) == _key(structure)]
+        return on_the_way[-1] if on_the_way else self._lacking.get(_key(structure))
 
-        What a model predicts wrongly while much is missing may hide how much of the torque an effect carries. One that
-        is proven and lets predictions err by clearly less is therefore added on trial: it stays if others are found
-        beside it and it carries its share by then.
-        """
-        trial: tuple[str, Fit] | None = None  # the effect on trial, and the model without it
-        for number in range(len(self.rounds) + 1, MOST + 1):
-            now = self.best
-            scores, tried = self.tried(now)
-            chosen = self.choice(tried)
-            new = tried[chosen] if chosen else self._pair(now, scores)
-            added = tuple(e for e in new.fit.structure.effects if e not in now.structure.effects) if new else ()
-            if new is None and trial is None and (new := self._on_trial(tried)):
-                trial, added = (new.effect, now), (new.effect,)
-                self.say(f"added {new.effect} on trial: log-likelihood +{0.5 * new.gain:.3g}")
-                self.rounds.append(Round(number, now, tuple(scores), tried, added))
-                self.best = new.fit
-                continue
-            self.rounds.append(Round(number, now, tuple(scores), tried, added))
-            if new is None:
-                break
-            self.say(
-                f"added {' and '.join(added)}: log-likelihood +{0.5 * new.gain:.3g}, "
-                f"{100.0 * new.weight:.0f} % of the disturbance"
-            )
-            self.best = self.pruned(new.fit, [e for e in self.trials.added(new.fit) if e not in added])
-            if trial and self._carries(trial[0]):
-                trial = None
-        if trial:
-            self.say(f"took {trial[0]} back")
-            self.best = self._without_trial(*trial)
-
-    def _pair(self, now: Fit, scores: Sequence[Score]) -> Evidence | None:
-        """The likeliest two effects at once that are worth it together; None where none are."""
-        seen = [self.weigher.evidence(one, now, fit) for one, _, fit in self.trials.pairs(now, scores)]
-        good = [e for e in seen if e.support > HOPE and e.weight > WEIGHT]
-        return min(good, key=lambda e: e.fit.penalised, default=None)
-
-    @staticmethod
-    def _on_trial(tried: Mapping[str, Evidence]) -> Evidence | None:
-        """The likeliest effect that is proven, though it carries little torque as yet."""
-        proven = [e for e in tried.values() if e.support > HOPE and e.beyond > WEIGHT]
-        return min(proven, key=lambda e: e.fit.penalised, default=None)
-
-    def _carries(self, name: str) -> bool:
-        """Whether an effect carries its share beside all others."""
-        if name not in self.best.structure.effects:
-            return True
-        evidence = self.weigher.evidence(name, self._without(self.best, name), self.best)
-        return evidence.support > APART and evidence.weight > WEIGHT
-
-    def _without_trial(self, name: str, before: Fit) -> Fit:
-        """The model without an effect that carries nothing still: as it was, or with what was found since."""
-        self.dropped.append((name, "it carries no torque that the others do not"))
-        found = len(self.best.structure.effects) > len(before.structure.effects) + 1
-        return self._without(self.best, name, MANY) if found else before
-
-    def against_curves(self, now: Fit) -> Fit:
-        """Without names that a curve in their place beats; what else is there is judged beside that curve next."""
-        if self.trials.added(now):
-            self.say("comparing what was found with curves in its place")
-        found = beaten_by_a_curve(self, now)
-        if found is None:
-            return now
-        names, curve, rest = found
-        self.dropped += [(n, f"a curve over the {ON[curve]} explains clearly more in its place") for n in names]
-        self.say(f"took {' and '.join(names)} back: a curve over the {ON[curve]} explains clearly more")
-        return rest
-
-    def without(self, now: Fit, names: Sequence[str]) -> Fit:
-        """The same without some effects, fitted."""
-        structure = now.structure
-        for name in names:
-            structure = structure.minus(name)
-        known = [r.now for r in self.rounds if _key(r.now.structure) == _key(structure)]
-        if known:
-            return known[-1]
-        if (key := _key(structure)) not in self._lacking:
-            values = {k: v for k, v in now.values.items() if k[0] not in names}
-            self._lacking[key] = self.problem.fit(
-                structure, values, now.noise, FEW, carry=now.shots, thorough=False
-            )  # fmt: skip
-        return self._lacking[key]
-
-    def beside_what_is_left(self, now: Fit) -> Fit:
+    def compare_with_free_form(self, now: Fit) -> Fit:
         """Without names that explain nothing beside a curve over what is left."""
         self.say("looking at what is left")
         while True:
-            left, self.doubtful = left_over(self, now)
+            left, self.doubtful = fit_free_forms(self, now)
             self.left = left
             if left is None:
                 break
-            name = needless_beside(self, left, self.trials.added(now))
+            name = redundant_given(self, left, self.trials.added(now))
             if name is None:
                 break
             self.dropped.append((name, "beside a curve over what no effect explains, it explains nothing"))
             self.say(f"took {name} back: a curve over what is left explains it")
-            now = self._without(now, name, MANY)
+            now = self.without(now, name, FULL_ITERATIONS)
         return now
 
     @property
@@ -210,26 +121,26 @@ class Stepwise:
         """Whether the likelihood is right about every effect of its model, and so about the disturbance it leaves."""
         return all(self.inflation.get(e, 1.0) < TRUSTED for e in self.trials.added(self.best))
 
-    def tried(self, now: Fit) -> tuple[list[Score], dict[str, Evidence]]:
+    def score_candidates(self, now: Fit) -> tuple[list[Score], dict[str, Evidence]]:
         """All candidates' scores, and the evidence for the most promising, fitted."""
-        scores, fits = self.trials.of_a_round(now)
+        scores, fits = self.trials.score_round(now)
         return scores, {n: self.weigher.evidence(n, now, f) for n, f in fits.items()}
 
-    def choice(self, tried: Mapping[str, Evidence]) -> str | None:
+    def best_candidate(self, tried: Mapping[str, Evidence]) -> str | None:
         """The candidate that is best supported, or the simplest of those that are as likely; None where none counts."""
         good = {n: e for n, e in tried.items() if e.support > HOPE and e.weight > WEIGHT}
         if not good:
             return None
         best = min(good.values(), key=lambda e: e.fit.penalised)
-        special = [n for n in effects.get(best.effect).nests if n in good and prefers_special(good[n], best)]
+        special = [n for n in effects.get(best.effect).nests if n in good and prefers_special_case(good[n], best)]
         if special:
             best = max((good[n] for n in special), key=lambda e: e.support)
-        alike = [n for n, e in good.items() if e is best or behind(e.fit, best.fit) < APART]
-        chosen = plainest(self.weigher, {n: good[n].fit for n in alike})
+        alike = [n for n, e in good.items() if e is best or support_difference(e.fit, best.fit) < STRONG_SUPPORT]
+        chosen = simplest(self.weigher, {n: good[n].fit for n in alike})
         lower = [n for n in effects.get(chosen).lower_order if n in good]
         return lower[0] if lower else chosen
 
-    def judged_again(self, now: Fit) -> Fit:
+    def re_evaluate(self, now: Fit) -> Fit:
         """Every named effect against all others in its place, beside the finished rest."""
         for name in self.trials.added(now):
             if name not in now.structure.effects:
@@ -237,9 +148,9 @@ class Stepwise:
             rest, others = self._others(now, name)
             fits: dict[str, Fit] = {name: now}
             for other, fit in others.items():
-                near = fit.penalised - now.penalised < FAR_BEHIND * (rest.cost - now.cost)
+                near = fit.penalised - now.penalised < MIN_RIVAL_SHARE * (rest.cost - now.cost)
                 fits[other] = self.trials.further(fit) if near else fit
-            fits = {n: self._without_soaking(f) for n, f in fits.items()}
+            fits = {n: self._without_absorbing_stiffness(f) for n, f in fits.items()}
             seen = {n: self.weigher.evidence(n, rest, f) for n, f in fits.items()}
             self._needed[name] = seen[name].support
             chosen, alike = self._best_of(name, seen)
@@ -251,40 +162,7 @@ class Stepwise:
             self.rivals[chosen] = {n: fits[n] for n in alike if n != chosen}
         return now
 
-    def in_place_of_terms(self, now: Fit) -> Fit:
-        """With an effect instead of damping or stiffness, where that is likelier: a drag is no viscous friction.
-
-        Beside the term such an effect explains little, and the other way round.
-        """
-        for term in ("damping", "stiffness"):
-            if term not in now.structure.terms or abs(now.values[(term,)]) >= CERTAIN * now.std_error((term,)):
-                continue
-            rest = self._without(now, term)
-            fits = self.trials.of_a_round(rest)[1]
-            fits = {
-                n: f for n, f in fits.items() if len(f.names) <= len(now.names) and behind(now, f) > APART
-                and set(now.structure.effects) <= set(f.structure.effects)
-            }  # fmt: skip
-            if not fits:
-                continue
-            best = min(fits.values(), key=lambda f: f.penalised)
-            name = plainest(self.weigher, {n: f for n, f in fits.items() if behind(f, best) < APART})
-            evidence = self.weigher.evidence(name, rest, fits[name])
-            if evidence.support < APART or evidence.weight < WEIGHT or self._goes_with(term, now, fits[name]):
-                continue
-            self.dropped.append((term, f"{name} explains more in its place"))
-            self.say(f"replaced {term} by {name}")
-            now, self.inflation[name] = fits[name], evidence.inflation
-        return now
-
-    def _goes_with(self, term: str, now: Fit, instead: Fit) -> bool:
-        """Whether a model with an effect in the place of a term is likelier still with both."""
-        start = {**instead.values, (term,): now.values[(term,)]}
-        structure = now.structure.plus(*(e for e in instead.structure.effects if e not in now.structure.effects))
-        both = self.problem.fit(structure, start, instead.noise, FEW, carry=instead.shots, thorough=False)
-        return behind(instead, both) > APART
-
-    def _without(self, now: Fit, name: str, steps: int = FEW) -> Fit:
+    def without(self, now: Fit, name: str, steps: int = TRIAL_ITERATIONS) -> Fit:
         """The same without a term or an effect."""
         return self.problem.fit(
             now.structure.minus(name), now.without(name), now.noise, steps, carry=now.shots, thorough=False
@@ -302,8 +180,8 @@ class Stepwise:
                 return r.now, tried
         rest = self._lacking.get(_key(without))
         if rest is None:
-            rest = self._without(now, name, MANY)
-        return rest, self.trials.instead(now, rest, name, self._promising())
+            rest = self.without(now, name, FULL_ITERATIONS)
+        return rest, self.trials.alternatives_to(now, rest, name, self._promising())
 
     def _promising(self) -> set[str]:
         """Effects whose score was not far behind what was added, in any round."""
@@ -318,22 +196,24 @@ class Stepwise:
         best = seen[name]
         for other in seen.values():
             special = best.effect in effects.get(other.effect).nests and not self._has_more(other, best)
-            if other.weight > WEIGHT and behind(best.fit, other.fit) > APART and not special:
+            if other.weight > WEIGHT and support_difference(best.fit, other.fit) > STRONG_SUPPORT and not special:
                 best = other
         while held := [n for n in effects.get(best.effect).nests if n in seen and not self._has_more(best, seen[n])]:
             best = max((seen[n] for n in held), key=lambda e: e.support)
         alike = [
             n for n, e in seen.items()
-            if e is best or (e.weight > WEIGHT and max(behind(e.fit, best.fit), behind(best.fit, e.fit)) < APART)
+            if e is best or (e.weight > WEIGHT and max(
+                support_difference(e.fit, best.fit), support_difference(best.fit, e.fit)
+            ) < STRONG_SUPPORT)
         ]  # fmt: skip
         more = max(1.0, self.samples / max(best.fit.count, 1))
         richer = {n for n in alike if best.effect in effects.get(n).nests}  # to which it was preferred
-        close = [n for n in alike if n not in richer and not cannot_gain(seen, n, alike, more)]
+        close = [n for n in alike if n not in richer and not no_possible_gain(seen, n, alike, more)]
         if len(close) > 1 and self.whole is not None:
             fits = {n: self.on_all(seen[n].fit) for n in close}
             likeliest = min(fits.values(), key=lambda f: f.penalised)
-            alike = [n for n, f in fits.items() if behind(f, likeliest) < APART]
-        return plainest(self.weigher, {n: seen[n].fit for n in alike}), alike
+            alike = [n for n, f in fits.items() if support_difference(f, likeliest) < STRONG_SUPPORT]
+        return simplest(self.weigher, {n: seen[n].fit for n in alike}), alike
 
     def _has_more(self, rich: Evidence, special: Evidence) -> bool:
         """Whether an effect is worth it after its special case, judged as it was when it was added."""
@@ -346,24 +226,24 @@ class Stepwise:
         key = _key(fit.structure)
         if key not in self._on_all:
             noise = self.whole.noise_of(fit)
-            self._on_all[key] = self.whole.fit(fit.structure, fit.values, noise, FEW, thorough=False)
+            self._on_all[key] = self.whole.fit(fit.structure, fit.values, noise, TRIAL_ITERATIONS, thorough=False)
         return self._on_all[key]
 
-    def pruned(self, now: Fit, names: Sequence[str]) -> Fit:
+    def backward_elimination(self, now: Fit, names: Sequence[str]) -> Fit:
         """Without every term or effect that the data do as well without."""
         for name in names:
             if name == "inertia" or len(now.structure.terms) + len(now.structure.effects) <= 1:
                 continue
             own = [n for n in now.names if n[0] == name]
             term = len(own) == 1 and own[0][0] in TERMS
-            if not self._asked(now, name, own):
+            if not self._is_in_doubt(now, name, own):
                 continue
-            without = self._without(now, name)
+            without = self.without(now, name)
             self._lacking[_key(without.structure)] = without
             evidence = self.weigher.evidence(name, without, now)
-            soaks = name == "stiffness" and self._may_soak(now)
+            soaks = name == "stiffness" and self._stiffness_may_absorb(now)
             light = evidence.weight < WEIGHT and (name not in TERMS or soaks)
-            if evidence.support > APART and not light:
+            if evidence.support > STRONG_SUPPORT and not light:
                 continue
             why = f"the log-likelihood changes by {-0.5 * evidence.gain:+.2g} without it"
             if term and light:
@@ -373,22 +253,22 @@ class Stepwise:
             now = without
         return now
 
-    def _may_soak(self, now: Fit) -> bool:
+    def _stiffness_may_absorb(self, now: Fit) -> bool:
         """Whether the spring is so weak that it may only soak up what is constant over a run, or pushes."""
         pull = now.values.get(("stiffness",), 0.0) * self.problem.angle_rad
-        return disturbed(now) > AT_NOISE and pull < WEIGHT * self.problem.torque_nm
+        return now.reduced_chi_square > AT_NOISE and pull < WEIGHT * self.problem.torque_nm
 
-    def _without_soaking(self, now: Fit) -> Fit:
+    def _without_absorbing_stiffness(self, now: Fit) -> Fit:
         """The same without a spring that only soaks up what is constant: gravity is a spring of its own."""
-        if "stiffness" not in now.structure.terms or not self._may_soak(now):
+        if "stiffness" not in now.structure.terms or not self._stiffness_may_absorb(now):
             return now
-        without = self._without(now, "stiffness")
+        without = self.without(now, "stiffness")
         evidence = self.weigher.evidence("stiffness", without, now)
-        return without if evidence.support < APART or evidence.weight < WEIGHT else now
+        return without if evidence.support < STRONG_SUPPORT or evidence.weight < WEIGHT else now
 
-    def _asked(self, now: Fit, name: str, own: Sequence[Name]) -> bool:
+    def _is_in_doubt(self, now: Fit, name: str, own: Sequence[Name]) -> bool:
         """Whether it is in doubt that a term or an effect is needed."""
-        if name == "stiffness" and self._may_soak(now):
+        if name == "stiffness" and self._stiffness_may_absorb(now):
             return True
         if name in TERMS:
             return abs(now.values[own[0]]) < CERTAIN * now.std_error(own[0])

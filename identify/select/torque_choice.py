@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from identify.select.evidence import APART
+from identify.select.evidence import STRONG_SUPPORT
 from identify.select.likelihood_search import LikelihoodSearch
 from identify.signals.torque_noise import quieter
 from identify.signals.trace import Trace
 
 
-def begun(
+def start_search(
     traces: Sequence[Trace], begin: Callable[[Sequence[Trace]], LikelihoodSearch]
 ) -> tuple[LikelihoodSearch, float | None]:
     """The search on the runs whose declared model is likelier, and above which frequency their torque was filtered.
@@ -23,6 +23,6 @@ def begun(
         return search, None
     filtered, cutoff_hz = less
     other = begin(filtered)
-    if other.stepwise.base.cost > search.stepwise.base.cost - APART:
+    if other.stepwise.base.cost > search.stepwise.base.cost - STRONG_SUPPORT:
         return search, None
     return other, cutoff_hz

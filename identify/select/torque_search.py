@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from identify.diagnose.torque_regression import TorqueFit, TorqueRegression
-from identify.propose.torque_looks import torque_looks
-from identify.select.evidence import WEIGHT
+from identify.diagnose.torque_fit import TorqueFit
+from identify.diagnose.torque_regression import TorqueRegression
+from identify.propose.torque_looks import candidate_torques
+from identify.select.evidence import MAX_EFFECTS, STRONG_SUPPORT, WEIGHT
 from rig import effects
 from rig.effects.base import Place
 
@@ -20,14 +21,12 @@ SURE = 4.0  # standard errors, over blocks of the held-out samples, by which the
 RICHER = 0.6  # share of what its special case leaves that a richer effect has to take away to be named in its place
 AS_HEAVY = 0.05  # of what is left: candidates that differ by less carry the same torque
 RIVAL = 0.02  # of what is left: rivals carry as much as what was taken, to that
-TOLD_APART = 10.0  # fall of the penalised cost that parts two candidates (Kass and Raftery 1995: very strong)
 INERTIA_MATTERS = 0.2  # of the torque: below, the motion hardly shows the inertia
 POLISHED = 8  # candidates whose shapes are searched for beside those of a grid
-MOST = 6  # effects that one recording is believed to show
 
 
 @dataclass(frozen=True)
-class Weighed:
+class TorqueCandidate:
     """One candidate on top of a model.
 
     Attributes
@@ -51,7 +50,7 @@ class Weighed:
     sureness_by_size: float
 
     @property
-    def counts(self) -> bool:
+    def is_significant(self) -> bool:
         """Whether it is proven and carries enough to be named."""
         flexible = effects.get(self.effect).resembles_much  # its shape was looked for on the held-out samples, too
         return self.weight >= WEIGHT and (self.sureness_by_size if flexible else self.sureness) >= SURE
@@ -79,32 +78,32 @@ class TorqueSearch:
     acceleration: float
     allowed: Sequence[str]
     say: Callable[[str], None] = lambda text: None
-    rounds: list[tuple[Weighed, ...]] = field(default_factory=list)
+    rounds: list[tuple[TorqueCandidate, ...]] = field(default_factory=list)
 
     def run(self) -> TorqueFit:
         """Add effects as long as one carries weight, then drop what no longer does."""
-        now = self.without_soaking_stiffness(self.base)
-        while len(now.structure.effects) < MOST + len(self.base.structure.effects):
-            looks = self.looks(now)
+        now = self.without_absorbing_stiffness(self.base)
+        while len(now.structure.effects) < MAX_EFFECTS + len(self.base.structure.effects):
+            looks = self.candidates(now)
             self.rounds.append(tuple(looks))
-            chosen = self.choice(looks)
+            chosen = self.best_candidate(looks)
             if chosen is None:
                 break
             self.say(f"added {chosen.effect}: {100.0 * chosen.weight:.0f} % of the residual torque on held-out data")
-            now = self.pruned(self.without_soaking_stiffness(chosen.fit))
+            now = self.backward_elimination(self.without_absorbing_stiffness(chosen.fit))
         return now
 
     def left(self, fit: TorqueFit) -> float:
         """Held-out power of the residual above the sensor's."""
-        return max(fit.held_nm**2 - self.floor_nm**2, 1e-4 * self.floor_nm**2)
+        return fit.power_above(self.floor_nm)
 
-    def weighed(self, name: str, now: TorqueFit, fit: TorqueFit) -> Weighed:
+    def candidate(self, name: str, now: TorqueFit, fit: TorqueFit) -> TorqueCandidate:
         """A candidate's weight and evidence on top of a model."""
         share = 1.0 - self._smaller_inertia(now, fit) * self.left(fit) / self.left(now)
         worth = share > 0.2 * WEIGHT
         evidence = self.regression.evidence(now, fit) if worth else 0.0
         by_size, by_ratio = self.regression.sureness(now, fit) if worth else (0.0, 0.0)
-        return Weighed(name, fit, share, evidence, max(by_size, by_ratio), by_size)
+        return TorqueCandidate(name, fit, share, evidence, max(by_size, by_ratio), by_size)
 
     def _smaller_inertia(self, now: TorqueFit, fit: TorqueFit) -> float:
         """By how much more a smaller inertia makes of the same torque, in acceleration and squared.
@@ -117,7 +116,7 @@ class TorqueSearch:
             return 1.0
         return float((old / max(new, 1e-9 * old)) ** 2)
 
-    def looks(self, now: TorqueFit) -> list[Weighed]:
+    def candidates(self, now: TorqueFit) -> list[TorqueCandidate]:
         """All candidates on top of a model, the heaviest first."""
         spring = "stiffness" in now.structure.terms
         answers = now.values.get(("inertia",), 0.0) * self.acceleration > INERTIA_MATTERS * self.regression.torque_nm
@@ -129,13 +128,13 @@ class TorqueSearch:
             and (answers or effects.get(n).place is not Place.DRIVE)  # a late torque shows in what it sets in motion
             and not set(effects.get(n).nests) & set(have)  # what holds one that is there is asked in its place
         ]  # fmt: skip
-        looks = torque_looks(self.regression, now, names, POLISHED, polish=True)
-        return sorted((self.weighed(w.effect, now, w.fit) for w in looks), key=lambda w: -w.weight)
+        looks = candidate_torques(self.regression, now, names, POLISHED, polish=True)
+        return sorted((self.candidate(w.effect, now, w.fit) for w in looks), key=lambda w: -w.weight)
 
     @staticmethod
-    def choice(looks: Sequence[Weighed]) -> Weighed | None:
+    def best_candidate(looks: Sequence[TorqueCandidate]) -> TorqueCandidate | None:
         """The candidate to add: of the heaviest the likeliest, of these the simplest."""
-        good = [w for w in looks if w.counts]
+        good = [w for w in looks if w.is_significant]
         if not good:
             return None
         heaviest = max(good, key=lambda w: w.weight)
@@ -145,7 +144,7 @@ class TorqueSearch:
         lower = [w for w in good if w.effect in effects.get(chosen.effect).lower_order]  # a constant before a slope
         return lower[0] if lower else chosen
 
-    def without_soaking_stiffness(self, now: TorqueFit) -> TorqueFit:
+    def without_absorbing_stiffness(self, now: TorqueFit) -> TorqueFit:
         """The same without a stiffness that carries no torque of its own, or that pushes where a spring pulls."""
         if "stiffness" not in now.structure.terms:
             return now
@@ -156,11 +155,12 @@ class TorqueSearch:
         return now if pulls and share >= WEIGHT and max(by_size, by_ratio) >= SURE else without
 
     @staticmethod
-    def as_good(look: Weighed, chosen: Weighed) -> bool:
+    def as_good(look: TorqueCandidate, chosen: TorqueCandidate) -> bool:
         """Whether a candidate carried as much as the one that was taken and is as likely: the data do not decide."""
-        return look.counts and look.weight > chosen.weight - RIVAL and look.evidence > chosen.evidence - TOLD_APART
+        as_heavy = look.is_significant and look.weight > chosen.weight - RIVAL
+        return as_heavy and look.evidence > chosen.evidence - STRONG_SUPPORT
 
-    def pruned(self, now: TorqueFit) -> TorqueFit:
+    def backward_elimination(self, now: TorqueFit) -> TorqueFit:
         """The same without the effects that no longer carry anything beside the others."""
         for name in now.structure.effects:
             if name in self.base.structure.effects or any(
@@ -169,12 +169,12 @@ class TorqueSearch:
                 continue
             shapes = {k: v for k, v in now.shapes.items() if k != name}
             without = self.regression.solve(now.structure.minus(name), shapes)
-            if not self.weighed(name, without, now).counts:
+            if not self.candidate(name, without, now).is_significant:
                 self.say(f"dropped {name}: the others carry its torque")
-                return self.pruned(without)
+                return self.backward_elimination(without)
         return now
 
 
-def _holds(simple: Weighed, rich: Weighed) -> bool:
+def _holds(simple: TorqueCandidate, rich: TorqueCandidate) -> bool:
     """Whether the richer effect carries too little beside its special case to be named in its place."""
     return (1.0 - rich.weight) > (1.0 - RICHER) * (1.0 - simple.weight)

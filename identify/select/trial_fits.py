@@ -16,9 +16,9 @@ from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.propose.innovation_score import InnovationScores, Score
-from identify.propose.torque_looks import TorqueLook, torque_looks
+from identify.propose.torque_looks import CandidateTorque, candidate_torques
 from identify.runs.measured_channels import simplicity
-from identify.select.evidence import WEIGHT, Weigher, disturbed
+from identify.select.evidence import WEIGHT, EvidenceModel
 from identify.signals.spectral_lines import foreign_lines_hz, ringing_hz, rings_hz
 from rig import effects
 from rig.effects.base import Place, Scale
@@ -29,11 +29,11 @@ TRIED = 4  # candidates of a round, by their scores, that are fitted
 PAIRS = 2  # pairs of a round, by their scores, that are fitted
 HEAVIEST = 3  # candidates by their weight in torque that are fitted beside those
 FAINT = 0.02  # of the best score: what promises so little is not what the round is about
-FEW, MANY = 14, 25  # steps of a fit that is compared, and of one that is kept
-NEAR = 0.9  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
+TRIAL_ITERATIONS, FULL_ITERATIONS = 14, 25  # steps of a fit that is compared, and of one that is kept
+FULL_FIT_RATIO = 0.9  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
 BEHIND = 0.3  # of the best fall of the cost so far: what has less after a few steps is not followed
 COMPARABLE = 0.3  # of the score of an effect, that another has in its place: with less it is no rival
-FOLLOWS = 1.1  # times the sensor's variance: where a prediction errs by less, no disturbance follows the readings
+FOLLOWS = 1.1  # reduced chi-square: where a prediction errs by less, no disturbance follows the readings
 OTHER_START = 1.5  # times the power in torque that a look leaves: a fit that leaves more is begun from there, too
 
 
@@ -56,7 +56,7 @@ class TrialFits:
     problem: PredictionError
     declared: Structure
     allowed: Sequence[str]
-    weigher: Weigher
+    weigher: EvidenceModel
 
     def added(self, now: Fit) -> list[str]:
         """Effects that the declared model lacks."""
@@ -80,51 +80,51 @@ class TrialFits:
         more = [m for n in have for m in effects.further(effects.first_of(n)) if m not in have][:1]
         return [n for n in (*self.allowed, *more) if n not in have]
 
-    def of_a_round(self, now: Fit) -> tuple[list[Score], dict[str, Fit]]:
+    def score_round(self, now: Fit) -> tuple[list[Score], dict[str, Fit]]:
         """All candidates' scores on top of a model, and fits of the most promising."""
         names = self.names(now)
         looks = InnovationScores(self.problem, now, self.scale(now)).all(names)
-        starts: dict[str, list[Mapping[Name, float] | TorqueLook]] = {
+        starts: dict[str, list[Mapping[Name, float] | CandidateTorque]] = {
             v[0].effect: [v[0].start] for v in self.shortlist(now, looks)
         }
         for name in self.unseen(now, names):
-            starts.setdefault(name, []).append(self.of_a_step(name, now))
-        for look in self.heaviest(now, names):
+            starts.setdefault(name, []).append(self.start_values(name, now))
+        for look in self.largest_torques(now, names):
             starts.setdefault(look.effect, []).append(look)
         fits = self.each_fitted(now, starts)
         most = max((now.cost - f.cost for f in fits.values()), default=0.0)
-        near = [n for n, f in fits.items() if now.cost - f.cost > NEAR * most]
+        near = [n for n, f in fits.items() if now.cost - f.cost > FULL_FIT_RATIO * most]
         for name in near:
             if not set(effects.get(name).nests) & set(near):  # a special case that is as good is taken in its place
                 fits[name] = self.further(fits[name])
         return [v[0] for v in looks], fits
 
-    def pairs(self, now: Fit, singles: Sequence[Score]) -> list[tuple[str, str, Fit]]:
+    def pairs(self, now: Fit, singles: Sequence[Score]) -> list[tuple[str, Fit]]:
         """Two effects at once where one alone shows little, fitted: those with the largest gains."""
         torque = [s for s in singles if effects.get(s.effect).place is not Place.SENSOR and not simplicity(s.effect)]
         price = float(np.log(max(now.count, 2)))
-        out: list[tuple[str, str, Fit]] = []
+        out: list[tuple[str, Fit]] = []
         for one, other, gain in InnovationScores(self.problem, now, self.scale(now)).pairs(torque)[:PAIRS]:
             parameters = sum(len(effects.get(s.effect).parameters) for s in (one, other))
             if gain < HOPE + price * parameters:
                 continue
             fit = self.problem.fit(
                 now.structure.plus(one.effect, other.effect), {**now.values, **one.start, **other.start}, now.noise,
-                MANY, carry=now.shots, thorough=False, against=now.cost,
+                FULL_ITERATIONS, carry=now.shots, thorough=False, against=now.cost,
             )  # fmt: skip
-            out.append((one.effect, other.effect, fit))
+            out.append((one.effect, fit))
         return out
 
     def unseen(self, now: Fit, names: Sequence[str]) -> list[str]:
         """Lags of the gyro, of a model without one: where a large disturbance follows every reading, their scores are
         small however long they are, and no torque goes with them.
         """
-        if disturbed(now) < FOLLOWS:
+        if now.reduced_chi_square < FOLLOWS:
             return []
         lags = [n for n in (*now.structure.effects, *names) if effects.get(n).lag is not None]
         return [] if set(lags) & set(now.structure.effects) else lags
 
-    def of_a_step(self, name: str, now: Fit) -> dict[Name, float]:
+    def start_values(self, name: str, now: Fit) -> dict[Name, float]:
         """An effect without gains, its times about a sample long."""
         scale = self.scale(now)
         return {
@@ -133,7 +133,7 @@ class TrialFits:
         }  # fmt: skip
 
     def each_fitted(
-        self, now: Fit, starts: Mapping[str, Sequence[Mapping[Name, float] | TorqueLook]]
+        self, now: Fit, starts: Mapping[str, Sequence[Mapping[Name, float] | CandidateTorque]]
     ) -> dict[str, Fit]:
         """Candidates fitted one after the other; one that begins far behind the best so far is not followed."""
         fits: dict[str, Fit] = {}
@@ -145,15 +145,15 @@ class TrialFits:
                 least = min(least, now.cost - BEHIND * (now.cost - fit.cost))
         return fits
 
-    def heaviest(self, now: Fit, names: Sequence[str]) -> list[TorqueLook]:
+    def largest_torques(self, now: Fit, names: Sequence[str]) -> list[CandidateTorque]:
         """Candidates that carry much of the disturbance along the measured motion."""
         there = self.weigher.in_torque(now)
         left = self.weigher.left(there)
         nested = {s for e in now.structure.effects for s in effects.get(e).nests}
         held = [n for n in names if n not in nested and not set(effects.get(n).nests) & set(there.structure.effects)]
-        looks = torque_looks(self.weigher.regression, there, held, HEAVIEST)
+        looks = candidate_torques(self.weigher.regression, there, held, HEAVIEST)
         special = {s for w in looks for s in effects.get(w.effect).nests} - {w.effect for w in looks}
-        looks += torque_looks(self.weigher.regression, there, [n for n in held if n in special], len(special))
+        looks += candidate_torques(self.weigher.regression, there, [n for n in held if n in special], len(special))
         floor = self.weigher.floor_nm**2
         return [w for w in looks if 1.0 - max(w.left_nm**2 - floor, 0.0) / left > WEIGHT]
 
@@ -170,7 +170,7 @@ class TrialFits:
         return short + [v for v in worth if v[0].effect in wanted and v not in short]
 
     def fitted(
-        self, now: Fit, name: str, starts: Sequence[Mapping[Name, float] | TorqueLook], least: float = np.inf
+        self, now: Fit, name: str, starts: Sequence[Mapping[Name, float] | CandidateTorque], least: float = np.inf
     ) -> Fit | None:  # fmt: skip
         """A candidate fitted on top of a model, in the place of what it contains: the best from all starts."""
         effect = effects.get(name)
@@ -181,22 +181,22 @@ class TrialFits:
             structure = structure.minus(special)
         fits: list[Fit] = []
         for start in starts:
-            if isinstance(start, TorqueLook):  # the rest begins there, too, and the disturbance is looked for anew
-                begun = starts[0] if fits and not isinstance(starts[0], TorqueLook) else {}
+            if isinstance(start, CandidateTorque):  # the rest begins there, too, and the disturbance is looked for anew
+                begun = starts[0] if fits and not isinstance(starts[0], CandidateTorque) else {}
                 if not fits or self._leaves_more(fits[0], start) or self._begun_small(name, begun, start):
                     begin = {**rest, **start.start}
-                    fits.append(
-                        self.problem.fit(
-                            structure.plus(name), begin, None, FEW, thorough=False, against=now.cost, least=least
-                        )
-                    )
+                    begun_there = self.problem.fit(
+                        structure.plus(name), begin, None, TRIAL_ITERATIONS,
+                        thorough=False, against=now.cost, least=least,
+                    )  # fmt: skip
+                    fits.append(begun_there)
                 continue
             own = {k: v for k, v in start.items() if k[0] not in held}
             for special in held:
                 own = {k: v + _gain(now, special) if k[0] == name and k[1] in linear else v for k, v in own.items()}
             fits.append(
                 self.problem.fit(
-                    structure.plus(name), {**rest, **own}, now.noise, FEW, carry=now.shots, thorough=False,
+                    structure.plus(name), {**rest, **own}, now.noise, TRIAL_ITERATIONS, carry=now.shots, thorough=False,
                     against=now.cost, least=least,
                 )
             )  # fmt: skip
@@ -204,21 +204,21 @@ class TrialFits:
         return best if np.isfinite(best.cost) else None
 
     @staticmethod
-    def _begun_small(name: str, begun: Mapping[Name, float], start: TorqueLook) -> bool:
+    def _begun_small(name: str, begun: Mapping[Name, float], start: CandidateTorque) -> bool:
         """Whether dry friction was begun far below what it has in torque: where it sticks, a fit stays there."""
         if effects.get(name).place is not Place.FRICTION:
             return False
         gains = [(name, p.name) for p in effects.get(name).parameters if p.linear]
         return any(OTHER_START * abs(begun.get(g, 0.0)) < abs(start.start.get(g, 0.0)) for g in gains)
 
-    def _leaves_more(self, fit: Fit, start: TorqueLook) -> bool:
+    def _leaves_more(self, fit: Fit, start: CandidateTorque) -> bool:
         """Whether a fit has missed what the same effect takes in torque."""
         left = self.weigher.left(self.weigher.in_torque(fit))
         return left > OTHER_START * self.weigher.left(start.fit)
 
     def further(self, fit: Fit) -> Fit:
         """The same with more steps."""
-        more = self.problem.fit(fit.structure, fit.values, fit.noise, MANY, carry=fit.shots)
+        more = self.problem.fit(fit.structure, fit.values, fit.noise, FULL_ITERATIONS, carry=fit.shots)
         return more if more.cost < fit.cost else fit
 
     def special_cases(self, now: Fit, rest: Fit, name: str) -> dict[str, Fit]:
@@ -235,11 +235,12 @@ class TrialFits:
             structure = replace(now.structure, effects=tuple(other if e == name else e for e in now.structure.effects))
             own: dict[Name, float] = {(other, p.name): _gain(now, name) for p in parameters}
             fits[other] = self.problem.fit(
-                structure, {**rest_values, **own}, now.noise, FEW, carry=now.shots, thorough=False, against=rest.cost
-            )
+                structure, {**rest_values, **own}, now.noise, TRIAL_ITERATIONS,
+                carry=now.shots, thorough=False, against=rest.cost,
+            )  # fmt: skip
         return fits
 
-    def instead(self, now: Fit, rest: Fit, name: str, among: Collection[str]) -> dict[str, Fit]:
+    def alternatives_to(self, now: Fit, rest: Fit, name: str, among: Collection[str]) -> dict[str, Fit]:
         """Fits with another effect, of ``among``, in the place of one."""
         names = [n for n in self.names(rest) if n in among or n == name]
         looks = InnovationScores(self.problem, rest, self.scale(rest)).all(names)

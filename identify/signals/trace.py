@@ -249,6 +249,11 @@ def release(traces: Sequence[Trace]) -> None:
         trace._series.clear()
 
 
+def pooled_noise(traces: Sequence[Trace]) -> float:
+    """The sensor's noise, one standard deviation, pooled over the runs."""
+    return float(np.sqrt(np.mean([t.noise**2 for t in traces])))
+
+
 def loads_differ(traces: Sequence[Trace]) -> bool:
     """Whether a known inertia was mounted for some of the runs."""
     return len({t.run.added_inertia_kg_m2 for t in traces}) > 1

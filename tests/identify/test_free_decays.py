@@ -96,7 +96,7 @@ def test_a_slow_error_of_the_encoder_is_no_torque() -> None:
     wander = float(np.sqrt(0.5 * fit.noise.walk * fit.noise.walk_s * fit.variance))
     assert wander == pytest.approx(5e-4, rel=0.3)
     assert fit.noise.walk_s == pytest.approx(0.05, rel=0.5)
-    assert fit.disturbed < 1.1
+    assert fit.reduced_chi_square < 1.1
     assert fit.values[("coulomb_friction", "level")] == pytest.approx(COULOMB, rel=0.05)
 
 
@@ -107,7 +107,7 @@ def test_where_a_decay_began_is_fitted_though_the_smoothed_start_is_off() -> Non
     fit = problem.fit(Structure(), start)
     assert fit.values[("stiffness",)] == pytest.approx(30.0, rel=1e-4)
     assert fit.values[("damping",)] == pytest.approx(0.02, rel=0.02)
-    assert fit.disturbed == pytest.approx(1.0, abs=0.05)
+    assert fit.reduced_chi_square == pytest.approx(1.0, abs=0.05)
 
 
 def test_an_added_inertia_without_torque_is_refused_with_what_to_do() -> None:

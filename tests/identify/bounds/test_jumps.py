@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from identify.bounds.jumps import why_of_a_jump
-from identify.estimate.final_fit import Fitted
+from identify.estimate.final_fit import FinalFit
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.signals.prepare import prepare
 from rig import effects
 from rig.effects import _outside
+from tests.identify.bounds.given_fit import final_fit
 from tests.identify.simulated import sine_run
 
 KERNEL = """
@@ -43,7 +45,7 @@ def forget(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_outside, "_FILES", {})
 
 
-def fitted(folder: Path, torque: str) -> Fitted:
+def fitted(folder: Path, torque: str) -> FinalFit:
     """A fit with the effect whose kernel returns ``torque``."""
     path = folder / "step.py"
     path.write_text(KERNEL.format(torque=torque), encoding="utf-8")
@@ -52,7 +54,7 @@ def fitted(folder: Path, torque: str) -> Fitted:
         ("inertia",): 0.02, ("stiffness",): 650.0, ("step_at_angle", "level"): 3.0, ("step_at_angle", "where"): 0.02
     }  # fmt: skip
     structure = Structure(("inertia", "stiffness"), ("step_at_angle",))
-    return Fitted(structure, values, np.eye(4), tuple(values), 1.0, None, True, (True, True, True, False), "")
+    return replace(final_fit(structure, values, np.eye(4)), determined=(True, True, True, False))
 
 
 def test_a_jump_is_said_to_be_the_reason_with_its_cure(tmp_path: Path) -> None:

@@ -1,25 +1,26 @@
 """Which parameters of a fit are not to be reported, on fits whose covariance is given."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from identify.bounds.undetermined import open_phases, undetermined
-from identify.estimate.final_fit import Fitted
+from identify.estimate.final_fit import FinalFit
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from rig.recording.run import Array
+from tests.identify.bounds.given_fit import final_fit
 
 TERMS: tuple[Name, ...] = (("inertia",), ("damping",), ("stiffness",))
 
 
-def fitted(errors: Array, tie: float = 0.0, determined: tuple[bool, ...] = (True,) * 3) -> Fitted:
+def fitted(errors: Array, tie: float = 0.0, determined: tuple[bool, ...] = (True,) * 3) -> FinalFit:
     """J, C, K of 1, 2, 3 with these standard errors; ``tie`` correlates inertia and stiffness."""
     correlation = np.eye(3)
     correlation[0, 2] = correlation[2, 0] = tie
     values = dict(zip(TERMS, (1.0, 2.0, 3.0), strict=True))
     covariance = correlation * np.outer(errors, errors)
-    return Fitted(
-        Structure(("inertia", "damping", "stiffness")), values, covariance, TERMS, 1.0, None, True, determined, ""
-    )
+    return replace(final_fit(Structure(), values, covariance), determined=determined)
 
 
 def test_what_is_known_well_is_not_listed() -> None:
@@ -52,10 +53,8 @@ def test_in_a_single_run_inertia_goes_with_a_lost_stiffness_however_little_they_
 
 def test_a_parameter_of_a_run_that_no_fit_looked_at_is_not_listed() -> None:
     name: Name = ("periodic_disturbance", "phase", "3")
-    lost = Fitted(
-        Structure(("inertia",), ("periodic_disturbance",)), {("inertia",): 1.0, name: 0.0},
-        np.diag([1e-4, np.inf]), (("inertia",), name), 1.0, None, True, (True, False), "",
-    )  # fmt: skip
+    structure, values = Structure(("inertia",), ("periodic_disturbance",)), {("inertia",): 1.0, name: 0.0}
+    lost = replace(final_fit(structure, values, np.diag([1e-4, np.inf])), determined=(True, False))
     assert undetermined(lost, {0, 1}, alone=False) == {}
     assert list(undetermined(lost, {0, 1, 3}, alone=False)) == [name]
 
@@ -66,9 +65,7 @@ def test_a_phase_that_may_be_anything_leaves_its_gains_open_by_their_amplitude()
 
     def of(cosine_error: float) -> dict[Name, float]:
         covariance = np.diag([3e-5, cosine_error]) ** 2
-        return open_phases(
-            Fitted(Structure((), ("cogging",)), values, covariance, pair, 1.0, None, True, (True,) * 2, "")
-        )
+        return open_phases(final_fit(Structure((), ("cogging",)), values, covariance))
 
     assert of(1e-3) == {}
     assert of(0.14) == {pair[0]: 0.01, pair[1]: 0.14}

@@ -186,7 +186,7 @@ def test_whatever_went_wrong_there_is_a_next_step(found: Identification) -> None
 def test_what_is_left_is_said_in_percent_of_the_torque_as_well() -> None:
     assert FOUND.after is not None
     error = replace(FOUND.after.error, holdout_torque_relative=0.0327)
-    told = unexplained_reason(909.2, replace(FOUND, after=replace(FOUND.after, error=error)))
+    told = unexplained_reason(909.2**2, replace(FOUND, after=replace(FOUND.after, error=error)))
     assert "3.3 % of the torque (909 times the sensor's noise)" in told
-    linear = unexplained_reason(909.2, replace(FOUND, axis="linear", after=replace(FOUND.after, error=error)))
+    linear = unexplained_reason(909.2**2, replace(FOUND, axis="linear", after=replace(FOUND.after, error=error)))
     assert "of the force" in linear

@@ -47,4 +47,4 @@ def test_a_column_without_a_sample_explains_nothing() -> None:
 @pytest.mark.parametrize("at", [(), (1500,), (3560,)])
 def test_pieces_between_lost_samples_are_held_out_as_well_as_whole_runs(at: tuple[int, ...]) -> None:
     fit = regression(*at).solve(Structure(), {})
-    assert fit.held_nm < 2.0 * fit.fitted_nm
+    assert fit.held_nm < 2.0 * fit.sigma

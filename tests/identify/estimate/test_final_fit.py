@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identify.estimate.final_fit import Fitted, by_output_error, by_regression, is_white, noise_of_all
+from identify.estimate.final_fit import FinalFit, by_output_error, by_regression, is_white
 from identify.estimate.initial_guess import first_guess
 from identify.model.structure import Structure
 from identify.runs.holdout import split
-from identify.signals.trace import Trace
+from identify.signals.trace import Trace, pooled_noise
 from rig.recording.run import Recording
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, sine_run, traces_of, white
 
@@ -17,12 +17,12 @@ JCK = {("inertia",): TRUTH[0], ("damping",): TRUTH[1], ("stiffness",): TRUTH[2]}
 TWO_SETS = ((104.0, 3.0), (42.0, 9.0))
 
 
-def regressed(traces: list[Trace]) -> Fitted:
+def regressed(traces: list[Trace]) -> FinalFit:
     found = split(traces)
     return by_regression(traces, Structure(), {}, first_guess(traces, Structure()), found.final, found.everything, {})
 
 
-def simulated(traces: list[Trace], effects: tuple[str, ...] = (), **more: float) -> Fitted:
+def simulated(traces: list[Trace], effects: tuple[str, ...] = (), **more: float) -> FinalFit:
     found = split(traces)
     start = dict(JCK) | {(e, p): v for e in effects for p, v in more.items()}
     return by_output_error(traces, Structure(effects=effects), start, 0.1, found.final, found.everything)
@@ -79,4 +79,4 @@ def test_white_noise_is_called_white_and_a_drift_is_not() -> None:
 
 def test_the_noise_of_several_runs_is_pooled() -> None:
     traces = traces_of(campaign(sets=TWO_SETS))
-    assert noise_of_all(traces) == pytest.approx(NOISE_RAD_S, rel=0.05)
+    assert pooled_noise(traces) == pytest.approx(NOISE_RAD_S, rel=0.05)

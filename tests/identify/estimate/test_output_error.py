@@ -33,14 +33,13 @@ def test_a_delay_and_coulomb_friction_are_found_from_a_start_that_is_well_off() 
     structure = Structure(effects=("coulomb_friction", "torque_delay"))
     guess = start(1.05, coulomb_friction={"level": 0.6}, torque_delay={"delay": 1e-3})
     near = refine(traces, structure, guess, 0.02, 10)
-    near = refine(traces, structure, dict(zip(near.names, near.values, strict=True)), 0.1, 10)
-    found = refine(traces, structure, dict(zip(near.names, near.values, strict=True)), None, 10)
-    values = dict(zip(found.names, found.values, strict=True))
+    near = refine(traces, structure, near.values, 0.1, 10)
+    found = refine(traces, structure, near.values, None, 10)
     assert found.sigma == pytest.approx(NOISE_RAD_S, rel=0.03)
-    assert values["torque_delay", "delay"] == pytest.approx(1.5e-3, rel=1e-3)
-    assert values["coulomb_friction", "level"] == pytest.approx(1.2, rel=2e-3)
-    assert values["damping",] == pytest.approx(TRUTH[1], rel=5e-3)
-    np.testing.assert_allclose([values["inertia",], values["stiffness",]], [TRUTH[0], TRUTH[2]], rtol=1e-4)
+    assert found.values["torque_delay", "delay"] == pytest.approx(1.5e-3, rel=1e-3)
+    assert found.values["coulomb_friction", "level"] == pytest.approx(1.2, rel=2e-3)
+    assert found.values["damping",] == pytest.approx(TRUTH[1], rel=5e-3)
+    np.testing.assert_allclose([found.values["inertia",], found.values["stiffness",]], [TRUTH[0], TRUTH[2]], rtol=1e-4)
 
 
 def test_runs_that_begin_stuck_beside_the_springs_rest_tell_friction_and_the_gyros_lag_to_the_noise() -> None:
@@ -52,10 +51,9 @@ def test_runs_that_begin_stuck_beside_the_springs_rest_tell_friction_and_the_gyr
     structure = Structure(effects=("coulomb_friction", "sensor_lag"))
     guess = start(coulomb_friction={"level": 0.97}, sensor_lag={"time": 0.95e-3})
     found = refine(traces, structure, guess, None, 15)
-    values = dict(zip(found.names, found.values, strict=True))
     assert found.sigma == pytest.approx(NOISE_RAD_S, rel=0.03)
-    assert values["sensor_lag", "time"] == pytest.approx(1e-3, rel=1e-3)
-    assert values["coulomb_friction", "level"] == pytest.approx(1.0, rel=1e-3)
+    assert found.values["sensor_lag", "time"] == pytest.approx(1e-3, rel=1e-3)
+    assert found.values["coulomb_friction", "level"] == pytest.approx(1.0, rel=1e-3)
     np.testing.assert_allclose([s.starts[0, 0] for s in found.shots], [stuck, -stuck], rtol=0.02)
 
 
@@ -89,7 +87,7 @@ def test_a_gyros_bias_is_fitted_and_disturbs_nothing() -> None:
     traces = traces_of(campaign(sets=TWO_SETS, bias=5e-3))
     found = refine(traces, Structure(), start(1.01), None, 8)
     assert found.shots[0].bias == pytest.approx(5e-3, rel=0.02)
-    np.testing.assert_allclose(found.values, TRUTH, rtol=3e-4)
+    np.testing.assert_allclose(found.vector, TRUTH, rtol=3e-4)
 
 
 def test_one_bad_shot_among_many_does_not_move_the_estimate() -> None:
@@ -99,13 +97,13 @@ def test_one_bad_shot_among_many_does_not_move_the_estimate() -> None:
     struck.measured = struck.measured.copy()
     struck.measured[2020:2040] += 3.0
     robust = refine([struck], Structure(), start(), 0.1, 10)
-    np.testing.assert_allclose(robust.values[[0, 2]], good.values[[0, 2]], rtol=2e-3)
+    np.testing.assert_allclose(robust.vector[[0, 2]], good.vector[[0, 2]], rtol=2e-3)
 
 
 def test_judging_fits_start_states_and_nothing_else() -> None:
     fitted = refine([prepare(sine_run(104, 3))], Structure(), start(), None, 5)
     held = evaluate(fitted, [prepare(sine_run(42, 9, seed=4))])
-    np.testing.assert_array_equal(held.values, fitted.values)
+    np.testing.assert_array_equal(held.vector, fitted.vector)
     assert held.sigma == pytest.approx(NOISE_RAD_S, rel=0.05)
 
 
@@ -116,7 +114,7 @@ def test_the_information_is_that_of_the_gyros_noise() -> None:
         fit = refine(traces_of(Recording((run,))), Structure(), start(), None, 5)
         scale = np.sqrt(np.diag(fit.information))
         bound = np.sqrt(np.diag(np.linalg.inv(fit.information / np.outer(scale, scale)))) / scale * fit.sigma
-        found.append((fit.values - TRUTH) / bound)
+        found.append((fit.vector - TRUTH) / bound)
     assert np.all(np.abs(found) < 4.5)
     assert 0.5 < float(np.std(found)) < 1.6
 

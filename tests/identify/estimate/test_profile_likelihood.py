@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.estimate.final_fit import Fitted, by_output_error
-from identify.estimate.output_error import Estimate, refine
+from identify.estimate.final_fit import FinalFit, by_output_error
+from identify.estimate.output_error import OutputErrorFit, refine
 from identify.estimate.profile_likelihood import settled
 from identify.estimate.started_at_rest import depends_on_ringing, with_fixed_initial_state
 from identify.model.structure import Structure
@@ -29,7 +29,7 @@ def slow(seed: int, begin_rad: float = 0.0) -> list[Trace]:
     ]
 
 
-def fitted(traces: Sequence[Trace], inertia: float) -> Fitted:
+def fitted(traces: Sequence[Trace], inertia: float) -> FinalFit:
     start = {INERTIA: inertia, ("damping",): TRUTH[1], ("stiffness",): TRUTH[2]}
     use = [t.keep for t in traces]
     return by_output_error(traces, Structure(), start, 0.1, use, use)
@@ -116,7 +116,7 @@ def test_a_known_mass_and_a_faint_ring_of_the_torque_tell_the_inertia() -> None:
     assert found.std_error(INERTIA) < 5e-3 * TRUTH[0]
 
 
-def estimate(traces: Sequence[Trace], rests: bool = False) -> Estimate:
+def estimate(traces: Sequence[Trace], rests: bool = False) -> OutputErrorFit:
     start = {INERTIA: TRUTH[0], ("damping",): TRUTH[1], ("stiffness",): TRUTH[2]}
     return refine(traces, Structure(), start, rests=rests)
 
@@ -125,12 +125,12 @@ def test_a_well_known_inertia_is_left_alone() -> None:
     traces = [prepare(sine_run(67.0, 6.0, seed=1)), prepare(sine_run(42.0, 9.0, seed=1))]
     free = estimate(traces)
 
-    def never(*_: object, **__: object) -> Estimate:
+    def never(*_: object, **__: object) -> OutputErrorFit:
         raise AssertionError("fitted again")
 
-    assert not depends_on_ringing(free, NOISE_RAD_S)
-    assert with_fixed_initial_state(free, NOISE_RAD_S, never) is free
-    assert settled(free, NOISE_RAD_S, never) == (free, None)
+    assert not depends_on_ringing(free)
+    assert with_fixed_initial_state(free, never) is free
+    assert settled(free, never) == (free, None)
 
 
 def test_a_run_held_to_rest_keeps_its_start_state() -> None:

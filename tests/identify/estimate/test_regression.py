@@ -34,10 +34,10 @@ def bound_of(solution: Solution) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(3))
 def test_on_the_papers_sets_the_residual_is_the_gyros_noise_and_jck_lie_within_the_bound(seed: int) -> None:
     solution = solved(traces_of(campaign(seed=seed, bias=3e-4)))
-    assert solution.rms == pytest.approx(NOISE_RAD_S, rel=0.02)
+    assert solution.sigma == pytest.approx(NOISE_RAD_S, rel=0.02)
     bound = bound_of(solution)
     np.testing.assert_allclose(bound / TRUTH, [3.1e-6, 1.9e-5, 3.1e-6], rtol=0.1)
-    assert np.all(np.abs(solution.values - TRUTH) < 4.0 * bound)
+    assert np.all(np.abs(solution.vector - TRUTH) < 4.0 * bound)
 
 
 def test_over_many_noises_the_estimates_scatter_as_the_bound_says_and_about_the_truth() -> None:
@@ -47,7 +47,7 @@ def test_over_many_noises_the_estimates_scatter_as_the_bound_says_and_about_the_
     for seed in range(40):
         noise = NOISE_RAD_S * np.random.default_rng(seed).standard_normal(len(run.time_s))
         solution = solved(traces_of(Recording((replace(run, rate_rad_s=run.rate_rad_s + noise),))))
-        found.append((solution.values - TRUTH) / bound_of(solution))
+        found.append((solution.vector - TRUTH) / bound_of(solution))
     assert np.all(np.abs(np.mean(found, axis=0)) < 4.0 / np.sqrt(40))
     np.testing.assert_allclose(np.std(found, axis=0), 1.0, atol=0.45)
 
@@ -56,7 +56,7 @@ def test_the_residual_is_white() -> None:
     traces = traces_of(campaign())
     solution = solved(traces)
     blocks = Regression(traces, Structure()).blocks(solution.denominator, {})
-    for r in residuals(blocks, solution.values):
+    for r in residuals(blocks, solution.vector):
         lagged = [float(r[k:] @ r[:-k]) / float(r @ r) for k in range(1, 20)]
         assert np.max(np.abs(lagged)) < 4.5 / np.sqrt(len(r))
 
@@ -64,24 +64,24 @@ def test_the_residual_is_white() -> None:
 def test_starts_a_hundred_times_apart_end_at_the_same_numbers() -> None:
     regression = Regression(traces_of(campaign()), Structure())
     low, high = (fit(regression, {}, tuple(f * x for x in TRUTH), 0.0, 8) for f in (0.1, 10.0))  # type: ignore[arg-type]
-    np.testing.assert_allclose(low.values, high.values, rtol=1e-7)
+    np.testing.assert_allclose(low.vector, high.vector, rtol=1e-7)
 
 
 @pytest.mark.parametrize("name", ["cubic_stiffness", "quadratic_damping", "stiffness_drift", "bilinear_stiffness"])
 def test_an_effect_that_is_linear_in_its_gain_is_solved_with_the_rest(name: str) -> None:
     solution = solved(traces_of(campaign({name: VALUES[name]})), (name,))
     ((parameter, value),) = VALUES[name].items()
-    assert solution.value(name, parameter) == pytest.approx(value, rel=0.02)
-    assert solution.value("damping") == pytest.approx(TRUTH[1], rel=0.04)
-    assert solution.value("stiffness") == pytest.approx(TRUTH[2], rel=2e-4)
+    assert solution.values[(name, parameter)] == pytest.approx(value, rel=0.02)
+    assert solution.values[("damping",)] == pytest.approx(TRUTH[1], rel=0.04)
+    assert solution.values[("stiffness",)] == pytest.approx(TRUTH[2], rel=2e-4)
 
 
 def test_at_the_true_delay_nothing_but_noise_is_left() -> None:
     traces = traces_of(campaign({"torque_delay": {"delay": 1.5e-3}}))
     without, with_it = solved(traces), solved(traces, ("torque_delay",), torque_delay=(1.5e-3,))
-    assert without.rms > 100 * NOISE_RAD_S
-    assert with_it.rms == pytest.approx(NOISE_RAD_S, rel=0.02)
-    assert with_it.value("damping") == pytest.approx(TRUTH[1], rel=2e-4)
+    assert without.sigma > 100 * NOISE_RAD_S
+    assert with_it.sigma == pytest.approx(NOISE_RAD_S, rel=0.02)
+    assert with_it.values[("damping",)] == pytest.approx(TRUTH[1], rel=2e-4)
 
 
 def test_lost_samples_and_jitter_cost_a_little_accuracy_and_no_bias() -> None:
@@ -99,8 +99,8 @@ def test_lost_samples_and_jitter_cost_a_little_accuracy_and_no_bias() -> None:
             Run(f"{frequency}", seen[kept], ok, rate_rad_s=rate[kept], torque_time_s=time, torque_nm=signal.torque_nm)
         )
     solution = solved(traces_of(Recording(tuple(runs))))
-    assert solution.rms < 1.3 * NOISE_RAD_S
-    np.testing.assert_allclose(solution.values, TRUTH, rtol=1e-3)
+    assert solution.sigma < 1.3 * NOISE_RAD_S
+    np.testing.assert_allclose(solution.vector, TRUTH, rtol=1e-3)
 
 
 def test_a_free_decay_gives_damping_and_stiffness_per_inertia() -> None:
@@ -110,15 +110,15 @@ def test_a_free_decay_gives_damping_and_stiffness_per_inertia() -> None:
     assert regression.torque_free
     assert regression.labels == (("damping",), ("stiffness",))
     solution = best_rho(traces, Structure(), {}, first_guess(traces, Structure()))
-    assert solution.value("damping") == pytest.approx(0.2, rel=5e-3)
-    assert solution.value("stiffness") == pytest.approx(40.0, rel=1e-4)
+    assert solution.values[("damping",)] == pytest.approx(0.2, rel=5e-3)
+    assert solution.values[("stiffness",)] == pytest.approx(40.0, rel=1e-4)
 
 
 def test_a_known_inertia_that_was_mounted_does_not_count_as_the_platforms() -> None:
     plain = sine_run(104, 3)
     heavy = replace(sine_run(104, 3, jck=(0.024, *TRUTH[1:]), seed=1), added_inertia_kg_m2=0.004)
     solution = solved(traces_of(Recording((plain, heavy))))
-    np.testing.assert_allclose(solution.values, TRUTH, rtol=2e-4)
+    np.testing.assert_allclose(solution.vector, TRUTH, rtol=2e-4)
 
 
 def test_one_steady_tone_leaves_a_direction_that_nothing_determines_and_its_ring_fills_it() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.estimate.final_fit import Fitted, by_output_error
+from identify.estimate.final_fit import FinalFit, by_output_error
 from identify.estimate.initial_guess import Start, first_guess
 from identify.estimate.regression import Regression, fit
 from identify.genetic.linear_traces import linear_traces
@@ -26,7 +26,7 @@ QUICK = IdentifyConfig.model_validate({"genetic": {"population": 60, "generation
 TWO_SETS = ((104.0, 3.0), (42.0, 9.0))
 
 
-def fitted(traces: list[Trace], effects: Effects) -> Fitted:
+def fitted(traces: list[Trace], effects: Effects) -> FinalFit:
     found = split(traces)
     start: dict[tuple[str, ...], float] = {(t,): v for t, v in zip(TERMS, TRUTH, strict=True)}
     start |= {(e, p): v for e, given in effects.items() for p, v in given.items()}
@@ -106,8 +106,8 @@ def test_with_its_effects_taken_off_a_set_answers_to_the_linear_equation(effects
     linear = linear_traces(traces, fitted(traces, effects))
     for trace in linear:
         found = fit(Regression([replace(trace, number=0)], Structure()), {}, TRUTH, 0.0, 8)
-        assert found.rms < 1.6 * NOISE_RAD_S
-        np.testing.assert_allclose(found.values, TRUTH, rtol=5e-3)
+        assert found.sigma < 1.6 * NOISE_RAD_S
+        np.testing.assert_allclose(found.vector, TRUTH, rtol=5e-3)
 
 
 def test_a_result_repeats_itself_and_another_seed_gives_another_population() -> None:

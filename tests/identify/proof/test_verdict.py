@@ -174,16 +174,16 @@ def test_the_share_takes_the_noise_off_and_its_interval_holds_the_truth() -> Non
     ],
 )  # fmt: skip
 def test_the_limits_of_the_verdict(left: float, low: float, announced: float, status: str) -> None:
-    assert status_of(Share(left, (low, 1.2)), announced, 50.0)[0] == status
+    assert status_of(Share(left, (low, 1.2)), announced, 50.0**2)[0] == status
 
 
 def test_a_name_that_makes_little_of_a_large_error_explains_nothing() -> None:
-    status, why = status_of(Share(1.0, (0.99, 1.01)), 0.95, 50.0, over_announced=9.0)
+    status, why = status_of(Share(1.0, (0.99, 1.01)), 0.95, 50.0**2, over_announced=9.0)
     assert status == "refuted" and "9 times the error that this effect predicts" in why
 
 
 def test_what_is_noise_is_confirmed_whatever_share_of_little_it_is() -> None:
-    assert status_of(Share(0.4, (0.3, 0.5)), 0.0, 1.1)[0] == "confirmed"
+    assert status_of(Share(0.4, (0.3, 0.5)), 0.0, 1.1**2)[0] == "confirmed"
 
 
 def test_result_json_and_the_sentences_hold_what_was_found() -> None:

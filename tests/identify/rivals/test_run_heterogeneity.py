@@ -10,8 +10,8 @@ from identify.conclude.next_steps import next_steps
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.pipeline import identify
-from identify.rivals.run_heterogeneity import as_likely, runs_apart, told
-from identify.rivals.whole_runs import WholeRuns
+from identify.rivals.run_heterogeneity import describe, explains_as_much, heterogeneity_of
+from identify.rivals.whole_runs import FreeRunFitter
 from identify.runs.holdout import split
 from rig.config.identify import IdentifyConfig
 from rig.recording.run import Recording, Run
@@ -32,36 +32,36 @@ def recorded(run: Run, gain: float = 1.0, late_s: float = 0.0) -> Run:
     return replace(run, torque_nm=run.torque_nm / gain, torque_time_s=run.torque_time_s + late_s)
 
 
-def fits_of(campaign: list[Run]) -> WholeRuns:
+def fits_of(campaign: list[Run]) -> FreeRunFitter:
     """To the samples that fit."""
     traces = traces_of(Recording(tuple(campaign)))
-    return WholeRuns(traces, split(traces))
+    return FreeRunFitter(traces, split(traces))
 
 
 def test_runs_that_agree_need_no_other_torque() -> None:
-    assert runs_apart(fits_of(runs()), Structure(), START) is None
+    assert heterogeneity_of(fits_of(runs()), Structure(), START) is None
 
 
 def test_the_run_and_the_size_are_told() -> None:
     five = runs()
     five[3] = recorded(five[3], gain=0.997)
-    found = runs_apart(fits_of(five), Structure(), START)
+    found = heterogeneity_of(fits_of(five), Structure(), START)
     assert found is not None
     ((run, kind, size),) = found.changes
     assert (run, kind) == ("6 Hz", "gain")
     assert size == pytest.approx(-0.003, abs=1e-4)
-    assert "smaller by 0.30 % in 6 Hz" in told(found, linear=False)[0]
+    assert "smaller by 0.30 % in 6 Hz" in describe(found, linear=False)[0]
 
 
 def test_a_run_whose_torque_is_stamped_late_is_told_by_its_milliseconds() -> None:
     five = runs()
     five[2] = recorded(five[2], late_s=2e-3)
-    found = runs_apart(fits_of(five), Structure(), START)
+    found = heterogeneity_of(fits_of(five), Structure(), START)
     assert found is not None
     ((run, kind, size),) = found.changes
     assert (run, kind) == ("3 Hz", "delay")
     assert size == pytest.approx(-2e-3, abs=2e-6)
-    assert "2.0 ms earlier in 3 Hz" in told(found, linear=False)[0]
+    assert "2.0 ms earlier in 3 Hz" in describe(found, linear=False)[0]
 
 
 @pytest.mark.parametrize(
@@ -75,13 +75,13 @@ def test_a_run_whose_torque_is_stamped_late_is_told_by_its_milliseconds() -> Non
 )
 def test_no_other_torque_in_a_few_runs_explains_an_effect_of_the_platform_as_well(hidden: Effects) -> None:
     fits = fits_of(runs(hidden))
-    found = runs_apart(fits, Structure(), START)
+    found = heterogeneity_of(fits, Structure(), START)
     if found is not None:
         (name,) = hidden
         own: dict[Name, float] = {(name, p): v for p, v in hidden[name].items()}
         named = fits.fitted(Structure(effects=(name,)), {**START, **own})
         assert named is not None
-        assert not as_likely(found, named)
+        assert not explains_as_much(found, named)
 
 
 @pytest.mark.slow

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.estimate.final_fit import Fitted, by_output_error
+from identify.estimate.final_fit import FinalFit, by_output_error
 from identify.model.structure import Structure
-from identify.rivals.whiteness_test import COLOURED, coloured, too_much_for
+from identify.rivals.whiteness_test import COLOURED, coloured, fails_whiteness_test
 from rig.platform import TERMS
 from rig.recording.run import Array, Recording
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
@@ -17,7 +17,7 @@ from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
 LINE = 0.3 * NOISE_RAD_S * np.sin(2.0 * np.pi * 17.3e-3 * np.arange(2001))
 
 
-def fitted(left: Array | None = None) -> Fitted:
+def fitted(left: Array | None = None) -> FinalFit:
     """J, C and K fitted to a clean campaign whose gyro also shows ``left``."""
     recording = campaign(duration_s=2.0)
     if left is not None:
@@ -29,8 +29,8 @@ def fitted(left: Array | None = None) -> Fitted:
     return by_output_error(traces, Structure(TERMS), start, 0.2, use, use)  # type: ignore[arg-type]
 
 
-def named(fit: Fitted, *names: str) -> Fitted:
-    return replace(fit, structure=Structure(TERMS, names))
+def named(fit: FinalFit, *names: str) -> FinalFit:
+    return replace(fit, fit=replace(fit.fit, structure=Structure(TERMS, names)))
 
 
 def test_white_noise_is_not_coloured_and_a_twentieth_of_its_power_low_down_is() -> None:
@@ -50,5 +50,5 @@ def test_white_noise_is_not_coloured_and_a_twentieth_of_its_power_low_down_is() 
 def test_only_three_of_which_one_follows_anything_are_asked(
     names: tuple[str, ...], declared: tuple[str, ...], too_much: bool
 ) -> None:
-    assert too_much_for(named(fitted(LINE), *names), declared) == too_much
-    assert not too_much_for(named(fitted(), *names), declared)
+    assert fails_whiteness_test(named(fitted(LINE), *names), declared) == too_much
+    assert not fails_whiteness_test(named(fitted(), *names), declared)

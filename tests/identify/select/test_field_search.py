@@ -7,7 +7,8 @@ from functools import cache
 import pytest
 
 from identify.pipeline import identify
-from identify.results import Identification
+from identify.results import Dependence, Disturbance, Identification
+from identify.select.field_search import with_free_form
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
 from tests.identify.servo import Servo
@@ -17,6 +18,13 @@ DECLARED = Platform(1e-3, 1e-3, 1.0)
 
 FEW = ("coulomb_friction", "torque_offset", "directional_damping", "torque_delay")
 OFFERED = pytest.mark.parametrize("offered", [FEW, pytest.param(None, marks=pytest.mark.slow)])  # None: the library
+
+
+def test_terms_that_two_curves_move_keep_their_order_from_run_to_run() -> None:
+    first = Dependence("angle", 1.0, 0.1, 0.0, (0.0,), (1.0,))
+    left = Disturbance(2.0, "N m", 0.2, (first,), {"damping": 1.0, "inertia": 2.0})
+    both = with_free_form(left, Dependence("rate", 1.5, 0.1, 0.0, (0.0,), (1.0,)), {"stiffness": 4.0, "inertia": 3.0})
+    assert list(both.moves_percent.items()) == [("damping", 1.0), ("inertia", 3.0), ("stiffness", 4.0)]
 
 
 @cache

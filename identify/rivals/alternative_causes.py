@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from identify.estimate.final_fit import Fitted
-from identify.estimate.judged import Judged
+from identify.estimate.final_fit import FinalFit
+from identify.model.parameter_fit import ParameterFit
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.rivals import run_heterogeneity
-from identify.rivals.tone_origin import TONE, standing_line, told
-from identify.rivals.whiteness_test import too_much_for
-from identify.rivals.whole_runs import WholeRuns
+from identify.rivals.tone_origin import TONE, describe, standing_line
+from identify.rivals.whiteness_test import fails_whiteness_test
+from identify.rivals.whole_runs import FreeRunFitter
 from identify.select.search_state import Search
 from identify.signals.trace import Trace
 from rig.platform import TERMS
 
 
 @dataclass(frozen=True)
-class Doubts:
+class AlternativeCauses:
     """Other causes than effects, looked at once a search is through.
 
     Attributes
@@ -32,47 +32,49 @@ class Doubts:
     """
 
     traces: Sequence[Trace]
-    fits: WholeRuns
+    fits: FreeRunFitter
     structure: Structure
     axis: Literal["rotary", "linear"]
     say: Callable[[str], None]
 
     def other_cause(self, search: Search) -> bool:
         """Whether no effect but a few runs whose torque was another may be what is left."""
-        return self._apart(search, search.best.structure, search.best.values()) is not None
+        return self._heterogeneous_runs(search, search.best.structure, search.best.values) is not None
 
-    def leave_open(self, search: Search, after: Fitted) -> bool:
+    def mark_undetermined(self, search: Search, after: FinalFit) -> bool:
         """Take back from a search what may be something else; whether anything was."""
         line = standing_line(after, self.traces) if TONE not in self.structure.effects else None
-        apart = self._apart(search, after.structure, after.values) if line is None or line.of_torque else None
+        apart = None
+        if line is None or line.of_torque:
+            apart = self._heterogeneous_runs(search, after.structure, after.values)
         if apart is not None:
-            search.leave_open("", run_heterogeneity.told(apart, self.axis == "linear"), search.base)
+            search.mark_undetermined("", run_heterogeneity.describe(apart, self.axis == "linear"), search.base)
             self.say("no effect is named: the runs disagree with each other, and that alone explains as much")
         elif line is not None:
-            words = told(line, self.axis, self.traces[0].channel)
-            search.leave_open(TONE, words, self._until(search, TONE))
+            words = describe(line, self.axis, self.traces[0].channel)
+            search.mark_undetermined(TONE, words, self._until(search, TONE))
             self.say(f"not named: {TONE}; the line may come from the sensor itself")
-        elif too_much_for(after, self.structure.effects):
-            search.take_all_back()
+        elif fails_whiteness_test(after, self.structure.effects):
+            search.reject_all()
             self.say("no effect is named: three flexible effects still leave more than noise")
         else:
             return False
         return True
 
-    def _apart(
-        self, search: Search, structure: Structure, values: dict[Name, float]
-    ) -> run_heterogeneity.RunsApart | None:  # fmt: skip
+    def _heterogeneous_runs(
+        self, search: Search, structure: Structure, values: Mapping[Name, float]
+    ) -> run_heterogeneity.Heterogeneity | None:  # fmt: skip
         """What would explain all that the declared model leaves, if it is likelier than what was named."""
-        apart = run_heterogeneity.runs_apart(self.fits, self.structure, search.base.values())
+        apart = run_heterogeneity.heterogeneity_of(self.fits, self.structure, search.base.values)
         if apart is None or structure == self.structure:
             return apart
         named = self.fits.fitted(structure, values)
-        return apart if named is None or run_heterogeneity.as_likely(apart, named) else None
+        return apart if named is None or run_heterogeneity.explains_as_much(apart, named) else None
 
-    def _until(self, search: Search, name: str) -> Judged:
+    def _until(self, search: Search, name: str) -> ParameterFit:
         """The model of what was found before an effect; the declared one where that is nothing."""
         best, base = search.best.structure, search.base.structure
         found = best.effects[: best.effects.index(name)]
-        start = {**search.base.values(), **{n: v for n, v in search.best.values().items() if n[0] in (*TERMS, *found)}}
+        start = {**search.base.values, **{n: v for n, v in search.best.values.items() if n[0] in (*TERMS, *found)}}
         fitted = None if set(found) <= set(base.effects) else self.fits.fitted(replace(base, effects=found), start)
-        return search.base if fitted is None else fitted.judged()
+        return search.base if fitted is None else fitted

@@ -18,7 +18,7 @@ from identify.likelihood.fit import Fit
 from identify.model.parameters import Name
 from identify.propose.free_forms import fitted, scores, states_of, torque_of
 from identify.results import Dependence
-from identify.select.evidence import APART, WEIGHT, Evidence, behind, likely_share
+from identify.select.evidence import STRONG_SUPPORT, WEIGHT, Evidence, likely_share, support_difference
 from rig import effects
 from rig.arrays import Array
 from rig.platform import TERMS
@@ -40,7 +40,7 @@ ON = {
 
 
 @dataclass(frozen=True)
-class LeftOver:
+class FreeFormFit:
     """A curve that belongs beside a model.
 
     Attributes
@@ -61,25 +61,25 @@ class LeftOver:
         return self.evidence.effect
 
     @property
-    def counts(self) -> bool:
+    def is_significant(self) -> bool:
         """Whether it is believed, and takes enough."""
-        return self.evidence.support > APART and self.share > WEIGHT
+        return self.evidence.support > STRONG_SUPPORT and self.share > WEIGHT
 
     @property
-    def by_chance(self) -> float:
+    def chance_level(self) -> float:
         """How often chance alone makes the cost fall as much, where the curve stands for nothing."""
         parameters = self.evidence.price / np.log(max(self.evidence.fit.count, 2))
         return float(chi2.sf(max(self.evidence.gain / self.evidence.inflation, 0.0), parameters))
 
 
-def left_over(search: Stepwise, now: Fit) -> tuple[LeftOver | None, list[LeftOver]]:
+def fit_free_forms(search: Stepwise, now: Fit) -> tuple[FreeFormFit | None, list[FreeFormFit]]:
     """The curve that explains most of what a model leaves, None where none explains enough to be believed.
 
     Besides, the other curves that are hardly chance: too little for a belief, but J may be another beside them.
     """
     problem = search.problem
-    best: LeftOver | None = None
-    others: list[LeftOver] = []
+    best: FreeFormFit | None = None
+    others: list[FreeFormFit] = []
     for form in scores(problem, now, search.trials.scale(now), tuple(effects.free_forms()))[:TRIED]:
         if form.gain < HOPE:
             break
@@ -87,18 +87,18 @@ def left_over(search: Stepwise, now: Fit) -> tuple[LeftOver | None, list[LeftOve
         if not np.isfinite(fit.cost):
             continue
         found = _beside(search, now, fit, form.effect)
-        if found.counts:
+        if found.is_significant:
             found = _beside(search, _from_there(search, now, fit), fit, form.effect)
-        if found.counts and (best is None or found.evidence.support > best.evidence.support):
+        if found.is_significant and (best is None or found.evidence.support > best.evidence.support):
             best = found
-        elif found.by_chance < BY_CHANCE:
+        elif found.chance_level < BY_CHANCE:
             others.append(found)
     return best, others
 
 
-def _beside(search: Stepwise, now: Fit, fit: Fit, form: str) -> LeftOver:
+def _beside(search: Stepwise, now: Fit, fit: Fit, form: str) -> FreeFormFit:
     weigher = search.weigher
-    return LeftOver(now, weigher.evidence(form, now, fit), likely_share(now, fit, weigher.regression.cutoff_hz))
+    return FreeFormFit(now, weigher.evidence(form, now, fit), likely_share(now, fit, weigher.regression.cutoff_hz))
 
 
 def _from_there(search: Stepwise, now: Fit, fit: Fit) -> Fit:
@@ -107,7 +107,7 @@ def _from_there(search: Stepwise, now: Fit, fit: Fit) -> Fit:
     return min((now, again), key=lambda f: f.cost)
 
 
-def needless_beside(search: Stepwise, left: LeftOver, names: Sequence[str]) -> str | None:
+def redundant_given(search: Stepwise, left: FreeFormFit, names: Sequence[str]) -> str | None:
     """The name that explains least once the curve is there, if that is too little; None where all are needed.
 
     A curve may hold the effect itself (a spring with a bend is a curve over the angle), so the curve in its place must
@@ -124,14 +124,17 @@ def needless_beside(search: Stepwise, left: LeftOver, names: Sequence[str]) -> s
         evidence = search.weigher.evidence(name, without, fit)
         cutoff_hz = search.weigher.regression.cutoff_hz
         share = max(evidence.weight, likely_share(without, fit, cutoff_hz))
-        better = behind(left.now, without) > APART and likely_share(left.now, without, cutoff_hz) > WEIGHT
-        needless = better and (evidence.support < APART or share < WEIGHT)
+        better = (
+            support_difference(left.now, without) > STRONG_SUPPORT
+            and likely_share(left.now, without, cutoff_hz) > WEIGHT
+        )
+        needless = better and (evidence.support < STRONG_SUPPORT or share < WEIGHT)
         if needless and (weakest is None or evidence.support < weakest[0]):
             weakest = (evidence.support, name)
     return weakest[1] if weakest else None
 
 
-def dependence_on(search: Stepwise, left: LeftOver) -> tuple[Dependence, dict[str, float]]:
+def dependence_on(search: Stepwise, left: FreeFormFit) -> tuple[Dependence, dict[str, float]]:
     """The curve as the report tells it, and by how much J, C and K are others with it, percent."""
     problem, fit, form = search.problem, left.evidence.fit, left.form
     states = np.concatenate(states_of(problem, fit))
@@ -158,7 +161,7 @@ def dependence_on(search: Stepwise, left: LeftOver) -> tuple[Dependence, dict[st
             moved += float(as_terms[k])
         if abs(moved) > SURE * _error(fit, (term,)):
             moves[term] = 100.0 * abs(moved / here)
-    return Dependence(ON[form], rms, rms / problem.torque_nm, left.by_chance, tuple(at), tuple(shape)), moves
+    return Dependence(ON[form], rms, rms / problem.torque_nm, left.chance_level, tuple(at), tuple(shape)), moves
 
 
 def _error(fit: Fit, name: Name) -> float:
@@ -186,7 +189,7 @@ def _shape(form: str, fit: Fit) -> tuple[list[float], list[float]]:
 
 
 def most_moving(
-    search: Stepwise, curves: Sequence[LeftOver], most_percent: Mapping[str, float]
+    search: Stepwise, curves: Sequence[FreeFormFit], most_percent: Mapping[str, float]
 ) -> tuple[Dependence, dict[str, float]] | None:
     """Of curves beside a model the one that moves J, C or K farthest beyond what is allowed; None where none does."""
     told = [dependence_on(search, c) for c in curves]

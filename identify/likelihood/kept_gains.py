@@ -1,0 +1,66 @@
+"""The gains of every run, computed once for runs that were sampled alike."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from identify.signals.trace import Trace
+from rig.arrays import Array
+from rig.dynamics.gains import Gains, Noise, Sensing, gains_of
+
+SAME_STEP = 1e-5  # relative: what steps of runs differ by and are the same to a gain
+GAIN_CACHE_SIZE = 12  # of runs that were sampled alike
+
+
+class KeptGains:
+    """The last few gains of a set of runs.
+
+    Parameters
+    ----------
+    step_s, longest
+        The step that most runs have, and the samples of the longest run.
+    start_variance
+        Of angle, rate and acceleration at the start of a stretch, over that of one reading.
+    """
+
+    def __init__(self, step_s: float, longest: int, start_variance: tuple[float, float, float]) -> None:
+        self.step_s, self.longest, self.start_variance = step_s, longest, start_variance
+        self._gains: dict[tuple[object, ...], tuple[dict[tuple[object, ...], Gains], Lock]] = {}
+
+    def of(
+        self, trace: Trace, jck: Array, noise: Noise, sensing: Sensing, spans: list[tuple[int, int]]
+    ) -> Gains:  # fmt: skip
+        """A run's gains; the last few are kept, because most looks change an effect and not the linear part."""
+        keep, spans, group = self._same_sampling(trace, spans)
+        even = abs(trace.step_s / self.step_s - 1.0) < SAME_STEP
+        step_s = self.step_s if even else trace.step_s
+        key = (*jck.tolist(), noise, sensing, step_s, *spans)
+        kept, lock = self._gains.setdefault(group, ({}, Lock()))
+        with lock:
+            found = kept.get(key)
+            if found is None:
+                found = gains_of(jck, noise, step_s, sensing, keep, spans, self.start_variance)
+                for old in list(kept)[: max(0, len(kept) + 1 - GAIN_CACHE_SIZE)]:
+                    kept.pop(old, None)
+                kept[key] = found
+        n = len(trace.measured)
+        return found if n == len(found.gain) else replace(found, gain=found.gain[:n], variance=found.variance[:n])
+
+    def _same_sampling(
+        self, trace: Trace, spans: list[tuple[int, int]]
+    ) -> tuple[Any, list[tuple[int, int]], tuple[object, ...]]:
+        """Samples, spans and a name for runs that have the same gains, as far as they go.
+
+        Gains know nothing of what was measured: runs of one piece without a lost sample differ in their length alone.
+        """
+        keep = np.asarray(trace.keep, dtype=bool)
+        seen = np.flatnonzero(keep)
+        told = [(a, b) for a, b in spans if np.any(keep[a : b + 1])]
+        if len(told) == 1 and seen[-1] - seen[0] + 1 == len(seen):
+            n, lead = self.longest, int(seen[0])
+            return np.arange(n) >= lead, [(told[0][0], n - 1)], (lead,)
+        return keep, spans, (keep.tobytes(),)

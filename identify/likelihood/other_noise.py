@@ -1,0 +1,91 @@
+"""Quite another noise for a descent to go on from: the likeliest alone, one far off, far less of a disturbance.
+
+Beside the right noise the likelihood is a quadratic in its logarithms, and a step finds it; far off it is not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from identify.likelihood.noise_search import likeliest_noise
+from identify.likelihood.normal_equations import COST_TOLERANCE, LEVENBERG_DAMPING
+
+if TYPE_CHECKING:
+    from identify.likelihood.descent import Descent
+
+# Times the disturbance: how far below a model is looked at with parameters that follow.
+CONTINUATION_LEVELS = (1e-3, 1e-6, 1e-10)
+CONTINUATION_STEPS, MAX_GAP_RATIO = 20, 0.7  # steps in which they do, and what each of them leaves of the gap at most
+LARGE_DISTURBANCE = 2.0  # reduced chi-square: less of a disturbance is found step by step
+NOISE_START_FACTORS = (  # times white density, slow variance and time constant: where else a noise is looked for
+    (0.01, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 10.0, 1.0), (1.0, 0.1, 0.1), (1.0, 0.03, 0.01),
+    (1.0, 1.0, 10.0),
+)  # fmt: skip
+# Of the rate, that a gyro's bias walks over a run: where else it is looked for.
+BIAS_WALK_STARTS = (1e-6, 1e-5, 1e-4, 1e-3)
+# Times torque and slow error of an encoder together: the rest is read white.
+DISTURBANCE_START_FACTORS = (1e-4, 1e-3, 1e-2, 0.1)
+
+
+def other_noise(d: Descent, lower: bool = True) -> bool:
+    """Whether a noise that is quite another one is likelier; if so the descent goes on from there.
+
+    Beside the right one the likelihood is a quadratic in its logarithms; far off it is flat, or has a valley for
+    a disturbance that is slow and another for one that is fast. ``lower``: far below is looked at, too.
+    """
+    before = d.cost
+    wanders = d.problem.wanders and not d.problem.gyro
+    others: list[dict[str, float]] = [
+        {"white": white, "slow": slow, "time_constant_s": time} for white, slow, time in NOISE_START_FACTORS
+    ]  # fmt: skip
+    others += [{"white": x, "slow": x, "walk": x} for x in DISTURBANCE_START_FACTORS if wanders]
+    if "walk" in d.kinds and not wanders:
+        others += [{"walk": d.problem.walk(share) / d.noise.walk} for share in BIAS_WALK_STARTS]
+    for times in others:
+        q = d.noise
+        noise = d.problem.within(replace(q, **{k: x * getattr(q, k) for k, x in times.items()}))
+        looks = d.looks_at(d.x, noise, d.shots)
+        cost = d.cost_of(looks)
+        if cost < d.cost - COST_TOLERANCE:
+            d.noise, d.looks, d.cost = noise, looks, cost
+    if d.alone:
+        noise_alone(d)
+    if lower:
+        without_disturbance(d)
+    d.damping = LEVENBERG_DAMPING
+    return d.cost < before - COST_TOLERANCE
+
+
+def noise_alone(d: Descent) -> None:
+    """The likeliest noise near this one, if it is likelier with the model as it stands."""
+    noise = likeliest_noise(
+        d.problem, d.structure, d.names, d.x, d.shots, d.looks, d.weights, d.noise, d.kinds
+    )  # fmt: skip
+    looks = d.looks_at(d.x, noise, d.shots)
+    cost = d.cost_of(looks)
+    if cost < d.cost - COST_TOLERANCE:
+        d.noise, d.looks, d.cost = noise, looks, cost
+
+
+def without_disturbance(d: Descent) -> None:
+    """Far less of a disturbance, if that is likelier once the parameters have followed.
+
+    A model that is right may otherwise stay where the disturbance explains all that is left, and the sensor has no
+    noise: between the two lies a ridge.
+    """
+    if d.reduced_chi_square() < LARGE_DISTURBANCE:
+        return
+    here = d.place()
+    for factor in CONTINUATION_LEVELS:
+        q = here[0]
+        d.noise = d.problem.within(replace(q, white=factor * q.white, slow=factor * q.slow))
+        d.looks = d.looks_at(d.x, d.noise, d.shots)
+        d.cost, d.damping = d.cost_of(d.looks), LEVENBERG_DAMPING
+        for _ in range(CONTINUATION_STEPS):
+            gap = d.cost - here[-1]
+            if not d.try_step(False) or d.cost < here[-1] - COST_TOLERANCE or d.cost - here[-1] > MAX_GAP_RATIO * gap:
+                break
+        if d.cost < here[-1] - COST_TOLERANCE:
+            return
+        d.go(here)

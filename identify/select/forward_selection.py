@@ -1,0 +1,91 @@
+"""Forward selection: effects added one at a time, two at once where neither shows alone, and one on trial.
+
+What a model predicts wrongly while much is missing may hide how much of the torque an effect carries. One that is
+proven and lets predictions err by clearly less is therefore added on trial: it stays if others are found beside it and
+it carries its share by then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from identify.likelihood.fit import Fit
+from identify.propose.innovation_score import Score
+from identify.select.evidence import MAX_EFFECTS, STRONG_SUPPORT, WEIGHT, Evidence
+from identify.select.trial_fits import FULL_ITERATIONS, HOPE
+
+if TYPE_CHECKING:
+    from identify.select.stepwise import Stepwise
+
+
+@dataclass(frozen=True)
+class Round:
+    """What was tried in one round: every candidate's score, the evidence of those fitted, and what was added."""
+
+    number: int
+    now: Fit
+    scores: tuple[Score, ...]
+    tried: Mapping[str, Evidence]
+    added: tuple[str, ...]
+
+    @property
+    def chosen(self) -> str | None:
+        """The effect that was added alone."""
+        return self.added[0] if len(self.added) == 1 else None
+
+
+def add_effects(search: Stepwise) -> None:
+    """Add effects to a search's best model as long as some are worth it."""
+    trial: tuple[str, Fit] | None = None  # the effect on trial, and the model without it
+    for number in range(len(search.rounds) + 1, MAX_EFFECTS + 1):
+        now = search.best
+        scores, tried = search.score_candidates(now)
+        chosen = search.best_candidate(tried)
+        new = tried[chosen] if chosen else _pair(search, now, scores)
+        how = f"{100.0 * new.weight:.0f} % of the disturbance" if new else "on trial"
+        if new is None and trial is None and (new := _on_trial(tried)):
+            trial = (new.effect, now)
+        added = tuple(e for e in new.fit.structure.effects if e not in now.structure.effects) if new else ()
+        search.rounds.append(Round(number, now, tuple(scores), tried, added))
+        if new is None:
+            break
+        search.say(f"added {' and '.join(added)}: log-likelihood +{0.5 * new.gain:.3g}, {how}")
+        if trial and trial[1] is now:
+            search.best = new.fit
+            continue
+        search.best = search.backward_elimination(new.fit, [e for e in search.trials.added(new.fit) if e not in added])
+        if trial and _carries_its_share(search, trial[0]):
+            trial = None
+    if trial:
+        search.say(f"took {trial[0]} back")
+        search.best = _without_trial(search, *trial)
+
+
+def _pair(search: Stepwise, now: Fit, scores: Sequence[Score]) -> Evidence | None:
+    """The likeliest two effects at once that are worth it together; None where none are."""
+    seen = [search.weigher.evidence(one, now, fit) for one, fit in search.trials.pairs(now, scores)]
+    good = [e for e in seen if e.support > HOPE and e.weight > WEIGHT]
+    return min(good, key=lambda e: e.fit.penalised, default=None)
+
+
+def _on_trial(tried: Mapping[str, Evidence]) -> Evidence | None:
+    """The likeliest effect that is proven, though it carries little torque as yet."""
+    proven = [e for e in tried.values() if e.support > HOPE and e.unfollowed_share > WEIGHT]
+    return min(proven, key=lambda e: e.fit.penalised, default=None)
+
+
+def _carries_its_share(search: Stepwise, name: str) -> bool:
+    """Whether an effect that is still there carries its share beside all others."""
+    if name not in search.best.structure.effects:
+        return True
+    evidence = search.weigher.evidence(name, search.without(search.best, name), search.best)
+    return evidence.support > STRONG_SUPPORT and evidence.weight > WEIGHT
+
+
+def _without_trial(search: Stepwise, name: str, before: Fit) -> Fit:
+    """The model without an effect that carries nothing still: as it was, or with what was found since."""
+    search.dropped.append((name, "it carries no torque that the others do not"))
+    found = len(search.best.structure.effects) > len(before.structure.effects) + 1
+    return search.without(search.best, name, FULL_ITERATIONS) if found else before

@@ -1,0 +1,51 @@
+"""An effect in place of damping or stiffness, where that is likelier: a drag is no viscous friction."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from identify.likelihood.fit import Fit
+from identify.select.evidence import STRONG_SUPPORT, WEIGHT, support_difference
+from identify.select.preference import simplest
+from identify.select.trial_fits import TRIAL_ITERATIONS
+
+if TYPE_CHECKING:
+    from identify.select.stepwise import Stepwise
+
+CERTAIN = 30.0  # standard errors beyond which nobody asks whether a term is needed; costs only time
+
+
+def replace_linear_terms(search: Stepwise, now: Fit) -> Fit:
+    """With an effect instead of damping or stiffness, where that is likelier: a drag is no viscous friction.
+
+    Beside the term such an effect explains little, and the other way round.
+    """
+    for term in ("damping", "stiffness"):
+        if term not in now.structure.terms or abs(now.values[(term,)]) >= CERTAIN * now.std_error((term,)):
+            continue
+        rest = search.without(now, term)
+        fits = search.trials.score_round(rest)[1]
+        fits = {
+            n: f for n, f in fits.items()
+            if len(f.names) <= len(now.names) and support_difference(now, f) > STRONG_SUPPORT
+            and set(now.structure.effects) <= set(f.structure.effects)
+        }  # fmt: skip
+        if not fits:
+            continue
+        best = min(fits.values(), key=lambda f: f.penalised)
+        name = simplest(search.weigher, {n: f for n, f in fits.items() if support_difference(f, best) < STRONG_SUPPORT})
+        evidence = search.weigher.evidence(name, rest, fits[name])
+        if evidence.support < STRONG_SUPPORT or evidence.weight < WEIGHT or _goes_with(search, term, now, fits[name]):
+            continue
+        search.dropped.append((term, f"{name} explains more in its place"))
+        search.say(f"replaced {term} by {name}")
+        now, search.inflation[name] = fits[name], evidence.inflation
+    return now
+
+
+def _goes_with(search: Stepwise, term: str, now: Fit, instead: Fit) -> bool:
+    """Whether a model with an effect in the place of a term is likelier still with both."""
+    start = {**instead.values, (term,): now.values[(term,)]}
+    structure = now.structure.plus(*(e for e in instead.structure.effects if e not in now.structure.effects))
+    both = search.problem.fit(structure, start, instead.noise, TRIAL_ITERATIONS, carry=instead.shots, thorough=False)
+    return support_difference(instead, both) > STRONG_SUPPORT
