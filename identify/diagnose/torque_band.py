@@ -49,6 +49,7 @@ class TorqueBand:
     def __init__(self, traces: Sequence[Trace], split: Split, cutoff_hz: float, scale: Scale) -> None:
         self.traces, self.split, self.cutoff_hz, self.scale = list(traces), split, cutoff_hz, scale
         self.torque_free = all(t.torque is None for t in traces)
+        self.by_gyro = all(t.channel == "rate" for t in traces)  # whose low-pass delays the motion that is seen here
         self.runs = 1 + max(t.number for t in traces)
         step = max(1, int(1.0 / (SAMPLES_A_PERIOD * cutoff_hz * traces[0].step_s)))
         self._rows = [self._rows_of(t, step) for t in traces]

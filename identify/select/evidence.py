@@ -39,6 +39,7 @@ WEIGHT = 0.20  # share of the disturbance that an effect takes away to be named:
 MAX_EFFECTS = 6  # that one recording is believed to show
 MAX_UNFOLLOWED_SHARE = 0.5  # of what a prediction errs by beyond the sensor's noise
 TRUSTED = 1.5  # inflation up to which what the likelihood takes the disturbance for is believed
+DELAY = "torque_delay"
 SHOWS = 0.1  # of the disturbance in the band, that its white part is: what becomes of less is chance
 
 
@@ -167,9 +168,16 @@ def likely_share(now: Fit, new: Fit, cutoff_hz: float) -> float:
 
 
 def torque_fit_of(regression: TorqueRegression, fit: Fit) -> TorqueFit:
-    """A model along the measured motion, in torque; without a lag of the sensor, which has no torque there."""
+    """A model along the measured motion, in torque.
+
+    A gyro's low-pass has no torque, but the motion that it shows is late: as late as if the torque were, for all of the
+    model is a function of that motion. Below its corner a low-pass delays by the first coefficient of its denominator.
+    """
     seen = tuple(e for e in fit.structure.effects if effects.get(e).place is not Place.SENSOR)
-    shapes = fit.structure.shapes_of(fit.values)
+    shapes = dict(fit.structure.shapes_of(fit.values))
+    if regression.by_gyro and (late_s := _late_s(fit)) > 0.0:
+        shapes[DELAY] = (sum(shapes.get(DELAY, ())) + late_s,)
+        seen = (*(e for e in seen if e != DELAY), DELAY)
     shaft = tuple(e for e in seen if effects.get(e).place is not Place.DRIVE)
     for kept in (seen, shaft, ()):
         # A drive that passes on nothing explains any torque, and a play run along a noisy motion may run away.
@@ -177,6 +185,12 @@ def torque_fit_of(regression: TorqueRegression, fit: Fit) -> TorqueFit:
         if found.held_nm < regression.torque_nm:
             break
     return found
+
+
+def _late_s(fit: Fit) -> float:
+    """By how much a gyro's low-passes delay the motion that they show."""
+    shapes = fit.structure.shapes_of(fit.values)
+    return sum(lag(shapes[e])[0] for e in fit.structure.effects if (lag := effects.get(e).lag) is not None)
 
 
 def unfollowed_share(now: Fit, new: Fit) -> float:

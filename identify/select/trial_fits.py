@@ -150,7 +150,8 @@ class TrialFits:
         there = self.weigher.in_torque(now)
         left = self.weigher.left(there)
         nested = {s for e in now.structure.effects for s in effects.get(e).nests}
-        held = [n for n in names if n not in nested and not set(effects.get(n).nests) & set(there.structure.effects)]
+        have = set(there.structure.effects)
+        held = [n for n in names if n not in nested | have and not set(effects.get(n).nests) & have]
         looks = candidate_torques(self.weigher.regression, there, held, HEAVIEST)
         special = {s for w in looks for s in effects.get(w.effect).nests} - {w.effect for w in looks}
         looks += candidate_torques(self.weigher.regression, there, [n for n in held if n in special], len(special))

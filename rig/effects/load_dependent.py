@@ -18,7 +18,7 @@ EFFECT = Effect(
     source="gear and bearing friction: Hamon, Gautier, Garrec 2010, load-dependent Coulomb friction",
     meaning="Gears and loaded bearings: the transmitted torque presses the sliding surfaces together.",
     sign="Resisting: it opposes the rate.",
-    parameters=(Parameter("factor", "1", "friction torque over transmitted torque", linear=True, high=0.5),),
+    parameters=(Parameter("factor", "1", "friction torque over transmitted torque", linear=True, high=0.95),),
     kernel=_level,
     formula="factor * fabs(torque_nm)",
     stays="friction holds the platform anywhere within a band, so its rest angle is not known before the run",
