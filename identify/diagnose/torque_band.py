@@ -108,11 +108,12 @@ class TorqueBand:
         return low_pass(values, self.cutoff_hz, self.traces[i].step_s)[self._rows[i]]
 
     def _kept(self, key: Any, make: Any) -> Array:
-        if key not in self._cache:
+        found = self._cache.get(key)  # another thread may clear it
+        if found is None:
             if len(self._cache) > 3000:
                 self._cache.clear()
-            self._cache[key] = make()
-        return self._cache[key]
+            found = self._cache[key] = make()
+        return found
 
     @cached_property
     def _motion(self) -> list[tuple[Array, Array, Array]]:

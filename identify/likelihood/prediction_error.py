@@ -11,7 +11,6 @@ Sources: Ljung, System Identification, ch. 7; Kristensen, Madsen and Jorgensen, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from threading import Lock
 from typing import Any
@@ -22,6 +21,7 @@ from identify.likelihood.descent import Descent
 from identify.likelihood.fit import Columns, Fit, Look
 from identify.likelihood.kept_gains import KeptGains
 from identify.likelihood.normal_equations import COST_TOLERANCE
+from identify.likelihood.workers import Workers
 from identify.model.parameters import Name, equations_of
 from identify.model.structure import Structure
 from identify.signals.trace import MOST_BIAS_RAD_S, Trace
@@ -78,7 +78,7 @@ class PredictionError:
         # A gyro's bias walks. An encoder's error (its eccentricity, stamps that wander) does, too, but matters only
         # where a small friction is to be seen in how a long decay keeps its phase.
         self.wanders = self.gyro or self.torque_free
-        self.workers = ThreadPoolExecutor(2)
+        self.workers = Workers()
         self._slopes: dict[tuple[object, ...], Array] = {}
         self._slopes_lock = Lock()
         # A decay shows nothing but how it began and how it swings on, far beyond what is linear about its prediction:

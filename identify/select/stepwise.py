@@ -146,10 +146,10 @@ class Stepwise:
             if name not in now.structure.effects:
                 continue
             rest, others = self._others(now, name)
-            fits: dict[str, Fit] = {name: now}
-            for other, fit in others.items():
-                near = fit.penalised - now.penalised < MIN_RIVAL_SHARE * (rest.cost - now.cost)
-                fits[other] = self.trials.further(fit) if near else fit
+            gap = MIN_RIVAL_SHARE * (rest.cost - now.cost)
+            near = [n for n, f in others.items() if f.penalised - now.penalised < gap]
+            fits: dict[str, Fit] = {name: now, **others}
+            fits |= zip(near, self.trials.all_further([others[n] for n in near]), strict=True)
             fits = {n: self._without_absorbing_stiffness(f) for n, f in fits.items()}
             seen = {n: self.weigher.evidence(n, rest, f) for n, f in fits.items()}
             self._needed[name] = seen[name].support

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,6 +25,8 @@ from identify.signals.spectral_lines import foreign_lines_hz, ringing_hz, rings_
 from rig import effects
 from rig.effects.base import Place, Scale
 from rig.platform import TERMS
+
+_Item = TypeVar("_Item")
 
 HOPE = 20.0  # fall of the cost, parameters paid for, that no chance among all candidates and shapes makes
 TRIED = 4  # candidates of a round, by their scores, that are fitted
@@ -94,26 +98,28 @@ class TrialFits:
         fits = self.each_fitted(now, starts)
         most = max((now.cost - f.cost for f in fits.values()), default=0.0)
         near = [n for n, f in fits.items() if now.cost - f.cost > FULL_FIT_RATIO * most]
-        for name in near:
-            if not set(effects.get(name).nests) & set(near):  # a special case that is as good is taken in its place
-                fits[name] = self.further(fits[name])
+        # A special case that is as good is taken in the place of what contains it.
+        near = [n for n in near if not set(effects.get(n).nests) & set(near)]
+        fits |= zip(near, self.all_further([fits[n] for n in near]), strict=True)
         return [v[0] for v in looks], fits
 
     def pairs(self, now: Fit, singles: Sequence[Score]) -> list[tuple[str, Fit]]:
         """Two effects at once where one alone shows little, fitted: those with the largest gains."""
         torque = [s for s in singles if effects.get(s.effect).place is not Place.SENSOR and not simplicity(s.effect)]
         price = float(np.log(max(now.count, 2)))
-        out: list[tuple[str, Fit]] = []
-        for one, other, gain in InnovationScores(self.problem, now, self.scale(now)).pairs(torque)[:PAIRS]:
-            parameters = sum(len(effects.get(s.effect).parameters) for s in (one, other))
-            if gain < HOPE + price * parameters:
-                continue
-            fit = self.problem.fit(
+        worth = [
+            (one, other) for one, other, gain in InnovationScores(self.problem, now, self.scale(now)).pairs(torque)
+            if gain > HOPE + price * sum(len(effects.get(s.effect).parameters) for s in (one, other))
+        ][:PAIRS]  # fmt: skip
+
+        def fitted(one: Score, other: Score) -> Fit:
+            return self.problem.fit(
                 now.structure.plus(one.effect, other.effect), {**now.values, **one.start, **other.start}, now.noise,
                 FULL_ITERATIONS, carry=now.shots, thorough=False, against=now.cost,
             )  # fmt: skip
-            out.append((one.effect, fit))
-        return out
+
+        fits = self.problem.workers.side_by_side([partial(fitted, *pair) for pair in worth])
+        return [(one.effect, fit) for (one, _), fit in zip(worth, fits, strict=True)]
 
     def unseen(self, now: Fit, names: Sequence[str]) -> list[str]:
         """Lags of the gyro, of a model without one: where a large disturbance follows every reading, their scores are
@@ -135,14 +141,15 @@ class TrialFits:
     def each_fitted(
         self, now: Fit, starts: Mapping[str, Sequence[Mapping[Name, float] | CandidateTorque]]
     ) -> dict[str, Fit]:
-        """Candidates fitted one after the other; one that begins far behind the best so far is not followed."""
+        """Candidates fitted, two at a time; one that begins far behind the best so far is not followed."""
         fits: dict[str, Fit] = {}
-        least = np.inf
-        for name, begin in starts.items():
-            fit = self.fitted(now, name, begin, least)
-            if fit is not None:
-                fits[name] = fit
-                least = min(least, now.cost - BEHIND * (now.cost - fit.cost))
+        workers, least = self.problem.workers, np.inf
+        for two in _batches(list(starts.items()), workers.AT_ONCE):
+            found = workers.side_by_side([partial(self.fitted, now, name, begin, least) for name, begin in two])
+            for (name, _), fit in zip(two, found, strict=True):
+                if fit is not None:
+                    fits[name] = fit
+                    least = min(least, now.cost - BEHIND * (now.cost - fit.cost))
         return fits
 
     def largest_torques(self, now: Fit, names: Sequence[str]) -> list[CandidateTorque]:
@@ -222,6 +229,10 @@ class TrialFits:
         more = self.problem.fit(fit.structure, fit.values, fit.noise, FULL_ITERATIONS, carry=fit.shots)
         return more if more.cost < fit.cost else fit
 
+    def all_further(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Several fits with more steps, side by side."""
+        return self.problem.workers.side_by_side([partial(self.further, fit) for fit in fits])
+
     def special_cases(self, now: Fit, rest: Fit, name: str) -> dict[str, Fit]:
         """Fits with a special case of an effect in its place, from where the richer one stands.
 
@@ -247,15 +258,20 @@ class TrialFits:
         looks = InnovationScores(self.problem, rest, self.scale(rest)).all(names)
         fits = self.special_cases(now, rest, name)
         own_score = next((v[0].gain for v in looks if v[0].effect == name), 0.0)
-        for group in self.shortlist(rest, looks):
-            other = group[0].effect
-            if other == name or group[0].gain < COMPARABLE * own_score:
-                continue
-            least = rest.cost - BEHIND * (rest.cost - now.cost)
-            found = self.fitted(rest, other, [group[0].start], least)
+        least = rest.cost - BEHIND * (rest.cost - now.cost)
+        near = [v[0] for v in self.shortlist(rest, looks) if v[0].effect != name and v[0].gain > COMPARABLE * own_score]
+        fitted = self.problem.workers.side_by_side(
+            [partial(self.fitted, rest, s.effect, [s.start], least) for s in near]
+        )
+        for score, found in zip(near, fitted, strict=True):
+            other = score.effect
             if found is not None and (other not in fits or found.cost < fits[other].cost):
                 fits[other] = found
         return {n: f for n, f in fits.items() if np.isfinite(f.cost)}
+
+
+def _batches(items: Sequence[_Item], size: int) -> list[Sequence[_Item]]:
+    return [items[k : k + size] for k in range(0, len(items), size)]
 
 
 def _gain(fit: Fit, name: str) -> float:
