@@ -225,7 +225,7 @@ def _more_flexible(best: TorqueFit, trial: TorqueFit) -> bool:
     """
     found = trial.structure.effects
     added = [effects.get(e) for e in best.structure.effects if e not in found]
-    return any(e.place is Place.DRIVE or (bool(found) and e.resembles_much) for e in added)
+    return any(e.place is Place.DRIVE or (bool(found) and e.is_flexible) for e in added)
 
 
 def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> FinalFit:
