@@ -38,7 +38,6 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "select/field_search.py": "NO_WORSE PERCENT",
     "select/free_form_residual.py": "HOPE SHOWN STEPS TRIED",
     "select/likelihood_search.py": "ALL MORE SAMPLES",
-    "select/replaced_terms.py": "CERTAIN",
     "select/stepwise.py": "MIN_RIVAL_SHARE PROMISING",
     "select/torque_search.py": "POLISHED RIVAL",
     "select/trial_fits.py": "BEHIND COMPARABLE FAINT FOLLOWS FULL_FIT_RATIO FULL_ITERATIONS HEAVIEST OTHER_START PAIRS "
