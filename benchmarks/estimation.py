@@ -21,7 +21,7 @@ from scipy import optimize, signal
 from threadpoolctl import threadpool_limits
 
 from benchmarks.campaigns import SETS, SIGMA_RAD_S, clean_rates, traces_from, white
-from benchmarks.kept import Result, parser_of, told
+from benchmarks.kept import Result, parser_of, print_and_write
 from benchmarks.peers import DRAWING_BOARD, UPSAMPLING, Simulation, bound, jax_sysid, lmfit_output_error, ours
 from benchmarks.peers import scipy_least_squares as least_squares
 from identify.signals.trace import Trace
@@ -139,7 +139,7 @@ def result_of(small: bool) -> Result:
 def main() -> None:
     """Print the table."""
     given = parser_of(__doc__).parse_args()
-    told(result_of(given.small), given.out, given.small)
+    print_and_write(result_of(given.small), given.out, given.small)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ from scipy import optimize, signal
 from threadpoolctl import threadpool_limits
 
 from benchmarks.campaigns import SAMPLE_S, SETS, TRUTH, clean_rates, times, white
-from benchmarks.kept import Result, parser_of, told
+from benchmarks.kept import Result, parser_of, print_and_write
 from identify.genetic.algorithm import QuadraticObjective, search
 from rig.arrays import Array
 from rig.config.identify import GeneticConfig
@@ -198,7 +198,7 @@ def result_of(small: bool) -> Result:
 def main() -> None:
     """Print the table."""
     given = parser_of(__doc__).parse_args()
-    told(result_of(given.small), given.out, given.small)
+    print_and_write(result_of(given.small), given.out, given.small)
 
 
 if __name__ == "__main__":

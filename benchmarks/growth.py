@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.kept import Result, parser_of, told
+from benchmarks.kept import Result, parser_of, print_and_write
 from benchmarks.long_recording import TRUTH, write_h5
 
 MINUTES = ((1.0, 1000.0), (20.0, 1000.0), (120.0, 1000.0), (1.0, 10_000.0), (12.0, 10_000.0), (120.0, 10_000.0))
@@ -66,7 +66,7 @@ def result_of(small: bool) -> Result:
 def main() -> None:
     """Print the table."""
     given = parser_of(__doc__).parse_args()
-    told(result_of(given.small), given.out, given.small)
+    print_and_write(result_of(given.small), given.out, given.small)
 
 
 if __name__ == "__main__":

@@ -65,7 +65,7 @@ def parser_of(description: str | None) -> argparse.ArgumentParser:
     return parser
 
 
-def told(result: Result, out: Path | None, small: bool) -> None:
+def print_and_write(result: Result, out: Path | None, small: bool) -> None:
     """Print the table and the ratios, and write the JSON where asked for."""
     names = list(result.rows[0]) if result.rows else []
     print(f"| {' | '.join(names)} |\n|{'---|' * len(names)}")

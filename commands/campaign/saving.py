@@ -119,15 +119,16 @@ def export_earlier(
     return dataclasses.replace(part.earlier, recording=recording)
 
 
-def figures(s: SetStatistics) -> dict[str, Any]:
+def figures(statistics: SetStatistics) -> dict[str, Any]:
     """How a set went, in numbers."""
     late_ms = {
-        f"late_ms_p{q:g}": s.late.quantile_s(q / 100) * 1e3 if s.late.ticks else None for q in (50, 99, 99.9, 100)
+        f"late_ms_p{q:g}": statistics.late.quantile_s(q / 100) * 1e3 if statistics.late.ticks else None
+        for q in (50, 99, 99.9, 100)
     }
     return {
-        "name": s.name,
-        "complete": s.complete,
-        "missed_ticks": s.missed_ticks,
-        "invalid_samples": s.drops,
-        "peak_torque_nm": s.peak_torque_nm,
+        "name": statistics.name,
+        "complete": statistics.complete,
+        "missed_ticks": statistics.missed_ticks,
+        "invalid_samples": statistics.drops,
+        "peak_torque_nm": statistics.peak_torque_nm,
     } | late_ms

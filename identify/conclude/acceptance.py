@@ -18,7 +18,7 @@ def of_reported(left: Disturbance, model: ModelResult) -> Disturbance:
     return replace(left, moves_percent={k: v for k, v in left.moves_percent.items() if k in model.parameters})
 
 
-def too_much_left(left: Disturbance, accept: AcceptConfig, axis: str) -> list[str]:
+def reasons_against_disturbance(left: Disturbance, accept: AcceptConfig, axis: str) -> list[str]:
     """Why the residual torque is material, one sentence a limit; nothing where it is immaterial."""
     if not left.depends_on:
         return []

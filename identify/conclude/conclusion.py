@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from identify.bounds.damping_or_lag import lag_for_damping
-from identify.conclude.acceptance import grown, of_reported, too_much_left
+from identify.conclude.acceptance import grown, of_reported, reasons_against_disturbance
 from identify.conclude.case import Case, runs_fitted
 from identify.conclude.error_figures import Measured
 from identify.conclude.max_error import with_max_error
@@ -94,7 +94,7 @@ def conclude(
     reference, per_set = with_max_error(per_set, case.settings.reference)
     material = measured is None and unexplained
     if measured is not None:
-        reasons += too_much_left(of_reported(measured, final), case.settings.accept, case.recording.axis)
+        reasons += reasons_against_disturbance(of_reported(measured, final), case.settings.accept, case.recording.axis)
     found = Identification(
         accepted=not reasons and not material, reasons=(), axis=case.recording.axis, before=result_before,
         verdict=verdict, after=result_after, noise_floor=floor, per_set=per_set, joint=joint,
@@ -140,9 +140,9 @@ def _note(case: Case, after: FinalFit) -> str:
     resting = (
         "these runs hardly determine J: runs that begin at rest are assumed to begin exactly at rest" if rests else ""
     )
-    torn = glitches.told([(t.run.name, t.glitches_s) for t in case.traces])
-    beyond = clipping.told([(t.run.name, *t.clipped) for t in case.traces], case.recording.axis)
-    uneven = resampling.told([(t.run.name, *t.scatter) for t in case.traces])
+    torn = glitches.describe([(t.run.name, t.glitches_s) for t in case.traces])
+    beyond = clipping.describe([(t.run.name, *t.clipped) for t in case.traces], case.recording.axis)
+    uneven = resampling.describe([(t.run.name, *t.scatter) for t in case.traces])
     filtered = coloured_noise.describe_colour(case.colour, case.recording.axis, case.traces[0].channel)
     return ". ".join(
         capital(note) for note in (case.split.note, resting, filtered, *case.left_out, torn, beyond, uneven) if note

@@ -37,23 +37,23 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
 
 
-def bounded(g: Array, b: Array, low: Array) -> Array:
+def bounded(normal: Array, right_side: Array, low: Array) -> Array:
     """Least squares from normal equations with lower bounds: what would go below is held at its bound."""
-    if not (np.all(np.isfinite(g)) and np.all(np.isfinite(b))):
-        return np.zeros(len(b))  # an effect that ran away along a noisy motion explains nothing
-    none = np.diag(g) <= 0.0  # no sample knows of it: rounding, divided by its size, would be anything
-    size = np.where(none, 1.0, np.sqrt(np.maximum(np.diag(g), 1e-300)))
-    g, b = g / np.outer(size, size), b / size
+    if not (np.all(np.isfinite(normal)) and np.all(np.isfinite(right_side))):
+        return np.zeros(len(right_side))  # an effect that ran away along a noisy motion explains nothing
+    none = np.diag(normal) <= 0.0  # no sample knows of it: rounding, divided by its size, would be anything
+    size = np.where(none, 1.0, np.sqrt(np.maximum(np.diag(normal), 1e-300)))
+    normal, right_side = normal / np.outer(size, size), right_side / size
     bound = np.where(none, 0.0, np.where(np.isfinite(low), low * size, -np.inf))
     held = none.copy()
-    x = np.zeros(len(b))
-    for _ in range(len(b) + 1):
+    x = np.zeros(len(right_side))
+    for _ in range(len(right_side) + 1):
         free = ~held
         x[held] = bound[held]
         if not np.any(free):
             break
-        right = b[free] - g[np.ix_(free, held)] @ x[held]
-        x[free] = np.linalg.lstsq(g[np.ix_(free, free)], right, rcond=1e-12)[0]
+        right = right_side[free] - normal[np.ix_(free, held)] @ x[held]
+        x[free] = np.linalg.lstsq(normal[np.ix_(free, free)], right, rcond=1e-12)[0]
         wrong = free & (x < bound)
         if not np.any(wrong):
             break
@@ -61,13 +61,13 @@ def bounded(g: Array, b: Array, low: Array) -> Array:
     return np.asarray(x / size)
 
 
-def coloured_cost(a: Array, y: Array, run: Array, x: Array, given: Array | None) -> tuple[float, Array]:
+def coloured_cost(columns: Array, target: Array, run: Array, gains: Array, given: Array | None) -> tuple[float, Array]:
     """Minus twice the log-likelihood with an autoregressive residual, parameters refitted behind its filter once."""
-    r = y - a @ x
-    order = min(ORDER, len(r) // 50)
+    residual = target - columns @ gains
+    order = min(ORDER, len(residual) // 50)
     if order < 1:
-        return float(len(r) * np.log(max(float(np.mean(r * r)), 1e-300))), np.ones(1)
-    filters = autoregression(r, run, order) if given is None else given
+        return float(len(residual) * np.log(max(float(np.mean(residual * residual)), 1e-300))), np.ones(1)
+    filters = autoregression(residual, run, order) if given is None else given
     order = len(filters) - 1
 
     members = [np.flatnonzero(run == k) for k in np.unique(run)]
@@ -87,26 +87,26 @@ def coloured_cost(a: Array, y: Array, run: Array, x: Array, given: Array | None)
 
     best = np.inf
     for _ in range(1 if given is not None else ROUNDS):
-        e = whitened(y)
-        if a.shape[1]:
-            w = np.column_stack([whitened(a[:, k]) for k in range(a.shape[1])])
+        e = whitened(target)
+        if columns.shape[1]:
+            w = np.column_stack([whitened(columns[:, k]) for k in range(columns.shape[1])])
             size = np.linalg.norm(w, axis=0)
             size = np.where(size > 0.0, size, 1.0)
-            x = np.linalg.lstsq(w / size, e, rcond=1e-9)[0] / size
-            e = e - w @ x
+            gains = np.linalg.lstsq(w / size, e, rcond=1e-9)[0] / size
+            e = e - w @ gains
         cost = float(len(e) * np.log(max(float(np.mean(e * e)), 1e-300)))
         if cost < best:
             best, kept = cost, filters
         if given is None:
-            filters = autoregression(y - a @ x, run, order)
+            filters = autoregression(target - columns @ gains, run, order)
     return best, kept
 
 
-def autoregression(r: Array, run: Array, order: int) -> Array:
+def autoregression(residual: Array, run: Array, order: int) -> Array:
     """Coefficients of the filter that whitens a residual, (order + 1,), the first one."""
     past, now = [], []
     for k in np.unique(run):
-        part = r[run == k]
+        part = residual[run == k]
         if len(part) > order:
             past.append(np.column_stack([part[order - i : len(part) - i] for i in range(1, order + 1)]))
             now.append(part[order:])

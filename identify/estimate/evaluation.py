@@ -77,26 +77,26 @@ def _with_own_gains(
 
 
 @RUNAWAY
-def settled(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> tuple[Shots, Array]:
+def settled(shots: Shots, structure: Structure, names: Sequence[Name], x: Array) -> tuple[Shots, Array]:
     """Start states and bias of one run at fixed parameters; every shot keeps what is best for itself."""
     still = np.ones(len(x), dtype=bool)
-    equations = equations_of(structure, names, x, s.number, s.added)
-    losses = losses_of(s, s.trace.measured - predict(s, equations, s.starts, s.bias))
-    share = np.ones(len(s.first))  # of the full step that each shot dares
+    equations = equations_of(structure, names, x, shots.number, shots.added)
+    losses = losses_of(shots, shots.trace.measured - predict(shots, equations, shots.starts, shots.bias))
+    share = np.ones(len(shots.first))  # of the full step that each shot dares
     for _ in range(SETTLE):
-        part = linearise(s, structure, names, x, np.ones(len(x)), still, np.inf)
+        part = linearise(shots, structure, names, x, np.ones(len(x)), still, np.inf)
         step, bias = part.back(np.zeros(len(x)))
-        trial = moved(s, (step * share[:, None], bias))
+        trial = moved(shots, (step * share[:, None], bias))
         new = losses_of(trial, trial.trace.measured - predict(trial, equations, trial.starts, trial.bias))
         worse = ~(new <= losses)
         stuck = bool(np.all(worse)) or np.sum(np.where(worse, losses, new)) > np.sum(losses) * (1.0 - 1e-4)
         if stuck and (np.min(share) < 0.2 or not np.any(worse)):
             break
         share = np.where(worse, 0.3 * share, np.minimum(1.0, 2.0 * share))
-        trial.starts[worse] = s.starts[worse]
+        trial.starts[worse] = shots.starts[worse]
         kept = losses_of(trial, trial.trace.measured - predict(trial, equations, trial.starts, trial.bias))
         if np.sum(kept) > np.sum(losses):
-            trial.bias = s.bias
+            trial.bias = shots.bias
             kept = losses_of(trial, trial.trace.measured - predict(trial, equations, trial.starts, trial.bias))
-        s, losses = trial, kept
-    return s, losses
+        shots, losses = trial, kept
+    return shots, losses

@@ -232,13 +232,13 @@ def residuals(blocks: Sequence[Block], x: Array) -> list[Array]:
     return out
 
 
-def solve(a: Array, b: Array) -> Array:
+def solve(normal: Array, right_side: Array) -> Array:
     """Least squares from normal equations, columns scaled; the direction that nothing determines stays zero."""
-    if not (np.all(np.isfinite(a)) and np.all(np.isfinite(b))):
-        return np.zeros(len(b))
-    scale = np.sqrt(np.maximum(np.diag(a), 1e-300))
-    scaled = a / np.outer(scale, scale)
-    return np.asarray(np.linalg.lstsq(scaled, b / scale, rcond=1e-13)[0] / scale)
+    if not (np.all(np.isfinite(normal)) and np.all(np.isfinite(right_side))):
+        return np.zeros(len(right_side))
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    scaled = normal / np.outer(scale, scale)
+    return np.asarray(np.linalg.lstsq(scaled, right_side / scale, rcond=1e-13)[0] / scale)
 
 
 def log_gain(platform: tuple[float, float, float], denominator: Denominator, step_s: float) -> float:

@@ -107,14 +107,14 @@ def relative_error_of(coherence: Array, averages: Array) -> Array:
     return np.sqrt((1.0 - coherence) / np.maximum(2.0 * averages * coherence, 1e-300))
 
 
-def chosen(f: Array, power: Array) -> NDArray[np.int_]:
+def chosen(frequency_hz: Array, power: Array) -> NDArray[np.int_]:
     """Excited lines above zero, at most ``MAX_LINES`` of them, evenly over the logarithm of frequency."""
-    inside = f > 0.0
+    inside = frequency_hz > 0.0
     at = np.flatnonzero(inside & (power > EXCITED * np.max(power, where=inside, initial=0.0)))
     if len(at) <= MAX_LINES:
         return at
-    wanted = np.geomspace(f[at[0]], f[at[-1]], MAX_LINES)
-    return np.unique(at[np.clip(np.searchsorted(f[at], wanted), 0, len(at) - 1)])
+    wanted = np.geomspace(frequency_hz[at[0]], frequency_hz[at[-1]], MAX_LINES)
+    return np.unique(at[np.clip(np.searchsorted(frequency_hz[at], wanted), 0, len(at) - 1)])
 
 
 def stands_apart(torque: Array) -> bool:

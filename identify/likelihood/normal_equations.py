@@ -85,8 +85,8 @@ def _stepped(step: Array) -> Array:
     return np.where(step > 0.0, np.log1p(np.clip(step, 0.0, MAX_NOISE_FACTOR)), np.maximum(step, -MAX_LOG_STEP))
 
 
-def changed(s: Shots, own: Array) -> Shots:
+def changed(shots: Shots, own: Array) -> Shots:
     """The same run with its own unknowns changed: its bias, if it has one, and its start states, if they are fitted."""
-    biased = int(s.trace.biased)
+    biased = int(shots.trace.biased)
     starts = own[biased:].reshape(-1, 2)
-    return moved(s, (starts if len(starts) else np.zeros(2), float(own[0]) if biased else 0.0))
+    return moved(shots, (starts if len(starts) else np.zeros(2), float(own[0]) if biased else 0.0))

@@ -28,64 +28,69 @@ BIAS_WALK_STARTS = (1e-6, 1e-5, 1e-4, 1e-3)
 DISTURBANCE_START_FACTORS = (1e-4, 1e-3, 1e-2, 0.1)
 
 
-def other_noise(d: Descent, lower: bool = True) -> bool:
+def other_noise(descent: Descent, lower: bool = True) -> bool:
     """Whether a noise that is quite another one is likelier; if so the descent goes on from there.
 
     Beside the right one the likelihood is a quadratic in its logarithms; far off it is flat, or has a valley for
     a disturbance that is slow and another for one that is fast. ``lower``: far below is looked at, too.
     """
-    before = d.cost
-    wanders = d.problem.wanders and not d.problem.gyro
+    before = descent.cost
+    wanders = descent.problem.wanders and not descent.problem.gyro
     others: list[dict[str, float]] = [
         {"white": white, "slow": slow, "time_constant_s": time} for white, slow, time in NOISE_START_FACTORS
     ]  # fmt: skip
     others += [{"white": x, "slow": x, "walk": x} for x in DISTURBANCE_START_FACTORS if wanders]
-    if "walk" in d.kinds and not wanders:
-        others += [{"walk": d.problem.walk(share) / d.noise.walk} for share in BIAS_WALK_STARTS]
+    if "walk" in descent.kinds and not wanders:
+        others += [{"walk": descent.problem.walk(share) / descent.noise.walk} for share in BIAS_WALK_STARTS]
     for times in others:
-        q = d.noise
-        noise = d.problem.within(replace(q, **{k: x * getattr(q, k) for k, x in times.items()}))
-        looks = d.looks_at(d.x, noise, d.shots)
-        cost = d.cost_of(looks)
-        if cost < d.cost - COST_TOLERANCE:
-            d.noise, d.looks, d.cost = noise, looks, cost
-    if d.alone:
-        noise_alone(d)
+        q = descent.noise
+        noise = descent.problem.within(replace(q, **{k: x * getattr(q, k) for k, x in times.items()}))
+        looks = descent.looks_at(descent.x, noise, descent.shots)
+        cost = descent.cost_of(looks)
+        if cost < descent.cost - COST_TOLERANCE:
+            descent.noise, descent.looks, descent.cost = noise, looks, cost
+    if descent.alone:
+        noise_alone(descent)
     if lower:
-        without_disturbance(d)
-    d.damping = LEVENBERG_DAMPING
-    return d.cost < before - COST_TOLERANCE
+        without_disturbance(descent)
+    descent.damping = LEVENBERG_DAMPING
+    return descent.cost < before - COST_TOLERANCE
 
 
-def noise_alone(d: Descent) -> None:
+def noise_alone(descent: Descent) -> None:
     """The likeliest noise near this one, if it is likelier with the model as it stands."""
     noise = likeliest_noise(
-        d.problem, d.structure, d.names, d.x, d.shots, d.looks, d.weights, d.noise, d.kinds
+        descent.problem, descent.structure, descent.names, descent.x, descent.shots, descent.looks, descent.weights,
+        descent.noise, descent.kinds,
     )  # fmt: skip
-    looks = d.looks_at(d.x, noise, d.shots)
-    cost = d.cost_of(looks)
-    if cost < d.cost - COST_TOLERANCE:
-        d.noise, d.looks, d.cost = noise, looks, cost
+    looks = descent.looks_at(descent.x, noise, descent.shots)
+    cost = descent.cost_of(looks)
+    if cost < descent.cost - COST_TOLERANCE:
+        descent.noise, descent.looks, descent.cost = noise, looks, cost
 
 
-def without_disturbance(d: Descent) -> None:
+def without_disturbance(descent: Descent) -> None:
     """Far less of a disturbance, if that is likelier once the parameters have followed.
 
     A model that is right may otherwise stay where the disturbance explains all that is left, and the sensor has no
     noise: between the two lies a ridge.
     """
-    if d.reduced_chi_square() < LARGE_DISTURBANCE:
+    if descent.reduced_chi_square() < LARGE_DISTURBANCE:
         return
-    here = d.place()
+    here = descent.place()
     for factor in CONTINUATION_LEVELS:
         q = here[0]
-        d.noise = d.problem.within(replace(q, white=factor * q.white, slow=factor * q.slow))
-        d.looks = d.looks_at(d.x, d.noise, d.shots)
-        d.cost, d.damping = d.cost_of(d.looks), LEVENBERG_DAMPING
+        descent.noise = descent.problem.within(replace(q, white=factor * q.white, slow=factor * q.slow))
+        descent.looks = descent.looks_at(descent.x, descent.noise, descent.shots)
+        descent.cost, descent.damping = descent.cost_of(descent.looks), LEVENBERG_DAMPING
         for _ in range(CONTINUATION_STEPS):
-            gap = d.cost - here[-1]
-            if not d.try_step(False) or d.cost < here[-1] - COST_TOLERANCE or d.cost - here[-1] > MAX_GAP_RATIO * gap:
+            gap = descent.cost - here[-1]
+            if (
+                not descent.try_step(False)
+                or descent.cost < here[-1] - COST_TOLERANCE
+                or descent.cost - here[-1] > MAX_GAP_RATIO * gap
+            ):
                 break
-        if d.cost < here[-1] - COST_TOLERANCE:
+        if descent.cost < here[-1] - COST_TOLERANCE:
             return
-        d.go(here)
+        descent.go(here)

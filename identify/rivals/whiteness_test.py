@@ -24,7 +24,7 @@ COLOURED = 5.0  # standard errors by which a band may stand out
 def fails_whiteness_test(fitted: FinalFit, declared: Sequence[str]) -> bool:
     """Whether what was found beside the declared effects is more than a residual like this one supports."""
     found = [e for e in fitted.structure.effects if e not in declared]
-    if len(found) < SO_MANY or not any(effects.get(e).resembles_much for e in found):
+    if len(found) < SO_MANY or not any(effects.get(e).is_flexible for e in found):
         return False
     return not fitted.sensor_limited or coloured(fitted) > COLOURED
 

@@ -54,7 +54,7 @@ def _plateaus(rate: Array, top: float) -> int:
     return count
 
 
-def told(runs: Sequence[tuple[str, int, float]], axis: str) -> str:
+def describe(runs: Sequence[tuple[str, int, float]], axis: str) -> str:
     """One sentence on the runs (name, samples at the full scale, that rate in rad/s or m/s); empty where none has any.
 
     Parameters

@@ -21,7 +21,7 @@ from identify.runs.holdout import Split
 from identify.runs.observability import can_show
 from identify.select.evidence import in_band, torque_fit_of
 from identify.select.search_state import Search
-from identify.select.torque_search import TorqueCandidate, TorqueSearch
+from identify.select.torque_search import SURE, TorqueCandidate, TorqueSearch
 from identify.signals.trace import Trace
 from rig import effects
 from rig.effects.base import Place
@@ -225,7 +225,7 @@ def _more_flexible(best: TorqueFit, trial: TorqueFit) -> bool:
     """
     found = trial.structure.effects
     added = [effects.get(e) for e in best.structure.effects if e not in found]
-    return any(e.place is Place.DRIVE or (bool(found) and e.resembles_much) for e in added)
+    return any(e.place is Place.DRIVE or (bool(found) and e.is_flexible) for e in added)
 
 
 def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> FinalFit:
@@ -279,6 +279,6 @@ def _status(look: TorqueCandidate, chosen: TorqueCandidate | None, named: Sequen
         return "added" if look.effect in named else "added, then no longer needed"
     if look.is_significant:
         return "carries less than what was added"
-    if look.sureness >= 4.0 and look.weight > 0.0:
+    if look.sureness >= SURE and look.weight > 0.0:
         return f"proven but small: {PERCENT * look.weight:.0f} % of what is left"
     return "no better"

@@ -12,7 +12,7 @@ from identify.select.trial_fits import TRIAL_ITERATIONS
 if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
 
-CERTAIN = 30.0  # standard errors beyond which nobody asks whether a term is needed; costs only time
+CERTAIN = 30.0  # standard errors beyond which a term is needed, and no effect is tried in its place
 
 
 def replace_linear_terms(search: Stepwise, now: Fit) -> Fit:

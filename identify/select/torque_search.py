@@ -52,7 +52,7 @@ class TorqueCandidate:
     @property
     def is_significant(self) -> bool:
         """Whether it is proven and carries enough to be named."""
-        flexible = effects.get(self.effect).resembles_much  # its shape was looked for on the held-out samples, too
+        flexible = effects.get(self.effect).is_flexible  # its shape was looked for on the held-out samples, too
         return self.weight >= WEIGHT and (self.sureness_by_size if flexible else self.sureness) >= SURE
 
 

@@ -79,7 +79,7 @@ def _highest(apart: Array) -> tuple[list[int], float]:
     return peaks, float(np.max(left))
 
 
-def told(runs: Sequence[tuple[str, Array]]) -> str:
+def describe(runs: Sequence[tuple[str, Array]]) -> str:
     """One sentence on the glitches of all runs (name, times in s); empty where there are none."""
     found = [(name, times) for name, times in runs if len(times)]
     if not found:

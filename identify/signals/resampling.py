@@ -180,7 +180,7 @@ def _followed(values: Array, step_s: float, cutoff_hz: float) -> Any:
     return make_interp_spline(step_s * np.arange(len(values)), slow, k=5)
 
 
-def told(runs: Sequence[tuple[str, float, bool]]) -> str:
+def describe(runs: Sequence[tuple[str, float, bool]]) -> str:
     """One sentence on stamps that scatter: (name, by how much in s, whether the stamps are wrong); empty for none."""
     wrong = [(name, scatter_s) for name, scatter_s, is_wrong in runs if is_wrong]
     if not wrong:

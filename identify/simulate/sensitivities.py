@@ -37,57 +37,57 @@ class Reduced:
 
 
 def linearise(
-    s: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any, outlier: float
+    shots: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any, outlier: float
 ) -> Reduced:
     """Normal equations of one run around a parameter vector."""
-    columns, state, residual = sensitivities(s, structure, names, x, scale, fixed)
-    return _eliminate(s, columns, state, residual, s.trace.biased, outlier)
+    columns, state, residual = sensitivities(shots, structure, names, x, scale, fixed)
+    return _eliminate(shots, columns, state, residual, shots.trace.biased, outlier)
 
 
-def at_residual(part: Reduced, s: Shots, residual: Array, outlier: float) -> Reduced:
+def at_residual(part: Reduced, shots: Shots, residual: Array, outlier: float) -> Reduced:
     """The normal equations a little further on: a new residual, the sensitivities as they were."""
-    return _eliminate(s, part.columns, part.state, residual, s.trace.biased, outlier)
+    return _eliminate(shots, part.columns, part.state, residual, shots.trace.biased, outlier)
 
 
 @RUNAWAY
-def jacobian(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> tuple[Array, Array]:
+def jacobian(shots: Shots, structure: Structure, names: Sequence[Name], x: Array) -> tuple[Array, Array]:
     """Sensitivities and residual of the samples that count, start states and bias projected out: (m, p), (m,)."""
     scale = np.where(np.abs(x) > 0, np.abs(x), 1.0)
     still = np.zeros(len(names), dtype=bool)
-    columns, state, residual = sensitivities(s, structure, names, x, scale, still)
+    columns, state, residual = sensitivities(shots, structure, names, x, scale, still)
     parts = []
-    for begin, end in s.edges:
-        mask = s.weight[begin:end]
+    for begin, end in shots.edges:
+        mask = shots.weight[begin:end]
         if not np.any(mask):
             continue
-        ones = [np.ones(int(mask.sum()))] if s.trace.biased else []
+        ones = [np.ones(int(mask.sum()))] if shots.trace.biased else []
         both = np.column_stack([columns[begin:end][mask], *ones, residual[begin:end][mask]])
         q = np.linalg.qr(state[begin:end][mask])[0]
         parts.append(both - q @ (q.T @ both))
     both = np.concatenate(parts)
-    if s.trace.biased:
+    if shots.trace.biased:
         one = both[:, -2] / np.linalg.norm(both[:, -2])
         both = np.delete(both - np.outer(one, one @ both), -2, axis=1)
     return both[:, :-1], both[:, -1]
 
 
-def nuisance_basis(s: Shots, state: Array) -> Array:
+def nuisance_basis(shots: Shots, state: Array) -> Array:
     """Orthonormal basis of what start states (two a shot) and bias add to the samples that count, (m, nuisances)."""
     columns = []
-    for begin, end in s.edges:
+    for begin, end in shots.edges:
         block = np.zeros_like(state)
         block[begin:end] = state[begin:end]
-        columns += list(block[s.weight].T)
-    if s.trace.biased:
-        columns.append(np.ones(int(s.weight.sum())))
+        columns += list(block[shots.weight].T)
+    if shots.trace.biased:
+        columns.append(np.ones(int(shots.weight.sum())))
     lengths = [float(np.linalg.norm(c)) for c in columns]
     kept = [c / size for c, size in zip(columns, lengths, strict=True) if size > 0.0]
-    return np.asarray(np.linalg.qr(np.stack(kept, axis=1))[0]) if kept else np.zeros((int(s.weight.sum()), 0))
+    return np.asarray(np.linalg.qr(np.stack(kept, axis=1))[0]) if kept else np.zeros((int(shots.weight.sum()), 0))
 
 
 @RUNAWAY
 def sensitivities(
-    s: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any,
+    shots: Shots, structure: Structure, names: Sequence[Name], x: Array, scale: Array, fixed: Any,
     near: Neighbourhood | None = None,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
     """Derivatives by the parameters (n, p) and by the shots' start states (n, 2), and the residual (n,).
@@ -96,37 +96,37 @@ def sensitivities(
     """
 
     def run(values: Array, starts: Array) -> Array:
-        return predict(s, equations_of(structure, names, values, s.number, s.added), starts, s.bias)
+        return predict(shots, equations_of(structure, names, values, shots.number, shots.added), starts, shots.bias)
 
-    equations = equations_of(structure, names, x, s.number, s.added)
-    near = near or neighbourhood_of(s, equations)
-    base = run(x, s.starts) if near is None else near.channel
-    residual = s.trace.measured - base
+    equations = equations_of(structure, names, x, shots.number, shots.added)
+    near = near or neighbourhood_of(shots, equations)
+    base = run(x, shots.starts) if near is None else near.channel
+    residual = shots.trace.measured - base
     columns = np.zeros((len(base), len(x)))
     for i in range(len(x)):
-        if fixed[i] or (len(names[i]) == 3 and int(names[i][2]) != s.number):
+        if fixed[i] or (len(names[i]) == 3 and int(names[i][2]) != shots.number):
             continue
         h = STEP * scale[i]
         _low, high = bounds_of(names[i])
         h = -h if x[i] + h > high else h
         moved = x.copy()
         moved[i] += h
-        other = None if near is None else near.changed(equations_of(structure, names, moved, s.number, s.added))
-        columns[:, i] = (run(moved, s.starts) - base if other is None else other) / h
-    span = np.maximum(np.max(np.abs(s.trace.fine[0])), 1e-9), np.maximum(np.max(np.abs(s.trace.fine[1])), 1e-9)
+        other = None if near is None else near.changed(equations_of(structure, names, moved, shots.number, shots.added))
+        columns[:, i] = (run(moved, shots.starts) - base if other is None else other) / h
+    span = np.maximum(np.max(np.abs(shots.trace.fine[0])), 1e-9), np.maximum(np.max(np.abs(shots.trace.fine[1])), 1e-9)
     state = np.zeros((len(base), 2))
     for k in range(2):
         if near is not None:
             state[:, k] = near.begun(k)
             continue
-        moved = s.starts.copy()
+        moved = shots.starts.copy()
         moved[:, k] += STEP * 10.0 * span[k]
         state[:, k] = (run(x, moved) - base) / (STEP * 10.0 * span[k])
-    if s.rests:
-        begin, end = s.edges[0]
+    if shots.rests:
+        begin, end = shots.edges[0]
         state[begin:end] = 0.0
     if equations.sticks:
-        _without_stuck_rates(s, state, equations)
+        _without_stuck_rates(shots, state, equations)
     return columns, state, residual
 
 

@@ -202,19 +202,21 @@ def _sensed(equations: Equations, rate: Array, first: int, step_s: float) -> Arr
 
 
 @RUNAWAY
-def losses_of(s: Shots, residual: Array) -> Array:
+def losses_of(shots: Shots, residual: Array) -> Array:
     """Sum of squares of every shot over the samples that count, (shots,); infinite where it ran away."""
-    squares = np.where(s.weight, residual**2, 0.0)
-    sums = np.array([float(np.sum(squares[a:b])) for a, b in s.edges])
+    squares = np.where(shots.weight, residual**2, 0.0)
+    sums = np.array([float(np.sum(squares[a:b])) for a, b in shots.edges])
     return np.where(np.isfinite(sums), sums, np.inf)
 
 
-def residual_at(s: Shots, structure: Structure, names: Sequence[Name], x: Array) -> tuple[Array, Array]:
+def residual_at(shots: Shots, structure: Structure, names: Sequence[Name], x: Array) -> tuple[Array, Array]:
     """Measured minus simulated at a parameter vector, (n,), and its sum of squares in every shot, (shots,)."""
-    residual = s.trace.measured - predict(s, equations_of(structure, names, x, s.number, s.added), s.starts, s.bias)
-    return residual, losses_of(s, residual)
+    residual = shots.trace.measured - predict(
+        shots, equations_of(structure, names, x, shots.number, shots.added), shots.starts, shots.bias
+    )
+    return residual, losses_of(shots, residual)
 
 
-def moved(s: Shots, by: tuple[Array, float]) -> Shots:
+def moved(shots: Shots, by: tuple[Array, float]) -> Shots:
     """The same shots with other start states and bias."""
-    return replace(s, starts=s.starts + by[0], bias=s.bias + by[1])
+    return replace(shots, starts=shots.starts + by[0], bias=shots.bias + by[1])

@@ -124,7 +124,7 @@ def _curve(
         parameters=(
             *ends, *(Parameter(f"value_{k}", unit, f"value {k} of the curve", True, low) for k in range(values))
         ),
-        kernel=kernel_, resembles_much=True, sought_alone=True, **more,
+        kernel=kernel_, is_flexible=True, sought_alone=True, **more,
     )  # fmt: skip
 
 

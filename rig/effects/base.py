@@ -154,7 +154,7 @@ class Effect:
     large_starts: Callable[[tuple[float, float, float], Scale], tuple[LargeStart, ...]] | None = None
     # From fitted (J, C, K), fitted own values and the scale: starting values near other possible minima.
     other_minima: Callable[[tuple[float, float, float], tuple[float, ...], Scale], tuple[LargeStart, ...]] | None = None
-    resembles_much: bool = False  # flexible enough to fit the residual that another missing effect leaves
+    is_flexible: bool = False  # flexible enough to fit the residual that another missing effect leaves
     sought_alone: bool = False  # never proposed in a pair: with some shape it fits what any other effect leaves
     separated_by: str = ""  # "from RIVAL: experiment, as an imperative; from ..."
     reads: Channel | None = None  # the measured channel that it is an effect of

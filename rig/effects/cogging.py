@@ -39,7 +39,7 @@ EFFECT = Effect(
     ),
     kernel=_torque,
     formula="sine_nm * sin(order * angle_rad) + cosine_nm * cos(order * angle_rad)",
-    resembles_much=True,
+    is_flexible=True,
     sought_alone=True,
     separated_by="from backlash and cubic stiffness: excite at several amplitudes, and move slowly through the whole "
     "travel",

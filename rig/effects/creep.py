@@ -36,6 +36,6 @@ EFFECT = Effect(
     states=1,
     rest_state=lambda angle, rate: (angle,),
     fastest_rad_s=lambda values: 0.3 / values[4],
-    resembles_much=True,
+    is_flexible=True,
     separated_by="from damping: excite at several frequencies; from stiffness drift: hold a constant torque",
 )

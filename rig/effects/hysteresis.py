@@ -52,7 +52,7 @@ EFFECT = Effect(
     fastest_rad_s=_fastest,
     follows_within_rad=lambda values: values[4] / values[5],
     nests=("presliding_friction",),
-    resembles_much=True,
+    is_flexible=True,
     stays="the initial deflection of the contact is not known before the run",
     separated_by="from presliding friction: repeat at several amplitudes",
 )

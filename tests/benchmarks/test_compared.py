@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks import compare, estimation, genetic
 from benchmarks.campaigns import TRUTH
-from benchmarks.kept import Result, file_of, told
+from benchmarks.kept import Result, file_of, print_and_write
 from benchmarks.long_recording import blocks
 
 ROOT = Path(__file__).parents[2]
@@ -46,7 +46,9 @@ def test_kept_results_of_every_small_benchmark_stand_where_compare_looks() -> No
 def test_a_result_is_written_with_versions_machine_and_seeds(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    told(Result("x", {}, [3], {"times": 2.0}, [{"tool": "one", "s": 1.5}, {"tool": "two"}]), tmp_path, small=True)
+    print_and_write(
+        Result("x", {}, [3], {"times": 2.0}, [{"tool": "one", "s": 1.5}, {"tool": "two"}]), tmp_path, small=True
+    )
     text = json.loads((tmp_path / "x-small.json").read_text(encoding="utf-8"))
     assert text["seeds"] == [3] and text["versions"]["numpy"] == np.__version__ and "cores" in text["machine"]
     assert "| one | 1.5 |" in capsys.readouterr().out

@@ -130,6 +130,28 @@ def test_every_path_on_a_page_exists(page: Path) -> None:
     assert not gone, f"{name_of(page)} names what has moved or is gone: {', '.join(gone)}"
 
 
+def names_in_files(page: Path) -> list[tuple[str, str]]:
+    """Name and file of "`CHECKS` in `rig/guard/guard.py`", "`a`, `b` in `x.py`" and "`x.py` (`name`)"."""
+    text, name = text_of(page), r"`\w+`"
+    before = re.findall(rf"((?:{name}(?:, | and ))*{name}) in `([\w/]+/\w+\.py)`", text)
+    behind = re.findall(rf"`([\w/]+/\w+\.py)` \(((?:{name}(?:, | and ))*{name})", text)
+    pairs = [*before, *((names, path) for path, names in behind)]
+    return [(n, path) for names, path in pairs for n in re.findall(r"`(\w+)`", names)]
+
+
+def test_names_said_to_be_in_a_file_are_found_on_a_page(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("a line in `A` in `rig/x.py`; `b`, `c` in `rig/y.py`, `rig/z.py` (`_d`)", encoding="utf-8")
+    found = [("A", "rig/x.py"), ("b", "rig/y.py"), ("c", "rig/y.py"), ("_d", "rig/z.py")]
+    assert names_in_files(page) == found
+
+
+@pytest.mark.parametrize("page", WITH_COMMANDS, ids=name_of)
+def test_every_name_that_a_page_puts_in_a_file_is_there(page: Path) -> None:
+    gone = [f"{n} in {path}" for n, path in names_in_files(page) if not re.search(rf"\b{n}\b", text_of(ROOT / path))]
+    assert not gone, f"{name_of(page)} looks in the wrong file for {', '.join(gone)}"
+
+
 def types_in(annotation: object) -> list[object]:
     """The type of a key, or all those inside a union, a list or a mapping."""
     return [annotation, *(found for inner in get_args(annotation) for found in types_in(inner))]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from identify.conclude.acceptance import too_much_left
+from identify.conclude.acceptance import reasons_against_disturbance
 from identify.residual import Dependence, Disturbance
 from identify.wording import residual_torque_sentence
 from rig.config.identify import AcceptConfig
@@ -13,7 +13,7 @@ RATE = Dependence("rate", 0.03, 0.03, 1e-9)
 
 
 def test_a_disturbance_that_goes_with_nothing_is_no_reason_however_large() -> None:
-    assert too_much_left(Disturbance(0.5, "N*m", 0.5), AcceptConfig(), "rotary") == []
+    assert reasons_against_disturbance(Disturbance(0.5, "N*m", 0.5), AcceptConfig(), "rotary") == []
 
 
 @pytest.mark.parametrize(
@@ -25,14 +25,14 @@ def test_a_disturbance_that_goes_with_nothing_is_no_reason_however_large() -> No
     ],
 )
 def test_each_limit_is_named_where_it_is_passed(left: Disturbance, words: str) -> None:
-    (reason,) = too_much_left(left, AcceptConfig(), "rotary")
+    (reason,) = reasons_against_disturbance(left, AcceptConfig(), "rotary")
     assert words in reason
     assert "rate" in reason
 
 
 def test_within_all_limits_it_is_accepted_and_told_in_a_sentence() -> None:
     left = Disturbance(0.1, "N*m", 0.1, (RATE,), {"inertia": 1.0, "damping": 5.0})
-    assert too_much_left(left, AcceptConfig(), "rotary") == []
+    assert reasons_against_disturbance(left, AcceptConfig(), "rotary") == []
     assert "3.0 % depends on the rate" in residual_torque_sentence(left, "rotary")
     assert "3.0 % depends on the speed" in residual_torque_sentence(left, "linear")
     assert "changes J by 1.0 % and C by 5.0 %" in residual_torque_sentence(left, "rotary")

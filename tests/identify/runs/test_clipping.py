@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identify.pipeline import identify
-from identify.runs.clipping import full_scale_of, told
+from identify.runs.clipping import describe, full_scale_of
 from rig.config.identify import IdentifyConfig
 from rig.platform import TERMS
 from rig.recording.run import Array, Recording
@@ -47,10 +47,10 @@ def test_a_platform_at_rest_or_one_that_reaches_a_constant_rate_once_tells_none(
 
 
 def test_it_is_told_in_which_runs() -> None:
-    said = told([("a", 12, np.radians(400.0)), ("b", 0, 0.0)], "rotary")
+    said = describe([("a", 12, np.radians(400.0)), ("b", 0, 0.0)], "rotary")
     assert said.endswith("the platform moved faster: a (12 samples at 400 deg/s)")
-    assert told([("a", 12, 1.5)], "linear").endswith("a (12 samples at 1.5 m/s)")
-    assert told([("b", 0, 0.0)], "rotary") == ""
+    assert describe([("a", 12, 1.5)], "linear").endswith("a (12 samples at 1.5 m/s)")
+    assert describe([("b", 0, 0.0)], "rotary") == ""
 
 
 def test_what_is_cut_off_bends_no_parameter_and_nothing_is_named_for_it() -> None:

@@ -1,11 +1,11 @@
-"""Spikes are left out and told; corners of the rate, lines and steep motion are not taken for spikes."""
+"""Spikes are left out and described; corners of the rate, lines and steep motion are not taken for spikes."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from identify.signals.glitches import FEW, GLITCH_SIGMAS, glitches, told
+from identify.signals.glitches import FEW, GLITCH_SIGMAS, describe, glitches
 from identify.signals.prepare import prepare
 from rig.dynamics import TorqueSignal, simulate
 from rig.platform import Platform
@@ -70,7 +70,7 @@ def test_a_spike_costs_its_own_sample_and_the_noise_is_the_noise() -> None:
 
 
 def test_it_is_told_where_they_were() -> None:
-    said = told([("a", np.array([1.5])), ("b", np.zeros(0)), ("c", np.array([2.0, 3.25]))])
+    said = describe([("a", np.array([1.5])), ("b", np.zeros(0)), ("c", np.array([2.0, 3.25]))])
     assert said.startswith(f"3 samples deviate by more than {GLITCH_SIGMAS:g} times the noise")
     assert said.endswith("excluded: a at 1.5 s; c at 2, 3.25 s")
-    assert told([("a", np.zeros(0))]) == ""
+    assert describe([("a", np.zeros(0))]) == ""

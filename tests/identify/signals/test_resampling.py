@@ -7,7 +7,7 @@ import pytest
 
 from identify.signals.noise import noise_of
 from identify.signals.prepare import prepare
-from identify.signals.resampling import beat_of, sampled, told
+from identify.signals.resampling import beat_of, describe, sampled
 from rig.errors import RecordingError
 from rig.recording.run import Array, Run
 from tests.identify.simulated import NOISE_RAD_S
@@ -51,8 +51,8 @@ def test_where_only_the_stamps_scatter_the_samples_are_taken_as_even() -> None:
     found = sampled(beat_of("x", time), time, values, np.ones(len(time), bool))
     assert found.stamps_wrong
     np.testing.assert_array_equal(found.values, values)
-    assert "a jitter of up to 49.9 us" in told([("x", found.scatter_s, True), ("y", 1.0, False)])
-    assert told([("x", 1e-4, False)]) == ""
+    assert "a jitter of up to 49.9 us" in describe([("x", found.scatter_s, True), ("y", 1.0, False)])
+    assert describe([("x", 1e-4, False)]) == ""
 
 
 def test_samples_that_are_missing_among_scattered_ones_are_bridged_and_do_not_count() -> None:

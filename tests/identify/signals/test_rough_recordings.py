@@ -136,4 +136,4 @@ def test_a_stuck_minute_of_zeros_flagged_invalid_is_as_if_it_were_not_there() ->
     valid = run.valid.copy()
     valid[1000:1400] = False
     one = refine([prepare(replace(run, rate_rad_s=broken, valid=valid), 0, NOISE_RAD_S)], Structure(), START)
-    np.testing.assert_allclose(one.values, TRUTH, rtol=2e-3)
+    np.testing.assert_allclose(one.vector, TRUTH, rtol=2e-3)
