@@ -12,6 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
+import numpy as np
+
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
@@ -211,8 +213,10 @@ class Stepwise:
         close = [n for n in alike if n not in richer and not no_possible_gain(seen, n, alike, more)]
         if len(close) > 1 and self.whole is not None:
             fits = {n: self.on_all(seen[n].fit) for n in close}
-            likeliest = min(fits.values(), key=lambda f: f.penalised)
-            alike = [n for n, f in fits.items() if support_difference(f, likeliest) < STRONG_SUPPORT]
+            fits = {n: f for n, f in fits.items() if np.isfinite(f.cost)}  # a model may run away there
+            if fits:
+                likeliest = min(fits.values(), key=lambda f: f.penalised)
+                alike = [n for n, f in fits.items() if support_difference(f, likeliest) < STRONG_SUPPORT]
         return simplest(self.weigher, {n: seen[n].fit for n in alike}), alike
 
     def _has_more(self, rich: Evidence, special: Evidence) -> bool:
