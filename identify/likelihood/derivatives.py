@@ -11,7 +11,7 @@ import numpy as np
 from identify.likelihood.fit import Columns, Look
 from identify.model.parameters import Name
 from identify.model.structure import Structure
-from identify.simulate.shots import RUNAWAY, Shots, moved
+from identify.simulate.shots import RUNAWAY, Shots, moved, with_bias
 from rig.arrays import Array
 from rig.dynamics.gains import Gains, Noise, innovations_with
 
@@ -126,7 +126,7 @@ def _of_run(
 
     def followed(gains: Gains, h: float, bias: float = 0.0, predict: bool = bends) -> Array:
         if predict:
-            e = p.look(moved(s, (np.zeros(2), bias)), at.structure, at.names, at.x, at.noise, gains).innovations
+            e = p.look(with_bias(s, s.bias + bias), at.structure, at.names, at.x, at.noise, gains).innovations
         else:
             e = innovations_with(base.gains, gains, base.innovations, base.state, s.trace.keep, spans, bias)
         return np.asarray(((base.innovations[w] - e[w]) / (h * root)).ravel())
@@ -141,7 +141,8 @@ def _of_run(
     own = np.zeros((scaled.size, 0))
     if s.trace.biased:
         h = BIAS_STEP * p.rate_rad_s
-        own = followed(base.gains, h, h)[:, None]
+        # Where a stretch begins within a run, its start angle goes with the bias.
+        own = followed(base.gains, h, h, predict=bends or bool(np.any(s.since_s > 0.0)))[:, None]
     if p.fits_starts:
         own = np.column_stack([own, _by_start(at, s, base, root)])
     for k, step in through_gains.items():

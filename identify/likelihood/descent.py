@@ -28,7 +28,7 @@ from identify.likelihood.other_noise import noise_alone, other_noise, without_di
 from identify.model.parameters import Name, bounds_of, names_of, ordered
 from identify.model.structure import Structure
 from identify.simulate.all_runs import shots_for
-from identify.simulate.shots import RUNAWAY, Shots
+from identify.simulate.shots import RUNAWAY, Shots, with_bias
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.gains import RATE, Noise
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from identify.likelihood.prediction_error import PredictionError
 
 DIFFERENCE_STEP = 1e-6  # relative step of the differences
+BIAS_STEPS = 3  # for the biases alone, before the first step
 MAX_STEP_TRIALS = 7  # step lengths tried before a direction is given up
 COARSE_TOLERANCE = 5e-3  # of the difference to the model it is compared with, that the last step of a fit brings
 STALLED_STEPS = 2  # steps in a row that bring little, after which a fit has arrived: one alone may have been cut short
@@ -77,8 +78,9 @@ class Descent:
         self.shots = shots_for(p.traces, structure, self.names, self.x, None, p.use, None, p.coarse, ahead=True)
         # Start states are carried over only where they are fitted: where a driven run begins stuck is a matter of the
         # friction that is tried.
+        if carry:
+            self.shots = [with_bias(s, earlier.bias) for s, earlier in zip(self.shots, carry, strict=True)]
         for s, earlier in zip(self.shots, carry or (), strict=bool(carry)):
-            s.bias = earlier.bias
             if p.fits_starts and np.array_equal(earlier.first, s.first):
                 s.starts = earlier.starts.copy()
         self.damping = LEVENBERG_DAMPING
@@ -90,11 +92,31 @@ class Descent:
         )
         self.looks = self.looks_at(self.x, self.noise, self.shots)
         self.cost = self.cost_of(self.looks)
+        self._settle_biases()
         self.alone = noise is None  # nobody has looked for the noise yet
         if self.alone and not structure.bends:  # else every look is a prediction
             noise_alone(self)
         self.information: Array = np.zeros((len(self.x), len(self.x)))
         self._informed: tuple[Noise, bytes] | None = None
+
+    def _settle_biases(self) -> None:
+        """The runs' biases where they are likeliest with the parameters that the descent begins with.
+
+        A model that lacks what pushes one way has it in the gyro's bias. An effect that is begun beside that bias would
+        be taken back by the first step.
+        """
+        if not any(s.trace.biased for s in self.shots):
+            return
+        for _ in range(BIAS_STEPS):
+            there = Standpoint(self.problem, self.structure, self.names, self.x, self.noise, self.shots, self.looks)
+            found = normal_equations(derivatives(there, {}, []), len(self.x), 0, self.count)
+            if not all(np.all(np.isfinite(taken)) for _, taken in found.own):
+                return
+            shots = [changed(s, taken) for s, (_, taken) in zip(self.shots, found.own, strict=True)]
+            looks = self.looks_at(self.x, self.noise, shots)
+            if not (cost := self.cost_of(looks)) < self.cost - COST_TOLERANCE:
+                return
+            self.shots, self.looks, self.cost = shots, looks, cost
 
     def _kinds_of_noise(self) -> list[str]:
         """The numbers of the noise that this model has; without a low-pass nothing is ahead of it."""

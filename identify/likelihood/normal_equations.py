@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identify.likelihood.derivatives import Derivatives
-from identify.simulate.shots import Shots, moved
+from identify.simulate.shots import Shots, moved, with_bias
 from rig.arrays import Array
 
 COST_TOLERANCE = 0.5  # fall of the cost below which a fit has arrived
@@ -85,8 +85,10 @@ def _stepped(step: Array) -> Array:
     return np.where(step > 0.0, np.log1p(np.clip(step, 0.0, MAX_NOISE_FACTOR)), np.maximum(step, -MAX_LOG_STEP))
 
 
-def changed(shots: Shots, own: Array) -> Shots:
+def changed(s: Shots, own: Array) -> Shots:
     """The same run with its own unknowns changed: its bias, if it has one, and its start states, if they are fitted."""
-    biased = int(shots.trace.biased)
+    biased = int(s.trace.biased)
     starts = own[biased:].reshape(-1, 2)
-    return moved(shots, (starts if len(starts) else np.zeros(2), float(own[0]) if biased else 0.0))
+    if len(starts):
+        return moved(s, (starts, float(own[0]) if biased else 0.0))
+    return with_bias(s, s.bias + float(own[0])) if biased else s

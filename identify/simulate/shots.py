@@ -46,6 +46,11 @@ class Shots:
         return self.trace.run.added_inertia_kg_m2
 
     @cached_property
+    def since_s(self) -> Array:
+        """Time since the run began, at the start of each shot, (s,)."""
+        return np.asarray(self.trace.offset_s + self.trace.step_s * self.first)
+
+    @cached_property
     def active(self) -> Any:
         """Which shots hold samples that count; the others are not simulated."""
         return np.array([bool(np.any(self.weight[a:b])) for a, b in self.edges])
@@ -220,3 +225,14 @@ def residual_at(shots: Shots, structure: Structure, names: Sequence[Name], x: Ar
 def moved(shots: Shots, by: tuple[Array, float]) -> Shots:
     """The same shots with other start states and bias."""
     return replace(shots, starts=shots.starts + by[0], bias=shots.bias + by[1])
+
+
+def with_bias(s: Shots, bias: float) -> Shots:
+    """The same shots with another bias.
+
+    Start angles were integrated from the rate since the run began, and the bias with it: a stretch cut out of the
+    middle of a run begins as far off as its bias has carried the angle by then.
+    """
+    starts = s.starts.copy()
+    starts[:, 0] -= (bias - s.bias) * s.since_s
+    return replace(s, starts=starts, bias=bias)
