@@ -16,6 +16,7 @@ import numpy as np
 from identify.estimate.output_error import held_still
 from identify.likelihood.derivatives import GAIN_STEP, Derivatives, Standpoint, derivatives
 from identify.likelihood.fit import Columns, Fit, Look, Prediction
+from identify.likelihood.gyro_biases import settle_biases
 from identify.likelihood.normal_equations import (
     COST_TOLERANCE,
     LEVENBERG_DAMPING,
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from identify.likelihood.prediction_error import PredictionError
 
 DIFFERENCE_STEP = 1e-6  # relative step of the differences
-BIAS_STEPS = 3  # for the biases alone, before the first step
 MAX_STEP_TRIALS = 7  # step lengths tried before a direction is given up
 COARSE_TOLERANCE = 5e-3  # of the difference to the model it is compared with, that the last step of a fit brings
 STALLED_STEPS = 2  # steps in a row that bring little, after which a fit has arrived: one alone may have been cut short
@@ -92,31 +92,12 @@ class Descent:
         )
         self.looks = self.looks_at(self.x, self.noise, self.shots)
         self.cost = self.cost_of(self.looks)
-        self._settle_biases()
+        settle_biases(self)
         self.alone = noise is None  # nobody has looked for the noise yet
         if self.alone and not structure.bends:  # else every look is a prediction
             noise_alone(self)
         self.information: Array = np.zeros((len(self.x), len(self.x)))
         self._informed: tuple[Noise, bytes] | None = None
-
-    def _settle_biases(self) -> None:
-        """The runs' biases where they are likeliest with the parameters that the descent begins with.
-
-        A model that lacks what pushes one way has it in the gyro's bias. An effect that is begun beside that bias would
-        be taken back by the first step.
-        """
-        if not any(s.trace.biased for s in self.shots):
-            return
-        for _ in range(BIAS_STEPS):
-            there = Standpoint(self.problem, self.structure, self.names, self.x, self.noise, self.shots, self.looks)
-            found = normal_equations(derivatives(there, {}, []), len(self.x), 0, self.count)
-            if not all(np.all(np.isfinite(taken)) for _, taken in found.own):
-                return
-            shots = [changed(s, taken) for s, (_, taken) in zip(self.shots, found.own, strict=True)]
-            looks = self.looks_at(self.x, self.noise, shots)
-            if not (cost := self.cost_of(looks)) < self.cost - COST_TOLERANCE:
-                return
-            self.shots, self.looks, self.cost = shots, looks, cost
 
     def _kinds_of_noise(self) -> list[str]:
         """The numbers of the noise that this model has; without a low-pass nothing is ahead of it."""

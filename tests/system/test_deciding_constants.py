@@ -21,6 +21,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "likelihood/derivatives.py": "BIAS_STEP GAIN_STEP NOISE_STEP START_STEP",
     "likelihood/descent.py": "COARSE_TOLERANCE DIFFERENCE_STEP EARLY_STEPS MAX_STEP_TRIALS STALLED_STEPS",
     "likelihood/fit.py": "MAX_LINEAR_INERTIA_CHANGE",
+    "likelihood/gyro_biases.py": "BIAS_STEPS",
     "likelihood/kept_gains.py": "GAIN_CACHE_SIZE SAME_STEP",
     "likelihood/noise_search.py": "GRADIENT_TOLERANCE INFEASIBLE_COST LOG_STEP MAX_ITERATIONS",
     "likelihood/normal_equations.py": "COST_TOLERANCE LEVENBERG_DAMPING MAX_LOG_STEP MAX_NOISE_FACTOR",

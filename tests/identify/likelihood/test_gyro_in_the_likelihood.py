@@ -104,3 +104,16 @@ def test_stamps_of_a_software_loop_that_wander_by_two_samples_cost_nothing() -> 
     fit = fitted(traces)
     assert fit.values[("inertia",)] == pytest.approx(TRUTH[0], rel=2e-3)
     assert fit.values[("stiffness",)] == pytest.approx(TRUTH[2], rel=2e-3)
+
+
+def test_a_stretch_from_the_middle_of_a_run_begins_where_the_bias_has_left_the_angle() -> None:
+    bend = {"bilinear_stiffness": {"step": 0.2 * TRUTH[2]}}
+    run = sine_run(104.0, 3.0, seed=3, duration_s=12.0, bias=0.05, effects=bend)
+    whole = one_noise([prepare(run, 0)], False)[0]
+    cut = whole.piece(9_000, len(whole.measured) - 1)
+    start = {(k,): 1.05 * v for k, v in zip(TERMS, TRUTH, strict=True)}
+    fit = PredictionError([cut]).fit(Structure(effects=("bilinear_stiffness",)), start)  # type: ignore[arg-type]
+    assert fit.shots[0].bias == pytest.approx(0.05, abs=2e-3)
+    for name, truth in zip(TERMS, TRUTH, strict=True):
+        assert abs(fit.values[(name,)] - truth) < 4.0 * fit.std_error((name,)), name
+    assert fit.values[("bilinear_stiffness", "step")] == pytest.approx(0.2 * TRUTH[2], rel=0.02)

@@ -80,7 +80,7 @@ def test_rows_stamped_by_a_busy_host_have_their_torque_on_the_beat_too() -> None
     assert np.all(off_by(traces) < (1e-4, 1e-3, 1e-4))
     use = [t.keep for t in traces]
     found = by_output_error(traces, Structure(), START, None, use, use)
-    assert found.sigma == pytest.approx(NOISE_RAD_S, rel=0.02)
+    assert found.fit.sigma == pytest.approx(NOISE_RAD_S, rel=0.02)
 
 
 @pytest.mark.parametrize("share", [0.01, 0.05])
