@@ -158,8 +158,6 @@ def search_in_torque(
         after = _final(regression, best, traces, split)
     disturbance = disturbance_of(regression, best, floor, unit)
     lost = [e for e in final.effects if e not in best.structure.effects and effects.get(e).place is not Place.SENSOR]
-    if by_likelihood and trusted:
-        disturbance = _beyond_disagreement(disturbance, best, by_likelihood[0])
     if by_likelihood and (unfollowed or lost):
         disturbance = Disturbance(size_nm, unit, size_nm / regression.torque_nm, (), {})
     if set(final.effects) <= set(known[0].structure.effects):
@@ -177,20 +175,6 @@ def search_in_torque(
         told, before, after, disturbance, (errors(base), errors(best)),
         lambda: disturbance_of(regression, base, floor, unit),
     )  # fmt: skip
-
-
-def _beyond_disagreement(left: Disturbance, in_torque: TorqueFit, fit: Fit) -> Disturbance:
-    """The same with moves of J, C and K only as far as least squares in torque can tell them.
-
-    Along a noisy motion they are biased, C above all where it is small. What a free form moves there by less than the
-    two fits of one model differ by anyway says nothing of a likelihood that is right about what it leaves.
-    """
-
-    def off(term: str) -> float:
-        value = fit.values.get((term,), 0.0)
-        return PERCENT * abs(in_torque.values.get((term,), value) - value) / abs(value) if value else 0.0
-
-    return replace(left, moves_percent={t: max(m - off(t), 0.0) for t, m in left.moves_percent.items()})
 
 
 def with_free_form(left: Disturbance, curve: Dependence, moves: Mapping[str, float]) -> Disturbance:
