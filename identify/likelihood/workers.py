@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from threading import local
+from concurrent.futures import CancelledError, ThreadPoolExecutor, wait
+from threading import Event, local
 from typing import TypeVar
 
 _In = TypeVar("_In")
@@ -18,11 +18,15 @@ class Workers:
 
     def __init__(self) -> None:
         self._parts, self._fits = ThreadPoolExecutor(self.AT_ONCE), ThreadPoolExecutor(self.AT_ONCE)
-        self._thread = local()
+        self._thread, self._stopped = local(), Event()
 
     def map(self, work: Callable[[_In], _Out], items: Iterable[_In]) -> Iterable[_Out]:
         """Work on parts of one fit, in their order; one after the other where fits are side by side."""
-        return map(work, items) if getattr(self._thread, "fits", False) else self._parts.map(work, items)
+        if not getattr(self._thread, "fits", False):
+            return self._parts.map(work, items)
+        if self._stopped.is_set():
+            raise CancelledError
+        return map(work, items)
 
     def side_by_side(self, fits: Sequence[Callable[[], _Out]]) -> list[_Out]:
         """Several fits, in their order."""
@@ -36,4 +40,13 @@ class Workers:
             finally:
                 self._thread.fits = False
 
-        return list(self._fits.map(alone, fits))
+        futures = [self._fits.submit(alone, fit) for fit in fits]
+        try:
+            return [future.result() for future in futures]
+        except BaseException:  # Ctrl-C: fits that nobody waits for would hold the process up
+            self._stopped.set()
+            for future in futures:
+                future.cancel()
+            wait(futures)
+            self._stopped.clear()
+            raise
