@@ -42,6 +42,7 @@ DIFFERENCE_STEP = 1e-6  # relative step of the differences
 MAX_STEP_TRIALS = 7  # step lengths tried before a direction is given up
 COARSE_TOLERANCE = 5e-3  # of the difference to the model it is compared with, that the last step of a fit brings
 STALLED_STEPS = 2  # steps in a row that bring little, after which a fit has arrived: one alone may have been cut short
+AT_BOUND = 1e-6  # of a number of the noise: where it moves by less, a bound holds it
 EARLY_STEPS = 3  # steps after which a model that is right is near enough for it
 
 
@@ -216,7 +217,10 @@ class Descent:
         if not (np.all(np.isfinite(found.matrix)) and np.all(np.isfinite(found.right))):
             return False
         size: Array = np.sqrt(np.maximum(np.diag(found.matrix), 1e-300))
-        free = (np.diag(found.matrix) > 0.0) & np.concatenate([~self.still, np.ones(len(size) - p, dtype=bool)])
+        bounded = self._at_bounds(found.right, len(size) - p)
+        free = (np.diag(found.matrix) > 0.0) & ~bounded & np.concatenate([~self.still, np.ones(len(size) - p, dtype=bool)])
+        if not np.any(free):
+            return False
         scaled, right = (found.matrix / np.outer(size, size))[np.ix_(free, free)], (found.right / size)[free]
         if float(right @ np.linalg.lstsq(scaled, right, rcond=1e-9)[0]) < 0.2 * COST_TOLERANCE:
             return False  # what a step promises is not worth taking
@@ -238,6 +242,20 @@ class Descent:
                 return True
             self.damping = max(10.0 * self.damping, 1e-3)
         return False
+
+    def _at_bounds(self, downhill: Array, kinds: int) -> Array:
+        """Parameters and numbers of the noise that stand at a bound and would be stepped beyond it, (p + k,).
+
+        They stay, and the others are solved for without them (active set: Bertsekas 1982). A step that counted on them
+        and was cut off at the bound would be no step downhill for the others.
+        """
+        out = np.zeros(len(downhill), dtype=bool)
+        p = len(self.x)
+        out[:p] = np.where(downhill[:p] > 0.0, self.x >= self.high, self.x <= self.low)
+        for k, kind in enumerate(self.kinds[:kinds], p):
+            toward = replace(self.noise, **{kind: getattr(self.noise, kind) * (1.0 + np.sign(downhill[k]) * AT_BOUND)})
+            out[k] = getattr(self.problem.within(toward), kind) == getattr(self.noise, kind)
+        return out
 
     def _with_logs(self, change: Array) -> Noise:
         values = {
