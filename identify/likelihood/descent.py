@@ -141,7 +141,7 @@ class Descent:
                 if self.cost > least:
                     return left
             enough = 0.0 if against is None else COARSE_TOLERANCE * max(against - self.cost, 0.0)
-            moved = self.step()
+            moved = self.step(enough)
             idle = 0 if before - self.cost > enough else idle + 1
             if moved and idle < STALLED_STEPS:
                 continue
@@ -150,10 +150,10 @@ class Descent:
             looked = True
         return 0
 
-    def step(self) -> bool:
-        """One step down; False where it has arrived, or none leads there."""
+    def step(self, enough: float = 0.0) -> bool:
+        """One step down; False where it has arrived to within ``enough``, or none leads there."""
         before = self.cost
-        return bool(np.isfinite(before)) and self.try_step(True) and before - self.cost > COST_TOLERANCE
+        return bool(np.isfinite(before)) and self.try_step(True, enough) and before - self.cost > COST_TOLERANCE
 
     def columns(self) -> list[Columns]:
         """Derivatives of every run, where the descent stands."""
@@ -209,8 +209,8 @@ class Descent:
         self.information, self._informed = found.information, (self.noise, self.x.tobytes())
         return found
 
-    def try_step(self, of_noise: bool) -> bool:
-        """One step of parameters, biases and, if asked for, the noise; False where none leads down."""
+    def try_step(self, of_noise: bool, enough: float = 0.0) -> bool:
+        """One step of parameters, biases and, if asked for, the noise; False where none leads down by ``enough``."""
         found = self._solvable(of_noise)
         p = len(self.x)
         ratios = [not kind.endswith("_s") for kind in self.kinds] if of_noise else []
@@ -222,7 +222,7 @@ class Descent:
         if not np.any(free):
             return False
         scaled, right = (found.matrix / np.outer(size, size))[np.ix_(free, free)], (found.right / size)[free]
-        if float(right @ np.linalg.lstsq(scaled, right, rcond=1e-9)[0]) < 0.2 * COST_TOLERANCE:
+        if float(right @ np.linalg.lstsq(scaled, right, rcond=1e-9)[0]) < max(0.2 * COST_TOLERANCE, enough):
             return False  # what a step promises is not worth taking
         for _ in range(MAX_STEP_TRIALS):
             d = np.zeros(len(size))

@@ -158,7 +158,9 @@ class PredictionError:
                 left > 0 and descent.sticks and descent.cost < least
             ):  # where a run begins stuck is another place with another friction
                 values = dict(zip(descent.names, descent.x.tolist(), strict=True))
-                again = Descent(self, structure, values, descent.noise, descent.found().shots, fixed)
+                again = Descent(self, structure, values, descent.noise, descent.shots, fixed)
+                if abs(again.cost - descent.cost) < COST_TOLERANCE:
+                    break
                 left = again.minimise(left, thorough, against, least)
                 if not again.cost < descent.cost - COST_TOLERANCE:
                     break
