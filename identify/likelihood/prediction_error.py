@@ -42,6 +42,7 @@ MAX_ENCODER_ERROR = 1.0  # of the angle, that an encoder's slow error takes over
 MIN_PREFILTER_NOISE, MAX_PREFILTER_NOISE = 1e-3, 1e8
 # Of the motion, root mean square, by which a start state may be off: the smoothed motion is worst where a run begins.
 START_RATE, START_ANGLE, UNKNOWN_ANGLE = 0.1, 0.05, 1.0
+LONG_RUN_SAMPLES = 10_000  # of a run: two threads predict such runs sooner than one
 SLOPE_CACHE_SIZE = 100  # of effects, along all runs
 
 
@@ -78,7 +79,7 @@ class PredictionError:
         # A gyro's bias walks. An encoder's error (its eccentricity, stamps that wander) does, too, but matters only
         # where a small friction is to be seen in how a long decay keeps its phase.
         self.wanders = self.gyro or self.torque_free
-        self.workers = Workers()
+        self.workers = Workers(traces, threads=longest > LONG_RUN_SAMPLES * self.step_s)
         self._slopes: dict[tuple[object, ...], Array] = {}
         self._slopes_lock = Lock()
         # A decay shows nothing but how it began and how it swings on, far beyond what is linear about its prediction:

@@ -59,7 +59,7 @@ def scores(problem: PredictionError, fit: Fit, scale: Scale, allowed: Sequence[s
     at = ranges(problem, fit)
     names = [n for n in allowed if n in at and not (problem.torque_free and "torque" in n)]
     with np.errstate(all="ignore"):
-        found = problem.workers.map(lambda n: tests.score(effects.get(n), at[n]), names)
+        found = problem.workers.each(lambda n: tests.score(effects.get(n), at[n]), names)
         return sorted((s for s in found if s is not None), key=lambda s: -s.gain)
 
 

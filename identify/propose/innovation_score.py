@@ -121,7 +121,7 @@ class InnovationScores:
         if self.lost:
             return []
         with np.errstate(all="ignore"):
-            found = self.problem.workers.map(lambda s: self._projected(effects.get(s.effect), s.shape), singles)
+            found = self.problem.workers.each(lambda s: self._projected(effects.get(s.effect), s.shape), singles)
             parts = [(s, p) for s, p in zip(singles, found, strict=True) if p is not None]
         out: list[tuple[Score, Score, float]] = []
         for i, (one, mine) in enumerate(parts):
@@ -143,7 +143,7 @@ class InnovationScores:
             return []
         tasks = [(effects.get(n), shape) for n in names for shape in grid_of(effects.get(n), self.scale)]
         with np.errstate(all="ignore"):
-            found = [s for s in self.problem.workers.map(lambda t: self.score(*t), tasks) if s is not None]
+            found = [s for s in self.problem.workers.each(lambda t: self.score(*t), tasks) if s is not None]
         of: dict[str, list[Score]] = {}
         for s in sorted(found, key=lambda s: -s.gain):
             of.setdefault(s.effect, []).append(s)

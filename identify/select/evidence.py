@@ -12,7 +12,7 @@ on samples not fitted.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -99,6 +99,11 @@ class EvidenceModel:
         weight = 1.0 if torqueless else self.explained_share(now, new, inflated < TRUSTED)
         price = (new.penalised - new.cost) - (now.penalised - now.cost)
         return Evidence(effect, new, now.cost - new.cost, inflated, price, weight, unfollowed_share(now, new))
+
+    def all(self, now: Fit, fits: Mapping[str, Fit]) -> dict[str, Evidence]:
+        """Several models, each with one effect more, against the one without it."""
+        found = self.problem.workers.each(lambda n: self.evidence(n, now, fits[n]), list(fits))
+        return {e.effect: replace(e, fit=fits[e.effect]) for e in found}
 
     def explained_share(self, now: Fit, new: Fit, trusted: bool) -> float:
         """Share of the disturbance that goes: of its power in the band of the motion, or of its white part.

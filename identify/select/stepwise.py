@@ -126,7 +126,7 @@ class Stepwise:
     def score_candidates(self, now: Fit) -> tuple[list[Score], dict[str, Evidence]]:
         """All candidates' scores, and the evidence for the most promising, fitted."""
         scores, fits = self.trials.score_round(now)
-        return scores, {n: self.weigher.evidence(n, now, f) for n, f in fits.items()}
+        return scores, self.weigher.all(now, fits)
 
     def best_candidate(self, tried: Mapping[str, Evidence]) -> str | None:
         """The candidate that is best supported, or the simplest of those that are as likely; None where none counts."""
@@ -153,7 +153,7 @@ class Stepwise:
             fits: dict[str, Fit] = {name: now, **others}
             fits |= zip(near, self.trials.all_further([others[n] for n in near]), strict=True)
             fits = {n: self._without_absorbing_stiffness(f) for n, f in fits.items()}
-            seen = {n: self.weigher.evidence(n, rest, f) for n, f in fits.items()}
+            seen = self.weigher.all(rest, fits)
             self._needed[name] = seen[name].support
             chosen, alike = self._best_of(name, seen)
             self.inflation[chosen] = seen[chosen].inflation
