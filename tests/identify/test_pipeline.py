@@ -116,16 +116,20 @@ def test_an_effect_that_is_declared_is_fitted_and_not_named_as_missing() -> None
 
 
 def test_a_torque_that_wanders_at_random_is_no_effect_and_its_size_is_said() -> None:
-    runs = []
+    runs, wanders, torques = [], [], []
     for i, run in enumerate(recording(friction=False).runs):
         assert run.torque_nm is not None
         wander = np.cumsum(white(len(run.time_s), 0.3, i))
-        runs.append(replace(run, torque_nm=run.torque_nm + wander - np.linspace(0, wander[-1], len(wander))))
+        wander -= np.linspace(0, wander[-1], len(wander))
+        wanders.append(wander)
+        torques.append(run.torque_nm)
+        runs.append(replace(run, torque_nm=run.torque_nm + wander))
     found = identify(Recording(tuple(runs)), LOW, SETTINGS)
     assert found.verdict.effects == ()
     assert not found.accepted
-    assert any("not determined" in r or "of the torque" in r for r in found.reasons)
-    assert found.disturbance is not None and found.disturbance.relative > 0.05
+    assert any("changes J by" in r for r in found.reasons)
+    share = np.linalg.norm(np.concatenate(wanders)) / np.linalg.norm(np.concatenate(torques))
+    assert found.disturbance is not None and found.disturbance.relative == pytest.approx(share, rel=0.3)
 
 
 def test_a_free_decay_gives_ratios_with_their_units() -> None:

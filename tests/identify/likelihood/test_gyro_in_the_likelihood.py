@@ -45,18 +45,22 @@ def test_behind_the_gyros_low_pass_every_number_is_right_within_its_error() -> N
     assert fit.values[("sensor_lag_second_order", "time")] == pytest.approx(TIME_S, rel=0.01)
 
 
-def beside(run: Run, counts: int, seed: int) -> Run:
-    """The same run with an encoder of so many counts, at a platform that begins at zero."""
+def beside(run: Run, counts: int, seed: int, white: bool = False) -> Run:
+    """The same run with an encoder of so many counts, at a platform that begins at zero.
+
+    Errors of rounding go with the motion and look like a torque; those of a ``white`` encoder do not.
+    """
     assert run.rate_rad_s is not None
     rng = np.random.default_rng(seed)
     true = np.concatenate([[0.0], np.cumsum(0.5 * (run.rate_rad_s[1:] + run.rate_rad_s[:-1]) * np.diff(run.time_s))])
     step = 2.0 * np.pi / counts
-    angle = np.rint(true / step) * step
+    read = true + step * rng.uniform(-0.5, 0.5, len(true)) if white else true
+    angle = np.rint(read / step) * step
     return replace(run, angle_rad=angle, rate_rad_s=run.rate_rad_s + NOISE_RAD_S * rng.standard_normal(len(true)))
 
 
 def test_a_gyro_and_an_encoder_are_read_together_and_know_more_than_either() -> None:
-    runs = [beside(sine_run(m, f, seed=i, noise=0.0), 20_000, i) for i, (m, f) in enumerate(SETS)]
+    runs = [beside(sine_run(m, f, seed=i, noise=0.0), 20_000, i, white=True) for i, (m, f) in enumerate(SETS)]
     found = channels_of(runs)
     assert found.both
     both = fitted(one_noise([prepare(r, i, channels=found) for i, r in enumerate(runs)], False))
