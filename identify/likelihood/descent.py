@@ -20,7 +20,9 @@ from identify.likelihood.gyro_biases import settle_biases
 from identify.likelihood.normal_equations import (
     COST_TOLERANCE,
     LEVENBERG_DAMPING,
+    MAX_LOG_STEP,
     Step,
+    bounded_step,
     changed,
     logs_of,
     normal_equations,
@@ -42,7 +44,7 @@ DIFFERENCE_STEP = 1e-6  # relative step of the differences
 MAX_STEP_TRIALS = 7  # step lengths tried before a direction is given up
 COARSE_TOLERANCE = 5e-3  # of the difference to the model it is compared with, that the last step of a fit brings
 STALLED_STEPS = 2  # steps in a row that bring little, after which a fit has arrived: one alone may have been cut short
-AT_BOUND = 1e-6  # of a number of the noise: where it moves by less, a bound holds it
+FAR = 1e-30, 1e30  # times a number of the noise: a bound holds it
 EARLY_STEPS = 3  # steps after which a model that is right is near enough for it
 
 
@@ -217,17 +219,15 @@ class Descent:
         if not (np.all(np.isfinite(found.matrix)) and np.all(np.isfinite(found.right))):
             return False
         size: Array = np.sqrt(np.maximum(np.diag(found.matrix), 1e-300))
-        bounded = self._at_bounds(found.right, len(size) - p)
-        free = (np.diag(found.matrix) > 0.0) & ~bounded & np.concatenate([~self.still, np.ones(len(size) - p, dtype=bool)])
-        if not np.any(free):
-            return False
-        scaled, right = (found.matrix / np.outer(size, size))[np.ix_(free, free)], (found.right / size)[free]
-        if float(right @ np.linalg.lstsq(scaled, right, rcond=1e-9)[0]) < max(0.2 * COST_TOLERANCE, enough):
+        scaled, right = found.matrix / np.outer(size, size), found.right / size
+        low, high = (bound * size for bound in self._room(len(size) - p))
+        told = np.diag(found.matrix) > 0.0
+        low, high = np.where(told, low, 0.0), np.where(told, high, 0.0)
+        d = bounded_step(scaled, right, low, high)
+        if float((2.0 * right - scaled @ d) @ d) < max(0.2 * COST_TOLERANCE, enough):
             return False  # what a step promises is not worth taking
         for _ in range(MAX_STEP_TRIALS):
-            d = np.zeros(len(size))
-            d[free] = np.linalg.lstsq(scaled + self.damping * np.eye(len(right)), right, rcond=1e-14)[0]
-            d = d / size
+            d = bounded_step(scaled + self.damping * np.eye(len(size)), right, low, high) / size
             x = ordered(self.names, np.clip(self.x + d[:p], self.low, self.high))
             change = np.concatenate([x - self.x, logs_of(d[p:], found.level, ratios)])
             noise = self._with_logs(change[p:])
@@ -243,19 +243,18 @@ class Descent:
             self.damping = max(10.0 * self.damping, 1e-3)
         return False
 
-    def _at_bounds(self, downhill: Array, kinds: int) -> Array:
-        """Parameters and numbers of the noise that stand at a bound and would be stepped beyond it, (p + k,).
-
-        They stay, and the others are solved for without them (active set: Bertsekas 1982). A step that counted on them
-        and was cut off at the bound would be no step downhill for the others.
-        """
-        out = np.zeros(len(downhill), dtype=bool)
-        p = len(self.x)
-        out[:p] = np.where(downhill[:p] > 0.0, self.x >= self.high, self.x <= self.low)
-        for k, kind in enumerate(self.kinds[:kinds], p):
-            toward = replace(self.noise, **{kind: getattr(self.noise, kind) * (1.0 + np.sign(downhill[k]) * AT_BOUND)})
-            out[k] = getattr(self.problem.within(toward), kind) == getattr(self.noise, kind)
-        return out
+    def _room(self, kinds: int) -> tuple[Array, Array]:
+        """How far parameters and numbers of the noise may be stepped down and up, (p + k,) each."""
+        down, up = self.low - self.x, self.high - self.x
+        down[self.still] = up[self.still] = 0.0
+        for kind in self.kinds[:kinds]:
+            value = getattr(self.noise, kind)
+            least, most = (
+                getattr(self.problem.within(replace(self.noise, **{kind: far * value})), kind) for far in FAR
+            )  # fmt: skip
+            down = np.append(down, max(np.log(least / value), -MAX_LOG_STEP))
+            up = np.append(up, most / value - 1.0)  # what rises is stepped as a density (``logs_of``)
+        return down, up
 
     def _with_logs(self, change: Array) -> Noise:
         values = {

@@ -11,6 +11,7 @@ from identify.likelihood.derivatives import Derivatives
 from identify.simulate.shots import Shots, moved, with_bias
 from rig.arrays import Array
 
+SINGULAR = 1e-9  # of the largest singular value of a scaled normal matrix
 COST_TOLERANCE = 0.5  # fall of the cost below which a fit has arrived
 LEVENBERG_DAMPING = 1e-4  # of a first step
 MAX_LOG_STEP = 4.0  # by which a logarithm of the noise may fall in one step
@@ -65,6 +66,24 @@ def _spanned(own: Array) -> tuple[Array, Array]:
     inverse = np.linalg.pinv(upper, rcond=1e-12)
     follow[told] = inverse / size[told, None]
     return basis, follow
+
+
+def bounded_step(matrix: Array, right: Array, low: Array, high: Array) -> Array:
+    """The change within bounds that lowers the cost most, by ``matrix`` (n, n) and ``right`` (n,).
+
+    What would go beyond a bound is held there, and the others are solved for beside it. Cut off afterwards, a number
+    that hardly acts, and would so be sent far, would leave the others where they counted on it.
+    """
+    step, free = np.zeros(len(right)), np.ones(len(right), dtype=bool)
+    while np.any(free):
+        rest = right[free] - matrix[np.ix_(free, ~free)] @ step[~free]
+        step[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], rest, rcond=SINGULAR)[0]
+        inside = np.clip(step, low, high)
+        beyond = free & (inside != step)
+        if not np.any(beyond):
+            break
+        step, free = inside, free & ~beyond
+    return step
 
 
 def logs_of(step: Array, level: Array, ratios: Sequence[bool]) -> Array:
