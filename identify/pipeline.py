@@ -20,12 +20,7 @@ from identify.estimate.final_fit import FinalFit
 from identify.estimate.initial_guess import Start, first_guess
 from identify.genetic.per_set import each_set
 from identify.model.structure import Structure, shape_values
-from identify.results import (
-    UNITS,
-    Dependence,
-    Identification,
-    SetResult,
-)
+from identify.results import UNITS, Dependence, Identification, SetResult
 from identify.rivals.alternative_causes import AlternativeCauses
 from identify.rivals.coloured_noise import Colour, with_noise_known
 from identify.rivals.tone_origin import TONE, describe, standing_line
@@ -219,9 +214,10 @@ class _Identifier:
         self, shapes: dict[str, tuple[float, ...]], search: LikelihoodSearch, found_there: Search
     ) -> Identification:  # fmt: skip
         """The way for measured data: what the model lacks is told by the torque that it leaves."""
-        unit = UNITS[self.recording.axis]["torque"]
+        allowed = [n for n in self._allowed() if n not in search.stepwise.stood_for_curves]
         found = search_in_torque(
-            self.traces, self.split, self.structure, shapes, self.start, self._allowed(), unit, self.say,
+            self.traces, self.split, self.structure, shapes, self.start, allowed,
+            UNITS[self.recording.axis]["torque"], self.say,
             (search.stepwise.best, found_there), search.stepwise.trusted, search.stepwise.weigher.regression,
             self._curves(search.stepwise),
         )  # fmt: skip

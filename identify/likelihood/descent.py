@@ -44,7 +44,6 @@ DIFFERENCE_STEP = 1e-6  # relative step of the differences
 MAX_STEP_TRIALS = 7  # step lengths tried before a direction is given up
 COARSE_TOLERANCE = 5e-3  # of the difference to the model it is compared with, that the last step of a fit brings
 STALLED_STEPS = 2  # steps in a row that bring little, after which a fit has arrived: one alone may have been cut short
-FAR = 1e-30, 1e30  # times a number of the noise: a bound holds it
 EARLY_STEPS = 3  # steps after which a model that is right is near enough for it
 
 
@@ -247,14 +246,9 @@ class Descent:
         """How far parameters and numbers of the noise may be stepped down and up, (p + k,) each."""
         down, up = self.low - self.x, self.high - self.x
         down[self.still] = up[self.still] = 0.0
-        for kind in self.kinds[:kinds]:
-            value = getattr(self.noise, kind)
-            least, most = (
-                getattr(self.problem.within(replace(self.noise, **{kind: far * value})), kind) for far in FAR
-            )  # fmt: skip
-            down = np.append(down, max(np.log(least / value), -MAX_LOG_STEP))
-            up = np.append(up, most / value - 1.0)  # what rises is stepped as a density (``logs_of``)
-        return down, up
+        least, most = self.problem.extremes(self.noise, self.kinds[:kinds])
+        fall = np.maximum(np.log(least), -MAX_LOG_STEP)
+        return np.append(down, fall), np.append(up, most - 1.0)  # what rises is stepped as a density (``logs_of``)
 
     def _with_logs(self, change: Array) -> Noise:
         values = {

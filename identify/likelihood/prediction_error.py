@@ -43,6 +43,7 @@ MIN_PREFILTER_NOISE, MAX_PREFILTER_NOISE = 1e-3, 1e8
 # Of the motion, root mean square, by which a start state may be off: the smoothed motion is worst where a run begins.
 START_RATE, START_ANGLE, UNKNOWN_ANGLE = 0.1, 0.05, 1.0
 LONG_RUN_SAMPLES = 10_000  # of a run: two threads predict such runs sooner than one
+FAR = 1e30  # times a number of the noise: a bound holds it
 SLOPE_CACHE_SIZE = 100  # of effects, along all runs
 
 
@@ -114,6 +115,15 @@ class PredictionError:
             ahead if self.gyro else 0.0,
             np.inf if self.gyro else float(np.clip(noise.walk_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
         )
+
+    def extremes(self, noise: Noise, kinds: Sequence[str]) -> tuple[Array, Array]:
+        """By how many times itself each number of the noise may be smaller and larger, (k,) each."""
+
+        def at(times: float) -> Array:
+            far = [self.within(replace(noise, **{k: times * getattr(noise, k)})) for k in kinds]
+            return np.array([getattr(q, k) / getattr(noise, k) for q, k in zip(far, kinds, strict=True)])
+
+        return at(1.0 / FAR), at(FAR)
 
     def noise_of(self, fit: Fit) -> Noise:
         """The noise of a fit to the same recording, sampled otherwise, whose readings had another variance."""

@@ -91,7 +91,7 @@ class Workers:
     def unpacked(self, sent: bytes) -> Any:
         """Results from bytes."""
         unpickler = pickle.Unpickler(io.BytesIO(sent))
-        unpickler.persistent_load = self._shared.__getitem__  # type: ignore[method-assign,assignment]
+        unpickler.persistent_load = self._shared.__getitem__  # type: ignore[method-assign]
         return unpickler.load()
 
 

@@ -40,6 +40,7 @@ def against_curves(search: Stepwise, now: Fit) -> Fit:
     if found is None:
         return now
     names, curve, rest = found
+    search.stood_for_curves |= set(names)
     search.dropped += [(n, f"a curve over the {ON[curve]} explains clearly more in its place") for n in names]
     search.say(f"took {' and '.join(names)} back: a curve over the {ON[curve]} explains clearly more")
     return rest

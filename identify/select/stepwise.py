@@ -74,6 +74,7 @@ class Stepwise:
     rounds: list[Round] = field(default_factory=list)
     rivals: dict[str, dict[str, Fit]] = field(default_factory=dict)
     dropped: list[tuple[str, str]] = field(default_factory=list)
+    stood_for_curves: set[str] = field(default_factory=set)  # wrong names: a curve explains what they seemed to
     best: Fit = None  # type: ignore[assignment]
     inflation: dict[str, float] = field(default_factory=dict)  # of every effect that was added, beside all others
     left: FreeFormFit | None = None  # a curve that belongs beside the model, though no effect of that kind is known
@@ -114,6 +115,7 @@ class Stepwise:
             if name is None:
                 break
             self.dropped.append((name, "beside a curve over what no effect explains, it explains nothing"))
+            self.stood_for_curves.add(name)
             self.say(f"took {name} back: a curve over what is left explains it")
             now = self.without(now, name, FULL_ITERATIONS)
         return now
