@@ -10,7 +10,7 @@ import numpy as np
 
 from identify.signals.trace import Trace
 from rig.arrays import Array
-from rig.dynamics.gains import Gains, Noise, Sensing, gains_of
+from rig.dynamics.gains import Gains, Noise, Sensing, StartVariance, gains_of
 
 SAME_STEP = 1e-5  # relative: what steps of runs differ by and are the same to a gain
 GAIN_CACHE_SIZE = 12  # of runs that were sampled alike
@@ -23,12 +23,12 @@ class KeptGains:
     ----------
     step_s, longest
         The step that most runs have, and the samples of the longest run.
-    start_variance
-        Of angle, rate and acceleration at the start of a stretch, over that of one reading.
+    begun
+        How well the start of a stretch is known.
     """
 
-    def __init__(self, step_s: float, longest: int, start_variance: tuple[float, float, float]) -> None:
-        self.step_s, self.longest, self.start_variance = step_s, longest, start_variance
+    def __init__(self, step_s: float, longest: int, begun: StartVariance) -> None:
+        self.step_s, self.longest, self.begun = step_s, longest, begun
         self._gains: dict[tuple[object, ...], tuple[dict[tuple[object, ...], Gains], Lock]] = {}
 
     def of(
@@ -43,7 +43,7 @@ class KeptGains:
         with lock:
             found = kept.get(key)
             if found is None:
-                found = gains_of(jck, noise, step_s, sensing, keep, spans, self.start_variance)
+                found = gains_of(jck, noise, step_s, sensing, keep, spans, self.begun)
                 for old in list(kept)[: max(0, len(kept) + 1 - GAIN_CACHE_SIZE)]:
                     kept.pop(old, None)
                 kept[key] = found

@@ -21,6 +21,7 @@ from identify.likelihood.descent import Descent
 from identify.likelihood.fit import Columns, Fit, Look
 from identify.likelihood.kept_gains import KeptGains
 from identify.likelihood.normal_equations import COST_TOLERANCE
+from identify.likelihood.settling import settled
 from identify.likelihood.workers import Workers
 from identify.model.parameters import Name, equations_of
 from identify.model.structure import Structure
@@ -30,7 +31,7 @@ from identify.simulate.shots import RUNAWAY, Shots
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.equations import Equations
-from rig.dynamics.gains import Gains, Noise, Sensing
+from rig.dynamics.gains import Gains, Noise, Sensing, StartVariance
 from rig.dynamics.predictor import predict_ahead
 
 LONGEST_SHARE = 0.2  # of the longest run: a disturbance slower than that is a constant
@@ -61,7 +62,7 @@ class PredictionError:
     """
 
     def __init__(self, traces: Sequence[Trace], use: Sequence[Any] | None = None, coarse: bool = True) -> None:
-        self.traces, self.use, self.coarse = list(traces), use, coarse
+        self.traces, self.use, self.coarse = list(traces), settled(traces, use), coarse
         self.runs = 1 + max(t.number for t in traces)
         self.torque_free = all(t.torque is None for t in traces)
         motion = [t.fine for t in traces]
@@ -86,8 +87,8 @@ class PredictionError:
         # A decay shows nothing but how it began and how it swings on, far beyond what is linear about its prediction:
         # where it began is fitted, and not corrected as the readings come in.
         self.fits_starts = self.torque_free
-        start_variance = (0.0, 0.0, 0.0) if self.fits_starts else self._start_variance()
-        self._gains = KeptGains(self.step_s, max(len(t.measured) for t in traces), start_variance)
+        begun = StartVariance() if self.fits_starts else self._start_variance()
+        self._gains = KeptGains(self.step_s, max(len(t.measured) for t in traces), begun)
 
     def columns_at(self, fit: Fit, with_variance: bool = False) -> list[Columns]:
         """Derivatives of every run's innovations where a fit stands; ``with_variance``, of their whole likelihood."""
@@ -253,16 +254,15 @@ class PredictionError:
         gyro, encoder = self._noises(trace)
         return Sensing(True, (encoder / gyro) ** 2, (first, second), (MOST_BIAS_RAD_S / gyro) ** 2)
 
-    def _start_variance(self) -> tuple[float, float, float]:
-        """Of angle and rate at the start of a stretch, read off the smoothed motion, and of the acceleration there, of
-        which nothing is assumed but its size; over that of one reading.
-        """
+    def _start_variance(self) -> StartVariance:
+        """Of angle and rate, read off the smoothed motion; of acceleration and jerk only their size is known."""
         smoothed = float(np.mean([t.fine[4] ** 2 for t in self.traces]))
         rate = 4.0 * smoothed + (START_RATE * self.rate_rad_s) ** 2
         known = self.both or all(t.channel == "angle" for t in self.traces)
         noise = float(np.sqrt(np.mean([self._noises(t)[-1] ** 2 for t in self.traces]))) if known else 0.0
         angle = 4.0 * noise**2 + ((START_ANGLE if known else UNKNOWN_ANGLE) * self.angle_rad) ** 2
-        return angle / self.reading_variance, rate / self.reading_variance, self.acceleration**2 / self.reading_variance
+        jerk = _rms([np.gradient(np.gradient(t.fine[1], t.fine[2]), t.fine[2]) for t in self.traces])
+        return StartVariance(*(x / self.reading_variance for x in (angle, rate, self.acceleration**2, jerk**2)))
 
     def on_grid(self, cost: Callable[[Noise], float]) -> Noise:
         """The best of a coarse grid of noises: white alone first, then a slow part beside it."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
@@ -85,6 +85,15 @@ class Sensing:
     def readings(self) -> int:
         """How many there are at every sample."""
         return int(self.rate) + int(self.angle_variance > 0.0)
+
+
+class StartVariance(NamedTuple):
+    """Of the motion where a stretch begins, over the variance of one reading."""
+
+    angle: float = 0.0
+    rate: float = 0.0
+    acceleration: float = 0.0
+    jerk: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -212,7 +221,7 @@ def _discrete(
 
 def gains_of(
     jck: Array, noise: Noise, step_s: float, sensing: Sensing, keep: Any, spans: Sequence[tuple[int, int]],
-    start_variance: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    begun: StartVariance = StartVariance(),  # noqa: B008  immutable
 ) -> Gains:  # fmt: skip
     """Kalman gains along a run.
 
@@ -226,9 +235,9 @@ def gains_of(
         (n,) boolean: samples that were measured.
     spans
         First and last sample of every stretch.
-    start_variance
-        Of angle, rate and acceleration at the start of a stretch, over that of one reading. What a low-pass holds back
-        there is its time constant times the acceleration, and nobody knows that.
+    begun
+        How well the start of a stretch is known. It is read off what a low-pass has let through. What that holds back
+        is its first coefficient times the acceleration and its second times the jerk, and nobody knows those.
     """
     phi, q = _discrete(*jck.tolist(), noise, sensing.lag, step_s)
     lagging = sensing.lag[0] > 0.0
@@ -245,18 +254,18 @@ def gains_of(
         reads.append(row)
         noises.append(sensing.angle_variance)
     start = np.zeros((STATES, STATES))
-    start[ANGLE, ANGLE], start[RATE, RATE], start[SLOW, SLOW] = start_variance[0], start_variance[1], noise.slow
+    start[ANGLE, ANGLE], start[RATE, RATE], start[SLOW, SLOW] = begun.angle, begun.rate, noise.slow
     if sensing.rate:
         start[BIAS, BIAS] = sensing.bias_variance
     elif noise.walk > 0.0:
         start[BIAS, BIAS] = 0.5 * noise.walk * noise.walk_s
     if lagging:
         first, second = sensing.lag
-        start[RATE, SENSED] = start[SENSED, RATE] = start[RATE, RATE]
-        start[SENSED, SENSED] = start[RATE, RATE] + first**2 * start_variance[2]
+        start[RATE, SENSED] = start[SENSED, RATE] = start[SENSED, SENSED] = begun.rate
+        start[RATE, RATE] += first**2 * begun.acceleration + second**2 * begun.jerk
         if second > 0.0:
-            start[SLOPE, SLOPE] = start_variance[2]
-            start[SENSED, SLOPE] = start[SLOPE, SENSED] = -first * start_variance[2]
+            start[SLOPE, SLOPE] = begun.acceleration
+            start[RATE, SLOPE] = start[SLOPE, RATE] = first * begun.acceleration
     # A state that is neither read, nor driven, nor unknown at the start needs no arithmetic.
     there = np.flatnonzero((np.arange(STATES) <= SLOW) | (np.diag(q) > 0.0) | (np.diag(start) > 0.0))
     at = np.ix_(there, there)

@@ -9,6 +9,7 @@ import pytest
 from scipy import signal
 
 from identify.likelihood.prediction_error import PredictionError
+from identify.likelihood.settling import settled
 from identify.model.structure import Structure
 from identify.signals.prepare import channels_of, one_noise, prepare
 from identify.signals.trace import Trace
@@ -43,6 +44,30 @@ def test_behind_the_gyros_low_pass_every_number_is_right_within_its_error() -> N
     for name, truth in zip(TERMS, TRUTH, strict=True):
         assert abs(fit.values[(name,)] - truth) < 4.0 * fit.std_error((name,)), name
     assert fit.values[("sensor_lag_second_order", "time")] == pytest.approx(TIME_S, rel=0.01)
+
+
+@pytest.mark.parametrize("first", [433, 500])
+def test_a_stretch_that_begins_while_the_low_pass_is_in_motion_tells_what_a_run_from_rest_does(first: int) -> None:
+    run = sine_run(67.0, 6.0, seed=1, effects={"sensor_lag_second_order": {"time": 2e-3}})
+    problem = PredictionError([one_noise([prepare(run)], False)[0].piece(first, first + 1500)])
+    true = {(k,): v for k, v in zip(TERMS, TRUTH, strict=True)} | {("sensor_lag_second_order", "time"): 2e-3}
+    fit = problem.fit(Structure(effects=("sensor_lag_second_order",)), true)
+    for name, value in true.items():
+        assert abs(fit.values[name] - value) < 4.0 * fit.std_error(name), name
+    assert fit.values[("damping",)] == pytest.approx(TRUTH[1], rel=1e-3)
+    early = fit.prediction.innovations[0] / np.sqrt(fit.prediction.variance[0] * fit.variance)
+    assert float(np.sqrt(np.mean(early[:20] ** 2))) < 1.5
+
+
+def test_samples_count_once_the_low_pass_has_settled_and_all_do_from_the_start_of_a_run() -> None:
+    whole = one_noise([prepare(sine_run(67.0, 6.0))], False)[0]
+    cut = whole.piece(500, 2000)
+    counts = settled([whole, cut])
+    assert counts is not None
+    assert np.all(counts[0])
+    assert not np.any(counts[1][:20]) and np.all(counts[1][20:])
+    encoder = [replace(whole, channel="angle"), replace(cut, channel="angle")]
+    assert settled(encoder) is None
 
 
 def beside(run: Run, counts: int, seed: int, white: bool = False) -> Run:
