@@ -66,6 +66,8 @@ LONGEST = (
     "system/test_from_python",
     "system/test_effect_of_your_own",
 )
+# Files that compile the same plant: on two workers each would compile it for itself the first time.
+COMPILED_TOGETHER = ("tests/benchmarks/test_blind", "tests/benchmarks/test_field")
 HERE = Path(__file__).parent
 
 
@@ -94,7 +96,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     class Lanes(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = nodeid.partition("::")[0]
-            return "with deadlines" if _has_deadlines(config.rootpath / file) else file
+            if _has_deadlines(config.rootpath / file):
+                return "with deadlines"
+            return next((shared for shared in COMPILED_TOGETHER if file.startswith(shared)), file)
 
     config.option.loadscopereorder = False  # in the order of the collection, not by number of tests
     return Lanes(config, log)
