@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,11 @@ for _name in ("SIGHUP", "SIGTERM"):
 # A worker has one processor: threads of the linear algebra would only wait for each other. Before numpy is imported.
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# Programs that tests start would each compile some two hundred modules that were compiled before. What Numba compiles
+# is kept beside the source whatever this says.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # Tests with deadlines of their own, by the beginning of their path: two of them at once would be late.
 WITH_DEADLINES = (
@@ -59,6 +66,8 @@ LONGEST = (
     "system/test_from_python",
     "system/test_effect_of_your_own",
 )
+# Files that compile the same plant: on two workers each would compile it for itself the first time.
+COMPILED_TOGETHER = ("tests/benchmarks/test_blind", "tests/benchmarks/test_field")
 HERE = Path(__file__).parent
 
 
@@ -66,6 +75,7 @@ def _has_deadlines(path: Path) -> bool:
     return _is_of(path, WITH_DEADLINES)
 
 
+@cache  # asked for every test, of which a file has many
 def _is_of(path: Path, beginnings: tuple[str, ...]) -> bool:
     return path.is_relative_to(HERE) and path.relative_to(HERE).as_posix().startswith(beginnings)
 
@@ -86,7 +96,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     class Lanes(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = nodeid.partition("::")[0]
-            return "with deadlines" if _has_deadlines(config.rootpath / file) else file
+            if _has_deadlines(config.rootpath / file):
+                return "with deadlines"
+            return next((shared for shared in COMPILED_TOGETHER if file.startswith(shared)), file)
 
     config.option.loadscopereorder = False  # in the order of the collection, not by number of tests
     return Lanes(config, log)

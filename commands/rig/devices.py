@@ -9,7 +9,9 @@ from typing import Any
 from commands.terminal.display import plain
 from drivers.transport.usb_latency import describe_usb_latency
 
-NO_ADAPTERS = ("virtual", "udp_multicast", "serial")  # offered by python-can everywhere; nothing is plugged in
+# Not asked for adapters: the first three python-can offers everywhere, with nothing plugged in; for servers elsewhere
+# on the network (socketcand, which drivers.transport.can_link does not open) it listens for four seconds.
+NO_ADAPTERS = ("virtual", "udp_multicast", "serial", "socketcand")
 Lister = Callable[[], list[Any]]
 
 
@@ -23,11 +25,12 @@ def serial_ports() -> list[Any]:
 def can_adapters() -> list[Any]:
     """The CAN adapters that python-can finds: interface, channel, and more."""
     import can
+    from can.interfaces import BACKENDS
 
     earlier = logging.root.manager.disable
     logging.disable(logging.CRITICAL)  # python-can reports every interface whose library is not installed
     try:
-        return [found for found in can.detect_available_configs() if found["interface"] not in NO_ADAPTERS]
+        return list(can.detect_available_configs([name for name in BACKENDS if name not in NO_ADAPTERS]))
     finally:
         logging.disable(earlier)
 

@@ -101,13 +101,13 @@ def _evolve(
     for generation in range(settings.generations):
         step = span * _mutation_step(generation, settings)
         children, changed = _offspring(people, values, settings, step, rng)
-        np.clip(children, low, high, out=children)
+        np.minimum(np.maximum(children, low, out=children), high, out=children)
         child_values = _valued(objective, children)
         if settings.elitism:
             # A clone stands among the parents already; letting it in again would fill the population with it.
             everyone = np.concatenate([people, children[changed]])
             all_values = np.concatenate([values, child_values[changed]])
-            keep = np.argpartition(all_values, size - 1)[:size]
+            keep = all_values.argpartition(size - 1)[:size]
             people, values = everyone[keep], all_values[keep]
         else:
             people, values = children, child_values
@@ -138,8 +138,8 @@ def fitness(values: Array) -> Array:
 
 
 def _roulette(values: Array, count: int, rng: np.random.Generator) -> Array:
-    wheel = np.cumsum(fitness(values))
-    return np.asarray(np.searchsorted(wheel, wheel[-1] * rng.random(count), side="right"))
+    wheel = fitness(values).cumsum()
+    return np.asarray(wheel.searchsorted(wheel[-1] * rng.random(count), side="right"))
 
 
 def _offspring(
@@ -153,7 +153,7 @@ def _offspring(
     children = np.where(crossed, first + point * (second - first), first)
     mutated = rng.random((size, genes)) < settings.mutation_probability
     children += np.where(mutated, step * rng.standard_normal((size, genes)), 0.0)
-    return children, np.any(children != first, axis=1)
+    return children, (children != first).any(axis=1)
 
 
 class QuadraticObjective:

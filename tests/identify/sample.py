@@ -97,6 +97,7 @@ def sample(duration_s: float = 10.0) -> tuple[Identification, Recording]:
     return found, Recording(tuple(runs), info={"backend": "SIMULATED torque: nothing moves"})
 
 
+@cache
 def _genetic(name: str, seed: int) -> GeneticRun:
     rng = np.random.default_rng(seed)
     columns = rng.standard_normal((4000, 3)) @ np.array([[1.0, 0.0, -0.97], [0.0, 0.3, 0.0], [0.0, 0.0, 0.2]])
@@ -126,6 +127,7 @@ def _genetic(name: str, seed: int) -> GeneticRun:
     )
 
 
+@cache  # the same whatever the duration
 def _sets() -> tuple[SetResult, ...]:
     relative = {0.5: 2.4e-5, 1.0: 1.2e-5, 3.0: 5e-6, 6.0: 3e-6, 9.0: 3e-6}
     results = []

@@ -16,13 +16,12 @@ model: {inertia_kg_m2: 0.018, damping_nm_s_rad: 0.06, stiffness_nm_rad: 640, eff
 excitation:
   sets:
     - {kind: sine, torque_nm: 90, frequency_hz: 1, duration_s: 2}
-    - {kind: sine, torque_nm: 70, frequency_hz: 3, duration_s: 2}
     - {kind: sine, torque_nm: 40, frequency_hz: 9, duration_s: 2}
 simulated:
   platform: {effects: {eddy_brake: {level_nm: 1.5, speed_rad_s: 1.2}}}
 identify:
   genetic: {population: 20, generations: 10}
-  candidates: [coulomb_friction, quadratic_damping, eddy_brake]
+  candidates: [coulomb_friction, eddy_brake]
 """
 
 

@@ -35,18 +35,24 @@ def values(model: dict[str, Any]) -> dict[str, float]:
     return {t: model["parameters"][t]["value"] for t in TERMS}
 
 
+SHORT = "[{torque_nm: 300, frequency_hz: 1, duration_s: 2}, {torque_nm: 200, frequency_hz: 6, duration_s: 2}]"
+
+
 @pytest.mark.parametrize(
-    "offered",
+    ("offered", "more"),
     [
-        "[coulomb_friction, torque_delay]",
+        ("[coulomb_friction, torque_delay]", ("--set", f"excitation.sets={SHORT}")),
+        pytest.param("[coulomb_friction, torque_delay]", (), marks=pytest.mark.slow),
         pytest.param(
-            "[coulomb_friction, torque_delay, presliding_friction, sensor_lag, unbalance]", marks=pytest.mark.slow
+            "[coulomb_friction, torque_delay, presliding_friction, sensor_lag, unbalance]", (), marks=pytest.mark.slow
         ),
-        pytest.param("null", marks=pytest.mark.slow),  # the whole library, as the file has it
+        pytest.param("null", (), marks=pytest.mark.slow),  # the whole library, as the file has it
     ],
 )
-def test_the_default_campaign_names_both_hidden_effects_and_mends_every_parameter(tmp_path: Path, offered: str) -> None:
-    found, said = run(tmp_path, "rig.yaml", "--set", f"identify.candidates={offered}")
+def test_the_default_campaign_names_both_hidden_effects_and_mends_every_parameter(
+    tmp_path: Path, offered: str, more: tuple[str, ...]
+) -> None:
+    found, said = run(tmp_path, "rig.yaml", "--set", f"identify.candidates={offered}", *more)
     assert set(found["verdict"]["effects"]) == {"coulomb_friction", "torque_delay"}
     truth = {"inertia": 0.0203, "damping": 0.0447, "stiffness": 681.2}
     before, after = values(found["before"]), values(found["after"])

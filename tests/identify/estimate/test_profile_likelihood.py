@@ -77,7 +77,7 @@ def in_motion(seed: int) -> list[Trace]:
 
 def test_runs_that_begin_in_motion_tell_as_little_and_say_so() -> None:
     off = []
-    for seed in range(5):
+    for seed in range(3):
         found = fitted(in_motion(seed), TRUTH[0])
         assert found.free_run is not None
         assert not any(s.rests for s in found.free_run.shots)
@@ -91,7 +91,7 @@ def test_runs_that_begin_in_motion_tell_as_little_and_say_so() -> None:
         pytest.param(0, 1e-4, marks=pytest.mark.slow),
         (2, 1e-4),
         pytest.param(4, 8.714331e-5, marks=pytest.mark.slow),
-        (5, 1.293086e-04),
+        pytest.param(5, 1.293086e-04, marks=pytest.mark.slow),
         pytest.param(7, 6.847339e-5, marks=pytest.mark.slow),
     ],
 )

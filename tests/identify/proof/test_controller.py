@@ -83,7 +83,8 @@ def test_every_effect_without_memory_on_the_shaft_has_a_formula() -> None:
 def test_c_compiles_without_a_warning_and_agrees_with_python(tmp_path: Path) -> None:
     if COMPILER is None:
         pytest.skip("no C compiler on this machine")
-    made = files(of_all())
+    known = of_all()
+    made = files(known)
     for name, text in made.items():
         (tmp_path / name).write_text(text, encoding="ascii")
     strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-O2", "-shared", "-fPIC"]
@@ -97,7 +98,7 @@ def test_c_compiles_without_a_warning_and_agrees_with_python(tmp_path: Path) -> 
     in_python, rng = module(made["compensation.py"]), np.random.default_rng(5)
     for angle, rate, torque in rng.uniform((-0.3, -4.0, -100.0), (0.3, 4.0, 100.0), (2000, 3)).tolist():
         assert abs(in_c(angle, rate, torque) - in_python.torque_nm(angle, rate, torque)) < 1e-9
-        assert abs(in_python.torque_nm(angle, rate, torque) - value(of_all(), angle, rate, torque)) < 1e-9
+        assert abs(in_python.torque_nm(angle, rate, torque) - value(known, angle, rate, torque)) < 1e-9
 
 
 def test_each_effect_alone_compiles_without_a_warning(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -31,11 +31,12 @@ def passed(order: int, hertz: float) -> Callable[[Array], Array]:
 
 
 def recorded(
-    colour: Callable[[Array], Array] | None, effects: Effects | None = None, seed: int = 0, duration_s: float = 2.5
-) -> Recording:
+    colour: Callable[[Array], Array] | None, effects: Effects | None = None, seed: int = 0, duration_s: float = 2.5,
+    sets: Sequence[tuple[float, float]] = SETS,
+) -> Recording:  # fmt: skip
     """The paper's sets, read by a gyro of that noise."""
     runs = []
-    for i, (m, f) in enumerate(SETS):
+    for i, (m, f) in enumerate(sets):
         run = sine_run(m, f, effects=effects, noise=1e-9 if colour else NOISE_RAD_S, seed=i, duration_s=duration_s)
         assert run.rate_rad_s is not None
         if colour:
@@ -59,7 +60,7 @@ def found_without_its_effect() -> tuple[Identification, list[str]]:
 
 @pytest.mark.parametrize(("order", "hertz"), [pytest.param(2, 50.0, marks=pytest.mark.slow), (1, 60.0)])
 def test_noise_that_the_gyro_filters_is_no_missing_effect(order: int, hertz: float) -> None:
-    found, said = found_in(recorded(passed(order, hertz), duration_s=4.0), [])
+    found, said = found_in(recorded(passed(order, hertz), duration_s=4.0, sets=SETS[2:]), [])
     assert found.accepted
     assert any(ONCE_MORE in line for line in said)
     colour = found.noise_floor.holdout_rate_rms
@@ -81,7 +82,7 @@ def test_noise_that_the_gyro_filters_is_no_missing_effect(order: int, hertz: flo
     ],
 )
 def test_an_effect_beside_such_noise_is_named(order: int, hertz: float, name: str, hidden: dict[str, float]) -> None:
-    found, _ = found_in(recorded(passed(order, hertz), {name: hidden}), [name, "quadratic_stiffness"])
+    found, _ = found_in(recorded(passed(order, hertz), {name: hidden}, sets=SETS[2:]), [name, "quadratic_stiffness"])
     assert found.verdict.effects == (name,)
     assert found.accepted
     assert found.final.effect_parameters[name][next(iter(hidden))].value == pytest.approx(

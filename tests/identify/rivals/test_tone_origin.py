@@ -18,8 +18,8 @@ from tests.identify.simulated import NOISE_RAD_S, TRUTH, sine_run
 
 HERTZ, TORQUE_NM = 13.37, 0.8
 LASTS_S = 1.5  # 20 periods of the line
-SETS = ((67.0, 6.0), (111.0, 1.0), (104.0, 3.0))
-SETTINGS = IdentifyConfig.model_validate({"candidates": ["periodic_disturbance", "coulomb_friction", "cogging"]})
+SETS = ((67.0, 6.0), (104.0, 3.0))
+SETTINGS = IdentifyConfig.model_validate({"candidates": ["periodic_disturbance", "cogging"]})
 
 
 def shaken(torque_nm: float, hertz: float, seed: int, added: float = 0.0, stands: bool = True) -> Run:
@@ -89,7 +89,7 @@ def test_records_that_begin_in_motion_do_not_tell_either(made) -> None:  # type:
 
 def test_a_line_in_one_run_is_told_with_that_run_and_its_size_there() -> None:
     runs = [
-        heard(*one, seed=k, lasts_s=2.5) if k == 2 else sine_run(*one, seed=k, duration_s=2.5)
+        heard(*one, seed=k, lasts_s=2.5) if k == 1 else sine_run(*one, seed=k, duration_s=2.5)
         for k, one in enumerate(SETS)
     ]
     found = found_in(runs)
@@ -107,7 +107,7 @@ def test_who_knows_that_it_is_a_torque_declares_it() -> None:
     assert found.before.parameters["inertia"].value == pytest.approx(TRUTH[0], rel=1e-4)
 
 
-LOADS = (0.0, 0.0, 0.6 * TRUTH[0])
+LOADS = (0.0, 0.6 * TRUTH[0])
 
 
 def test_a_known_mass_shows_a_torque() -> None:
@@ -149,12 +149,9 @@ def test_nothing_is_named_that_was_only_found_beside_an_open_line() -> None:
 )
 def test_a_line_at_the_frequency_of_one_runs_own_torque_is_that_torque(gain: float, late: int, said: str) -> None:
     """A drive that gave one percent less in one run; or its rows one sample late, and what was cut off in front."""
-    runs = [
-        sine_run(*one, seed=k, duration_s=LASTS_S)
-        for k, one in enumerate(((67.0, 6.0), (111.0, 1.0), (104.0, 3.0), (60.0, 15.0)))
-    ]
-    assert runs[3].torque_nm is not None
-    runs[3] = replace(runs[3], torque_nm=np.roll(runs[3].torque_nm, late) * gain)
+    runs = [sine_run(*one, seed=k, duration_s=LASTS_S) for k, one in enumerate((*SETS, (60.0, 15.0)))]
+    assert runs[2].torque_nm is not None
+    runs[2] = replace(runs[2], torque_nm=np.roll(runs[2].torque_nm, late) * gain)
     found = found_in(runs)
     assert found.verdict.effects == ()
     assert said in found.verdict.left_open

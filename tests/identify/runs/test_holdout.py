@@ -70,7 +70,7 @@ def test_a_disturbance_is_named_where_whole_runs_are_held_out_whose_phase_no_fit
     tone = [{"sine": 0.3 * np.cos(k), "cosine": 0.3 * np.sin(k), "frequency": 3.37} for k in range(3)]
     sets = ((67.0, 6.0), (111.0, 1.0), (104.0, 3.0))
     runs = [
-        sine_run(*one, effects={"periodic_disturbance": t}, duration_s=2.0, seed=k)
+        sine_run(*one, effects={"periodic_disturbance": t}, duration_s=1.5, seed=k)
         for k, (one, t) in enumerate(zip(sets, tone, strict=True))
     ]
     runs[2] = replace(runs[2], use="holdout")

@@ -53,8 +53,9 @@ def coupled(seed: int = 0) -> Recording:
     return played(OTHER_AXIS, swinging, load=load, reading_noise=0.05, seed=seed)
 
 
-def softening(seed: int = 0) -> Recording:
-    return played(WINDING, cycling, load=lambda t, th, w: -0.8 * (cycling(t) - 21.0) * th, seed=seed)
+def softening(seed: int = 0, duration_s: float = 2.5) -> Recording:
+    bends = lambda t, th, w: -0.8 * (cycling(t) - 21.0) * th  # noqa: E731
+    return played(WINDING, cycling, load=bends, seed=seed, duration_s=duration_s)
 
 
 def of_channel(channel: Channel) -> tuple[str, ...]:
@@ -76,7 +77,7 @@ def of_the_magnet() -> Identification:
 
 @cache
 def of_the_spring() -> Identification:
-    return identified(softening())
+    return identified(softening(duration_s=2.0))
 
 
 def assert_terms(found: Identification, relative: float = 0.001) -> None:
@@ -142,7 +143,7 @@ def test_the_noise_of_a_measured_current_pushes_the_platform_and_bends_no_value(
 
 
 def test_the_measured_current_takes_the_place_of_the_torque_asked_of_a_drive_that_sags() -> None:
-    found = identified(sagging(2.5, reading_noise=0.0001))
+    found = identified(sagging(2.5, reading_noise=0.0001, duration_s=2.0))
     assert found.accepted, found.reasons
     assert found.verdict.effects == ("motor_current_drive",)
     assert_number(found, "motor_current_drive", "share", 1.0)
@@ -163,7 +164,7 @@ def test_where_channel_and_library_do_as_well_the_library_is_named_and_the_chann
 
 
 def test_a_temperature_that_wanders_is_not_named_on_clean_data() -> None:
-    found = identified(played(WINDING, random_walk(7), reading_noise=0.0))
+    found = identified(played(WINDING, random_walk(7), reading_noise=0.0, duration_s=2.0))
     assert found.accepted, found.reasons
     assert found.verdict.effects == ()
     tried = {c.effect for c in found.verdict.candidates}

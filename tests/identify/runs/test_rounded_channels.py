@@ -37,7 +37,7 @@ def test_what_has_no_steps_loses_nothing_by_them() -> None:
     assert rounding_of(np.repeat([0.0, 1.0], 50)) is None
 
 
-def read_in_steps(effects: Effects, sets: Sequence[tuple[float, float]] = SETS[1:]) -> Recording:
+def read_in_steps(effects: Effects, sets: Sequence[tuple[float, float]] = SETS[2:]) -> Recording:
     runs = []
     for m, f in sets:
         torque = TorqueSignal(TIME, m * np.sin(2.0 * np.pi * f * TIME))
@@ -65,7 +65,7 @@ def test_friction_that_holds_the_platform_beside_a_coarse_encoder_is_explained_t
 def test_a_run_of_few_steps_has_the_noise_of_the_others() -> None:
     """Its reading, of nearly nothing, had been the noise of all, and J came out a thousandth of what it is."""
     found = identify(
-        read_in_steps({}, (*SETS[1:], (0.4, 2.0))), DECLARED, IdentifyConfig.model_validate({"candidates": []})
+        read_in_steps({}, (*SETS[2:], (0.4, 2.0))), DECLARED, IdentifyConfig.model_validate({"candidates": []})
     )
     assert found.accepted
     assert found.noise_floor.holdout_rate_rms == pytest.approx(STEP_RAD / np.sqrt(12.0), rel=0.05)

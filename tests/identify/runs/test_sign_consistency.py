@@ -58,9 +58,12 @@ def test_a_run_whose_torque_has_nothing_to_do_with_its_motion_is_not_called_turn
     assert reversed_runs(traces_of(replace(campaign(), runs=tuple(runs)))) == []
 
 
-def test_the_rest_is_identified_without_it_and_the_result_says_so() -> None:
+@pytest.mark.parametrize(
+    "offered", [("coulomb_friction", "torque_delay"), pytest.param(None, marks=pytest.mark.slow)]
+)  # None: the library
+def test_the_rest_is_identified_without_it_and_the_result_says_so(offered: tuple[str, ...] | None) -> None:
     recording = with_turned(1, duration_s=2.0)
-    found = identify(recording, DECLARED, IdentifyConfig())
+    found = identify(recording, DECLARED, IdentifyConfig(candidates=offered))
     name = recording.runs[1].name
     assert found.verdict.effects == ()
     assert found.accepted

@@ -13,19 +13,25 @@ from rig.recording.run import Recording
 from tests.identify.simulated import TRUTH, sine_run, white
 
 SETS = ((67.0, 6.0), (111.0, 1.0), (104.0, 3.0))
-SETTINGS = IdentifyConfig.model_validate(
-    {"candidates": ["backlash", "coulomb_friction", "cubic_stiffness", "cogging", "unbalance"]}
+FEW = ("backlash", "coulomb_friction", "cubic_stiffness")
+MORE = (*FEW, "cogging", "unbalance")
+
+
+@pytest.mark.parametrize(
+    ("share", "offered"),
+    [
+        pytest.param(0.003, MORE, marks=pytest.mark.slow),
+        pytest.param(0.01, MORE, marks=pytest.mark.slow),
+        (0.01, FEW),
+    ],
 )
-
-
-@pytest.mark.parametrize("share", [pytest.param(0.003, marks=pytest.mark.slow), 0.01])
-def test_an_effect_is_named_beside_a_small_torque_that_nobody_recorded(share: float) -> None:
+def test_an_effect_is_named_beside_a_small_torque_that_nobody_recorded(share: float, offered: tuple[str, ...]) -> None:
     runs = []
     for seed, (torque_nm, hertz) in enumerate(SETS):
         run = sine_run(torque_nm, hertz, seed=seed, effects={"backlash": {"half_gap": 1e-3}}, duration_s=1.5)
         assert run.torque_nm is not None
         runs.append(replace(run, torque_nm=run.torque_nm + white(len(run.torque_nm), share * torque_nm, 100 + seed)))
-    found = identify(Recording(tuple(runs)), Platform(*TRUTH), SETTINGS)
+    found = identify(Recording(tuple(runs)), Platform(*TRUTH), IdentifyConfig(candidates=offered))
     assert found.verdict.effects == ("backlash",)
     assert found.accepted, found.reasons
     assert found.final.parameters["stiffness"].value == pytest.approx(TRUTH[2], rel=0.002)

@@ -47,10 +47,17 @@ def test_a_commanded_torque_is_known_and_stays_as_it_is() -> None:
     assert quieter(traces_of(Recording(held))) is None
 
 
-@pytest.mark.parametrize("share", [0.01, pytest.param(0.05, marks=pytest.mark.slow)])
-def test_noise_in_the_recorded_torque_does_not_pass_for_inertia(share: float) -> None:
+@pytest.mark.parametrize(
+    ("share", "offered"),
+    [
+        (0.01, ("coulomb_friction", "torque_delay", "cubic_stiffness", "flexible_mode")),
+        pytest.param(0.01, None, marks=pytest.mark.slow),  # the whole library
+        pytest.param(0.05, None, marks=pytest.mark.slow),
+    ],
+)
+def test_noise_in_the_recorded_torque_does_not_pass_for_inertia(share: float, offered: tuple[str, ...] | None) -> None:
     """As it was recorded the likelihood finds five times the inertia."""
-    found = identify(Recording(noisy(share)), Platform(*TRUTH), IdentifyConfig())
+    found = identify(Recording(noisy(share)), Platform(*TRUTH), IdentifyConfig(candidates=offered))
     assert found.verdict.effects == ()
     assert found.accepted, found.reasons
     assert found.final.parameters["inertia"].value == pytest.approx(TRUTH[0], rel=0.02)
