@@ -18,6 +18,7 @@ from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.model.parameters import Name, gains_at_zero, in_order
 from identify.propose.shape_grids import grid_of
+from identify.runs.observability import shows_a_period
 from rig import effects
 from rig.effects.base import Place
 
@@ -77,7 +78,8 @@ def candidate_torques(
     for _, name, shape in sorted(found)[:most]:
         best = beside.polished(name, shape) if polish else shape
         fit = regression.solve(now.structure.plus(name), {**now.shapes, name: best})
-        if in_order(fit.values, name) and not gains_at_zero(fit.values, name):
+        whole = shows_a_period(name, fit.values, regression.traces)
+        if whole and in_order(fit.values, name) and not gains_at_zero(fit.values, name):
             looks.append(CandidateTorque(name, fit))
     return sorted(looks, key=lambda w: w.left_nm)
 

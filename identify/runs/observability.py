@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from identify.model.parameters import Name
 from identify.signals.trace import Trace, loads_differ
 from rig import effects
 from rig.effects.base import Place
@@ -22,6 +23,15 @@ def why_unseen(name: str, traces: Sequence[Trace]) -> str:
     if effects.get(name).place is Place.DRIVE and all(t.torque is None for t in traces):
         return "no torque was applied, so effects of the drive do not show"
     return ""
+
+
+def shows_a_period(name: str, values: Mapping[Name, float], traces: Sequence[Trace]) -> bool:
+    """Whether a run is as long as a period of an effect that repeats: what is slower is a drift as well as a period."""
+    repeats = effects.get(name).repeats
+    if not repeats:
+        return True
+    longest_s = max(len(t.measured) * t.step_s for t in traces)
+    return values.get((name, repeats), 0.0) * longest_s >= 1.0
 
 
 def can_show(name: str, traces: Sequence[Trace]) -> bool:

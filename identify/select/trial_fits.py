@@ -20,6 +20,7 @@ from identify.model.structure import Structure
 from identify.propose.innovation_score import InnovationScores, Score
 from identify.propose.torque_looks import CandidateTorque, candidate_torques
 from identify.runs.measured_channels import simplicity
+from identify.runs.observability import shows_a_period
 from identify.select.evidence import WEIGHT, EvidenceModel
 from identify.signals.spectral_lines import foreign_lines_hz, ringing_hz, rings_hz
 from rig import effects
@@ -209,7 +210,8 @@ class TrialFits:
                 )
             )  # fmt: skip
         best = min(fits, key=lambda f: f.cost)
-        return best if np.isfinite(best.cost) else None
+        shown = shows_a_period(name, best.values, self.problem.traces)
+        return best if np.isfinite(best.cost) and shown else None
 
     @staticmethod
     def _begun_small(name: str, begun: Mapping[Name, float], start: CandidateTorque) -> bool:

@@ -149,6 +149,7 @@ class Effect:
     never_separable: Mapping[str, Alike] | None = None  # rival -> why no data of torque and rate can tell them apart
     # By rival of never_separable, from its own values: the values of that rival, and what the change adds to J, C, K.
     as_rival: Mapping[str, Callable[[tuple[float, ...]], LargeStart]] | None = None
+    repeats: str = ""  # its parameter that is a frequency in time: a run has to show a period of it
     needs_added_inertia: bool = False  # determined only if some runs have a known inertia mounted
     # From (J, C, K) and the scale: starting values of the platform and of the effect if the effect is large.
     large_starts: Callable[[tuple[float, float, float], Scale], tuple[LargeStart, ...]] | None = None

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from identify.pipeline import identify
-from identify.runs.observability import why_unseen
+from identify.runs.observability import shows_a_period, why_unseen
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
 from rig.recording.run import Recording
@@ -43,3 +43,11 @@ def test_what_is_declared_and_unseen_is_set_aside_and_the_rest_identified(
 def test_no_candidates_means_none() -> None:
     found = identify(campaign({"coulomb_friction": {"level": 1.0}}, sets=TWO, duration_s=1.0), Platform(*TRUTH), NONE)
     assert not found.verdict.candidates and found.verdict.unexplained
+
+
+@pytest.mark.parametrize(("hertz", "shown"), [(0.2, False), (0.24, False), (0.26, True), (3.0, True)])
+def test_what_repeats_needs_a_run_as_long_as_its_period(hertz: float, shown: bool) -> None:
+    traces = traces_of(campaign(sets=TWO, duration_s=4.0))
+    values = {("periodic_disturbance", "frequency"): hertz}
+    assert shows_a_period("periodic_disturbance", values, traces) is shown
+    assert shows_a_period("coulomb_friction", {("coulomb_friction", "level"): 1.0}, traces)
