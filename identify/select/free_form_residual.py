@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -80,19 +81,19 @@ def fit_free_forms(search: Stepwise, now: Fit) -> tuple[FreeFormFit | None, list
     problem = search.problem
     best: FreeFormFit | None = None
     others: list[FreeFormFit] = []
-    for form in scores(problem, now, search.trials.scale(now), tuple(effects.free_forms()))[:TRIED]:
-        if form.gain < HOPE:
-            break
-        fit = fitted(problem, now, form, STEPS)
+    found = scores(problem, now, search.trials.scale(now), tuple(effects.free_forms()))[:TRIED]
+    forms = [form for form in found if form.gain >= HOPE]
+    fits = problem.workers.side_by_side([partial(fitted, problem, now, form, STEPS) for form in forms])
+    for form, fit in zip(forms, fits, strict=True):
         if not np.isfinite(fit.cost):
             continue
-        found = _beside(search, now, fit, form.effect)
-        if found.is_significant:
-            found = _beside(search, _from_there(search, now, fit), fit, form.effect)
-        if found.is_significant and (best is None or found.evidence.support > best.evidence.support):
-            best = found
-        elif found.chance_level < BY_CHANCE:
-            others.append(found)
+        beside = _beside(search, now, fit, form.effect)
+        if beside.is_significant:
+            beside = _beside(search, _from_there(search, now, fit), fit, form.effect)
+        if beside.is_significant and (best is None or beside.evidence.support > best.evidence.support):
+            best = beside
+        elif beside.chance_level < BY_CHANCE:
+            others.append(beside)
     return best, others
 
 
@@ -115,12 +116,8 @@ def redundant_given(search: Stepwise, left: FreeFormFit, names: Sequence[str]) -
     """
     weakest: tuple[float, str] | None = None
     fit = left.evidence.fit
-    for name in names:
-        if name not in fit.structure.effects:  # the curve holds it
-            continue
-        without = search.problem.fit(
-            fit.structure.minus(name), fit.without(name), fit.noise, STEPS, carry=fit.shots, thorough=False
-        )  # fmt: skip
+    there = [name for name in names if name in fit.structure.effects]  # others the curve holds
+    for name, without in zip(there, search.all_without(fit, there), strict=True):
         evidence = search.weigher.evidence(name, without, fit)
         cutoff_hz = search.weigher.regression.cutoff_hz
         share = max(evidence.weight, likely_share(without, fit, cutoff_hz))

@@ -16,7 +16,6 @@ import numpy as np
 
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
-from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.propose.innovation_score import Score
 from identify.select.curve_rivals import against_curves
@@ -172,6 +171,10 @@ class Stepwise:
             now.structure.minus(name), now.without(name), now.noise, steps, carry=now.shots, thorough=False
         )  # fmt: skip
 
+    def all_without(self, now: Fit, names: Sequence[str]) -> list[Fit]:
+        """The same without each of some terms or effects, side by side."""
+        return self.problem.workers.side_by_side([partial(self.without, now, name) for name in names])
+
     def _others(self, now: Fit, name: str) -> tuple[Fit, dict[str, Fit]]:
         """A model without an effect, and with others in its place; from the round that added it, if that stands."""
         without = now.structure.minus(name)
@@ -237,14 +240,14 @@ class Stepwise:
 
     def backward_elimination(self, now: Fit, names: Sequence[str]) -> Fit:
         """Without every term or effect that the data do as well without."""
+        begun, doubted = now, [n for n in names if self._is_in_doubt(now, n)]
+        lacking = dict(zip(doubted, self.all_without(now, doubted), strict=True))
         for name in names:
-            if name == "inertia" or len(now.structure.terms) + len(now.structure.effects) <= 1:
+            if len(now.structure.terms) + len(now.structure.effects) <= 1 or not self._is_in_doubt(now, name):
                 continue
             own = [n for n in now.names if n[0] == name]
             term = len(own) == 1 and own[0][0] in TERMS
-            if not self._is_in_doubt(now, name, own):
-                continue
-            without = self.without(now, name)
+            without = lacking[name] if now is begun and name in lacking else self.without(now, name)
             self._lacking[_key(without.structure)] = without
             evidence = self.weigher.evidence(name, without, now)
             soaks = name == "stiffness" and self._stiffness_may_absorb(now)
@@ -272,12 +275,14 @@ class Stepwise:
         evidence = self.weigher.evidence("stiffness", without, now)
         return without if evidence.support < STRONG_SUPPORT or evidence.weight < WEIGHT else now
 
-    def _is_in_doubt(self, now: Fit, name: str, own: Sequence[Name]) -> bool:
+    def _is_in_doubt(self, now: Fit, name: str) -> bool:
         """Whether it is in doubt that a term or an effect is needed."""
+        if name == "inertia":
+            return False
         if name == "stiffness" and self._stiffness_may_absorb(now):
             return True
         if name in TERMS:
-            return abs(now.values[own[0]]) < CERTAIN * now.std_error(own[0])
+            return abs(now.values[(name,)]) < CERTAIN * now.std_error((name,))
         return self._needed.get(name, 0.0) < CERTAIN**2
 
 
