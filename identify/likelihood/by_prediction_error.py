@@ -33,9 +33,23 @@ def by_prediction_error(
     like
         A fit to the same recording whose noise to begin from.
     """
+    problem, fit = fitted_on_all(traces, structure, start, use, like)
+    return as_final(problem, fit, traces, everything)
+
+
+def fitted_on_all(
+    traces: Sequence[Trace], structure: Structure, start: Mapping[Name, float], use: Sequence[Any],
+    like: Fit | None = None,
+) -> tuple[PredictionError, Fit]:  # fmt: skip
+    """The likelihood on all samples that fit, and the model fitted by it."""
     few, masks = thinned(traces, use, MAX_SAMPLES)
     problem = PredictionError(few, masks)
-    fit = problem.fit(structure, start, problem.noise_of(like) if like else None, MAX_ITERATIONS)
+    return problem, problem.fit(structure, start, problem.noise_of(like) if like else None, MAX_ITERATIONS)
+
+
+def as_final(problem: PredictionError, fit: Fit, traces: Sequence[Trace], everything: Sequence[Any]) -> FinalFit:
+    """The same as a final fit: the runs simulated freely, and what the likelihood knows of each number."""
+    structure = fit.structure
     held = free_run_of(traces, structure, fit.values, everything)
     told = [i for i, n in enumerate(fit.names) if n != ("inertia",) or not problem.torque_free]
     determined = tuple(bool(x > ZERO_INFORMATION) for x in np.diag(fit.information)[told])

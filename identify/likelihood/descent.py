@@ -223,7 +223,7 @@ class Descent:
         told = np.diag(found.matrix) > 0.0
         low, high = np.where(told, low, 0.0), np.where(told, high, 0.0)
         d = bounded_step(scaled, right, low, high)
-        if float((2.0 * right - scaled @ d) @ d) < max(0.2 * COST_TOLERANCE, enough):
+        if found.promised + float((2.0 * right - scaled @ d) @ d) < max(0.2 * COST_TOLERANCE, enough):
             return False  # what a step promises is not worth taking
         for _ in range(MAX_STEP_TRIALS):
             d = bounded_step(scaled + self.damping * np.eye(len(size)), right, low, high) / size

@@ -27,6 +27,7 @@ class Step:
     information: Array  # of the parameters alone, for readings of unit variance, (p, p)
     own: Sequence[tuple[Array, Array]]  # (k, p) and (k,): what they lose with a change, and take without one
     level: Array  # by how much the variance of one reading falls with the logarithms of the noise, (k,)
+    promised: float  # by how much the cost falls with what the runs' own unknowns take
 
 
 def normal_equations(parts: Sequence[Derivatives], p: int, k: int, count: int) -> Step:
@@ -35,7 +36,7 @@ def normal_equations(parts: Sequence[Derivatives], p: int, k: int, count: int) -
     ``count`` is the number of readings that count.
     """
     matrix, right = np.zeros((p + k, p + k)), np.zeros(p + k)
-    information, own = np.zeros((p, p)), []
+    information, own, promised = np.zeros((p, p)), [], 0.0
     squares = sum(float(d.columns.scaled @ d.columns.scaled) for d in parts)
     variance = squares / max(count, 1)
     level = np.sum([d.spread.sum(axis=0) for d in parts], axis=0) / max(count, 1)
@@ -47,12 +48,13 @@ def normal_equations(parts: Sequence[Derivatives], p: int, k: int, count: int) -
         matrix += (wide.T @ wide - across.T @ across) / variance
         right += (wide.T @ z - across.T @ taken) / variance
         own.append((follow @ across, follow @ taken))
+        promised += float(taken @ taken) / variance
         steady = basis.T @ d.columns.columns
         information += d.columns.columns.T @ d.columns.columns - steady.T @ steady
         apart = d.spread - level  # the scale of all variances is free: only what differs between samples tells
         matrix += 0.5 * apart.T @ apart
         right -= 0.5 * apart.T @ (1.0 - z * z / variance)
-    return Step(matrix, right, information, own, level[p:])
+    return Step(matrix, right, information, own, level[p:], promised)
 
 
 def _spanned(own: Array) -> tuple[Array, Array]:

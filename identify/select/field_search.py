@@ -13,13 +13,13 @@ from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.final_fit import FinalFit, covariance_of, free_run_of
 from identify.estimate.initial_guess import Start, scale_of
-from identify.likelihood.by_prediction_error import by_prediction_error
+from identify.likelihood.by_prediction_error import as_final, by_prediction_error, fitted_on_all
 from identify.likelihood.fit import Fit
 from identify.model.structure import Structure
 from identify.results import Candidate, Dependence, Disturbance
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
-from identify.select.evidence import in_band, torque_fit_of
+from identify.select.evidence import TRUSTED, in_band, inflation, torque_fit_of
 from identify.select.search_state import Search
 from identify.select.torque_search import SURE, TorqueCandidate, TorqueSearch
 from identify.signals.trace import Trace
@@ -213,15 +213,18 @@ def _more_flexible(best: TorqueFit, trial: TorqueFit) -> bool:
 
 
 def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> FinalFit:
-    """The final fit by prediction error, or in torque where that leaves clearly less of it.
+    """The final fit by prediction error, or in torque where that leaves less and the likelihood is not to be believed.
 
-    Prediction error is the better estimate as long as what is left is a disturbance. Where it is a torque that goes
-    with something, prediction error weighs the frequencies at which the model happens to be right and gives the rest
-    away; least squares in torque does the least harm to the parameters.
+    Prediction error is the better estimate as long as what is left is a disturbance: in a closed loop that goes with
+    the motion, and least squares takes it for inertia. Where the scores of the parameters scatter by more than the
+    likelihood takes them to, what is left is none. Prediction error then weighs the frequencies at which the model
+    happens to be right and gives the rest away; least squares in torque does the least harm to the parameters.
     """
-    fitted = by_prediction_error(traces, fit.structure, fit.values, split.final, split.everything)
+    problem, likely = fitted_on_all(traces, fit.structure, fit.values, split.final)
+    fitted = as_final(problem, likely, traces, split.everything)
     left = regression.left_by(fit.structure, fitted.values)
-    if left <= NO_WORSE * fit.sigma:
+    believed = inflation(problem.columns_at(likely, with_variance=True), likely, likely.names) < TRUSTED
+    if left <= NO_WORSE * fit.sigma or believed:
         return fitted
     columns, residuals, names = regression.linear_parts(fit.structure, fit.values)
     covariance, determined = covariance_of(list(zip(columns, residuals, strict=True)), len(names))
