@@ -11,6 +11,7 @@ from identify.likelihood.derivatives import Derivatives
 from identify.simulate.shots import Shots, moved, with_bias
 from rig.arrays import Array
 
+SMALLEST_VARIANCE = 1e-300  # of scaled innovations: none are left where the linear part runs away
 SINGULAR = 1e-9  # of the largest singular value of a scaled normal matrix
 COST_TOLERANCE = 0.5  # fall of the cost below which a fit has arrived
 LEVENBERG_DAMPING = 1e-4  # of a first step
@@ -38,7 +39,7 @@ def normal_equations(parts: Sequence[Derivatives], p: int, k: int, count: int) -
     matrix, right = np.zeros((p + k, p + k)), np.zeros(p + k)
     information, own, promised = np.zeros((p, p)), [], 0.0
     squares = sum(float(d.columns.scaled @ d.columns.scaled) for d in parts)
-    variance = squares / max(count, 1)
+    variance = max(squares / max(count, 1), SMALLEST_VARIANCE)
     level = np.sum([d.spread.sum(axis=0) for d in parts], axis=0) / max(count, 1)
     for d in parts:
         z, wide = d.columns.scaled, d.pulled.copy()

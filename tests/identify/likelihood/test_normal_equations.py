@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from identify.likelihood.normal_equations import COST_TOLERANCE, bounded_step
+from identify.likelihood.derivatives import Derivatives
+from identify.likelihood.fit import Columns
+from identify.likelihood.normal_equations import COST_TOLERANCE, bounded_step, normal_equations
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
 from identify.signals.prepare import one_noise
@@ -35,6 +37,14 @@ def test_beside_a_number_that_is_held_the_others_are_solved_for_again() -> None:
 def test_where_nothing_may_move_no_step_is_taken() -> None:
     nothing = np.zeros(2)
     assert np.array_equal(bounded_step(np.eye(2), np.ones(2), nothing, nothing), nothing)
+
+
+def test_where_a_model_runs_away_and_nothing_is_left_to_predict_no_step_is_promised() -> None:
+    nothing = np.zeros((6, 2))
+    columns = Columns(nothing, np.ones((6, 1)), np.zeros(6), np.full(6, np.inf))
+    found = normal_equations([Derivatives(columns, nothing, nothing)], 2, 0, 6)
+    assert found.promised == 0.0
+    assert np.array_equal(bounded_step(found.matrix, found.right, -np.ones(2), np.ones(2)), np.zeros(2))
 
 
 def test_a_fit_arrives_where_a_fit_from_the_truth_does_though_nothing_disturbs() -> None:
