@@ -219,7 +219,7 @@ class _Identifier:
             self.traces, self.split, self.structure, shapes, self.start, allowed,
             UNITS[self.recording.axis]["torque"], self.say,
             (search.stepwise.best, found_there), search.stepwise.trusted, search.stepwise.weigher.regression,
-            self._curves(search.stepwise),
+            self._curves(search.stepwise), search.refutes,
         )  # fmt: skip
         after = found.after
         gyro = all(t.channel == "rate" and t.beside is None for t in self.traces)  # an encoder has no line of its own

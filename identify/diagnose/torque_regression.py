@@ -26,6 +26,7 @@ from rig.arrays import Array
 
 BLOCK, BLOCKS_A_RUN, MIN_BLOCKS = 8, 24, 8  # samples behind the low-pass in a block, and how many blocks
 RIDGE = 1e-9  # of their own size, on the gains of free-form columns: two of them may be alike
+LEAST_PASSED_ON = 1e6  # times: a drive that passes on less passes on nothing
 MIN_FOR_LINES, MIN_TRAVEL_RAD = 64, 0.5  # samples, and travel to show a line against the angle
 
 
@@ -84,7 +85,7 @@ class TorqueRegression(TorqueBand):
         own = np.arange(wide.shape[1])
         free = (own >= len(names)) & (own < a.shape[1])
         x, held, _ = self._with_folds(wide, y, low, self._folds(names, extra), free, ridge)
-        scale = self.torque_nm / max(rms(y - self._taken(names, x[: a.shape[1]], a)), 1e-300)
+        scale = self._passed_on(y - self._taken(names, x[: a.shape[1]], a))
         r, held = scale * (y - wide @ x), scale * held
         ends = np.cumsum([len(rows) for rows in self._rows])[:-1]
         values = {**fit.values, **dict(zip(names, x[: len(names)].tolist(), strict=True))}
@@ -193,7 +194,7 @@ class TorqueRegression(TorqueBand):
         x, held, normal = self._with_folds(a, y, low, self._folds(names, extra), own)
         r = y - a @ x
         # A drive that passes on little of the torque leaves little of it unexplained: what counts is the share.
-        scale = self.torque_nm / max(rms(y - self._taken(names, x, a)), 1e-300)
+        scale = self._passed_on(y - self._taken(names, x, a))
         r, held = scale * r, scale * held
         values = dict(zip(names, x[: len(names)].tolist(), strict=True))
         for name in structure.effects:
@@ -209,6 +210,10 @@ class TorqueRegression(TorqueBand):
             structure, tuple(values), np.array(list(values.values())), int(used.sum()), rms(r[fitting]) ** 2, cost,
             information, rms(held[self._judged]), np.split(r, ends), np.split(held, ends), filters,
         )  # fmt: skip
+
+    def _passed_on(self, torque: Array) -> float:
+        """How many times what a drive passes on the recorded torque is: of what it leaves, the share counts."""
+        return float(min(self.torque_nm / max(rms(torque), 1e-300), LEAST_PASSED_ON))
 
     @staticmethod
     def _taken(names: Sequence[Name], x: Array, a: Array) -> Array:

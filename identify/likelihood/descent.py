@@ -24,6 +24,7 @@ from identify.likelihood.normal_equations import (
     Step,
     bounded_step,
     changed,
+    level_of,
     logs_of,
     normal_equations,
 )
@@ -157,15 +158,13 @@ class Descent:
         return bool(np.isfinite(before)) and self.try_step(True, enough) and before - self.cost > COST_TOLERANCE
 
     def columns(self) -> list[Columns]:
-        """Derivatives of every run, where the descent stands."""
+        """Derivatives of every run."""
         return [d.columns for d in self._derivatives(False, False)]
 
     def scores(self) -> list[Columns]:
         """The same with what the parameters do through the gains, and to the variance of the innovations."""
         parts = self._derivatives(False, True)
-        squares = sum(float(d.columns.scaled @ d.columns.scaled) for d in parts)
-        variance = squares / max(self.count, 1)
-        level = np.sum([d.spread.sum(axis=0) for d in parts], axis=0) / max(self.count, 1)
+        variance, level = level_of(parts, self.count, self.problem.variance_of)
         return [d.with_variance(level, variance) for d in parts]
 
     def looks_at(self, x: Array, noise: Noise, shots: Sequence[Shots]) -> list[Look]:
@@ -182,7 +181,12 @@ class Descent:
         if not np.isfinite(squares) or squares <= 0.0:
             return np.inf
         log = sum(float(np.sum(np.log(q.variance[w]))) for q, w in zip(looks, self.weights, strict=True))
-        return float(self.count * np.log(squares / self.count) + log)
+        variance, _ = self.problem.variance_of(squares, self.count)
+        return float(self.count * (np.log(variance) - 1.0) + squares / variance + log)
+
+    def _squares(self, looks: Sequence[Look]) -> float:
+        both = zip(looks, self.weights, strict=True)
+        return sum(float(np.sum(q.innovations[w] ** 2 / q.variance[w])) for q, w in both)
 
     def _derivatives(self, of_noise: bool, of_gains: bool) -> list[Derivatives]:
         """Every run's derivatives, where the descent stands."""
@@ -206,7 +210,8 @@ class Descent:
     def _solvable(self, of_noise: bool, of_gains: bool = True) -> Step:
         """The normal equations where the descent stands; the information of the parameters is kept."""
         kinds = len(self.kinds) if of_noise else 0
-        found = normal_equations(self._derivatives(of_noise, of_gains), len(self.x), kinds, self.count)
+        parts = self._derivatives(of_noise, of_gains)
+        found = normal_equations(parts, len(self.x), kinds, self.count, self.problem.variance_of)
         self.information, self._informed = found.information, (self.noise, self.x.tobytes())
         return found
 
@@ -215,7 +220,7 @@ class Descent:
         found = self._solvable(of_noise)
         p = len(self.x)
         ratios = [not kind.endswith("_s") for kind in self.kinds] if of_noise else []
-        if not (np.all(np.isfinite(found.matrix)) and np.all(np.isfinite(found.right))):
+        if not np.all(np.isfinite(np.column_stack([found.matrix, found.right]))):
             return False
         size: Array = np.sqrt(np.maximum(np.diag(found.matrix), 1e-300))
         scaled, right = found.matrix / np.outer(size, size), found.right / size
@@ -251,13 +256,11 @@ class Descent:
         return np.append(down, fall), np.append(up, most - 1.0)  # what rises is stepped as a density (``logs_of``)
 
     def _with_logs(self, change: Array) -> Noise:
-        values = {
-            kind: getattr(self.noise, kind) * float(np.exp(d)) for kind, d in zip(self.kinds, change, strict=False)
-        }
-        return self.problem.within(replace(self.noise, **values))
+        times = zip(self.kinds, np.exp(change).tolist(), strict=False)
+        return self.problem.within(replace(self.noise, **{k: getattr(self.noise, k) * x for k, x in times}))
 
     def place(self) -> tuple[Noise, Array, list[Shots], list[Look], float]:
-        """Where the descent stands, to go back to."""
+        """Where it stands, to go back to."""
         return self.noise, self.x, self.shots, self.looks, self.cost
 
     def go(self, place: tuple[Noise, Array, list[Shots], list[Look], float]) -> None:
@@ -270,8 +273,7 @@ class Descent:
         A gyro's walk is left out, too: beside a wrong model it takes what is torque, and would hide it here.
         """
         p, quiet = self.problem, replace(self.noise, white=0.0, slow=0.0)
-        if p.gyro:
-            quiet = replace(quiet, walk=0.0)
+        quiet = replace(quiet, walk=0.0) if p.gyro else quiet
         ratios = [
             (q.variance[w] / p.gains_at(s, self.structure, self.names, self.x, quiet).variance[w])[:, -1]
             for s, q, w in zip(self.shots, self.looks, self.weights, strict=True)
@@ -282,19 +284,16 @@ class Descent:
         """The fit where the descent stands."""
         if self._informed != (self.noise, self.x.tobytes()):
             self._solvable(False, False)
-        squares = sum(
-            float(np.sum(q.innovations[w] ** 2 / q.variance[w])) for q, w in zip(self.looks, self.weights, strict=True)
-        )
         inertia = self.x[self.names.index(("inertia",))] if ("inertia",) in self.names else 1.0
         disturbance = [
             q.state[:, 2]
             + (inertia + s.added) * np.sum(q.gains.gain[:, :, RATE] * q.innovations, axis=1) / s.trace.step_s
             for q, s in zip(self.looks, self.shots, strict=True)
         ]  # fmt: skip
-        prediction = Prediction(
-            [q.innovations[:, 0] for q in self.looks], [q.variance[:, 0] for q in self.looks], disturbance
-        )  # fmt: skip
+        first = [(q.innovations[:, 0], q.variance[:, 0]) for q in self.looks]
+        prediction = Prediction([e for e, _ in first], [v for _, v in first], disturbance)
+        variance, _ = self.problem.variance_of(self._squares(self.looks), self.count)
         return Fit(
-            self.structure, self.names, self.x, self.count, squares / max(self.count, 1), self.cost, self.information,
-            self.noise, tuple(self.shots), prediction, self.reduced_chi_square(),
+            self.structure, self.names, self.x, self.count, variance, self.cost, self.information, self.noise,
+            tuple(self.shots), prediction, self.reduced_chi_square(),
         )  # fmt: skip

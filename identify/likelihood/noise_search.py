@@ -62,7 +62,8 @@ def likeliest_noise(
             v = gains.variance[w]
             squares += float(np.sum(e * e / v))
             spread += float(np.sum(np.log(v)))
-        value = count * np.log(squares / count) + spread if squares > 0.0 else np.inf
+        variance, _ = problem.variance_of(squares, count)
+        value = count * (np.log(variance) - 1.0) + squares / variance + spread
         return float(value) if np.isfinite(value) else INFEASIBLE_COST
 
     found = minimize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from identify.likelihood.derivatives import Derivatives
 from identify.simulate.shots import Shots, moved, with_bias
 from rig.arrays import Array
 
-SMALLEST_VARIANCE = 1e-300  # of scaled innovations: none are left where the linear part runs away
+VarianceOf = Callable[[float, int], tuple[float, bool]]
 SINGULAR = 1e-9  # of the largest singular value of a scaled normal matrix
 COST_TOLERANCE = 0.5  # fall of the cost below which a fit has arrived
 LEVENBERG_DAMPING = 1e-4  # of a first step
@@ -31,16 +31,28 @@ class Step:
     promised: float  # by how much the cost falls with what the runs' own unknowns take
 
 
-def normal_equations(parts: Sequence[Derivatives], p: int, k: int, count: int) -> Step:
+def level_of(parts: Sequence[Derivatives], count: int, variance_of: VarianceOf) -> tuple[float, Array]:
+    """The variance of one reading, and by how much it falls with parameters and noise, (p + k,).
+
+    Where it stands at the sensor's floor it does not fall: then every variance tells, not only how they differ.
+    """
+    squares = sum(float(d.columns.scaled @ d.columns.scaled) for d in parts)
+    variance, free = variance_of(squares, count)
+    spread = np.sum([d.spread.sum(axis=0) for d in parts], axis=0) / max(count, 1)
+    return variance, spread if free else 0.0 * spread
+
+
+def normal_equations(
+    parts: Sequence[Derivatives], p: int, k: int, count: int, variance_of: VarianceOf
+) -> Step:  # fmt: skip
     """Of ``p`` parameters and ``k`` numbers of the noise, from every run's derivatives.
 
-    ``count`` is the number of readings that count.
+    ``count`` is the number of readings that count; ``variance_of`` says from the sum of their squares and their number
+    what the variance of one is, and whether that is free.
     """
     matrix, right = np.zeros((p + k, p + k)), np.zeros(p + k)
     information, own, promised = np.zeros((p, p)), [], 0.0
-    squares = sum(float(d.columns.scaled @ d.columns.scaled) for d in parts)
-    variance = max(squares / max(count, 1), SMALLEST_VARIANCE)
-    level = np.sum([d.spread.sum(axis=0) for d in parts], axis=0) / max(count, 1)
+    variance, level = level_of(parts, count, variance_of)
     for d in parts:
         z, wide = d.columns.scaled, d.pulled.copy()
         wide[:, :p] += d.columns.columns
@@ -52,7 +64,7 @@ def normal_equations(parts: Sequence[Derivatives], p: int, k: int, count: int) -
         promised += float(taken @ taken) / variance
         steady = basis.T @ d.columns.columns
         information += d.columns.columns.T @ d.columns.columns - steady.T @ steady
-        apart = d.spread - level  # the scale of all variances is free: only what differs between samples tells
+        apart = d.spread - level  # where the scale of all variances is free, only what differs between samples tells
         matrix += 0.5 * apart.T @ apart
         right -= 0.5 * apart.T @ (1.0 - z * z / variance)
     return Step(matrix, right, information, own, level[p:], promised)

@@ -44,6 +44,7 @@ MIN_PREFILTER_NOISE, MAX_PREFILTER_NOISE = 1e-3, 1e8
 # Of the motion, root mean square, by which a start state may be off: the smoothed motion is worst where a run begins.
 START_RATE, START_ANGLE, UNKNOWN_ANGLE = 0.1, 0.05, 1.0
 LONG_RUN_SAMPLES = 10_000  # of a run: two threads predict such runs sooner than one
+LEAST_VARIANCE = 0.5  # of what the readings show above the motion: the sensor's noise is no smaller
 FAR = 1e30  # times a number of the noise: a bound holds it
 SLOPE_CACHE_SIZE = 100  # of effects, along all runs
 
@@ -89,6 +90,11 @@ class PredictionError:
         self.fits_starts = self.torque_free
         begun = StartVariance() if self.fits_starts else self._start_variance()
         self._gains = KeptGains(self.step_s, max(len(t.measured) for t in traces), begun)
+
+    def variance_of(self, squares: float, count: int) -> tuple[float, bool]:
+        """Of one reading, and whether the innovations decide it: no sensor is far better than its own floor shows."""
+        found, least = squares / max(count, 1), LEAST_VARIANCE * self.reading_variance
+        return max(found, least), found > least
 
     def columns_at(self, fit: Fit, with_variance: bool = False) -> list[Columns]:
         """Derivatives of every run's innovations where a fit stands; ``with_variance``, of their whole likelihood."""

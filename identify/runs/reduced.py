@@ -19,6 +19,7 @@ TURNS = 0.02  # of the largest rate, below which a turn may be noise
 SHORTEST_SPAN = 1_500  # samples: slow effects need a span to show in
 COLUMNS = 5  # acceleration, rate, angle, direction, constant
 PLACES = 12  # where a span may begin
+LEAD = 0.25  # of a span, that is measured ahead of it: ``identify.likelihood.settling`` leaves it out again
 
 
 def reduced(traces: Sequence[Trace], split: Split, enough: int = ENOUGH) -> tuple[list[Trace], Split]:
@@ -46,6 +47,9 @@ def reduced(traces: Sequence[Trace], split: Split, enough: int = ENOUGH) -> tupl
     for i in chosen:
         t = few[i]
         first, last, told = _span(t, wanted, told)
+        lead = min(first, int(LEAD * wanted))  # in it what is inside the platform settles
+        fit[i][:first] = judge[i][:first] = False
+        first -= lead
         piece = t if (first, last) == (0, len(t.measured) - 1) else t.piece(first, last)
         if not piece.stretches:
             continue

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import chi2, rankdata
 
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
@@ -135,18 +135,28 @@ class EvidenceModel:
 def support_difference(one: Fit, other: Fit) -> float:
     """By how much another model on the same samples is likelier, as far as that can be believed; zero if it is not.
 
-    The smaller of two numbers: the fall of the penalised cost, and the square of its standard errors, read off how it
-    scatters over blocks of the record (Vuong 1989), which asks nothing of either model but that blocks are alike. Those
-    of a decay are not: the first ones tell nearly all.
+    The smaller of two numbers: the fall of the penalised cost, and the square of the standard errors by which blocks of
+    the record agree on it. That asks nothing of either model but that blocks are alike. Their mean over its scatter
+    (Vuong 1989) is ruined by a single block in which one of them happens to fail, so the ranks of the differences are
+    taken (Wilcoxon 1945; of models: Clarke 2007). Blocks of a decay are not alike: the first ones tell nearly all.
     """
     fall = one.penalised - other.penalised
     if fall <= 0.0:
         return 0.0
     if all(s.trace.torque is None for s in one.shots):
         return fall
-    difference = block_costs(one) - block_costs(other)
-    scatter = float(np.std(difference, ddof=1)) * np.sqrt(len(difference))
-    return min(fall, (fall / max(scatter, 1e-300)) ** 2)
+    price = (one.penalised - one.cost) - (other.penalised - other.cost)
+    return min(fall, agreement(block_costs(one) - block_costs(other), price) ** 2)
+
+
+def agreement(falls: Array, price: float = 0.0) -> float:
+    """Standard errors by which blocks agree that they fall, by the sum of their signed ranks; zero if they do not.
+
+    ``price`` is what they have to pay together.
+    """
+    each = falls + price / len(falls)
+    ranks = rankdata(np.abs(each))
+    return max(float(np.sum(np.sign(each) * ranks) / np.linalg.norm(ranks)), 0.0)
 
 
 def block_costs(fit: Fit) -> Array:

@@ -86,6 +86,7 @@ def search_in_torque(
     traces: Sequence[Trace], split: Split, structure: Structure, shapes: dict[str, tuple[float, ...]], start: Start,
     allowed: Sequence[str], unit: str, say: Callable[[str], None], known: tuple[Fit, Search],
     trusted: bool, along_few: TorqueRegression, curves: Sequence[tuple[Dependence, Mapping[str, float]]] = (),
+    refutes: Callable[[TorqueFit], bool] = lambda fit: False,
 ) -> Found:  # fmt: skip
     """Find what the declared model lacks, and fit both models with their disturbance.
 
@@ -109,6 +110,8 @@ def search_in_torque(
         The samples that search looked at, in torque.
     curves
         What curves over what that model leaves show, and how far J, C and K move with each, percent.
+    refutes
+        Whether that model, which names nothing, is likelier than one found in torque.
     """
     few, parts = along_few.traces, along_few.split
     scale = scale_of(few, start.platform, ())
@@ -134,7 +137,8 @@ def search_in_torque(
         say("looking at what is left as a torque")
         depends = bool(curves or disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on)
         best = search.run()
-        if _better(search, best, trial, depends) and not (trusted and _more_flexible(best, trial)):
+        better = _better(search, best, trial, depends) and not (trusted and _more_flexible(best, trial))
+        if better and not (known[0].structure.effects == structure.effects and refutes(best)):
             by_likelihood = None
         else:
             best = trial

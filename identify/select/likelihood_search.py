@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.initial_guess import Start, scale_of
 from identify.estimate.starting_point import horizon_s
@@ -18,7 +19,7 @@ from identify.results import Candidate
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
 from identify.runs.reduced import reduced
-from identify.select.evidence import EvidenceModel
+from identify.select.evidence import STRONG_SUPPORT, EvidenceModel, support_difference
 from identify.select.search_state import Search
 from identify.select.stepwise import AT_NOISE, Stepwise
 from identify.signals.trace import Trace, pooled_noise
@@ -82,6 +83,13 @@ class LikelihoodSearch:
     def run(self) -> bool:
         """Search; whether the last model predicts down to the sensor's noise."""
         return self.stepwise.run().reduced_chi_square < AT_NOISE
+
+    def refutes(self, fit: TorqueFit) -> bool:
+        """Whether the best model is likelier than one found in torque, also where that has its own best numbers."""
+        if fit.structure == self.stepwise.best.structure:
+            return False
+        there = self.stepwise.problem.fit(fit.structure, fit.values)
+        return bool(np.isfinite(there.cost)) and support_difference(there, self.stepwise.best) > STRONG_SUPPORT
 
     @property
     def found(self) -> Search:

@@ -59,15 +59,15 @@ def test_a_stretch_that_begins_while_the_low_pass_is_in_motion_tells_what_a_run_
     assert float(np.sqrt(np.mean(early[:20] ** 2))) < 1.5
 
 
-def test_samples_count_once_the_low_pass_has_settled_and_all_do_from_the_start_of_a_run() -> None:
+def test_samples_of_a_cut_stretch_count_once_it_has_settled_and_all_do_from_the_start_of_a_run() -> None:
     whole = one_noise([prepare(sine_run(67.0, 6.0))], False)[0]
-    cut = whole.piece(500, 2000)
-    counts = settled([whole, cut])
-    assert counts is not None
-    assert np.all(counts[0])
-    assert not np.any(counts[1][:20]) and np.all(counts[1][20:])
-    encoder = [replace(whole, channel="angle"), replace(cut, channel="angle")]
-    assert settled(encoder) is None
+    cut = whole.piece(500, 1999)
+    for channel in ("rate", "angle"):
+        counts = settled([replace(whole, channel=channel), replace(cut, channel=channel)])
+        assert counts is not None
+        assert np.all(counts[0])
+        assert not np.any(counts[1][:300]) and np.all(counts[1][300:])
+    assert settled([replace(whole, channel="angle")]) is None
 
 
 def beside(run: Run, counts: int, seed: int, white: bool = False) -> Run:

@@ -42,7 +42,7 @@ def test_where_nothing_may_move_no_step_is_taken() -> None:
 def test_where_a_model_runs_away_and_nothing_is_left_to_predict_no_step_is_promised() -> None:
     nothing = np.zeros((6, 2))
     columns = Columns(nothing, np.ones((6, 1)), np.zeros(6), np.full(6, np.inf))
-    found = normal_equations([Derivatives(columns, nothing, nothing)], 2, 0, 6)
+    found = normal_equations([Derivatives(columns, nothing, nothing)], 2, 0, 6, lambda squares, count: (1e-12, False))
     assert found.promised == 0.0
     assert np.array_equal(bounded_step(found.matrix, found.right, -np.ones(2), np.ones(2)), np.zeros(2))
 
