@@ -210,6 +210,15 @@ class TrialFits:
                 )
             )  # fmt: skip
         best = min(fits, key=lambda f: f.cost)
+        if not held and not best.cost < now.cost:  # a model is no worse than what it contains: from there, then
+            own = {k: v for k, v in best.values.items() if k[0] == name and k[1] not in linear}
+            fits.append(
+                self.problem.fit(
+                    structure.plus(name), {**rest, **own}, now.noise, TRIAL_ITERATIONS, carry=now.shots, thorough=False,
+                    against=now.cost, least=least,
+                )
+            )  # fmt: skip
+            best = min(fits, key=lambda f: f.cost)
         shown = shows_a_period(name, best.values, self.problem.traces)
         return best if np.isfinite(best.cost) and shown else None
 
