@@ -90,17 +90,20 @@ class Descent:
         self.weights = [s.weight for s in self.shots]
         self.count = int(sum(w.sum() for w in self.weights)) * p.readings
         self.kinds = self._kinds_of_noise()
-        self.noise = p.within(
-            noise or p.on_grid(lambda q: self.cost_of(self.looks_at(self.x, p.within(q), self.shots)))
-        )
-        self.looks = self.looks_at(self.x, self.noise, self.shots)
-        self.cost = self.cost_of(self.looks)
+        self.alone = noise is None or not self._begins(p.within(noise))  # nobody has looked for the noise yet
+        if self.alone:
+            self._begins(p.within(p.on_grid(lambda q: self.cost_of(self.looks_at(self.x, p.within(q), self.shots)))))
         settle_biases(self)
-        self.alone = noise is None  # nobody has looked for the noise yet
         if self.alone and not structure.bends:  # else every look is a prediction
             noise_alone(self)
         self.information: Array = np.zeros((len(self.x), len(self.x)))
         self._informed: tuple[Noise, bytes] | None = None
+
+    def _begins(self, noise: Noise) -> bool:
+        """Begin from a noise; False where the prediction runs away with it."""
+        self.noise, self.looks = noise, self.looks_at(self.x, noise, self.shots)
+        self.cost = self.cost_of(self.looks)
+        return bool(np.isfinite(self.cost))
 
     def _kinds_of_noise(self) -> list[str]:
         """The numbers of the noise that this model has; without a low-pass nothing is ahead of it."""
@@ -175,9 +178,7 @@ class Descent:
     @RUNAWAY
     def cost_of(self, looks: Sequence[Look]) -> float:
         """Minus twice the log-likelihood of such predictions; infinite where they run away."""
-        squares = sum(
-            float(np.sum(q.innovations[w] ** 2 / q.variance[w])) for q, w in zip(looks, self.weights, strict=True)
-        )
+        squares = self._squares(looks)
         if not np.isfinite(squares) or squares <= 0.0:
             return np.inf
         log = sum(float(np.sum(np.log(q.variance[w]))) for q, w in zip(looks, self.weights, strict=True))
@@ -290,10 +291,9 @@ class Descent:
             + (inertia + s.added) * np.sum(q.gains.gain[:, :, RATE] * q.innovations, axis=1) / s.trace.step_s
             for q, s in zip(self.looks, self.shots, strict=True)
         ]  # fmt: skip
-        first = [(q.innovations[:, 0], q.variance[:, 0]) for q in self.looks]
-        prediction = Prediction([e for e, _ in first], [v for _, v in first], disturbance)
+        first, spread = [q.innovations[:, 0] for q in self.looks], [q.variance[:, 0] for q in self.looks]
         variance, _ = self.problem.variance_of(self._squares(self.looks), self.count)
         return Fit(
             self.structure, self.names, self.x, self.count, variance, self.cost, self.information, self.noise,
-            tuple(self.shots), prediction, self.reduced_chi_square(),
+            tuple(self.shots), Prediction(first, spread, disturbance), self.reduced_chi_square(),
         )  # fmt: skip

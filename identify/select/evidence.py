@@ -56,7 +56,8 @@ class Evidence:
     price
         Penalty for the parameters that were added (Schwarz 1978).
     weight
-        Share of the disturbance's power that goes with the model; one for an effect in the sensor, which is no torque.
+        Share of the disturbance's power that goes with the model; one for an effect in the sensor that no residual in
+        torque shows, since the motion there is another sensor's.
     unfollowed_share
         Share that goes of what predictions err by beyond the sensor's noise.
     """
@@ -96,7 +97,10 @@ class EvidenceModel:
         added = [n for n in new.names if n not in now.names]
         inflated = inflation(self.problem.columns_at(new, with_variance=True), new, added)
         torqueless = effect not in TERMS and effects.get(effect).place is Place.SENSOR
-        weight = 1.0 if torqueless else self.explained_share(now, new, inflated < TRUSTED)
+        if torqueless and not self.regression.by_gyro:
+            weight = 1.0
+        else:
+            weight = self.explained_share(now, new, inflated < TRUSTED, torqueless)
         price = (new.penalised - new.cost) - (now.penalised - now.cost)
         return Evidence(effect, new, now.cost - new.cost, inflated, price, weight, unfollowed_share(now, new))
 
@@ -105,15 +109,21 @@ class EvidenceModel:
         found = self.problem.workers.each(lambda n: self.evidence(n, now, fits[n]), list(fits))
         return {e.effect: replace(e, fit=fits[e.effect]) for e in found}
 
-    def explained_share(self, now: Fit, new: Fit, trusted: bool) -> float:
+    def explained_share(self, now: Fit, new: Fit, trusted: bool, torqueless: bool = False) -> float:
         """Share of the disturbance that goes: of its power in the band of the motion, or of its white part.
 
         The power in the band is what the residual in torque has on held-out samples, and what the likelihood takes the
         disturbance for. The first knows no model of it but sees the sensor's noise as well, the second the reverse, so
         the second counts only where the likelihood can be ``trusted``. Most of what predictions err by beyond the
         sensor's noise counts in any case: a dead zone acts at every crossing of zero, far above the band of the motion.
+
+        An effect in the sensor is no torque (``torqueless``), but it makes the motion late: only in the residual in
+        torque, the torque taken as late, is it seen as such. To the likelihood it may be a filter that takes any torque
+        for noise ahead of it.
         """
         shares = [1.0 - self.left(self.in_torque(new)) / self.left(self.in_torque(now))]
+        if torqueless:
+            return float(shares[0])
         if trusted:
             shares.append(likely_share(now, new, self.regression.cutoff_hz))
             cutoff_hz = self.regression.cutoff_hz

@@ -248,6 +248,8 @@ class Stepwise:
             own = [n for n in now.names if n[0] == name]
             term = len(own) == 1 and own[0][0] in TERMS
             without = lacking[name] if now is begun and name in lacking else self.without(now, name)
+            if not np.isfinite(without.cost):  # it runs away without
+                continue
             self._lacking[_key(without.structure)] = without
             evidence = self.weigher.evidence(name, without, now)
             soaks = name == "stiffness" and self._stiffness_may_absorb(now)
