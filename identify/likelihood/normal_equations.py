@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from identify.likelihood.derivatives import Derivatives
 from identify.simulate.shots import Shots, moved, with_bias
@@ -86,18 +87,20 @@ def _spanned(own: Array) -> tuple[Array, Array]:
 def bounded_step(matrix: Array, right: Array, low: Array, high: Array) -> Array:
     """The change within bounds that lowers the cost most, by ``matrix`` (n, n) and ``right`` (n,).
 
-    What would go beyond a bound is held there, and the others are solved for beside it. Cut off afterwards, a number
-    that hardly acts, and would so be sent far, would leave the others where they counted on it.
+    What would go beyond a bound is held there and the others are solved for beside it, but which are to be held is
+    searched (bounded least squares: Stark and Parker 1995). Of two numbers that do nearly the same, as the size of
+    a disturbance and its time constant, one may run to a bound by what the other takes back.
     """
-    step, free = np.zeros(len(right)), np.ones(len(right), dtype=bool)
-    while np.any(free):
-        rest = right[free] - matrix[np.ix_(free, ~free)] @ step[~free]
-        step[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], rest, rcond=SINGULAR)[0]
-        inside = np.clip(step, low, high)
-        beyond = free & (inside != step)
-        if not np.any(beyond):
-            break
-        step, free = inside, free & ~beyond
+    step, free = np.zeros(len(right)), high > low
+    part = matrix[np.ix_(free, free)]
+    step[free] = np.linalg.lstsq(part, right[free], rcond=SINGULAR)[0]
+    if np.all((step >= low) & (step <= high)):
+        return step
+    values, vectors = np.linalg.eigh(part)
+    told = values > SINGULAR * max(float(values[-1]), 0.0)
+    root, along = np.sqrt(values[told]), vectors[:, told].T
+    found = lsq_linear(root[:, None] * along, (along @ right[free]) / root, (low[free], high[free]), "bvls")
+    step[free] = np.clip(found.x, low[free], high[free])
     return step
 
 

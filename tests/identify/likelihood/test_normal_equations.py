@@ -34,6 +34,21 @@ def test_beside_a_number_that_is_held_the_others_are_solved_for_again() -> None:
     assert np.linalg.solve(matrix, right)[0] == pytest.approx(51.0)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_of_two_numbers_that_do_nearly_the_same_neither_is_held_where_the_other_sent_it(seed: int) -> None:
+    """As the size of a disturbance and its time constant: a step cut off there would lead upwards."""
+    rng = np.random.default_rng(seed)
+    columns = rng.standard_normal((40, 1)) * np.array([1.0, 1.0, -1.0, 1.0, 1.0])
+    columns += 0.05 * rng.standard_normal((40, 5))
+    residual = rng.standard_normal(40)
+    low, high = np.array([-0.1, -4.0, -1.6, 0.0, -3.0]), np.array([4.0, 4.0, 18.0, 4.0, 0.2])
+    step = bounded_step(columns.T @ columns, columns.T @ residual, low, high)
+    best = lsq_linear(columns, residual, (low, high), tol=1e-12)
+    assert np.all((step >= low) & (step <= high))
+    assert np.sum((columns @ step - residual) ** 2) == pytest.approx(2.0 * best.cost, rel=1e-6)
+    assert np.sum((columns @ step - residual) ** 2) <= np.sum(residual**2)
+
+
 def test_where_nothing_may_move_no_step_is_taken() -> None:
     nothing = np.zeros(2)
     assert np.array_equal(bounded_step(np.eye(2), np.ones(2), nothing, nothing), nothing)
