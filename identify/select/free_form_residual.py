@@ -76,7 +76,8 @@ class FreeFormFit:
 def fit_free_forms(search: Stepwise, now: Fit) -> tuple[FreeFormFit | None, list[FreeFormFit]]:
     """The curve that explains most of what a model leaves, None where none explains enough to be believed.
 
-    Besides, the other curves that are hardly chance: too little for a belief, but J may be another beside them.
+    Besides, the other curves that take a little and are hardly chance: too little for a belief, but J may be another
+    beside them.
     """
     problem = search.problem
     best: FreeFormFit | None = None
@@ -92,7 +93,7 @@ def fit_free_forms(search: Stepwise, now: Fit) -> tuple[FreeFormFit | None, list
             beside = _beside(search, _from_there(search, now, fit), fit, form.effect)
         if beside.is_significant and (best is None or beside.evidence.support > best.evidence.support):
             best = beside
-        elif beside.chance_level < BY_CHANCE:
+        elif beside.share > 0.0 and beside.chance_level < BY_CHANCE:  # beside some, more is left than without
             others.append(beside)
     return best, others
 

@@ -189,6 +189,13 @@ class TrialFits:
         for special in held:
             structure = structure.minus(special)
         fits: list[Fit] = []
+
+        def begun_where_it_stands(own: Mapping[Name, float]) -> Fit:
+            return self.problem.fit(
+                structure.plus(name), {**rest, **own}, now.noise, TRIAL_ITERATIONS, carry=now.shots, thorough=False,
+                against=now.cost, least=least,
+            )  # fmt: skip
+
         for start in starts:
             if isinstance(start, CandidateTorque):  # the rest begins there, too, and the disturbance is looked for anew
                 begun = starts[0] if fits and not isinstance(starts[0], CandidateTorque) else {}
@@ -203,21 +210,11 @@ class TrialFits:
             own = {k: v for k, v in start.items() if k[0] not in held}
             for special in held:
                 own = {k: v + _gain(now, special) if k[0] == name and k[1] in linear else v for k, v in own.items()}
-            fits.append(
-                self.problem.fit(
-                    structure.plus(name), {**rest, **own}, now.noise, TRIAL_ITERATIONS, carry=now.shots, thorough=False,
-                    against=now.cost, least=least,
-                )
-            )  # fmt: skip
+            fits.append(begun_where_it_stands(own))
         best = min(fits, key=lambda f: f.cost)
         if not held and not best.cost < now.cost:  # a model is no worse than what it contains: from there, then
             own = {k: v for k, v in best.values.items() if k[0] == name and k[1] not in linear}
-            fits.append(
-                self.problem.fit(
-                    structure.plus(name), {**rest, **own}, now.noise, TRIAL_ITERATIONS, carry=now.shots, thorough=False,
-                    against=now.cost, least=least,
-                )
-            )  # fmt: skip
+            fits.append(begun_where_it_stands(own))
             best = min(fits, key=lambda f: f.cost)
         shown = shows_a_period(name, best.values, self.problem.traces)
         return best if np.isfinite(best.cost) and shown else None
