@@ -17,6 +17,7 @@ from identify.estimate.output_error import held_still
 from identify.likelihood.derivatives import GAIN_STEP, Derivatives, Standpoint, derivatives
 from identify.likelihood.fit import Columns, Fit, Look, Prediction
 from identify.likelihood.gyro_biases import settle_biases
+from identify.likelihood.noise_search import kinds_of_noise, noise_on_grid
 from identify.likelihood.normal_equations import (
     COST_TOLERANCE,
     LEVENBERG_DAMPING,
@@ -63,11 +64,13 @@ class Descent:
         Runs of an earlier fit, whose biases (and start states, where they are fitted) to begin from.
     fixed
         Parameters that stay at their start value.
+    smooth
+        Whether the grid has a smooth disturbance or a rough one.
     """
 
     def __init__(
         self, problem: PredictionError, structure: Structure, start: Mapping[Name, float], noise: Noise | None,
-        carry: Sequence[Shots] | None, fixed: Sequence[Name],
+        carry: Sequence[Shots] | None, fixed: Sequence[Name], smooth: bool = False,
     ) -> None:  # fmt: skip
         p = self.problem = problem
         self.structure, self.names = structure, names_of(structure, p.runs)
@@ -89,10 +92,10 @@ class Descent:
         self.damping = LEVENBERG_DAMPING
         self.weights = [s.weight for s in self.shots]
         self.count = int(sum(w.sum() for w in self.weights)) * p.readings
-        self.kinds = self._kinds_of_noise()
+        self.kinds = kinds_of_noise(p, structure)
         self.alone = noise is None or not self._begins(p.within(noise))  # nobody has looked for the noise yet
         if self.alone:
-            self._begins(p.within(p.on_grid(lambda q: self.cost_of(self.looks_at(self.x, p.within(q), self.shots)))))
+            self._begins(noise_on_grid(p, lambda q: self.cost_of(self.looks_at(self.x, q, self.shots)), smooth))
         settle_biases(self)
         if self.alone and not structure.bends:  # else every look is a prediction
             noise_alone(self)
@@ -104,17 +107,6 @@ class Descent:
         self.noise, self.looks = noise, self.looks_at(self.x, noise, self.shots)
         self.cost = self.cost_of(self.looks)
         return bool(np.isfinite(self.cost))
-
-    def _kinds_of_noise(self) -> list[str]:
-        """The numbers of the noise that this model has; without a low-pass nothing is ahead of it."""
-        out = ["white", "slow", "time_constant_s"]
-        if self.problem.gyro:
-            out.append("walk")
-            if any(effects.get(e).lag is not None for e in self.structure.effects):
-                out.append("ahead")
-        elif self.problem.wanders:
-            out += ["walk", "walk_s"]
-        return out
 
     def _unit(self, name: Name) -> float:
         """What changes the torque by about itself: the scale of a parameter that is zero."""
@@ -273,7 +265,7 @@ class Descent:
 
         A gyro's walk is left out, too: beside a wrong model it takes what is torque, and would hide it here.
         """
-        p, quiet = self.problem, replace(self.noise, white=0.0, slow=0.0)
+        p, quiet = self.problem, replace(self.noise, white=0.0, slow=0.0, smooth=0.0)
         quiet = replace(quiet, walk=0.0) if p.gyro else quiet
         ratios = [
             (q.variance[w] / p.gains_at(s, self.structure, self.names, self.x, quiet).variance[w])[:, -1]

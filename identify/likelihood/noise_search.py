@@ -8,7 +8,7 @@ the same wherever the platform stands.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ from identify.likelihood.fit import Look
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.simulate.shots import RUNAWAY, Shots
+from rig import effects
 from rig.arrays import Array
 from rig.dynamics.gains import Noise, innovations_with
 
@@ -29,6 +30,40 @@ INFEASIBLE_COST = 1e300
 LOG_STEP = 0.02  # of a logarithm, in differences
 MAX_ITERATIONS = 20
 GRADIENT_TOLERANCE = 1.0  # slope of the cost, a unit of a logarithm, at which it has arrived
+INITIAL_BIAS_WALK = 1e-5  # of the rate, over a run
+WHITE_SHARES = (1.0, 0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)  # of the torque, on the grid
+COLOURED_SHARES, BESIDE = (0.3, 0.03, 0.003), (1.0, 0.05)  # of the torque, and times the best white beside them
+LITTLE = 1e-6  # of the torque
+
+
+def kinds_of_noise(problem: PredictionError, structure: Structure) -> list[str]:
+    """The numbers of the noise that a model has; without a low-pass nothing is ahead of it."""
+    out = ["white", "slow", "time_constant_s", "smooth"]
+    if problem.gyro:
+        out.append("walk")
+        if any(effects.get(e).lag is not None for e in structure.effects):
+            out.append("ahead")
+    elif problem.wanders:
+        out += ["walk", "walk_s"]
+    return out
+
+
+def noise_on_grid(problem: PredictionError, cost: Callable[[Noise], float], smooth: bool) -> Noise:
+    """The best of a coarse grid of noises: white alone first, then a coloured part beside it, smooth or rough."""
+    p = problem
+    times_s = np.geomspace(20.0 * p.step_s, 0.3 * p.slowest_s, 3).tolist()
+    gyro = (p.walk(INITIAL_BIAS_WALK), p.step_s, np.inf if p.gyro else 30.0 * p.step_s)
+    little = p.slow(LITTLE)
+
+    def of(white: float, coloured: float, time_s: float) -> Noise:
+        slow, also = (little, coloured) if smooth else (coloured, little)
+        return p.within(Noise(white, slow, time_s, *gyro, also))
+
+    best = min((of(p.white(share), little, times_s[1]) for share in WHITE_SHARES), key=cost)
+    coloured = [
+        of(best.white * w, p.slow(share), t) for t in times_s for share in COLOURED_SHARES for w in BESIDE
+    ]  # fmt: skip
+    return min((best, *coloured), key=cost)
 
 
 @RUNAWAY

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from identify.likelihood.noise_search import likeliest_noise
 from identify.likelihood.normal_equations import COST_TOLERANCE, LEVENBERG_DAMPING
+from rig.dynamics.gains import Noise
 
 if TYPE_CHECKING:
     from identify.likelihood.descent import Descent
@@ -22,6 +23,8 @@ NOISE_START_FACTORS = (  # times white density, slow variance and time constant:
     (0.01, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 10.0, 1.0), (1.0, 0.1, 0.1), (1.0, 0.03, 0.01),
     (1.0, 1.0, 10.0),
 )  # fmt: skip
+# Times the time constant, with which a smooth disturbance stands for a rough one as large, and the other way round.
+EXCHANGED_TIME_FACTORS = (0.1, 0.3, 1.0, 3.0)
 # Of the rate, that a gyro's bias walks over a run: where else it is looked for.
 BIAS_WALK_STARTS = (1e-6, 1e-5, 1e-4, 1e-3)
 # Times torque and slow error of an encoder together: the rest is read white.
@@ -39,16 +42,17 @@ def other_noise(descent: Descent, lower: bool = True) -> bool:
     others: list[dict[str, float]] = [
         {"white": white, "slow": slow, "time_constant_s": time} for white, slow, time in NOISE_START_FACTORS
     ]  # fmt: skip
-    others += [{"white": x, "slow": x, "walk": x} for x in DISTURBANCE_START_FACTORS if wanders]
+    others += [{"white": x, "slow": x, "smooth": x, "walk": x} for x in DISTURBANCE_START_FACTORS if wanders]
     if "walk" in descent.kinds and not wanders:
         others += [{"walk": descent.problem.walk(share) / descent.noise.walk} for share in BIAS_WALK_STARTS]
     for times in others:
         q = descent.noise
-        noise = descent.problem.within(replace(q, **{k: x * getattr(q, k) for k, x in times.items()}))
-        looks = descent.looks_at(descent.x, noise, descent.shots)
-        cost = descent.cost_of(looks)
-        if cost < descent.cost - COST_TOLERANCE:
-            descent.noise, descent.looks, descent.cost = noise, looks, cost
+        _take_if_likelier(descent, replace(q, **{k: x * getattr(q, k) for k, x in times.items()}))
+    q = descent.noise
+    for factor in EXCHANGED_TIME_FACTORS:
+        _take_if_likelier(
+            descent, replace(q, slow=q.smooth, smooth=q.slow, time_constant_s=factor * q.time_constant_s)
+        )  # fmt: skip
     if descent.alone:
         noise_alone(descent)
     if lower:
@@ -63,6 +67,11 @@ def noise_alone(descent: Descent) -> None:
         descent.problem, descent.structure, descent.names, descent.x, descent.shots, descent.looks, descent.weights,
         descent.noise, descent.kinds,
     )  # fmt: skip
+    _take_if_likelier(descent, noise)
+
+
+def _take_if_likelier(descent: Descent, noise: Noise) -> None:
+    noise = descent.problem.within(noise)
     looks = descent.looks_at(descent.x, noise, descent.shots)
     cost = descent.cost_of(looks)
     if cost < descent.cost - COST_TOLERANCE:
@@ -80,7 +89,8 @@ def without_disturbance(descent: Descent) -> None:
     here = descent.place()
     for factor in CONTINUATION_LEVELS:
         q = here[0]
-        descent.noise = descent.problem.within(replace(q, white=factor * q.white, slow=factor * q.slow))
+        less = {kind: factor * getattr(q, kind) for kind in ("white", "slow", "smooth")}
+        descent.noise = descent.problem.within(replace(q, **less))
         descent.looks = descent.looks_at(descent.x, descent.noise, descent.shots)
         descent.cost, descent.damping = descent.cost_of(descent.looks), LEVENBERG_DAMPING
         for _ in range(CONTINUATION_STEPS):

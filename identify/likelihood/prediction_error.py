@@ -10,7 +10,7 @@ Sources: Ljung, System Identification, ch. 7; Kristensen, Madsen and Jorgensen, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from threading import Lock
 from typing import Any
@@ -37,7 +37,10 @@ from rig.dynamics.predictor import predict_ahead
 LONGEST_SHARE = 0.2  # of the longest run: a disturbance slower than that is a constant
 SHORTEST_SAMPLES = 4.0  # time constant of a disturbance, in samples: a faster one is white
 MIN_DISTURBANCE, MAX_DISTURBANCE = 1e-7, 10.0  # of the torque: how large a disturbance may be
-MIN_BIAS_WALK, INITIAL_BIAS_WALK, MAX_BIAS_WALK = 1e-7, 1e-5, 0.01  # of the rate, that a gyro's bias walks over a run
+# Of the torque, how large a smooth disturbance may be: a larger one follows the motion wherever it goes, whatever the
+# recorded torque says, and a noisy record of the torque would then be taken for no record at all.
+MAX_SMOOTH = 0.1
+MIN_BIAS_WALK, MAX_BIAS_WALK = 1e-7, 0.01  # of the rate, that a gyro's bias walks over a run
 MAX_ENCODER_ERROR = 1.0  # of the angle, that an encoder's slow error takes over a run
 # Times the variance of one reading, of a gyro's noise ahead of its low-pass.
 MIN_PREFILTER_NOISE, MAX_PREFILTER_NOISE = 1e-3, 1e8
@@ -75,6 +78,8 @@ class PredictionError:
         self.gyro = self.both or any(t.channel == "rate" for t in traces)
         self.readings = 2 if self.both else 1
         self.reading_variance = float(np.mean([self._noises(t)[0] ** 2 for t in traces]))
+        white = all(t.noise_is_white for t in traces)  # else the floor was read where there still is motion
+        self.least_variance = LEAST_VARIANCE * self.reading_variance if white else 0.0
         self.step_s = float(np.median([t.step_s for t in traces]))
         longest = max(t.step_s * len(t.measured) for t in traces)
         self.longest_s = longest
@@ -93,7 +98,7 @@ class PredictionError:
 
     def variance_of(self, squares: float, count: int) -> tuple[float, bool]:
         """Of one reading, and whether the innovations decide it: no sensor is far better than its own floor shows."""
-        found, least = squares / max(count, 1), LEAST_VARIANCE * self.reading_variance
+        found, least = squares / max(count, 1), self.least_variance
         return max(found, least), found > least
 
     def columns_at(self, fit: Fit, with_variance: bool = False) -> list[Columns]:
@@ -121,6 +126,7 @@ class PredictionError:
             float(np.clip(noise.walk, self.walk(MIN_BIAS_WALK), self.walk(walks))) if self.wanders else 0.0,
             ahead if self.gyro else 0.0,
             np.inf if self.gyro else float(np.clip(noise.walk_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
+            float(np.clip(noise.smooth, self.slow(MIN_DISTURBANCE), self.slow(MAX_SMOOTH))),
         )
 
     def extremes(self, noise: Noise, kinds: Sequence[str]) -> tuple[Array, Array]:
@@ -137,7 +143,10 @@ class PredictionError:
         theirs = float(np.mean([self._noises(s.trace)[0] ** 2 for s in fit.shots]))
         ratio, q = theirs / self.reading_variance, fit.noise
         return self.within(
-            replace(q, white=ratio * q.white, slow=ratio * q.slow, walk=ratio * q.walk, ahead=ratio * q.ahead)
+            replace(
+                q, white=ratio * q.white, slow=ratio * q.slow, walk=ratio * q.walk, ahead=ratio * q.ahead,
+                smooth=ratio * q.smooth,
+            )
         )  # fmt: skip
 
     def walk(self, share: float) -> float:
@@ -170,11 +179,9 @@ class PredictionError:
             Cost that it must be below after a few steps to be followed to its end.
         """
         with np.errstate(all="ignore"):
-            descent = Descent(self, structure, start, noise, carry, fixed)
-            left = descent.minimise(iterations, thorough, against, least)
-            while (
-                left > 0 and descent.sticks and descent.cost < least
-            ):  # where a run begins stuck is another place with another friction
+            descent, left = self._descended(structure, start, noise, carry, fixed, iterations, thorough, against, least)
+            # Where a run begins stuck is another place with another friction.
+            while left > 0 and descent.sticks and descent.cost < least:
                 values = dict(zip(descent.names, descent.x.tolist(), strict=True))
                 again = Descent(self, structure, values, descent.noise, descent.shots, fixed)
                 if abs(again.cost - descent.cost) < COST_TOLERANCE:
@@ -184,6 +191,21 @@ class PredictionError:
                     break
                 descent = again
             return descent.found()
+
+    def _descended(
+        self, structure: Structure, start: Mapping[Name, float], noise: Noise | None, carry: Sequence[Shots] | None,
+        fixed: Sequence[Name], iterations: int, thorough: bool, against: float | None, least: float,
+    ) -> tuple[Descent, int]:  # fmt: skip
+        """The better of the descents, and the steps it has left.
+
+        A rough disturbance and a smooth one are two valleys, and parameters far off may stay in the wrong one: where
+        nobody knows the noise, both are tried.
+        """
+        ends = []
+        for smooth in (False, True) if noise is None else (False,):
+            descent = Descent(self, structure, start, noise, carry, fixed, smooth)
+            ends.append((descent, descent.minimise(iterations, thorough, against, least)))
+        return min(ends, key=lambda end: end[0].cost)
 
     @RUNAWAY
     def look(
@@ -269,19 +291,6 @@ class PredictionError:
         angle = 4.0 * noise**2 + ((START_ANGLE if known else UNKNOWN_ANGLE) * self.angle_rad) ** 2
         jerk = _rms([np.gradient(np.gradient(t.fine[1], t.fine[2]), t.fine[2]) for t in self.traces])
         return StartVariance(*(x / self.reading_variance for x in (angle, rate, self.acceleration**2, jerk**2)))
-
-    def on_grid(self, cost: Callable[[Noise], float]) -> Noise:
-        """The best of a coarse grid of noises: white alone first, then a slow part beside it."""
-        tau = np.geomspace(20.0 * self.step_s, 0.3 * self.slowest_s, 3).tolist()
-        little = self.slow(1e-6)
-        gyro = (self.walk(INITIAL_BIAS_WALK), self.step_s, np.inf if self.gyro else 30.0 * self.step_s)
-        shares = (1.0, 0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)
-        best = min((Noise(self.white(share), little, tau[1], *gyro) for share in shares), key=cost)
-        slow = [
-            Noise(best.white * w, self.slow(share), t, *gyro)
-            for t in tau for share in (0.3, 0.03, 0.003) for w in (1.0, 0.05)
-        ]  # fmt: skip
-        return min((best, *slow), key=cost)
 
 
 def _rms(parts: Sequence[Array]) -> float:

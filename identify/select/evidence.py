@@ -182,8 +182,9 @@ def block_costs(fit: Fit) -> Array:
 
 def in_band(noise: Noise, cutoff_hz: float) -> float:
     """Variance of a disturbance below a frequency, over the variance of one reading."""
-    slow = noise.slow * 2.0 / np.pi * np.arctan(2.0 * np.pi * cutoff_hz * noise.time_constant_s)
-    return float(slow + noise.white * cutoff_hz)
+    w = 2.0 * np.pi * cutoff_hz * noise.time_constant_s
+    slow, smooth = np.arctan(w), np.arctan(w) + w / (1.0 + w**2)  # integrals of 1 / (1 + w^2)^n, n of one and two
+    return float((noise.slow * slow + noise.smooth * smooth) * 2.0 / np.pi + noise.white * cutoff_hz)
 
 
 def likely_share(now: Fit, new: Fit, cutoff_hz: float) -> float:

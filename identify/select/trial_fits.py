@@ -38,6 +38,7 @@ TRIAL_ITERATIONS, FULL_ITERATIONS = 14, 25  # steps of a fit that is compared, a
 FULL_FIT_RATIO = 0.9  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
 BEHIND = 0.3  # of the best fall of the cost so far: what has less after a few steps is not followed
 COMPARABLE = 0.3  # of the score of an effect, that another has in its place: with less it is no rival
+FOLLOWED_LINES = 2  # of the disturbance: lines at which a periodic torque is looked for beside those of what is left
 FOLLOWS = 1.1  # reduced chi-square: where a prediction errs by less, no disturbance follows the readings
 OTHER_START = 1.5  # times the power in torque that a look leaves: a fit that leaves more is begun from there, too
 
@@ -76,6 +77,11 @@ class TrialFits:
         noise = float(np.sqrt(fit.variance * self.problem.reading_variance))
         noise = float(np.sqrt(np.mean([np.mean(r[t.keep] ** 2) for r, t in zip(left, traces, strict=True)]))) or noise
         lines = foreign_lines_hz(traces, left, noise, natural_hz)
+        # A line that the disturbance follows is none in what is left.
+        followed = fit.prediction.disturbance_nm
+        size_nm = float(np.sqrt(np.mean([np.mean(d[t.keep] ** 2) for d, t in zip(followed, traces, strict=True)])))
+        also = foreign_lines_hz(traces, followed, size_nm, natural_hz)[:FOLLOWED_LINES] if size_nm > 0.0 else ()
+        lines = (*lines, *also)
         scale = scale_of(traces, (inertia, damping, stiffness), lines, ringing_hz(traces, natural_hz))
         return replace(scale, rings_hz=rings_hz(traces, left, natural_hz))
 

@@ -18,9 +18,11 @@ MIN_LEVELS = 8  # of a channel, for its steps to be seen
 SAME, WHOLE = 1e-12, 0.02  # of the largest value, and of a step: as near as a file's digits bring them
 
 AGREEMENT_SIGMAS = 3.0  # standard errors by which two readings of one noise may differ
+FLAT = 1.25  # times the least of a band's quarters: a density that rises no more is one of white noise
 
 
 UPPER = (0.5, 0.98)  # of Nyquist: where the noise is read
+SHORTEST = 64  # samples whose spectrum is looked at
 
 
 def noise_of(values: Array, band: tuple[float, float] = UPPER) -> float:
@@ -29,16 +31,39 @@ def noise_of(values: Array, band: tuple[float, float] = UPPER) -> float:
     The mean of the lower four fifths of the periodogram there is blind to lines and to a signal below, and scatters
     less than its median; a third difference first takes away what a steep low-frequency signal would leak.
     """
-    if len(values) < 64:
+    if len(values) < SHORTEST:
         return float(np.std(np.diff(values, 3)) / np.sqrt(20.0))
+    return float(np.sqrt(_mean_of_lower(_power_in(values, band))))
+
+
+def is_white(values: Array, band: tuple[float, float] = UPPER) -> bool:
+    """Whether a signal's spectrum is flat in a band, so that what ``noise_of`` reads there is noise.
+
+    Motion that reaches up there falls with the frequency. The quarters of the band are compared; none differs from
+    another by more than chance and a little.
+    """
+    if len(values) < SHORTEST:
+        return True
+    quarters = np.array_split(_power_in(values, band), 4)
+    levels = [_mean_of_lower(q) for q in quarters]
+    chance = (
+        2.0 * AGREEMENT_SIGMAS * SCATTER * float(np.sqrt(1.0 / len(quarters[-1])))
+    )  # of a power, twice an amplitude's
+    return max(levels) <= FLAT * (1.0 + chance) * min(levels)
+
+
+def _power_in(values: Array, band: tuple[float, float]) -> Array:
+    """Periodogram in a band, as the variance that white noise of that power has."""
     d = np.diff(values, 3)
     spectrum = np.abs(np.fft.rfft(d * signal.windows.hann(len(d), sym=False))) ** 2
     f = np.arange(len(spectrum)) / len(spectrum)  # of Nyquist
     gain = (2.0 * np.sin(0.5 * np.pi * f)) ** 6
-    upper = (f > band[0]) & (f < band[1])
-    power = np.sort(spectrum[upper] / gain[upper])
-    level = np.mean(power[: round(LOWER * len(power))]) / LOWER_MEAN
-    return float(np.sqrt(level / (0.375 * len(d))))
+    inside = (f > band[0]) & (f < band[1])
+    return np.asarray(spectrum[inside] / gain[inside] / (0.375 * len(d)))
+
+
+def _mean_of_lower(power: Array) -> float:
+    return float(np.mean(np.sort(power)[: round(LOWER * len(power))]) / LOWER_MEAN)
 
 
 def rounding_of(values: Array) -> float | None:

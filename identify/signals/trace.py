@@ -11,6 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from identify.model.effect_torque import torque_along
+from identify.signals.noise import is_white
 from identify.signals.prefilter import held_pieces, linear_pieces, smooth_pieces
 from rig import effects
 from rig.channels import Channel
@@ -71,6 +72,12 @@ class Trace:
     def start_s(self) -> float:
         """Time stamp of the first sample."""
         return float(self.run.time_s[0]) + self.offset_s
+
+    @cached_property
+    def noise_is_white(self) -> bool:
+        """Whether the measured channel's spectrum ends in a flat floor: else its noise was not read, only motion."""
+        first, last = max(self.stretches, key=lambda ab: ab[1] - ab[0], default=(0, len(self.measured) - 1))
+        return is_white(self.measured[first : last + 1])
 
     def piece(self, first: int, last: int) -> Trace:
         """Samples first..last as a trace of their own."""

@@ -2,8 +2,8 @@
 
 The gains come from inertia, damping and stiffness and two noises, by the Riccati recursion (compiled).
 
-States of the linear part: angle, rate, slow disturbance torque, the sensor's output and its slope (what its low-pass
-still holds back), and the gyro's bias, which walks.
+States of the linear part: angle, rate, coloured disturbance torque and where that is heading, the sensor's output and
+its slope (what its low-pass still holds back), and the gyro's bias, which walks.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from scipy.linalg import expm
 from rig.arrays import Array
 from rig.dynamics.native import jit
 
-STATES = 6  # angle, rate, slow disturbance torque, sensor output, its slope, bias
-ANGLE, RATE, SLOW, SENSED, SLOPE, BIAS = range(STATES)
+STATES = 7  # angle, rate, disturbance torque and what it is heading for, sensor output, its slope, bias
+ANGLE, RATE, TORQUE, AIM, SENSED, SLOPE, BIAS = range(STATES)
 SETTLED = 1e-5  # relative change of a gain from sample to sample below which it is taken for constant
 SMALL = 1e-2  # gain of the bias: it settles as slowly as the bias walks, and is small by then
 SETTLED_FOR = 20  # samples in a row
@@ -35,9 +35,9 @@ class Noise:
     white
         Density of a white torque, (N m)^2 s over the variance of one reading.
     slow
-        Variance of a slow torque (first-order coloured) over the variance of one reading, (N m)^2.
+        Variance of a slow torque (first-order coloured: rough) over the variance of one reading, (N m)^2.
     time_constant_s
-        Of the slow torque.
+        Of the slow torque, and of the smooth one.
     walk
         Density of the steps of the gyro's bias, (rad/s)^2 / s over the variance of one reading; where an encoder is
         alone, of the steps of its error, rad^2 / s.
@@ -45,6 +45,8 @@ class Noise:
         Time constant with which that returns to nothing; infinite: never.
     ahead
         Density of the gyro's white noise ahead of its low-pass, (rad/s)^2 s over the variance of one reading.
+    smooth
+        Variance of a smooth torque (second-order coloured: it has a slope) over the variance of one reading, (N m)^2.
     """
 
     white: float = 0.0
@@ -53,11 +55,31 @@ class Noise:
     walk: float = 0.0
     ahead: float = 0.0
     walk_s: float = float("inf")
+    smooth: float = 0.0
 
     @property
     def none(self) -> bool:
         """Whether there is no torque disturbance: the prediction is a simulation."""
-        return self.white <= 0.0 and self.slow <= 0.0
+        return self.white <= 0.0 and self.slow <= 0.0 and self.smooth <= 0.0
+
+    @property
+    def kicks(self) -> tuple[float, float]:
+        """What one white noise of unit density does to the coloured torque and to what it is heading for, a second.
+
+        The spectra of the slow and of the smooth torque add up to that of one process of second order (spectral
+        factorisation): (smooth + slow (1 + w^2 T^2)) / (1 + w^2 T^2)^2, each with its own scale.
+        """
+        time = self.time_constant_s
+        still, rough = np.sqrt(4.0 * time * self.smooth + 2.0 * time * self.slow), np.sqrt(2.0 * self.slow / time)
+        return float(rough), float(still / time - rough)
+
+    @property
+    def coloured(self) -> Array:
+        """Covariance of the coloured torque and of what it is heading for, long after they began, (2, 2)."""
+        time, (torque, aim) = self.time_constant_s, self.kicks
+        ahead = 0.5 * aim**2 * time
+        both = 0.5 * (ahead + torque * aim * time)
+        return np.array([[both + 0.5 * torque**2 * time, both], [both, ahead]])
 
 
 @dataclass(frozen=True)
@@ -98,13 +120,17 @@ class StartVariance(NamedTuple):
 
 @dataclass(frozen=True)
 class Gains:
-    """What an innovation of one adds to the states after every sample, (n, m, 6), and its variance, (n, m)."""
+    """What an innovation of one adds to the states after every sample, (n, m, 7), and its variance, (n, m)."""
 
     gain: Array
     variance: Array
-    slow_decay: float  # of the slow torque, a sample
-    onward: Array  # the linear part over a sample, (6, 6)
-    reads: Array  # what each reading is of the states, (m, 6)
+    onward: Array  # the linear part over a sample, (7, 7)
+    reads: Array  # what each reading is of the states, (m, 7)
+
+    @property
+    def coloured(self) -> Array:
+        """What a sample makes of the coloured torque and of what it is heading for, (2, 2)."""
+        return np.ascontiguousarray(self.onward[TORQUE : AIM + 1, TORQUE : AIM + 1])
 
     @property
     def walk_decay(self) -> float:
@@ -185,16 +211,17 @@ def _riccati(  # type: ignore[no-untyped-def]
 def _discrete(
     j: float, c: float, k: float, noise: Noise, lag: tuple[float, float], step_s: float
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Transition and disturbance covariance of the linear part over a sample (van Loan 1978), (6, 6) each.
+    """Transition and disturbance covariance of the linear part over a sample (van Loan 1978), (7, 7) each.
 
     States that are not there (a low-pass of first order has no slope) keep nothing and get nothing.
     """
     f, density = np.zeros((STATES, STATES)), np.zeros((STATES, STATES))
     f[ANGLE, RATE] = 1.0
     f[RATE, :3] = -k / j, -c / j, 1.0 / j
-    f[SLOW, SLOW] = -1.0 / noise.time_constant_s
+    time = noise.time_constant_s
+    f[TORQUE, TORQUE], f[TORQUE, AIM], f[AIM, AIM] = -1.0 / time, 1.0 / time, -1.0 / time
     first, second = lag
-    there = [ANGLE, RATE, SLOW, BIAS]
+    there = [ANGLE, RATE, TORQUE, AIM, BIAS]
     if second > 0.0:
         f[SENSED, SLOPE] = 1.0
         f[SLOPE, RATE], f[SLOPE, SENSED], f[SLOPE, SLOPE] = 1.0 / second, -1.0 / second, -first / second
@@ -205,7 +232,7 @@ def _discrete(
         density[SENSED, SENSED] = noise.ahead / first**2
         there.append(SENSED)
     density[RATE, RATE] = noise.white / j**2
-    density[SLOW, SLOW] = 2.0 * noise.slow / noise.time_constant_s
+    density[TORQUE : AIM + 1, TORQUE : AIM + 1] = np.outer(noise.kicks, noise.kicks)
     f[BIAS, BIAS] = -1.0 / noise.walk_s
     density[BIAS, BIAS] = noise.walk
     at = np.ix_(sorted(there), sorted(there))
@@ -254,7 +281,8 @@ def gains_of(
         reads.append(row)
         noises.append(sensing.angle_variance)
     start = np.zeros((STATES, STATES))
-    start[ANGLE, ANGLE], start[RATE, RATE], start[SLOW, SLOW] = begun.angle, begun.rate, noise.slow
+    start[ANGLE, ANGLE], start[RATE, RATE] = begun.angle, begun.rate
+    start[TORQUE : AIM + 1, TORQUE : AIM + 1] = noise.coloured
     if sensing.rate:
         start[BIAS, BIAS] = sensing.bias_variance
     elif noise.walk > 0.0:
@@ -267,7 +295,7 @@ def gains_of(
             start[SLOPE, SLOPE] = begun.acceleration
             start[RATE, SLOPE] = start[SLOPE, RATE] = first * begun.acceleration
     # A state that is neither read, nor driven, nor unknown at the start needs no arithmetic.
-    there = np.flatnonzero((np.arange(STATES) <= SLOW) | (np.diag(q) > 0.0) | (np.diag(start) > 0.0))
+    there = np.flatnonzero((np.arange(STATES) <= TORQUE) | (np.diag(q) > 0.0) | (np.diag(start) > 0.0))
     at = np.ix_(there, there)
     few, driven, seen = np.ascontiguousarray(phi[at]), np.ascontiguousarray(q[at]), np.array(reads)[:, there]
     m, n = len(reads), len(there)
@@ -277,11 +305,11 @@ def gains_of(
         _riccati(few, driven, seen, np.array(noises), start[at].copy(), keep, begin, last, gain, variance, bias, SMALL)
     whole = np.zeros((len(keep), m, STATES))
     whole[:, :, there] = gain
-    return Gains(whole, variance, float(np.exp(-step_s / noise.time_constant_s)), phi, np.array(reads))
+    return Gains(whole, variance, phi, np.array(reads))
 
 
 @jit
-def _follow(spans, e, slow, walked, keep, gain, other, phi, reads, decay, walk_decay, bias, out):  # type: ignore[no-untyped-def]
+def _follow(spans, e, state, keep, gain, other, phi, reads, coloured, walk_decay, bias, out):  # type: ignore[no-untyped-def]
     states, readings = len(phi), len(reads)
     d, ahead = np.zeros(states), np.zeros(states)
     for k in range(len(spans)):
@@ -300,8 +328,10 @@ def _follow(spans, e, slow, walked, keep, gain, other, phi, reads, decay, walk_d
                 for b in range(states):
                     if phi[a, b] != 0.0:
                         ahead[a] += phi[a, b] * d[b]
-            ahead[2] += (phi[2, 2] - decay) * slow[i]
-            ahead[states - 1] += (phi[states - 1, states - 1] - walk_decay) * walked[i]
+            for a in range(2):
+                for b in range(2):
+                    ahead[TORQUE + a] += (phi[TORQUE + a, TORQUE + b] - coloured[a, b]) * state[i, TORQUE + b]
+            ahead[states - 1] += (phi[states - 1, states - 1] - walk_decay) * state[i, AIM + 1]
             d[:] = ahead
 
 
@@ -314,7 +344,7 @@ def innovations_with(
     Parameters
     ----------
     gains, innovations, state
-        Of a prediction: its gains, its innovations (n, m), and its states after every sample, (n, 4).
+        Of a prediction: its gains, its innovations (n, m), and its states after every sample, (n, 5).
     other
         The other gains, of the same platform with another noise.
     bias
@@ -322,8 +352,7 @@ def innovations_with(
     """
     out = np.empty_like(innovations)
     _follow(
-        np.array(spans, dtype=np.int64).reshape(-1, 2), innovations, np.ascontiguousarray(state[:, SLOW]),
-        np.ascontiguousarray(state[:, -1]), keep, gains.gain, other.gain, other.onward, other.reads, gains.slow_decay,
-        gains.walk_decay, bias, out,
+        np.array(spans, dtype=np.int64).reshape(-1, 2), innovations, state, keep, gains.gain, other.gain, other.onward,
+        other.reads, gains.coloured, gains.walk_decay, bias, out,
     )  # fmt: skip
     return out

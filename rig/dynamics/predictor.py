@@ -2,9 +2,10 @@
 
 A torque that nobody recorded (current ripple, the floor, a cable) sets a simulated platform off for good. A Kalman
 filter in innovations form takes it up: the nonlinear simulator predicts each sample from the one before, the
-difference to the measurement corrects angle, rate and an estimate of the slow part of that torque. The gains come from
-the linear part of the platform and two noises (``rig.dynamics.gains``). With no torque disturbance they are zero and
-the prediction is the simulation of the whole run (Ljung, System Identification, ch. 7; Astrom, Automatica 16, 1980).
+difference to the measurement corrects angle, rate and an estimate of the coloured part of that torque. The gains come
+from the linear part of the platform and its noises (``rig.dynamics.gains``). With no torque disturbance they are zero
+and the prediction is the simulation of the whole run (Ljung, System Identification, ch. 7; Astrom, Automatica 16,
+1980).
 
 A gyro and an encoder are two readings of one state, taken one after the other at every sample.
 """
@@ -39,7 +40,7 @@ def _between(w0, a0, w1, a1, h, x, same):  # type: ignore[no-untyped-def]
 @jit
 def _predict(  # type: ignore[no-untyped-def]
     starts, spans, offset_s, z, h, ratio, torque, jck, kernels, loads, z_at, p, p_at, kinks,
-    filters, fs, fs_at, fp, fp_at, measured, keep, gain, slow_decay, decay, walks, walk_decay, rate, bias, reads,
+    filters, fs, fs_at, fp, fp_at, measured, keep, gain, coloured, decay, walks, walk_decay, rate, bias, reads,
     out, state,
 ):  # fmt: skip
     n_states, readings = len(z), measured.shape[1]
@@ -58,7 +59,7 @@ def _predict(  # type: ignore[no-untyped-def]
         first, last = spans[k, 0], spans[k, 1]
         motion[0], motion[1], motion[2] = starts[k, 0], starts[k, 1], np.sign(starts[k, 1])
         motion[3] = offset_s + first * ratio * h
-        slow, held, slope, walked = 0.0, 0.0, 0.0, 0.0
+        slow, aim, held, slope, walked = 0.0, 0.0, 0.0, 0.0, 0.0
         # A correction of the rate is a jump. The filters see the rate without its jumps, and the sum of these passes
         # the linear low-pass with what the low-pass holds back.
         jumps = 0.0
@@ -76,23 +77,26 @@ def _predict(  # type: ignore[no-untyped-def]
                     motion[1] += gain[i, m, 1] * e
                     jumps += gain[i, m, 1] * e
                     slow += gain[i, m, 2] * e
-                    held += gain[i, m, 3] * e
-                    slope += gain[i, m, 4] * e
-                    walked += gain[i, m, 5] * e
+                    aim += gain[i, m, 3] * e
+                    held += gain[i, m, 4] * e
+                    slope += gain[i, m, 5] * e
+                    walked += gain[i, m, 6] * e
                     if frictions and gain[i, m, 1] != 0.0:
                         motion[2] = np.sign(motion[1])
-            state[i, 0], state[i, 1], state[i, 2], state[i, 3] = motion[0], motion[1], slow, walked
+            state[i, 0], state[i, 1], state[i, 2], state[i, 3], state[i, 4] = motion[0], motion[1], slow, aim, walked
             if i == last:
                 break
+            onward = coloured[0, 0] * slow + coloured[0, 1] * aim
+            acting = 0.5 * (slow + onward)  # held over the sample: its mean there
             for s in range(i * ratio, (i + 1) * ratio):
                 w0, slip, a0 = motion[1], motion[2], 0.0
                 if filtered and (slip != 0.0 or not frictions):
                     a0 = acceleration(
-                        mo[0], mo[1], mo[3], torque[s, 0] + slow, slip, zp, spare, jck3, body
+                        mo[0], mo[1], mo[3], torque[s, 0] + acting, slip, zp, spare, jck3, body
                     )  # fmt: skip
                 step_over_kinks(
-                    mo, n_states, zp, work, saved, h, torque[s, 0] + slow, torque[s, 1] + slow, torque[s, 2] + slow,
-                    jck3, body, bends, len(kinks), before,
+                    mo, n_states, zp, work, saved, h, torque[s, 0] + acting, torque[s, 1] + acting,
+                    torque[s, 2] + acting, jck3, body, bends, len(kinks), before,
                 )  # fmt: skip
                 motion[3] = offset_s + (s + 1) * h
                 if not filtered:
@@ -100,7 +104,7 @@ def _predict(  # type: ignore[no-untyped-def]
                     continue
                 a1 = 0.0
                 if motion[2] != 0.0 or not frictions:
-                    a1 = acceleration(mo[0], mo[1], mo[3], torque[s, 2] + slow, mo[2], zp, spare, jck3, body)
+                    a1 = acceleration(mo[0], mo[1], mo[3], torque[s, 2] + acting, mo[2], zp, spare, jck3, body)
                 for r in range(1, reads + 1):
                     same = slip == motion[2]
                     sensed = motion[1] if r == reads else _between(w0, a0, motion[1], a1, h, r / reads, same)
@@ -110,7 +114,7 @@ def _predict(  # type: ignore[no-untyped-def]
                             filters[f], sensed, h / reads, offset(pointer(fs), fs_at[f]), offset(pointer(fp), fp_at[f])
                         )  # fmt: skip
                 sensed += still
-            slow *= slow_decay
+            slow, aim = onward, coloured[1, 1] * aim
             walked *= walk_decay
             held -= jumps
             held, slope = decay[0, 0] * held + decay[0, 1] * slope, decay[1, 0] * held + decay[1, 1] * slope
@@ -126,9 +130,10 @@ def predict_ahead(
     measured: Array, keep: Any, gains: Gains, rate: bool, bias: float, offset_s: float = 0.0,
     readings: Readings | None = None, reads: int = 1,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Every reading predicted from those before it, (n, m), and the states after it, (n, 4).
+    """Every reading predicted from those before it, (n, m), and the states after it, (n, 5).
 
-    Those are angle, rate, slow torque, and the slow error of the reading (a gyro's bias beyond ``bias``).
+    Those are angle, rate, coloured torque and what it is heading for, and the slow error of the reading (a gyro's bias
+    beyond ``bias``).
 
     Parameters
     ----------
@@ -145,12 +150,12 @@ def predict_ahead(
     """
     p, _kept = equations.parameters_with(readings)
     filters, fs, fs_at, fp, fp_at = equations.sensor.arrays(step_s)
-    out, state = np.zeros(measured.shape), np.zeros((len(measured), 4))
+    out, state = np.zeros(measured.shape), np.zeros((len(measured), 5))
     _predict(
         np.ascontiguousarray(starts), np.array(spans, dtype=np.int64).reshape(-1, 2), offset_s,
         equations.rest_states(*starts[0]), step_s, ratio, torque, equations.jck, equations.kernels, equations.loads,
         equations.z_at, p, equations.p_at, equations.kinks, filters, fs, fs_at, fp, fp_at, measured, keep, gains.gain,
-        gains.slow_decay, gains.held, np.ascontiguousarray(gains.reads[:, BIAS]), gains.walk_decay, rate, bias,
+        gains.coloured, gains.held, np.ascontiguousarray(gains.reads[:, BIAS]), gains.walk_decay, rate, bias,
         reads, out, state,
     )  # fmt: skip
     return out, state
