@@ -18,6 +18,7 @@ MIN_LEVELS = 8  # of a channel, for its steps to be seen
 SAME, WHOLE = 1e-12, 0.02  # of the largest value, and of a step: as near as a file's digits bring them
 
 AGREEMENT_SIGMAS = 3.0  # standard errors by which two readings of one noise may differ
+BIN_SCATTER = 1.5  # of the logarithm of a band's power, over the root of the number of its bins
 FLAT = 1.25  # times the least of a band's quarters: a density that rises no more is one of white noise
 
 
@@ -46,10 +47,8 @@ def is_white(values: Array, band: tuple[float, float] = UPPER) -> bool:
         return True
     quarters = np.array_split(_power_in(values, band), 4)
     levels = [_mean_of_lower(q) for q in quarters]
-    chance = (
-        2.0 * AGREEMENT_SIGMAS * SCATTER * float(np.sqrt(1.0 / len(quarters[-1])))
-    )  # of a power, twice an amplitude's
-    return max(levels) <= FLAT * (1.0 + chance) * min(levels)
+    chance = np.exp(2.0 * AGREEMENT_SIGMAS * BIN_SCATTER / np.sqrt(len(quarters[-1])))
+    return bool(max(levels) <= FLAT * chance * min(levels))
 
 
 def _power_in(values: Array, band: tuple[float, float]) -> Array:
