@@ -47,7 +47,9 @@ MIN_PREFILTER_NOISE, MAX_PREFILTER_NOISE = 1e-3, 1e8
 # Of the motion, root mean square, by which a start state may be off: the smoothed motion is worst where a run begins.
 START_RATE, START_ANGLE, UNKNOWN_ANGLE = 0.1, 0.05, 1.0
 LONG_RUN_SAMPLES = 10_000  # of a run: two threads predict such runs sooner than one
-LEAST_VARIANCE = 0.5  # of what the readings show above the motion: the sensor's noise is no smaller
+# Of what the readings show above the motion: the sensor's noise is no smaller; nor than the other where motion reaches
+# up there and is read for noise, for beside a sensor without any noise all is disturbance.
+LEAST_VARIANCE, LEAST_UNREAD_VARIANCE = 0.5, 0.01
 FAR = 1e30  # times a number of the noise: a bound holds it
 SLOPE_CACHE_SIZE = 100  # of effects, along all runs
 
@@ -78,8 +80,9 @@ class PredictionError:
         self.gyro = self.both or any(t.channel == "rate" for t in traces)
         self.readings = 2 if self.both else 1
         self.reading_variance = float(np.mean([self._noises(t)[0] ** 2 for t in traces]))
-        white = all(t.noise_is_white for t in traces)  # else the floor was read where there still is motion
-        self.least_variance = LEAST_VARIANCE * self.reading_variance if white else 0.0
+        _, noisy = min(t.upper_spectrum for t in traces)  # of the quietest run, whose noise is taken for all
+        least = LEAST_VARIANCE if noisy else LEAST_UNREAD_VARIANCE
+        self.least_variance = least * self.reading_variance
         self.step_s = float(np.median([t.step_s for t in traces]))
         longest = max(t.step_s * len(t.measured) for t in traces)
         self.longest_s = longest

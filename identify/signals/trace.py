@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from identify.model.effect_torque import torque_along
-from identify.signals.noise import is_white
+from identify.signals.noise import is_noise, noise_of, rounding_of
 from identify.signals.prefilter import held_pieces, linear_pieces, smooth_pieces
 from rig import effects
 from rig.channels import Channel
@@ -74,10 +74,11 @@ class Trace:
         return float(self.run.time_s[0]) + self.offset_s
 
     @cached_property
-    def noise_is_white(self) -> bool:
-        """Whether the measured channel's spectrum ends in a flat floor: else its noise was not read, only motion."""
+    def upper_spectrum(self) -> tuple[float, bool]:
+        """The noise that the end of this run's spectrum shows, and whether it is noise and not motion up there."""
         first, last = max(self.stretches, key=lambda ab: ab[1] - ab[0], default=(0, len(self.measured) - 1))
-        return is_white(self.measured[first : last + 1])
+        values = self.measured[first : last + 1]
+        return noise_of(values), bool(rounding_of(values)) or is_noise(values)
 
     def piece(self, first: int, last: int) -> Trace:
         """Samples first..last as a trace of their own."""

@@ -18,7 +18,7 @@ ORIGINS = ("derivation: ", "reference: ", "calibration run: ", "set by hand")
 # Judged by hand: these cost time, guard the arithmetic, or shape what is shown. None of them gives another name.
 DECIDE_NOTHING: Mapping[str, str] = {
     "likelihood/by_prediction_error.py": "MAX_ITERATIONS MAX_SAMPLES",
-    "likelihood/derivatives.py": "BIAS_STEP GAIN_STEP NOISE_STEP START_STEP",
+    "likelihood/derivatives.py": "BIAS_STEP GAIN_STEP NOISE_STEP RAN_AWAY START_STEP",
     "likelihood/descent.py": "COARSE_TOLERANCE DIFFERENCE_STEP EARLY_STEPS MAX_STEP_TRIALS STALLED_STEPS",
     "likelihood/fit.py": "MAX_LINEAR_INERTIA_CHANGE",
     "likelihood/gyro_biases.py": "BIAS_STEPS",
@@ -28,7 +28,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "likelihood/normal_equations.py": "COST_TOLERANCE LEVENBERG_DAMPING MAX_LOG_STEP MAX_NOISE_FACTOR SINGULAR",
     "likelihood/other_noise.py": "BIAS_WALK_STARTS CONTINUATION_LEVELS CONTINUATION_STEPS DISTURBANCE_START_FACTORS "
     "EXCHANGED_TIME_FACTORS LARGE_DISTURBANCE MAX_GAP_RATIO NOISE_START_FACTORS",
-    "likelihood/prediction_error.py": "FAR LONG_RUN_SAMPLES MAX_DISTURBANCE MAX_ENCODER_ERROR "
+    "likelihood/prediction_error.py": "FAR LEAST_UNREAD_VARIANCE LONG_RUN_SAMPLES MAX_DISTURBANCE MAX_ENCODER_ERROR "
     "MAX_PREFILTER_NOISE MIN_BIAS_WALK MIN_DISTURBANCE MIN_PREFILTER_NOISE SHORTEST_SAMPLES SLOPE_CACHE_SIZE "
     "START_ANGLE START_RATE UNKNOWN_ANGLE",
     "likelihood/settling.py": "LARGEST_SHARE LEAD_SHARE LONGEST_LEAD SETTLING_SAMPLES",
