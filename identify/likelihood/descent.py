@@ -65,12 +65,12 @@ class Descent:
     fixed
         Parameters that stay at their start value.
     smooth
-        Whether the grid has a smooth disturbance or a rough one.
+        Whether the grid has a smooth disturbance, a rough one, or both.
     """
 
     def __init__(
         self, problem: PredictionError, structure: Structure, start: Mapping[Name, float], noise: Noise | None,
-        carry: Sequence[Shots] | None, fixed: Sequence[Name], smooth: bool = False,
+        carry: Sequence[Shots] | None, fixed: Sequence[Name], smooth: Sequence[bool] = (False, True),
     ) -> None:  # fmt: skip
         p = self.problem = problem
         self.structure, self.names = structure, names_of(structure, p.runs)

@@ -48,20 +48,21 @@ def kinds_of_noise(problem: PredictionError, structure: Structure) -> list[str]:
     return out
 
 
-def noise_on_grid(problem: PredictionError, cost: Callable[[Noise], float], smooth: bool) -> Noise:
-    """The best of a coarse grid of noises: white alone first, then a coloured part beside it, smooth or rough."""
+def noise_on_grid(problem: PredictionError, cost: Callable[[Noise], float], smooth: Sequence[bool]) -> Noise:
+    """The best of a coarse grid of noises: white alone first, then a coloured part beside it, rough or smooth."""
     p = problem
     times_s = np.geomspace(20.0 * p.step_s, 0.3 * p.slowest_s, 3).tolist()
     gyro = (p.walk(INITIAL_BIAS_WALK), p.step_s, np.inf if p.gyro else 30.0 * p.step_s)
     little = p.slow(LITTLE)
 
-    def of(white: float, coloured: float, time_s: float) -> Noise:
-        slow, also = (little, coloured) if smooth else (coloured, little)
+    def of(white: float, coloured: float, time_s: float, is_smooth: bool = True) -> Noise:
+        slow, also = (little, coloured) if is_smooth else (coloured, little)
         return p.within(Noise(white, slow, time_s, *gyro, also))
 
     best = min((of(p.white(share), little, times_s[1]) for share in WHITE_SHARES), key=cost)
     coloured = [
-        of(best.white * w, p.slow(share), t) for t in times_s for share in COLOURED_SHARES for w in BESIDE
+        of(best.white * w, p.slow(share), t, which)
+        for which in smooth for t in times_s for share in COLOURED_SHARES for w in BESIDE
     ]  # fmt: skip
     return min((best, *coloured), key=cost)
 

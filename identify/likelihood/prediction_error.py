@@ -202,10 +202,10 @@ class PredictionError:
         """The better of the descents, and the steps it has left.
 
         A rough disturbance and a smooth one are two valleys, and parameters far off may stay in the wrong one: where
-        nobody knows the noise, both are tried.
+        nobody knows the noise, a thorough fit tries both.
         """
         ends = []
-        for smooth in (False, True) if noise is None else (False,):
+        for smooth in ((False,), (True,)) if noise is None and thorough else ((False, True),):
             descent = Descent(self, structure, start, noise, carry, fixed, smooth)
             ends.append((descent, descent.minimise(iterations, thorough, against, least)))
         return min(ends, key=lambda end: end[0].cost)

@@ -102,7 +102,7 @@ def test_the_stop_button_takes_the_torque_off_as_the_drive_saw_it(live: LiveRun)
 
     clicked_s = time.monotonic()
     page.evaluate("document.getElementById('stop').click()")
-    assert live.process.wait(60) == 130
+    assert live.process.wait(120) == 130  # what was recorded is identified first, however long that takes
     assert "torque is off" in page.wait_for("/^Stopped/.test(document.getElementById('title').textContent)"
                                             " && document.getElementById('title').textContent")  # fmt: skip
     drive = read_recording_h5(live.out / "recording.h5").info["emulated_drive"]
