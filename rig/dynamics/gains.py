@@ -1,6 +1,6 @@
 """Kalman gains along a run, of the linear part of a platform, and the innovations that other gains would have left.
 
-The gains come from inertia, damping and stiffness and two noises, by the Riccati recursion (compiled).
+The gains come from inertia, damping and stiffness and two noises, by the Riccati recursion (``rig.dynamics.riccati``).
 
 States of the linear part: angle, rate, coloured disturbance torque and where that is heading, the sensor's output and
 its slope (what its low-pass still holds back), and the gyro's bias, which walks.
@@ -18,12 +18,10 @@ from scipy.linalg import expm
 
 from rig.arrays import Array
 from rig.dynamics.native import jit
+from rig.dynamics.riccati import riccati
 
 STATES = 7  # angle, rate, disturbance torque and what it is heading for, sensor output, its slope, bias
 ANGLE, RATE, TORQUE, AIM, SENSED, SLOPE, BIAS = range(STATES)
-SETTLED = 1e-5  # relative change of a gain from sample to sample below which it is taken for constant
-SMALL = 1e-2  # gain of the bias: it settles as slowly as the bias walks, and is small by then
-SETTLED_FOR = 20  # samples in a row
 
 
 @dataclass(frozen=True)
@@ -143,70 +141,6 @@ class Gains:
         return np.ascontiguousarray(self.onward[SENSED : SLOPE + 1, SENSED : SLOPE + 1])
 
 
-@jit
-def _onward(phi, q, p, half):  # type: ignore[no-untyped-def]
-    """Covariance a sample later, in place: phi p phi' + q. Loops: a call to a matrix library costs more than this."""
-    n = len(q)
-    for a in range(n):
-        for b in range(n):
-            half[a, b] = 0.0
-            for c in range(n):
-                if phi[a, c] != 0.0:
-                    half[a, b] += phi[a, c] * p[c, b]
-    for a in range(n):
-        for b in range(a + 1):
-            total = q[a, b]
-            for c in range(n):
-                if phi[b, c] != 0.0:
-                    total += half[a, c] * phi[b, c]
-            p[a, b] = p[b, a] = total
-
-
-@jit
-def _riccati(  # type: ignore[no-untyped-def]
-    phi, q, reads, noises, p, keep, first, last, gain, variance, bias, small
-):  # fmt: skip
-    """Gains and innovation variances of samples first..last, for readings of the states ``reads`` (m, n)."""
-    n, m = len(q), len(reads)
-    g, half = np.zeros(n), np.zeros((n, n))
-    calm = 0
-    for i in range(first, last + 1):
-        if calm < SETTLED_FOR:
-            change = 0.0
-            for k in range(m):
-                s = noises[k]
-                for a in range(n):
-                    g[a] = 0.0
-                    for b in range(n):
-                        if reads[k, b] != 0.0:
-                            g[a] += p[a, b] * reads[k, b]
-                for a in range(n):
-                    s += reads[k, a] * g[a]
-                if not s >= noises[k]:
-                    s = np.inf  # the linear part ran away: nothing is predicted from here
-                variance[i, k] = s
-                if keep[i]:
-                    for a in range(n):
-                        gain[i, k, a] = g[a] / s
-                        if i > first:
-                            least = small if a == bias else 0.0
-                            change = max(
-                                change, abs(gain[i, k, a] - gain[i - 1, k, a]) - SETTLED * (abs(gain[i, k, a]) + least)
-                            )
-                    for a in range(n):
-                        for b in range(n):
-                            p[a, b] -= g[a] * g[b] / s
-            calm = calm + 1 if keep[i] and change <= 0.0 and i > first else 0
-            _onward(phi, q, p, half)
-        elif keep[i]:
-            variance[i] = variance[i - 1]
-            gain[i] = gain[i - 1]
-        else:  # a sample was lost: what it would have told is missing for a while
-            variance[i] = variance[i - 1]
-            calm = 0
-            _onward(phi, q, p, half)
-
-
 @lru_cache(maxsize=64)
 def _discrete(
     j: float, c: float, k: float, noise: Noise, lag: tuple[float, float], step_s: float
@@ -299,10 +233,9 @@ def gains_of(
     at = np.ix_(there, there)
     few, driven, seen = np.ascontiguousarray(phi[at]), np.ascontiguousarray(q[at]), np.array(reads)[:, there]
     m, n = len(reads), len(there)
-    bias = n - 1 if there[-1] == BIAS else -1
     gain, variance = np.zeros((len(keep), m, n)), np.ones((len(keep), m))
     for begin, last in spans:
-        _riccati(few, driven, seen, np.array(noises), start[at].copy(), keep, begin, last, gain, variance, bias, SMALL)
+        riccati(few, driven, seen, np.array(noises), start[at].copy(), keep, begin, last, gain, variance)
     whole = np.zeros((len(keep), m, STATES))
     whole[:, :, there] = gain
     return Gains(whole, variance, phi, np.array(reads))
