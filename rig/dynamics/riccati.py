@@ -2,8 +2,8 @@
 
 A gain settles within a few samples where the sensor tells a state at once, and over thousands where it tells it by and
 by: the angle beside a gyro, a bias that walks. There the recursion's map over 2^k samples, found by doubling (Anderson
-1978; Chu, Fan and Lin, Int. J. Control 77, 2004), leaps to the middle and to the end of a stretch. Where the middle lies
-on the parabola through what came before and the end, so do the gains between, to ``LEAP_TOLERANCE``; else the
+1978; Chu, Fan and Lin, Int. J. Control 77, 2004), leaps to the middle and to the end of a stretch. Where the middle
+lies on the parabola through what came before and the end, so do the gains between, to ``LEAP_TOLERANCE``; else the
 leap is shorter.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from rig.dynamics.native import jit
 
 LEAP_TOLERANCE = 1e-5  # of a gain and of the innovations' variance, by which a leap's middle may lie off the parabola
-# Of what the state's own spread would make of a reading: a gain below that matters less, and is not held to its own size.
+# Of what the state's own spread would make of a reading: a gain below that matters less, and may be off by more.
 SMALL_GAIN = 0.01
 SHORTEST_LEAP, LEVELS = 3, 13  # powers of two: 8 samples at least, 4,096 at most
 STEPS_FIRST, STEPS_BETWEEN = 20, 10  # single samples after a start or a lost sample, and after a leap that failed
