@@ -1,34 +1,27 @@
-"""The low-passes before a decimation, as windows of weights around a sample."""
+"""The low-pass before a decimation, as weights around a sample."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 
 import numpy as np
-from scipy import signal
 
 from rig.arrays import Array
 
 SAMPLES_A_PERIOD = 8.0  # of the fastest motion that stands above the noise: beyond, a sample tells nothing new
 REACH = 16  # new samples to either side
-# A sharp one: flat to 1e-5 up to 0.6 of the new Nyquist frequency and 100 dB down above it.
-PASSED, KAISER = 0.8, 10.0  # cut-off over the new Nyquist frequency, window
-ROLL_OFF = 0.5  # of the one that keeps noise white
-
-
-@lru_cache(maxsize=32)
-def sharp(factor: int) -> Array:
-    """Weights of shape (2 REACH factor + 1,) of a low-pass below the new Nyquist frequency."""
-    return np.asarray(signal.firwin(2 * REACH * factor + 1, PASSED / factor, window=("kaiser", KAISER)))
+# Of the new Nyquist frequency: flat to 2e-5 up to 0.65 of it, and as far down above 1.35. A smaller one rings for longer
+# than ``REACH``.
+ROLL_OFF = 0.35
 
 
 @lru_cache(maxsize=32)
 def keeps_white(factor: int) -> Array:
-    """Weights of the same shape of a low-pass behind which, decimated, white noise is white again.
+    """Weights of shape (2 REACH factor + 1,) of a low-pass behind which, decimated, white noise is white again.
 
     A sharper one leaves a hole below the new Nyquist frequency, and a likelihood takes the noise for coloured. The
     squares of this one (Meyer's scaling function: Daubechies, Ten Lectures on Wavelets, 5.2) and of its aliases add
-    up to one at every frequency; it is flat up to half the new Nyquist frequency.
+    up to one at every frequency.
     """
     count = 64 * REACH * factor
     of_new_rate = np.abs(np.fft.fftfreq(count)) * factor

@@ -11,7 +11,7 @@ import numpy as np
 from identify.runs.holdout import Split
 from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace
 from rig.arrays import Array
-from rig.decimation import REACH, SAMPLES_A_PERIOD, keeps_white, sharp
+from rig.decimation import REACH, SAMPLES_A_PERIOD, keeps_white
 
 ENOUGH = 20_000  # samples, where nothing else is asked for
 HARMONICS = 5.0  # of a decay's swing: it moves no faster, whatever its noise does
@@ -93,8 +93,7 @@ def decimated(trace: Trace, factor: int) -> Trace:
     if factor <= 1:
         return trace
     order = REACH * factor
-    # What a driven platform does close to the new Nyquist frequency has to stay as its torque says.
-    weights = sharp(factor) if trace.torque is not None else keeps_white(factor)
+    weights = keeps_white(factor)
 
     def passed(values: Array) -> Array:
         padded = np.pad(values, order, mode="reflect", reflect_type="odd")
