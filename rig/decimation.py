@@ -10,8 +10,8 @@ from rig.arrays import Array
 
 SAMPLES_A_PERIOD = 8.0  # of the fastest motion that stands above the noise: beyond, a sample tells nothing new
 REACH = 16  # new samples to either side
-# Of the new Nyquist frequency: flat to 2e-5 up to 0.65 of it, and as far down above 1.35. A smaller one rings for longer
-# than ``REACH``.
+# Of the new Nyquist frequency: flat to 2e-5 up to 0.65 of it, and as far down above 1.35. With a smaller one the filter
+# rings for longer than ``REACH``.
 ROLL_OFF = 0.35
 
 

@@ -132,14 +132,16 @@ class Descent:
         """
         looked, idle = False, 0
         for left in range(steps, 0, -1):
-            before = self.cost
+            before, damping = self.cost, self.damping
             if steps - left == EARLY_STEPS:
                 without_disturbance(self)
                 if self.cost > least:
                     return left
             enough = 0.0 if against is None else COARSE_TOLERANCE * max(against - self.cost, 0.0)
             moved = self.step(enough)
-            idle = 0 if before - self.cost > enough else idle + 1
+            # Along a valley damping holds a step short; where it was right to be taken, the next one is longer.
+            lengthens = self.damping < damping
+            idle = 0 if before - self.cost > enough else idle + (not lengthens)
             if moved and idle < STALLED_STEPS:
                 continue
             if left == 1 or not thorough or not other_noise(self, lower=not looked):

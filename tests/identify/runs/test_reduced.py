@@ -33,8 +33,7 @@ def test_a_lag_of_the_drive_is_not_taken_for_one_of_the_gyro_because_of_the_filt
     right = fits["actuator_lag"]
     assert right.cost < fits["sensor_lag"].cost + 10.0
     assert right.reduced_chi_square < 1.02
-    scaled = np.concatenate(
-        [e / np.sqrt(v * right.variance) for e, v in zip(right.prediction.innovations, right.prediction.variance)]
-    )
+    told = zip(right.prediction.innovations, right.prediction.variance, strict=True)
+    scaled = np.concatenate([e / np.sqrt(v * right.variance) for e, v in told])
     next_to = float(np.mean(scaled[1:] * scaled[:-1])) / float(np.mean(scaled**2))
     assert abs(next_to) < 4.0 / np.sqrt(len(scaled))
