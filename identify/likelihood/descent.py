@@ -225,20 +225,25 @@ class Descent:
         d = bounded_step(scaled, right, low, high)
         if found.promised + float((2.0 * right - scaled @ d) @ d) < max(0.2 * COST_TOLERANCE, enough):
             return False  # what a step promises is not worth taking
+        held = np.arange(len(size)) < p  # what is left of the bounds where the noise is held
         for _ in range(MAX_STEP_TRIALS):
-            d = bounded_step(scaled + self.damping * np.eye(len(size)), right, low, high) / size
-            x = ordered(self.names, np.clip(self.x + d[:p], self.low, self.high))
-            change = np.concatenate([x - self.x, logs_of(d[p:], found.level, ratios)])
-            noise = self._with_logs(change[p:])
-            shots = [
-                changed(s, taken - across @ change) for s, (across, taken) in zip(self.shots, found.own, strict=True)
-            ]
-            looks = self.looks_at(x, noise, shots)
-            cost = self.cost_of(looks)
-            if cost < self.cost:
-                self.x, self.shots, self.looks, self.cost, self.noise = x, shots, looks, cost, noise
-                self.damping = max(self.damping / 10.0, 1e-9)
-                return True
+            damped = scaled + self.damping * np.eye(len(size))
+            # The noise is far from square in its logarithms: where a step of both fails, the parameters go alone.
+            for room in (1.0, held) if len(self.kinds) and of_noise else (1.0,):
+                d = bounded_step(damped, right, room * low, room * high) / size
+                x = ordered(self.names, np.clip(self.x + d[:p], self.low, self.high))
+                change = np.concatenate([x - self.x, logs_of(d[p:], found.level, ratios)])
+                noise = self._with_logs(change[p:])
+                shots = [
+                    changed(s, taken - across @ change)
+                    for s, (across, taken) in zip(self.shots, found.own, strict=True)
+                ]
+                looks = self.looks_at(x, noise, shots)
+                cost = self.cost_of(looks)
+                if cost < self.cost:
+                    self.x, self.shots, self.looks, self.cost, self.noise = x, shots, looks, cost, noise
+                    self.damping = max(self.damping / 10.0, 1e-9)
+                    return True
             self.damping = max(10.0 * self.damping, 1e-3)
         return False
 
