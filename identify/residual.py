@@ -66,7 +66,7 @@ class Dependence:
     Attributes
     ----------
     on
-        "angle", "rate", "direction", "torque", "time" or "history".
+        "angle", "rate", "direction", "torque", "time", "history" or "frequency" (spectral lines).
     torque_rms
         Root mean square of that part, N m.
     relative
@@ -75,7 +75,7 @@ class Dependence:
         How often chance alone would show as much.
     at
         Where the term's shape is shown: rad, rad/s, N m, seconds since the start of the run, or -1 and 1 for the
-        two directions. Empty for what depends on the past, which no single number describes.
+        two directions. Empty for what depends on the past, which no single number describes, and for lines.
     shape_nm
         The torque there, N m, without the constant and the linear part that J, C and K take up.
     """

@@ -39,6 +39,11 @@ RUN = {
         "To separate hysteresis, creep and a second mode, vary how long the torque acts: hold a constant torque for a "
         "minute and release it, and repeat one set at a quarter of its frequency."
     ),
+    "frequency": (
+        "To find what makes the spectral lines, play each set again at half its torque and at a frequency that is a "
+        "few percent higher. Lines that move with the excitation come from the drive or the platform (a torque sent "
+        "in steps, a gap); lines that stay come from the surroundings or the sensor."
+    ),
 }
 RUN["direction"] = RUN["rate"]
 # What the steps above are called in the `excitation` section: only where a campaign was played is there one.

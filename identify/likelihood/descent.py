@@ -46,6 +46,7 @@ DIFFERENCE_STEP = 1e-6  # relative step of the differences
 MAX_STEP_TRIALS = 7  # step lengths tried before a direction is given up
 COARSE_TOLERANCE = 5e-3  # of the difference to the model it is compared with, that the last step of a fit brings
 STALLED_STEPS = 2  # steps in a row that bring little, after which a fit has arrived: one alone may have been cut short
+ALONE = 0.25  # of the fall that a step promises, that the parameters have to bring without the noise
 EARLY_STEPS = 3  # steps after which a model that is right is near enough for it
 
 
@@ -223,24 +224,24 @@ class Descent:
         told = np.diag(found.matrix) > 0.0
         low, high = np.where(told, low, 0.0), np.where(told, high, 0.0)
         d = bounded_step(scaled, right, low, high)
-        if found.promised + float((2.0 * right - scaled @ d) @ d) < max(0.2 * COST_TOLERANCE, enough):
+        promised = found.promised + float((2.0 * right - scaled @ d) @ d)
+        if promised < max(0.2 * COST_TOLERANCE, enough):
             return False  # what a step promises is not worth taking
+        own = list(zip(self.shots, found.own, strict=True))
         held = np.arange(len(size)) < p  # what is left of the bounds where the noise is held
         for _ in range(MAX_STEP_TRIALS):
             damped = scaled + self.damping * np.eye(len(size))
-            # The noise is far from square in its logarithms: where a step of both fails, the parameters go alone.
-            for room in (1.0, held) if len(self.kinds) and of_noise else (1.0,):
+            # The noise is far from square in its logarithms: where a step of both fails, the parameters go alone, if
+            # much of what is promised is theirs.
+            for room, least in ((1.0, 0.0), (held, ALONE * promised)) if ratios else ((1.0, 0.0),):
                 d = bounded_step(damped, right, room * low, room * high) / size
                 x = ordered(self.names, np.clip(self.x + d[:p], self.low, self.high))
                 change = np.concatenate([x - self.x, logs_of(d[p:], found.level, ratios)])
                 noise = self._with_logs(change[p:])
-                shots = [
-                    changed(s, taken - across @ change)
-                    for s, (across, taken) in zip(self.shots, found.own, strict=True)
-                ]
+                shots = [changed(s, taken - across @ change) for s, (across, taken) in own]
                 looks = self.looks_at(x, noise, shots)
                 cost = self.cost_of(looks)
-                if cost < self.cost:
+                if cost < self.cost - least:
                     self.x, self.shots, self.looks, self.cost, self.noise = x, shots, looks, cost, noise
                     self.damping = max(self.damping / 10.0, 1e-9)
                     return True

@@ -19,7 +19,7 @@ ORIGINS = ("derivation: ", "reference: ", "calibration run: ", "set by hand")
 DECIDE_NOTHING: Mapping[str, str] = {
     "likelihood/by_prediction_error.py": "MAX_ITERATIONS MAX_SAMPLES",
     "likelihood/derivatives.py": "BIAS_STEP GAIN_STEP NOISE_STEP RAN_AWAY START_STEP",
-    "likelihood/descent.py": "COARSE_TOLERANCE DIFFERENCE_STEP EARLY_STEPS MAX_STEP_TRIALS STALLED_STEPS",
+    "likelihood/descent.py": "ALONE COARSE_TOLERANCE DIFFERENCE_STEP EARLY_STEPS MAX_STEP_TRIALS STALLED_STEPS",
     "likelihood/fit.py": "MAX_LINEAR_INERTIA_CHANGE",
     "likelihood/gyro_biases.py": "BIAS_STEPS",
     "likelihood/kept_gains.py": "GAIN_CACHE_SIZE SAME_STEP",
@@ -38,6 +38,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "rivals/run_heterogeneity.py": "ROUNDS",
     "rivals/whole_runs.py": "MAX_ITERATIONS TOLERANCE",
     "select/curve_rivals.py": "COMPARABLE NEAR STEPS",
+    "select/disturbance_lines.py": "FLOOR_BINS LOWEST_BIN SHORTEST",
     "select/evidence.py": "ALONE",
     "select/field_search.py": "NO_WORSE PERCENT",
     "select/free_form_residual.py": "HOPE SHOWN STEPS TRIED",

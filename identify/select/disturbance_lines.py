@@ -1,0 +1,81 @@
+"""Spectral lines in what a model predicts wrongly, and the part of the disturbance that stands at their frequencies.
+
+A torque that the likelihood takes for noise has a smooth spectrum, and so have the innovations of a right model: they
+are white. An effect that the library lacks repeats with the motion (a torque sent in coarse steps, a spring that is
+shaken, a coupling that slips): its power stands at a few frequencies, which no curve over angle, rate or time shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.signal.windows import hann
+from scipy.stats import norm
+
+from identify.diagnose.disturbance import MIN_POWER_SHARE, SURE
+from identify.likelihood.fit import Fit
+from identify.results import Dependence
+from rig.arrays import Array
+
+FLOOR_BINS = 81  # of a spectrum, whose median is its level without lines
+LOWEST_BIN = 3  # cycles in a stretch: what turns more slowly is a drift and no line
+SHORTEST = 4 * FLOOR_BINS  # samples: a shorter stretch shows no line
+
+
+def lines_left(fit: Fit, torque_nm: float) -> Dependence | None:
+    """The part of the disturbance at spectral lines of the innovations; None where it is not worth a word.
+
+    A bin is a line where it stands so far above the median of its neighbours that chance alone brings one in all bins
+    together with the probability that any other dependence is held to (``SURE``). The power in a bin of white noise is
+    exponentially distributed, and its median is its mean times the logarithm of two.
+
+    Parameters
+    ----------
+    fit
+        The final model on the samples that were searched.
+    torque_nm
+        Root mean square of the torque, N m.
+    """
+    spectra = list(_spectra(fit))
+    count = sum(len(own) for own, _ in spectra)
+    if not count:
+        return None
+    false_alarm = float(norm.sf(SURE))
+    above = float(np.log(count / false_alarm))
+    at_lines = together = 0.0
+    for own, disturbance in spectra:
+        level = median_filter(own, FLOOR_BINS, mode="reflect") / np.log(2.0)
+        at_lines += float(np.sum(disturbance[own > above * level]))
+        together += float(np.sum(disturbance))
+    share = at_lines / max(together, 1e-300)
+    if share < MIN_POWER_SHARE:
+        return None
+    squares = [np.mean(d[s.weight] ** 2) for d, s in zip(fit.prediction.disturbance_nm, fit.shots, strict=True)]
+    rms = float(np.sqrt(share * np.mean(squares)))
+    return Dependence("frequency", rms, rms / torque_nm, false_alarm)
+
+
+def _spectra(fit: Fit) -> Iterator[tuple[Array, Array]]:
+    """Power of the scaled innovations and of the disturbance in every bin of every stretch that counts."""
+    p = fit.prediction
+    for innovations, variance, torque, shots in zip(
+        p.innovations, p.variance, p.disturbance_nm, fit.shots, strict=True
+    ):
+        scaled = innovations / np.sqrt(variance)
+        for first, last in _stretches(shots.weight):
+            if last - first >= SHORTEST:
+                yield _power(scaled[first:last]), _power(torque[first:last])
+
+
+def _power(values: Array) -> Array:
+    window = hann(len(values), sym=False)
+    power = np.abs(np.fft.rfft((values - np.mean(values)) * window)) ** 2
+    return np.asarray(power[LOWEST_BIN:] / np.sum(window**2))
+
+
+def _stretches(counts: Array) -> Sequence[tuple[int, int]]:
+    """First sample of every stretch that counts, and the one behind its last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], counts, [False]]).astype(int)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
