@@ -33,7 +33,6 @@ from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_without_motion
 from identify.runs.usable import runs_used
-from identify.select.disturbance_lines import lines_left
 from identify.select.field_search import Found, search_in_torque, with_free_form
 from identify.select.free_form_residual import dependence_on, most_moving
 from identify.select.likelihood_search import LikelihoodSearch
@@ -222,9 +221,7 @@ class _Identifier:
             (search.stepwise.best, found_there), search.stepwise.trusted, search.stepwise.weigher.regression,
             self._curves(search.stepwise), search.refutes,
         )  # fmt: skip
-        if not found.disturbance.depends_on and set(found.named) <= set(found_there.best.structure.effects):
-            lines = lines_left(search.stepwise.best, search.stepwise.problem.torque_nm)
-            found = found if lines is None else replace(found, disturbance=with_free_form(found.disturbance, lines, {}))
+        found = found.with_lines(search.stepwise.best, search.stepwise.problem.torque_nm)
         after = found.after
         gyro = all(t.channel == "rate" and t.beside is None for t in self.traces)  # an encoder has no line of its own
         line = standing_line(after, self.traces) if gyro and TONE in found.named else None

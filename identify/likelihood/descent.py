@@ -238,7 +238,7 @@ class Descent:
                 x = ordered(self.names, np.clip(self.x + d[:p], self.low, self.high))
                 change = np.concatenate([x - self.x, logs_of(d[p:], found.level, ratios)])
                 noise = self._with_logs(change[p:])
-                shots = [changed(s, taken - across @ change) for s, (across, taken) in own]
+                shots = [changed(s, (taken - across @ change) / (1.0 + self.damping)) for s, (across, taken) in own]
                 looks = self.looks_at(x, noise, shots)
                 cost = self.cost_of(looks)
                 if cost < self.cost - least:

@@ -103,6 +103,12 @@ class Fit(ParameterFit):
     prediction: Prediction
     reduced_chi_square: float
 
+    @property
+    def penalised(self) -> float:
+        """The cost with its parameters paid for (Schwarz 1978), and the noise that only a lag of the gyro has ahead."""
+        lags = any(effects.get(e).lag is not None for e in self.structure.effects)
+        return super().penalised + lags * float(np.log(max(self.count, 2)))
+
     def without(self, name: str) -> dict[Name, float]:
         """All other parameters, gains as they follow to first order where those of a term or an effect become zero."""
         gains = [i for i, n in enumerate(self.names) if len(n) == 1 or _is_gain(n)]

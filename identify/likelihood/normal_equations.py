@@ -123,9 +123,14 @@ def _stepped(step: Array) -> Array:
 
 
 def changed(s: Shots, own: Array) -> Shots:
-    """The same run with its own unknowns changed: its bias, if it has one, and its start states, if they are fitted."""
+    """The same run with its own unknowns changed: its bias, if it has one, and its start states, if they are fitted.
+
+    Where a cut stretch begins, a bias that may walk is hardly known, and would carry the angle off by radians.
+    """
     biased = int(s.trace.biased)
     starts = own[biased:].reshape(-1, 2)
+    most = s.trace.largest_bias_rad_s
+    bias = min(max(s.bias + float(own[0]), -most), most) if biased else 0.0
     if len(starts):
-        return moved(s, (starts, float(own[0]) if biased else 0.0))
-    return with_bias(s, s.bias + float(own[0])) if biased else s
+        return moved(s, (starts, bias - s.bias if biased else 0.0))
+    return with_bias(s, bias) if biased else s

@@ -39,15 +39,21 @@ def against_curves(search: Stepwise, now: Fit) -> Fit:
     found = _beaten(search, now)
     if found is None:
         return now
-    names, curve, rest = found
+    names, curve, rest, with_curve = found
+    search.in_place = with_curve
     search.stood_for_curves |= set(names)
     search.dropped += [(n, f"a curve over the {ON[curve]} explains clearly more in its place") for n in names]
     search.say(f"took {' and '.join(names)} back: a curve over the {ON[curve]} explains clearly more")
     return rest
 
 
-def _beaten(search: Stepwise, now: Fit) -> tuple[list[str], str, Fit] | None:
-    """Names that a curve in their place beats, the curve, and the model without them; None where none does.
+def is_beaten(search: Stepwise, now: Fit) -> bool:
+    """Whether a curve in the place of names of one kind explains clearly more."""
+    return _beaten(search, now) is not None
+
+
+def _beaten(search: Stepwise, now: Fit) -> tuple[list[str], str, Fit, Fit] | None:
+    """Names that a curve in their place beats, the curve, and the model without them and with it; None where none does.
 
     Several effects of one kind (two waves over the angle) are judged together.
     """
@@ -62,7 +68,7 @@ def _beaten(search: Stepwise, now: Fit) -> tuple[list[str], str, Fit] | None:
         rest = _without(search, now, names)
         curve = _in_place(search, now, rest, names, curves)
         if curve is not None and support_difference(now, curve[1]) > STRONG_SUPPORT:
-            return names, curve[0], rest
+            return names, curve[0], rest, curve[1]
     return None
 
 

@@ -19,6 +19,7 @@ from identify.model.structure import Structure
 from identify.results import Candidate, Dependence, Disturbance
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
+from identify.select.disturbance_lines import lines_left
 from identify.select.evidence import TRUSTED, in_band, inflation, torque_fit_of
 from identify.select.search_state import Search
 from identify.select.torque_search import SURE, TorqueCandidate, TorqueSearch
@@ -34,6 +35,7 @@ CLEARLY_LESS, ABOUT_AS_MUCH = 0.75, 1.25  # times the power that prediction erro
 UNFOLLOWED = 0.5  # of the residual in torque, that the likelihood takes the disturbance for
 NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
 PERCENT = 100.0
+IN_TORQUE = "least squares in torque"  # the method of a fit that the likelihood is not to be believed for
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,12 @@ class Found:
         return replace(
             self, after=self.before, in_torque=(self.in_torque[0],) * 2, disturbance=self.left_before()
         )  # fmt: skip
+
+    def with_lines(self, likeliest: Fit, torque_nm: float) -> Found:
+        """The same with the spectral lines of what the likeliest model leaves, where that is the final one."""
+        final = self.after.method != IN_TORQUE and set(self.after.structure.effects) <= set(likeliest.structure.effects)
+        lines = lines_left(likeliest, torque_nm) if final and not self.disturbance.depends_on else None
+        return self if lines is None else replace(self, disturbance=with_free_form(self.disturbance, lines, {}))
 
     @property
     def named(self) -> list[str]:
@@ -238,7 +246,7 @@ def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace]
     free = free_run_of(traces, fit.structure, values, split.everything)
     return FinalFit(
         fit, values, (*names, *shapes), covariance, free, False, (*determined, *(True for _ in shapes)),
-        "least squares in torque",
+        IN_TORQUE,
     )  # fmt: skip
 
 

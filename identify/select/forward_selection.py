@@ -13,11 +13,15 @@ from typing import TYPE_CHECKING
 
 from identify.likelihood.fit import Fit
 from identify.propose.innovation_score import Score
+from identify.select.curve_rivals import is_beaten
 from identify.select.evidence import MAX_EFFECTS, STRONG_SUPPORT, WEIGHT, Evidence
 from identify.select.trial_fits import FULL_ITERATIONS, HOPE
+from rig import effects
 
 if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
+
+SERIES = 2  # effects of one kind, beside which a curve in their place is tried before a third is added
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,8 @@ def add_effects(search: Stepwise) -> None:
         now = search.best
         scores, tried = search.score_candidates(now)
         chosen = search.best_candidate(tried)
+        if chosen and _is_series(search, now, chosen) and is_beaten(search, now):
+            break
         new = tried[chosen] if chosen else _pair(search, now, scores)
         how = f"{100.0 * new.weight:.0f} % of the disturbance" if new else "on trial"
         if new is None and trial is None and (new := _on_trial(tried)):
@@ -61,6 +67,11 @@ def add_effects(search: Stepwise) -> None:
     if trial:
         search.say(f"took {trial[0]} back")
         search.best = _without_trial(search, *trial)
+
+
+def _is_series(search: Stepwise, now: Fit, name: str) -> bool:
+    """Whether an effect is the third of a kind: any curve is a sum of waves, and none of them need be there."""
+    return sum(effects.first_of(e) == effects.first_of(name) for e in search.trials.added(now)) >= SERIES
 
 
 def _pair(search: Stepwise, now: Fit, scores: Sequence[Score]) -> Evidence | None:

@@ -85,13 +85,17 @@ def fit_free_forms(search: Stepwise, now: Fit) -> tuple[FreeFormFit | None, list
     found = scores(problem, now, search.trials.scale(now), tuple(effects.free_forms()))[:TRIED]
     forms = [form for form in found if form.gain >= HOPE]
     fits = problem.workers.side_by_side([partial(fitted, problem, now, form, STEPS) for form in forms])
-    for form, fit in zip(forms, fits, strict=True):
+    found_by = {form.effect: fit for form, fit in zip(forms, fits, strict=True)}
+    if (known := search.in_place) is not None and known.structure.minus(known.structure.effects[-1]) == now.structure:
+        name = known.structure.effects[-1]
+        found_by[name] = min((known, found_by.get(name, known)), key=lambda f: f.cost)
+    for name, fit in found_by.items():
         if not np.isfinite(fit.cost):
             continue
-        beside = _beside(search, now, fit, form.effect)
+        beside = _beside(search, now, fit, name)
         if beside.is_significant:
-            beside = _beside(search, _from_there(search, now, fit), fit, form.effect)
-        if beside.is_significant and (best is None or beside.evidence.support > best.evidence.support):
+            beside = _beside(search, _from_there(search, now, fit), fit, name)
+        if beside.is_significant and (best is None or fit.penalised < best.evidence.fit.penalised):
             best = beside
         elif beside.share > 0.0 and beside.chance_level < BY_CHANCE:  # beside some, more is left than without
             others.append(beside)

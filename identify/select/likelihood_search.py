@@ -85,11 +85,16 @@ class LikelihoodSearch:
         return self.stepwise.run().reduced_chi_square < AT_NOISE
 
     def refutes(self, fit: TorqueFit) -> bool:
-        """Whether the best model is likelier than one found in torque, also where that has its own best numbers."""
-        if fit.structure == self.stepwise.best.structure:
+        """Whether the best model is likelier than one found in torque, also where that has its own best numbers.
+
+        A curve that is believed beside the best model belongs to it: what it shows is not another effect of that kind.
+        """
+        search = self.stepwise
+        if fit.structure == search.best.structure:
             return False
-        there = self.stepwise.problem.fit(fit.structure, fit.values)
-        return bool(np.isfinite(there.cost)) and support_difference(there, self.stepwise.best) > STRONG_SUPPORT
+        best = search.best if search.left is None else search.left.evidence.fit
+        there = search.problem.fit(fit.structure, fit.values)
+        return bool(np.isfinite(there.cost)) and support_difference(there, best) > STRONG_SUPPORT
 
     @property
     def found(self) -> Search:

@@ -77,6 +77,7 @@ class Stepwise:
     best: Fit = None  # type: ignore[assignment]
     inflation: dict[str, float] = field(default_factory=dict)  # of every effect that was added, beside all others
     left: FreeFormFit | None = None  # a curve that belongs beside the model, though no effect of that kind is known
+    in_place: Fit | None = None  # the model with a curve in the place of names that it beat
     doubtful: list[FreeFormFit] = field(default_factory=list)  # curves beside the model that are hardly chance
     _on_all: dict[_Key, Fit] = field(default_factory=dict)
     _lacking: dict[_Key, Fit] = field(default_factory=dict)  # fits with one effect less than one that was tried

@@ -110,6 +110,11 @@ class Trace:
         """Whether the channel may carry an unknown constant: a gyro alone; an encoder beside it would show it."""
         return self.channel == "rate" and self.run.angle_rad is None
 
+    @cached_property
+    def largest_bias_rad_s(self) -> float:
+        """What a gyro's bias is no larger than: a spring lets no rate stay, and what turns on has a larger mean."""
+        return max(MOST_BIAS_RAD_S, 2.0 * abs(float(np.mean(self.measured))))
+
     @property
     def travel_deg(self) -> float:
         """How far the platform goes to either side of where it mostly is, what a gyro's bias adds left out."""
