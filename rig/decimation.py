@@ -1,10 +1,11 @@
-"""The low-pass before a decimation, as weights around a sample."""
+"""The low-passes before a decimation, as weights around a sample."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 
 import numpy as np
+from scipy import signal
 
 from rig.arrays import Array
 
@@ -13,6 +14,14 @@ REACH = 16  # new samples to either side
 # Of the new Nyquist frequency: flat to 2e-5 up to 0.65 of it, and as far down above 1.35. With a smaller one the filter
 # rings for longer than ``REACH``.
 ROLL_OFF = 0.35
+# A sharp one: flat to 1e-5 up to 0.6 of the new Nyquist frequency and 100 dB down above it.
+PASSED, KAISER = 0.8, 10.0  # cut-off over the new Nyquist frequency, window
+
+
+@lru_cache(maxsize=32)
+def sharp(factor: int) -> Array:
+    """Weights of shape (2 REACH factor + 1,) of a low-pass below the new Nyquist frequency."""
+    return np.asarray(signal.firwin(2 * REACH * factor + 1, PASSED / factor, window=("kaiser", KAISER)))
 
 
 @lru_cache(maxsize=32)

@@ -11,7 +11,7 @@ import numpy as np
 from identify.runs.holdout import Split
 from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace
 from rig.arrays import Array
-from rig.decimation import REACH, SAMPLES_A_PERIOD, keeps_white
+from rig.decimation import REACH, SAMPLES_A_PERIOD, keeps_white, sharp
 
 ENOUGH = 20_000  # samples, where nothing else is asked for
 HARMONICS = 5.0  # of a decay's swing: it moves no faster, whatever its noise does
@@ -93,7 +93,10 @@ def decimated(trace: Trace, factor: int) -> Trace:
     if factor <= 1:
         return trace
     order = REACH * factor
-    weights = keeps_white(factor)
+    # A gyro's noise has to stay white: a low-pass of the gyro is told by it. Next to an encoder, whose steps are not
+    # white in any case, what a driven platform does close to the new Nyquist frequency counts for more.
+    by_gyro = trace.channel == "rate" or trace.beside is not None
+    weights = keeps_white(factor) if by_gyro or trace.torque is None else sharp(factor)
 
     def passed(values: Array) -> Array:
         padded = np.pad(values, order, mode="reflect", reflect_type="odd")
