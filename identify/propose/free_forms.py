@@ -37,7 +37,9 @@ def ranges(problem: PredictionError, fit: Fit) -> dict[str, Range]:
     states = np.concatenate(states_of(problem, fit))
     angle, rate = states[:, 0], states[:, 1]
     torque = np.concatenate([t.fine[3] for t in problem.traces])
-    time = (0.0, problem.longest_s)
+    # What is measured ahead of a cut stretch holds no curve: whatever it did there has died away by the first sample.
+    first_s = min(float(np.argmax(s.weight)) * s.trace.step_s for s in fit.shots)
+    time = (first_s, problem.longest_s)
     turning = float(np.sqrt(np.mean(rate**2) / max(float(np.var(angle)), 1e-300)))
 
     def inner(values: Array) -> Range:

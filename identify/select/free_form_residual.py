@@ -144,6 +144,8 @@ def dependence_on(search: Stepwise, left: FreeFormFit) -> tuple[Dependence, dict
     acceleration = np.concatenate(
         [np.gradient(s[:, 1], t.step_s) for s, t in zip(states_of(problem, fit), problem.traces, strict=True)]
     )
+    counts = np.concatenate([s.weight for s in fit.shots])
+    torque, states, acceleration = torque[counts], states[counts], acceleration[counts]
     terms = np.column_stack([acceleration, states[:, 1], states[:, 0], np.ones(len(states))])
     size = np.maximum(np.linalg.norm(terms, axis=0), 1e-300)
     as_terms = np.linalg.lstsq(terms / size, torque, rcond=1e-9)[0] / size

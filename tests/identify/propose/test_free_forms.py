@@ -1,0 +1,25 @@
+"""Where the curve of a free form begins and ends."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identify.likelihood.prediction_error import PredictionError
+from identify.model.structure import Structure
+from identify.propose.free_forms import ranges
+from identify.signals.prepare import one_noise, prepare
+from rig.platform import TERMS
+from tests.identify.simulated import TRUTH, sine_run
+
+LEAD_S = 0.8
+
+
+def test_a_curve_over_time_begins_with_the_first_sample_that_counts() -> None:
+    traces = one_noise([prepare(sine_run(100.0, f, duration_s=3.0), i) for i, f in enumerate((1.0, 3.0))], False)
+    use = [np.arange(len(t.measured)) * t.step_s >= LEAD_S for t in traces]
+    problem = PredictionError(traces, use)
+    fit = problem.fit(Structure(), {(k,): v for k, v in zip(TERMS, TRUTH, strict=True)})
+    begin, end = ranges(problem, fit)["free_time"]
+    assert begin == pytest.approx(LEAD_S, abs=0.1)
+    assert end == pytest.approx(3.0, abs=0.1)
