@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identify.estimate.output_error import held_still
+from identify.likelihood.damped_step import step_down
 from identify.likelihood.derivatives import GAIN_STEP, Derivatives, Standpoint, derivatives
 from identify.likelihood.fit import Columns, Fit, Look, Prediction
 from identify.likelihood.gyro_biases import settle_biases
@@ -23,10 +24,7 @@ from identify.likelihood.normal_equations import (
     LEVENBERG_DAMPING,
     MAX_LOG_STEP,
     Step,
-    bounded_step,
-    changed,
     level_of,
-    logs_of,
     normal_equations,
 )
 from identify.likelihood.other_noise import noise_alone, other_noise, without_disturbance
@@ -43,10 +41,8 @@ if TYPE_CHECKING:
     from identify.likelihood.prediction_error import PredictionError
 
 DIFFERENCE_STEP = 1e-6  # relative step of the differences
-MAX_STEP_TRIALS = 7  # step lengths tried before a direction is given up
 COARSE_TOLERANCE = 5e-3  # of the difference to the model it is compared with, that the last step of a fit brings
 STALLED_STEPS = 2  # steps in a row that bring little, after which a fit has arrived: one alone may have been cut short
-ALONE = 0.25  # of the fall that a step promises, that the parameters have to bring without the noise
 EARLY_STEPS = 3  # steps after which a model that is right is near enough for it
 
 
@@ -90,7 +86,7 @@ class Descent:
         for s, earlier in zip(self.shots, carry or (), strict=bool(carry)):
             if p.fits_starts and np.array_equal(earlier.first, s.first):
                 s.starts = earlier.starts.copy()
-        self.damping = LEVENBERG_DAMPING
+        self.damping = self.noise_damping = LEVENBERG_DAMPING
         self.weights = [s.weight for s in self.shots]
         self.count = int(sum(w.sum() for w in self.weights)) * p.readings
         self.kinds = kinds_of_noise(p, structure)
@@ -214,41 +210,9 @@ class Descent:
     def try_step(self, of_noise: bool, enough: float = 0.0) -> bool:
         """One step of parameters, biases and, if asked for, the noise; False where none leads down by ``enough``."""
         found = self._solvable(of_noise)
-        p = len(self.x)
-        ratios = [not kind.endswith("_s") for kind in self.kinds] if of_noise else []
-        if not np.all(np.isfinite(np.column_stack([found.matrix, found.right]))):
-            return False
-        size: Array = np.sqrt(np.maximum(np.diag(found.matrix), 1e-300))
-        scaled, right = found.matrix / np.outer(size, size), found.right / size
-        low, high = (bound * size for bound in self._room(len(size) - p))
-        told = np.diag(found.matrix) > 0.0
-        low, high = np.where(told, low, 0.0), np.where(told, high, 0.0)
-        d = bounded_step(scaled, right, low, high)
-        promised = found.promised + float((2.0 * right - scaled @ d) @ d)
-        if promised < max(0.2 * COST_TOLERANCE, enough):
-            return False  # what a step promises is not worth taking
-        own = list(zip(self.shots, found.own, strict=True))
-        held = np.arange(len(size)) < p  # what is left of the bounds where the noise is held
-        for _ in range(MAX_STEP_TRIALS):
-            damped = scaled + self.damping * np.eye(len(size))
-            # The noise is far from square in its logarithms: where a step of both fails, the parameters go alone, if
-            # much of what is promised is theirs.
-            for room, least in ((1.0, 0.0), (held, ALONE * promised)) if ratios else ((1.0, 0.0),):
-                d = bounded_step(damped, right, room * low, room * high) / size
-                x = ordered(self.names, np.clip(self.x + d[:p], self.low, self.high))
-                change = np.concatenate([x - self.x, logs_of(d[p:], found.level, ratios)])
-                noise = self._with_logs(change[p:])
-                shots = [changed(s, (taken - across @ change) / (1.0 + self.damping)) for s, (across, taken) in own]
-                looks = self.looks_at(x, noise, shots)
-                cost = self.cost_of(looks)
-                if cost < self.cost - least:
-                    self.x, self.shots, self.looks, self.cost, self.noise = x, shots, looks, cost, noise
-                    self.damping = max(self.damping / 10.0, 1e-9)
-                    return True
-            self.damping = max(10.0 * self.damping, 1e-3)
-        return False
+        return step_down(self, found, of_noise, enough)
 
-    def _room(self, kinds: int) -> tuple[Array, Array]:
+    def room(self, kinds: int) -> tuple[Array, Array]:
         """How far parameters and numbers of the noise may be stepped down and up, (p + k,) each."""
         down, up = self.low - self.x, self.high - self.x
         down[self.still] = up[self.still] = 0.0
@@ -256,7 +220,7 @@ class Descent:
         fall = np.maximum(np.log(least), -MAX_LOG_STEP)
         return np.append(down, fall), np.append(up, most - 1.0)  # what rises is stepped as a density (``logs_of``)
 
-    def _with_logs(self, change: Array) -> Noise:
+    def with_logs(self, change: Array) -> Noise:
         times = zip(self.kinds, np.exp(change).tolist(), strict=False)
         return self.problem.within(replace(self.noise, **{k: getattr(self.noise, k) * x for k, x in times}))
 

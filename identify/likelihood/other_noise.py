@@ -57,7 +57,7 @@ def other_noise(descent: Descent, lower: bool = True) -> bool:
         noise_alone(descent)
     if lower:
         without_disturbance(descent)
-    descent.damping = LEVENBERG_DAMPING
+    descent.damping = descent.noise_damping = LEVENBERG_DAMPING
     return descent.cost < before - COST_TOLERANCE
 
 
@@ -92,7 +92,8 @@ def without_disturbance(descent: Descent) -> None:
         less = {kind: factor * getattr(q, kind) for kind in ("white", "slow", "smooth")}
         descent.noise = descent.problem.within(replace(q, **less))
         descent.looks = descent.looks_at(descent.x, descent.noise, descent.shots)
-        descent.cost, descent.damping = descent.cost_of(descent.looks), LEVENBERG_DAMPING
+        descent.cost = descent.cost_of(descent.looks)
+        descent.damping = descent.noise_damping = LEVENBERG_DAMPING
         for _ in range(CONTINUATION_STEPS):
             gap = descent.cost - here[-1]
             if (

@@ -172,7 +172,8 @@ def search_in_torque(
     lost = [e for e in final.effects if e not in best.structure.effects and effects.get(e).place is not Place.SENSOR]
     if by_likelihood and (unfollowed or lost):
         disturbance = Disturbance(size_nm, unit, size_nm / regression.torque_nm, (), {})
-    if set(final.effects) <= set(known[0].structure.effects):
+    # What the likelihood shows beside a model whose numbers are not to be believed is shown beside another platform.
+    if set(final.effects) <= set(known[0].structure.effects) and after.method != IN_TORQUE:
         for curve in curves:
             disturbance = with_free_form(disturbance, *curve)
 

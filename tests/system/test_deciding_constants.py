@@ -19,7 +19,8 @@ ORIGINS = ("derivation: ", "reference: ", "calibration run: ", "set by hand")
 DECIDE_NOTHING: Mapping[str, str] = {
     "likelihood/by_prediction_error.py": "MAX_ITERATIONS MAX_SAMPLES",
     "likelihood/derivatives.py": "BIAS_STEP GAIN_STEP NOISE_STEP RAN_AWAY START_STEP",
-    "likelihood/descent.py": "ALONE COARSE_TOLERANCE DIFFERENCE_STEP EARLY_STEPS MAX_STEP_TRIALS STALLED_STEPS",
+    "likelihood/damped_step.py": "LEAST_DAMPING MAX_STEP_TRIALS",
+    "likelihood/descent.py": "COARSE_TOLERANCE DIFFERENCE_STEP EARLY_STEPS STALLED_STEPS",
     "likelihood/fit.py": "MAX_LINEAR_INERTIA_CHANGE",
     "likelihood/gyro_biases.py": "BIAS_STEPS",
     "likelihood/kept_gains.py": "GAIN_CACHE_SIZE SAME_STEP",
