@@ -35,7 +35,7 @@ CLEARLY_LESS, ABOUT_AS_MUCH = 0.75, 1.25  # times the power that prediction erro
 UNFOLLOWED = 0.5  # of the residual in torque, that the likelihood takes the disturbance for
 NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
 PERCENT = 100.0
-IN_TORQUE = "least squares in torque"  # the method of a fit that the likelihood is not to be believed for
+ANOTHER = 0.5  # of the inertia, by which the likeliest platform is another than the one that is reported
 
 
 @dataclass(frozen=True)
@@ -69,8 +69,8 @@ class Found:
 
     def with_lines(self, likeliest: Fit, torque_nm: float) -> Found:
         """The same with the spectral lines of what the likeliest model leaves, where that is the final one."""
-        final = self.after.method != IN_TORQUE and set(self.after.structure.effects) <= set(likeliest.structure.effects)
-        lines = lines_left(likeliest, torque_nm) if final and not self.disturbance.depends_on else None
+        final = _describes(likeliest, self.after) and not self.disturbance.depends_on
+        lines = lines_left(likeliest, torque_nm) if final else None
         return self if lines is None else replace(self, disturbance=with_free_form(self.disturbance, lines, {}))
 
     @property
@@ -172,8 +172,7 @@ def search_in_torque(
     lost = [e for e in final.effects if e not in best.structure.effects and effects.get(e).place is not Place.SENSOR]
     if by_likelihood and (unfollowed or lost):
         disturbance = Disturbance(size_nm, unit, size_nm / regression.torque_nm, (), {})
-    # What the likelihood shows beside a model whose numbers are not to be believed is shown beside another platform.
-    if set(final.effects) <= set(known[0].structure.effects) and after.method != IN_TORQUE:
+    if _describes(known[0], after):
         for curve in curves:
             disturbance = with_free_form(disturbance, *curve)
 
@@ -188,6 +187,13 @@ def search_in_torque(
         told, before, after, disturbance, (errors(base), errors(best)),
         lambda: disturbance_of(regression, base, floor, unit),
     )  # fmt: skip
+
+
+def _describes(likeliest: Fit, final: FinalFit) -> bool:
+    """Whether what is left beside the likeliest model is left beside the final one, too."""
+    ours, theirs = (f.values.get(("inertia",), 0.0) for f in (final, likeliest))
+    same = abs(theirs - ours) <= ANOTHER * abs(ours)
+    return same and set(final.structure.effects) <= set(likeliest.structure.effects)
 
 
 def with_free_form(left: Disturbance, curve: Dependence, moves: Mapping[str, float]) -> Disturbance:
@@ -247,7 +253,7 @@ def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace]
     free = free_run_of(traces, fit.structure, values, split.everything)
     return FinalFit(
         fit, values, (*names, *shapes), covariance, free, False, (*determined, *(True for _ in shapes)),
-        IN_TORQUE,
+        "least squares in torque",
     )  # fmt: skip
 
 
