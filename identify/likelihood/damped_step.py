@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from identify.likelihood.descent import Descent
 
 MAX_STEP_TRIALS = 7  # step lengths tried before a direction is given up
-LEAST_DAMPING = 1e-9
+LEVENBERG_DAMPING, LEAST_DAMPING = 1e-4, 1e-9  # of a first step, and after many that went down
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,11 @@ class _Reach:
     low: Array
     high: Array
     ratios: Sequence[bool]  # whether each number of the noise is a ratio to the variance of a reading
+
+
+def begin_damping(d: Descent) -> None:
+    """Damp the next step of a descent as a first one."""
+    d.damping = d.noise_damping = LEVENBERG_DAMPING
 
 
 def step_down(d: Descent, found: Step, of_noise: bool, enough: float) -> bool:

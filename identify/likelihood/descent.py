@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identify.estimate.output_error import held_still
-from identify.likelihood.damped_step import step_down
+from identify.likelihood.damped_step import LEVENBERG_DAMPING, step_down
 from identify.likelihood.derivatives import GAIN_STEP, Derivatives, Standpoint, derivatives
 from identify.likelihood.fit import Columns, Fit, Look, Prediction
 from identify.likelihood.gyro_biases import settle_biases
 from identify.likelihood.noise_search import kinds_of_noise, noise_on_grid
 from identify.likelihood.normal_equations import (
     COST_TOLERANCE,
-    LEVENBERG_DAMPING,
     MAX_LOG_STEP,
     Step,
     level_of,

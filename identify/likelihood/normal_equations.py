@@ -15,7 +15,6 @@ from rig.arrays import Array
 VarianceOf = Callable[[float, int], tuple[float, bool]]
 SINGULAR = 1e-9  # of the largest singular value of a scaled normal matrix
 COST_TOLERANCE = 0.5  # fall of the cost below which a fit has arrived
-LEVENBERG_DAMPING = 1e-4  # of a first step
 MAX_LOG_STEP = 4.0  # by which a logarithm of the noise may fall in one step
 MAX_NOISE_FACTOR = 1e12  # times itself, that a number of the noise may become in one step
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from identify.likelihood.damped_step import begin_damping
 from identify.likelihood.noise_search import likeliest_noise
-from identify.likelihood.normal_equations import COST_TOLERANCE, LEVENBERG_DAMPING
+from identify.likelihood.normal_equations import COST_TOLERANCE
 from rig.dynamics.gains import Noise
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def other_noise(descent: Descent, lower: bool = True) -> bool:
         noise_alone(descent)
     if lower:
         without_disturbance(descent)
-    descent.damping = descent.noise_damping = LEVENBERG_DAMPING
+    begin_damping(descent)
     return descent.cost < before - COST_TOLERANCE
 
 
@@ -93,7 +94,7 @@ def without_disturbance(descent: Descent) -> None:
         descent.noise = descent.problem.within(replace(q, **less))
         descent.looks = descent.looks_at(descent.x, descent.noise, descent.shots)
         descent.cost = descent.cost_of(descent.looks)
-        descent.damping = descent.noise_damping = LEVENBERG_DAMPING
+        begin_damping(descent)
         for _ in range(CONTINUATION_STEPS):
             gap = descent.cost - here[-1]
             if (

@@ -19,14 +19,14 @@ ORIGINS = ("derivation: ", "reference: ", "calibration run: ", "set by hand")
 DECIDE_NOTHING: Mapping[str, str] = {
     "likelihood/by_prediction_error.py": "MAX_ITERATIONS MAX_SAMPLES",
     "likelihood/derivatives.py": "BIAS_STEP GAIN_STEP NOISE_STEP RAN_AWAY START_STEP",
-    "likelihood/damped_step.py": "LEAST_DAMPING MAX_STEP_TRIALS",
+    "likelihood/damped_step.py": "LEAST_DAMPING LEVENBERG_DAMPING MAX_STEP_TRIALS",
     "likelihood/descent.py": "COARSE_TOLERANCE DIFFERENCE_STEP EARLY_STEPS STALLED_STEPS",
     "likelihood/fit.py": "MAX_LINEAR_INERTIA_CHANGE",
     "likelihood/gyro_biases.py": "BIAS_STEPS",
     "likelihood/kept_gains.py": "GAIN_CACHE_SIZE SAME_STEP",
     "likelihood/noise_search.py": "BESIDE COLOURED_SHARES GRADIENT_TOLERANCE INFEASIBLE_COST INITIAL_BIAS_WALK LITTLE "
     "LOG_STEP MAX_ITERATIONS WHITE_SHARES",
-    "likelihood/normal_equations.py": "COST_TOLERANCE LEVENBERG_DAMPING MAX_LOG_STEP MAX_NOISE_FACTOR SINGULAR",
+    "likelihood/normal_equations.py": "COST_TOLERANCE MAX_LOG_STEP MAX_NOISE_FACTOR SINGULAR",
     "likelihood/other_noise.py": "BIAS_WALK_STARTS CONTINUATION_LEVELS CONTINUATION_STEPS DISTURBANCE_START_FACTORS "
     "EXCHANGED_TIME_FACTORS LARGE_DISTURBANCE MAX_GAP_RATIO NOISE_START_FACTORS",
     "likelihood/prediction_error.py": "FAR LEAST_UNREAD_VARIANCE LONG_RUN_SAMPLES MAX_DISTURBANCE MAX_ENCODER_ERROR "
