@@ -34,6 +34,7 @@ BLOCKS = 30  # of all runs together, over which scores scatter: their ratio is t
 CHANCE = 0.95  # quantile of a ratio of variances: what chance alone reaches is no sign of a wrong likelihood
 MIN_RUNS = 4  # whose scores show whether runs differ
 ALONE = 1e-3  # of a parameter's influence, that the others leave: of less only rounding is seen
+ADDED_SUPPORT = 20.0  # support of an effect that is added: no chance among all candidates and their shapes makes it
 STRONG_SUPPORT = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
 WEIGHT = 0.20  # share of the disturbance that an effect takes away to be named: below, it is true but small
 MAX_EFFECTS = 6  # that one recording is believed to show

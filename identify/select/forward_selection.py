@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 from identify.likelihood.fit import Fit
 from identify.propose.innovation_score import Score
 from identify.select.curve_rivals import is_beaten
-from identify.select.evidence import MAX_EFFECTS, STRONG_SUPPORT, WEIGHT, Evidence
-from identify.select.trial_fits import FULL_ITERATIONS, HOPE
+from identify.select.evidence import ADDED_SUPPORT, MAX_EFFECTS, STRONG_SUPPORT, WEIGHT, Evidence
+from identify.select.trial_fits import FULL_ITERATIONS
 from rig import effects
 
 if TYPE_CHECKING:
@@ -77,13 +77,13 @@ def _is_series(search: Stepwise, now: Fit, name: str) -> bool:
 def _pair(search: Stepwise, now: Fit, scores: Sequence[Score]) -> Evidence | None:
     """The likeliest two effects at once that are worth it together; None where none are."""
     seen = [search.weigher.evidence(one, now, fit) for one, fit in search.trials.pairs(now, scores)]
-    good = [e for e in seen if e.support > HOPE and e.weight > WEIGHT]
+    good = [e for e in seen if e.support > ADDED_SUPPORT and e.weight > WEIGHT]
     return min(good, key=lambda e: e.fit.penalised, default=None)
 
 
 def _on_trial(tried: Mapping[str, Evidence]) -> Evidence | None:
     """The likeliest effect that is proven, though it carries little torque as yet."""
-    proven = [e for e in tried.values() if e.support > HOPE and e.unfollowed_share > WEIGHT]
+    proven = [e for e in tried.values() if e.support > ADDED_SUPPORT and e.unfollowed_share > WEIGHT]
     return min(proven, key=lambda e: e.fit.penalised, default=None)
 
 

@@ -20,6 +20,7 @@ from identify.model.structure import Structure
 from identify.propose.innovation_score import Score
 from identify.select.curve_rivals import against_curves
 from identify.select.evidence import (
+    ADDED_SUPPORT,
     STRONG_SUPPORT,
     TRUSTED,
     WEIGHT,
@@ -31,7 +32,7 @@ from identify.select.forward_selection import Round, add_effects
 from identify.select.free_form_residual import FreeFormFit, fit_free_forms, redundant_given
 from identify.select.preference import no_possible_gain, prefers_special_case, simplest
 from identify.select.replaced_terms import CERTAIN, replace_linear_terms
-from identify.select.trial_fits import FULL_ITERATIONS, HOPE, TRIAL_ITERATIONS, TrialFits
+from identify.select.trial_fits import FULL_ITERATIONS, TRIAL_ITERATIONS, TrialFits
 from rig import effects
 from rig.platform import TERMS
 
@@ -132,7 +133,7 @@ class Stepwise:
 
     def best_candidate(self, tried: Mapping[str, Evidence]) -> str | None:
         """The candidate that is best supported, or the simplest of those that are as likely; None where none counts."""
-        good = {n: e for n, e in tried.items() if e.support > HOPE and e.weight > WEIGHT}
+        good = {n: e for n, e in tried.items() if e.support > ADDED_SUPPORT and e.weight > WEIGHT}
         if not good:
             return None
         best = min(good.values(), key=lambda e: e.fit.penalised)
@@ -228,7 +229,7 @@ class Stepwise:
     def _has_more(self, rich: Evidence, special: Evidence) -> bool:
         """Whether an effect is worth it after its special case, judged as it was when it was added."""
         more = self.weigher.evidence(rich.effect, special.fit, rich.fit)
-        return more.support > HOPE and more.weight > WEIGHT
+        return more.support > ADDED_SUPPORT and more.weight > WEIGHT
 
     def on_all(self, fit: Fit) -> Fit:
         """The same model on all samples."""

@@ -29,7 +29,7 @@ from rig.platform import TERMS
 
 _Item = TypeVar("_Item")
 
-HOPE = 20.0  # fall of the cost, parameters paid for, that no chance among all candidates and shapes makes
+HOPE = 20.0  # of a score, parameters paid for: less would not be added when fitted
 TRIED = 4  # candidates of a round, by their scores, that are fitted
 PAIRS = 2  # pairs of a round, by their scores, that are fitted
 HEAVIEST = 3  # candidates by their weight in torque that are fitted beside those
