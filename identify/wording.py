@@ -232,8 +232,9 @@ def residual_torque_sentence(left: Disturbance, axis: str) -> str:
 
 def depends_on(quantity: str, axis: str) -> str:
     """What a torque depends on, in words: "angle" is "position" on a linear axis, "history" the past motion."""
-    words = {"angle": "position", "rate": "speed", "torque": "force"} if axis == "linear" else {}
-    return "past motion" if quantity == "history" else words.get(quantity, quantity)
+    words = {"history": "past motion", "frequency": "frequency (spectral lines)"}
+    words |= {"angle": "position", "rate": "speed", "torque": "force"} if axis == "linear" else {}
+    return words.get(quantity, quantity)
 
 
 def without(times: float) -> str:
