@@ -42,7 +42,6 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "select/disturbance_lines.py": "FLOOR_BINS LOWEST_BIN SHORTEST",
     "select/evidence.py": "ALONE",
     "select/field_search.py": "ANOTHER NO_WORSE PERCENT",
-    "select/forward_selection.py": "SERIES",
     "select/free_form_residual.py": "HOPE SHOWN STEPS TRIED",
     "select/likelihood_search.py": "ALL MORE SAMPLES",
     "select/stepwise.py": "MIN_RIVAL_SHARE PROMISING",
