@@ -19,10 +19,12 @@ from identify.results import Candidate
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
 from identify.runs.reduced import reduced
+from identify.select.curve_rivals import CURVES
 from identify.select.evidence import STRONG_SUPPORT, EvidenceModel, support_difference
 from identify.select.search_state import Search
 from identify.select.stepwise import AT_NOISE, Stepwise
 from identify.signals.trace import Trace, pooled_noise
+from rig import effects
 from rig.platform import TERMS
 
 SAMPLES = 10_000  # that the search looks at
@@ -87,12 +89,15 @@ class LikelihoodSearch:
     def refutes(self, fit: TorqueFit) -> bool:
         """Whether the best model is likelier than one found in torque, also where that has its own best numbers.
 
-        A curve that is believed beside the best model belongs to it: what it shows is not another effect of that kind.
+        A curve that is believed beside the best model belongs to it where all that was found is of the kind that the
+        curve stands for: what it shows is not another effect of that kind.
         """
         search = self.stepwise
         if fit.structure == search.best.structure:
             return False
-        best = search.best if search.left is None else search.left.evidence.fit
+        left, added = search.left, [e for e in fit.structure.effects if e not in search.base.structure.effects]
+        beside = left is not None and all(left.form in CURVES.get(effects.get(e).family, ()) for e in added)
+        best = left.evidence.fit if left is not None and beside else search.best
         there = search.problem.fit(fit.structure, fit.values)
         return bool(np.isfinite(there.cost)) and support_difference(there, best) > STRONG_SUPPORT
 
