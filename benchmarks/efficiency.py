@@ -29,7 +29,7 @@ from benchmarks.campaigns import (
     traces_from,
     white,
 )  # fmt: skip
-from identify.bounds.identifiability import Information, information_of, together
+from identify.bounds.cramer_rao import Information, information_of, together
 from identify.model.parameters import Name
 from identify.signals.trace import Trace
 from rig.arrays import Array

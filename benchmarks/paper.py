@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.line_chart import panel, stacked, svg
-from identify.bounds.identifiability import of_planned
+from identify.bounds.cramer_rao import of_planned
 from identify.estimate.regression import Regression, fit
 from identify.model.structure import Structure
 from identify.signals.prepare import prepare

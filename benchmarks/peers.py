@@ -36,7 +36,7 @@ from benchmarks.campaigns import (
     traces_from,
     white,
 )
-from identify.bounds.identifiability import information_of, together
+from identify.bounds.cramer_rao import information_of, together
 from identify.signals.trace import Trace
 from rig.arrays import Array
 from rig.platform import Platform

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from identify.conclude.acceptance import interrupted_reason
 from identify.conclude.case import Case
 from identify.conclude.conclusion import conclude
 from identify.conclude.contribution import contributions
 from identify.conclude.declared_values import declared_values
 from identify.conclude.error_figures import floor_of, in_torque, measure
 from identify.conclude.final_models import FinalModels
-from identify.conclude.next_steps import interrupted_reason
 from identify.diagnose.decay_disturbance import left_of_a_decay
 from identify.estimate.final_fit import FinalFit
 from identify.estimate.initial_guess import Start, first_guess

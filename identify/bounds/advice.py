@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.bounds.identifiability import DELAY, Information, together
+from identify.bounds.cramer_rao import DELAY, Information, together
 from identify.model.parameters import Name
 from identify.wording import SYMBOLS, joined, number, plain
 from rig import effects

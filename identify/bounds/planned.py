@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.bounds import advice
-from identify.bounds.identifiability import Information, of_planned, with_delay
+from identify.bounds.cramer_rao import Information, of_planned, with_delay
 from rig.excitation import PlannedSet
 from rig.platform import Platform
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.bounds.identifiability import information_of, with_delay
+from identify.bounds.cramer_rao import information_of, with_delay
 from identify.bounds.planned import lines_of
 from identify.estimate.initial_guess import Start, first_guess
 from identify.estimate.regression import Regression, fit

@@ -1,21 +1,40 @@
-"""What of the residual torque speaks against acceptance, one of the reasons in ``conclusion``; an error that grew."""
+"""Why a result is not accepted: every reason and its sentence; ``conclusion`` puts those that hold together."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 from identify.residual import Disturbance
-from identify.results import ModelResult
-from identify.wording import SYMBOLS, depends_on, joined, number
+from identify.results import GeneticRun, Identification, ModelResult
+from identify.runs.sign_convention import signs
+from identify.wording import SYMBOLS, depends_on, joined, number, percent, plain
 from rig.config.identify import AcceptConfig
 from rig.platform import TERMS
 
-MAX_ERROR_GROWTH = 1.02  # times the declared model's error: less is chance
+INTERRUPTED = "the search was interrupted"
+USUAL_CUTOFF_HZ = 50.0
 
 
 def of_reported(left: Disturbance, model: ModelResult) -> Disturbance:
     """Without what it does to parameters that are not reported."""
     return replace(left, moves_percent={k: v for k, v in left.moves_percent.items() if k in model.parameters})
+
+
+def reasons_against_fit(searched: Sequence[GeneticRun], final: ModelResult) -> list[str]:
+    """Sets that stay above J_dec (Eq. 14) though the search was repeated, and parameters that are not determined.
+
+    Parameters
+    ----------
+    searched
+        The genetic searches that have to reach J_dec.
+    """
+    above = [
+        f"{g.name}: the objective {g.objective:.4g} is still above J_dec {g.j_dec:.4g} after {g.restarts} repeats"
+        for g in searched if not g.accepted
+    ]  # fmt: skip
+    return above + [f"{x.name} is not determined: {x.reason}" for x in final.not_determined]
 
 
 def reasons_against_disturbance(left: Disturbance, accept: AcceptConfig, axis: str) -> list[str]:
@@ -42,14 +61,36 @@ def reasons_against_disturbance(left: Disturbance, accept: AcceptConfig, axis: s
     return out
 
 
-def grown(before: ModelResult, after: ModelResult | None) -> str:
-    """Why an error in the table grew although the model is better; empty where none did."""
-    if after is None:
-        return ""
-    old, new = before.error.holdout_rate_rms, after.error.holdout_rate_rms
-    if old is None or new is None or new <= MAX_ERROR_GROWTH * old:
-        return ""
-    return (
-        "The final model's held-out error in free run is larger than the declared model's. Over a whole run, a torque "
-        "that was not recorded accumulates, so this error says little about the model; the torque residual decided."
-    )
+def interrupted_reason(named: Sequence[str]) -> str:
+    """Why the results of a search that somebody stopped are not accepted; ``named`` are the effects proven by then."""
+    if not named:
+        return f"{INTERRUPTED}; missing effects are not yet determined"
+    proven = joined([plain(name) for name in named])
+    verb = "was" if len(named) == 1 else "were"
+    return f"{INTERRUPTED} after {proven} {verb} proven; whether more is missing is not yet determined"
+
+
+def opposite_signs(found: Identification) -> bool:
+    """Whether torque and motion were recorded with opposite sign conventions."""
+    seen = signs(found.traces, found.final.error.lowpass_hz or USUAL_CUTOFF_HZ) if found.traces else None
+    return seen is not None and seen.opposite
+
+
+def unexplained_reason(chi_square: float, found: Identification) -> str:
+    """Why a residual that stays is no matter of noise: in units of the sensor's noise, and of the signal.
+
+    ``chi_square`` is the reduced one of the residual.
+    """
+    error, share = found.final.error, ""
+    force = "force" if found.axis == "linear" else "torque"
+    relative = error.holdout_torque_relative
+    if relative is not None and math.isfinite(relative):
+        share = f"{percent(100.0 * relative).lstrip('+')} of the {force}"
+    elif error.holdout_fit_percent is not None and math.isfinite(error.holdout_fit_percent):
+        share = f"{percent(100.0 - error.holdout_fit_percent).lstrip('+')} of the motion"
+    size = f"{number(math.sqrt(chi_square), 3)} times the sensor's noise"
+    amount = f"{share} ({size})" if share else size
+    acts = "no effect that was tried describes it"
+    if found.verdict.left_open:
+        acts = "the cause of a part of it is not determined (see the verdict)"
+    return f"the model leaves {amount} unexplained: {acts}"

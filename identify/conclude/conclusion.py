@@ -7,12 +7,17 @@ from dataclasses import replace
 import numpy as np
 
 from identify.bounds.damping_or_lag import lag_for_damping
-from identify.conclude.acceptance import grown, of_reported, reasons_against_disturbance
+from identify.conclude.acceptance import (
+    of_reported,
+    opposite_signs,
+    reasons_against_disturbance,
+    reasons_against_fit,
+    unexplained_reason,
+)
 from identify.conclude.case import Case, runs_fitted
-from identify.conclude.error_figures import Measured
+from identify.conclude.error_figures import Measured, grown
 from identify.conclude.max_error import with_max_error
 from identify.conclude.model_result import model_of, to_build_on
-from identify.conclude.next_steps import opposite_signs, unexplained_reason
 from identify.conclude.verdict import sentences_of
 from identify.diagnose.diagnosis import with_diagnosis
 from identify.estimate.final_fit import FinalFit
@@ -84,13 +89,8 @@ def conclude(
         tells_apart=search.tells_apart,
         explained_fraction=1.0 - _fraction(measured_before, measured_after, floor) if changed else 0.0,
     )
-    reasons = []
     searched = [g for g in (*(s.genetic for s in per_set), joint) if g is not None]
-    reasons += [
-        f"{g.name}: the objective {g.objective:.4g} is still above J_dec {g.j_dec:.4g} after {g.restarts} repeats"
-        for g in searched if after.sensor_limited and not g.accepted
-    ]  # fmt: skip
-    reasons += [f"{x.name} is not determined: {x.reason}" for x in final.not_determined]
+    reasons = reasons_against_fit(searched if after.sensor_limited else (), final)
     reference, per_set = with_max_error(per_set, case.settings.reference)
     material = measured is None and unexplained
     if measured is not None:

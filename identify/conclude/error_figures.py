@@ -12,13 +12,14 @@ from identify.diagnose.torque_residual import TorqueResidual, relative, torque_n
 from identify.estimate.final_fit import FinalFit
 from identify.genetic.linear_traces import linear_traces
 from identify.model.structure import Structure
-from identify.results import Errors, NoiseFloor
+from identify.results import Errors, ModelResult, NoiseFloor
 from identify.runs.holdout import Split
 from identify.select.field_search import TorqueErrors
 from identify.signals.trace import Trace, pooled_noise
 from rig.recording.run import Array
 
 EDGE_PERIODS = 3.0  # of the cut-off, left out at both ends of a run
+MAX_ERROR_GROWTH = 1.02  # times the declared model's error: less is chance
 
 
 @dataclass(frozen=True)
@@ -96,4 +97,17 @@ def floor_of(traces: Sequence[Trace], split: Split, fitted: FinalFit, cutoff_hz:
         residual_rms_torque=None if np.isnan(torque) else torque,
         holdout_rate_rms=pooled_noise(traces),
         source="given" if given else "estimated",
+    )
+
+
+def grown(before: ModelResult, after: ModelResult | None) -> str:
+    """Why an error in the table grew although the model is better; empty where none did."""
+    if after is None:
+        return ""
+    old, new = before.error.holdout_rate_rms, after.error.holdout_rate_rms
+    if old is None or new is None or new <= MAX_ERROR_GROWTH * old:
+        return ""
+    return (
+        "The final model's held-out error in free run is larger than the declared model's. Over a whole run, a torque "
+        "that was not recorded accumulates, so this error says little about the model; the torque residual decided."
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from identify.conclude.next_steps import opposite_signs
+from identify.conclude.acceptance import opposite_signs
 from identify.model.parameter_fit import reduced_chi_square
 from identify.results import Identification
 from identify.runs.sign_convention import SENTENCE
@@ -29,7 +29,7 @@ UNITS = {("rotary", "rate"): "rad/s", ("rotary", "angle"): "rad", ("linear", "ra
 
 def headline(found: Identification) -> tuple[str, str, str]:
     """Three sentences for the first screen of the report."""
-    return _found(found), _error(found), acceptance(found)
+    return _found(found), _error(found), accepted_or_not(found)
 
 
 def _found(found: Identification) -> str:
@@ -87,7 +87,7 @@ def _error(found: Identification) -> str:
     return f"{text}{times}{'; without it, ' + joined(moved) if moved else ''}."
 
 
-def acceptance(found: Identification) -> str:
+def accepted_or_not(found: Identification) -> str:
     """Accepted or not, and why, in one sentence."""
     if not found.accepted:
         shown, more = list(found.reasons[:MAX_REASONS]), len(found.reasons) - MAX_REASONS

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from identify.bounds.jumps import JUMP
+from identify.conclude.acceptance import INTERRUPTED, USUAL_CUTOFF_HZ, opposite_signs
 from identify.diagnose import torque_noise
 from identify.diagnose.torque_residual import dependence
 from identify.diagnose.wording import is_significant
 from identify.model.parameter_fit import reduced_chi_square
 from identify.results import GeneticRun, Identification, ResidualDiagnosis, RunTraces, follow_up_file_name
-from identify.runs.sign_convention import SENTENCE, signs
-from identify.wording import capital, joined, number, percent, plain
+from identify.runs.sign_convention import SENTENCE
+from identify.wording import capital, joined, number, plain
 
 MIN_SHARE = 0.1  # share of the residual's power from which it is said to depend on a quantity
-USUAL_CUTOFF_HZ = 50.0
 RUN = {
     "rate": (
         "To separate friction from damping, vary the speed: add a slow ramp to a torque that is held and released, and "
@@ -92,7 +91,6 @@ COLOURED = (
 )
 REPEAT = "Play the campaign again and compare the results; `rig check` predicts what each set can determine."
 RECORD_AGAIN = "Record the campaign again and compare the results."
-INTERRUPTED = "the search was interrupted"
 IDENTIFY_AGAIN = "Identify this recording again and let the search come to its end; nothing has to be played for it."
 NOISE_LIMITED = 4.0**2  # reduced chi-square
 START_SAMPLES = 3  # of a run: the first ones
@@ -125,41 +123,6 @@ def next_steps(found: Identification) -> tuple[str, ...]:
     if found.aborted:
         steps.append("The campaign was aborted: play it again in full.")
     return tuple(steps) or (RECORD_AGAIN if found.recorded else REPEAT,)
-
-
-def interrupted_reason(named: Sequence[str]) -> str:
-    """Why the results of a search that somebody stopped are not accepted; ``named`` are the effects proven by then."""
-    if not named:
-        return f"{INTERRUPTED}; missing effects are not yet determined"
-    proven = joined([plain(name) for name in named])
-    verb = "was" if len(named) == 1 else "were"
-    return f"{INTERRUPTED} after {proven} {verb} proven; whether more is missing is not yet determined"
-
-
-def opposite_signs(found: Identification) -> bool:
-    """Whether torque and motion were recorded with opposite sign conventions."""
-    seen = signs(found.traces, found.final.error.lowpass_hz or USUAL_CUTOFF_HZ) if found.traces else None
-    return seen is not None and seen.opposite
-
-
-def unexplained_reason(chi_square: float, found: Identification) -> str:
-    """Why a residual that stays is no matter of noise: in units of the sensor's noise, and of the signal.
-
-    ``chi_square`` is the reduced one of the residual.
-    """
-    error, share = found.final.error, ""
-    force = "force" if found.axis == "linear" else "torque"
-    relative = error.holdout_torque_relative
-    if relative is not None and math.isfinite(relative):
-        share = f"{percent(100.0 * relative).lstrip('+')} of the {force}"
-    elif error.holdout_fit_percent is not None and math.isfinite(error.holdout_fit_percent):
-        share = f"{percent(100.0 - error.holdout_fit_percent).lstrip('+')} of the motion"
-    size = f"{number(math.sqrt(chi_square), 3)} times the sensor's noise"
-    amount = f"{share} ({size})" if share else size
-    acts = "no effect that was tried describes it"
-    if found.verdict.left_open:
-        acts = "the cause of a part of it is not determined (see the verdict)"
-    return f"the model leaves {amount} unexplained: {acts}"
 
 
 def torque_free(found: Identification) -> bool:

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from identify.conclude.next_steps import opposite_signs
+from identify.conclude.acceptance import opposite_signs
 from identify.results import Identification, Implausible
 from identify.wording import SYMBOLS, half_interval, joined, number
 from rig.platform import TERMS

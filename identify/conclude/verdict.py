@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from identify.bounds.advice import WELL_KNOWN
-from identify.conclude.acceptance import of_reported
-from identify.conclude.next_steps import opposite_signs, to_determine, torque_free
+from identify.conclude.acceptance import of_reported, opposite_signs
+from identify.conclude.next_steps import to_determine, torque_free
 from identify.results import Identification
 from identify.runs.measured_channels import REFUSED
 from identify.runs.sign_convention import SENTENCE

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.bounds.identifiability import vector_of
+from identify.bounds.cramer_rao import vector_of
 from identify.estimate.evaluation import evaluate
 from identify.estimate.output_error import OutputErrorFit, refine
 from identify.follow_up.separation import Way, prior_of

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from identify.bounds.achieved import usable_traces
+from identify.bounds.bound_and_estimate import usable_traces
 from identify.follow_up.choice import MIN_CHI_SQUARE, Looks, choose
 from identify.follow_up.excitations import Candidate, candidates, fitting, shapes
 from identify.follow_up.pairs import Pair, pairs_of

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.bounds.achieved import usable_traces
-from identify.bounds.identifiability import vector_of
+from identify.bounds.bound_and_estimate import usable_traces
+from identify.bounds.cramer_rao import vector_of
 from identify.conclude.error_figures import measure
 from identify.conclude.next_steps import USUAL_CUTOFF_HZ
 from identify.estimate.final_fit import NEAR_FLOOR, FinalFit

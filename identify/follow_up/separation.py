@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from identify.bounds.identifiability import Information, information_of, planned_trace, vector_of
+from identify.bounds.cramer_rao import Information, information_of, planned_trace, vector_of
 from identify.model.parameters import bounds_of, ordered, platform_of
 from identify.signals.trace import Trace
 from identify.simulate.sensitivities import nuisance_basis, sensitivities

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.bounds.identifiability import information_of
+from identify.bounds.cramer_rao import information_of
 from identify.estimate.final_fit import FinalFit, _regression_covariance
 from identify.estimate.initial_guess import Start
 from identify.estimate.initial_state_sensitivity import least_std_errors

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.bounds.identifiability import vector_of
+from identify.bounds.cramer_rao import vector_of
 from identify.estimate.output_error import refine
 from identify.follow_up.pairs import free_run
 from identify.proof.compensation import linear_part

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from identify.conclude.expected_delay import delay_lines
-from identify.conclude.headline import acceptance
+from identify.conclude.headline import accepted_or_not
 from identify.conclude.next_steps import next_steps
 from identify.follow_up.wording import lines as follow_up_lines
 from identify.proof.wording import lines as proof_lines
@@ -104,7 +104,7 @@ def _outcome(identification: Identification) -> list[RenderableType]:
         head = Text("ABORTED: these results use only the samples recorded before the stop.", style="bold red")
     elif identification.accepted:
         head = Text("ACCEPTED", style="bold green")
-        lines = [acceptance(identification).removeprefix("Accepted: ")]
+        lines = [accepted_or_not(identification).removeprefix("Accepted: ")]
     else:
         head = Text("NOT ACCEPTED", style="bold red")
     why = [Padding(Text(printable(f"- {capital(line)}")), (0, 0, 0, 2)) for line in lines]

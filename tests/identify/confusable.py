@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.bounds.identifiability import planned_trace, vector_of
+from identify.bounds.cramer_rao import planned_trace, vector_of
 from identify.estimate.output_error import refine
 from identify.results import Errors, Identification, ModelResult, NoiseFloor, Verdict
 from rig.excitation import PlannedSet, Sine

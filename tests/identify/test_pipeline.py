@@ -10,7 +10,7 @@ from typing import get_type_hints
 import numpy as np
 import pytest
 
-from identify.conclude.next_steps import interrupted_reason
+from identify.conclude.acceptance import interrupted_reason
 from identify.pipeline import identify
 from identify.report.files import result_json
 from identify.results import Identification

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from identify.bounds.achieved import BoundComparison
+from identify.bounds.bound_and_estimate import BoundComparison
 from identify.report.page.markup import Markup, Piece, element, join, table
 from identify.wording import SYMBOLS, capital, number
 

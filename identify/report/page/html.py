@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from identify.bounds.achieved import compare_with_bound
+from identify.bounds.bound_and_estimate import compare_with_bound
 from identify.conclude.expected_delay import delay_lines
 from identify.conclude.next_steps import next_steps
 from identify.diagnose.wording import diagnosis_sentences

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from identify.conclude.headline import acceptance, headline
+from identify.conclude.headline import accepted_or_not, headline
 from identify.residual import Dependence, Disturbance
 from tests.identify.sample import sample, unhappy
 
@@ -30,16 +30,18 @@ def test_without_a_change_the_model_that_stands_is_spoken_of_alone() -> None:
 
 def test_what_is_left_is_said_with_its_size_and_what_it_moves() -> None:
     left = Disturbance(0.2, "N*m", 0.02, (Dependence("angle", 0.1, 0.015, 1e-6),), {"inertia": 0.4, "stiffness": 1.2})
-    said = acceptance(replace(FOUND, disturbance=left))
+    said = accepted_or_not(replace(FOUND, disturbance=left))
     assert "depends on the angle is 1.5 % of the torque and moves J by 0.40 % and K by 1.2 %, which is allowed" in said
     noise = replace(left, depends_on=(), moves_percent={})
-    assert "(2.0 % of the torque) depends on nothing that was tested" in acceptance(replace(FOUND, disturbance=noise))
+    assert "(2.0 % of the torque) depends on nothing that was tested" in accepted_or_not(
+        replace(FOUND, disturbance=noise)
+    )
 
 
 def test_a_refusal_gives_its_first_reasons_and_counts_the_rest() -> None:
     refused = replace(FOUND, accepted=False, reasons=("one is wrong", "two is wrong", "three is wrong"))
-    assert acceptance(refused) == "Not accepted: one is wrong; two is wrong (1 more reason below)."
-    assert acceptance(replace(refused, aborted=True)).startswith("Aborted: ")
+    assert accepted_or_not(refused) == "Not accepted: one is wrong; two is wrong (1 more reason below)."
+    assert accepted_or_not(replace(refused, aborted=True)).startswith("Aborted: ")
     assert len(headline(unhappy())) == 3
 
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.conclude.next_steps import interrupted_reason, next_steps, unexplained_reason
+from identify.conclude.acceptance import interrupted_reason, unexplained_reason
+from identify.conclude.next_steps import next_steps
 from identify.diagnose.torque_residual import dependence
 from identify.report.files import result_json
 from identify.report.page import report_html

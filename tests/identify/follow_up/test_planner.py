@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.blind.excitations import read
-from identify.bounds.identifiability import planned_trace
+from identify.bounds.cramer_rao import planned_trace
 from identify.follow_up.choice import GOOD, MIN_CHI_SQUARE
 from identify.follow_up.pairs import free_run, never_reason
 from identify.follow_up.planner import plan_follow_up, with_follow_up

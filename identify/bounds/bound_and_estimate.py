@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identify.bounds import advice
-from identify.bounds.identifiability import Information, information_of, together
+from identify.bounds.cramer_rao import Information, information_of, together
 from identify.bounds.recorded import MIN_SAMPLES, silent
 from identify.model.parameters import Name
 from identify.results import Identification, ParameterEstimate

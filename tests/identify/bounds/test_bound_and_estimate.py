@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.bounds.achieved import TOTAL, compare_with_bound
+from identify.bounds.bound_and_estimate import TOTAL, compare_with_bound
 from identify.report.page.determined import determined_table
 from identify.results import Identification
 from rig.dynamics import TorqueSignal, simulate

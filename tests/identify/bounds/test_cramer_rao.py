@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from identify.bounds import advice
-from identify.bounds.identifiability import Information, information_of, of_planned, planned_trace, together, with_delay
+from identify.bounds.cramer_rao import Information, information_of, of_planned, planned_trace, together, with_delay
 from identify.bounds.planned import of_planned_campaign
 from identify.bounds.recorded import of_recorded_campaign
 from rig.excitation import Sine, planned
