@@ -18,7 +18,7 @@ from identify.likelihood.damped_step import LEVENBERG_DAMPING, step_down
 from identify.likelihood.derivatives import GAIN_STEP, Derivatives, Standpoint, derivatives
 from identify.likelihood.fit import Columns, Fit, Look, Prediction
 from identify.likelihood.gyro_biases import settle_biases
-from identify.likelihood.noise_search import kinds_of_noise, noise_on_grid
+from identify.likelihood.noise_grid import kinds_of_noise, noise_on_grid
 from identify.likelihood.normal_equations import (
     COST_TOLERANCE,
     MAX_LOG_STEP,
@@ -182,7 +182,6 @@ class Descent:
     def _derivatives(self, of_noise: bool, of_gains: bool) -> list[Derivatives]:
         """Every run's derivatives, where the descent stands."""
         free = [k for k in range(len(self.names)) if not self.still[k]]
-        there = Standpoint(self.problem, self.structure, self.names, self.x, self.noise, self.shots, self.looks)
 
         def steps(relative: float, places: Sequence[int]) -> dict[int, float]:
             size = relative * self.scale * np.where(self.x + relative * self.scale > self.high, -1.0, 1.0)
@@ -190,8 +189,11 @@ class Descent:
 
         shaping = [k for k in free if of_gains and self._shapes_gains(self.names[k])]
         return derivatives(
-            there, steps(DIFFERENCE_STEP, free), self.kinds if of_noise else [], steps(GAIN_STEP, shaping)
+            self._standpoint(), steps(DIFFERENCE_STEP, free), self.kinds if of_noise else [], steps(GAIN_STEP, shaping)
         )
+
+    def _standpoint(self) -> Standpoint:
+        return Standpoint(self.problem, self.structure, self.names, self.x, self.noise, self.shots, self.looks)
 
     @staticmethod
     def _shapes_gains(name: Name) -> bool:
@@ -205,6 +207,11 @@ class Descent:
         found = normal_equations(parts, len(self.x), kinds, self.count, self.problem.variance_of)
         self.information, self._informed = found.information, (self.noise, self.x.tobytes())
         return found
+
+    def of_noise(self) -> Step:
+        """The normal equations of the noise and the runs' own unknowns, where the descent stands."""
+        parts = derivatives(self._standpoint(), {}, self.kinds)
+        return normal_equations(parts, len(self.x), len(self.kinds), self.count, self.problem.variance_of)
 
     def try_step(self, of_noise: bool, enough: float = 0.0) -> bool:
         """One step of parameters, biases and, if asked for, the noise; False where none leads down by ``enough``."""

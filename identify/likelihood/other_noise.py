@@ -8,8 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from identify.likelihood.damped_step import begin_damping
-from identify.likelihood.noise_search import likeliest_noise
+from identify.likelihood.damped_step import begin_damping, step_down
 from identify.likelihood.normal_equations import COST_TOLERANCE
 from rig.dynamics.gains import Noise
 
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
 # Times the disturbance: how far below a model is looked at with parameters that follow.
 CONTINUATION_LEVELS = (1e-3, 1e-6, 1e-10)
 CONTINUATION_STEPS, MAX_GAP_RATIO = 20, 0.7  # steps in which they do, and what each of them leaves of the gap at most
+MAX_STEPS_ALONE = 20  # of the noise alone
 LARGE_DISTURBANCE = 2.0  # reduced chi-square: less of a disturbance is found step by step
 NOISE_START_FACTORS = (  # times white density, slow variance and time constant: where else a noise is looked for
     (0.01, 1.0, 1.0), (10.0, 1.0, 1.0), (1.0, 0.01, 1.0), (1.0, 10.0, 1.0), (1.0, 0.1, 0.1), (1.0, 0.03, 0.01),
@@ -63,12 +63,17 @@ def other_noise(descent: Descent, lower: bool = True) -> bool:
 
 
 def noise_alone(descent: Descent) -> None:
-    """The likeliest noise near this one, if it is likelier with the model as it stands."""
-    noise = likeliest_noise(
-        descent.problem, descent.structure, descent.names, descent.x, descent.shots, descent.looks, descent.weights,
-        descent.noise, descent.kinds,
-    )  # fmt: skip
-    _take_if_likelier(descent, noise)
+    """Down to the nearest noise that is likeliest beside the parameters as they stand.
+
+    A fit steps both together, which is quick where both are near. Far off, the noise has long curved valleys (less
+    noise behind a gyro's low-pass, and all else more), and a step of both would be as short as the noise needs it.
+    """
+    begin_damping(descent)
+    for _ in range(MAX_STEPS_ALONE):
+        before = descent.cost
+        if not (step_down(descent, descent.of_noise(), True, 0.0) and before - descent.cost > COST_TOLERANCE):
+            break
+    begin_damping(descent)
 
 
 def _take_if_likelier(descent: Descent, noise: Noise) -> None:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from identify.likelihood.descent import Descent
 from identify.likelihood.normal_equations import changed
+from identify.likelihood.other_noise import noise_alone
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.signals.prepare import one_noise, prepare
 from identify.signals.trace import MOST_BIAS_RAD_S, Trace
+from rig.dynamics.gains import Noise
 from rig.platform import TERMS
 from tests.identify.simulated import TRUTH, Effects, sine_run
 
@@ -57,3 +62,22 @@ def test_the_noise_ahead_of_a_gyros_low_pass_is_paid_for() -> None:
     fits = [problem.fit(Structure(), platform), problem.fit(Structure().plus("sensor_lag"), late)]
     numbers = [(f.penalised - f.cost) / np.log(f.count) for f in fits]
     assert numbers == pytest.approx([3.0, 5.0])
+
+
+@pytest.mark.parametrize("white, smooth, time", [(1e-4, 1e3, 1.0), (1e3, 1e-4, 10.0), (1e-3, 1e-3, 0.03)])
+def test_the_likeliest_noise_is_found_from_decades_off(white: float, smooth: float, time: float) -> None:
+    problem = PredictionError(traces({"coulomb_friction": {"level": 1.2}}))
+    platform: dict[Name, float] = {(k,): v for k, v in zip(TERMS, TRUTH, strict=True)}
+    known = problem.fit(Structure(), platform)
+
+    def descent(noise: Noise) -> Descent:
+        return Descent(problem, Structure(), known.values, problem.within(noise), known.shots, ())
+
+    best, far = descent(known.noise), known.noise
+    far = replace(far, white=white * far.white, smooth=smooth * far.smooth, time_constant_s=time * far.time_constant_s)
+    moved = descent(far)
+    begun = moved.cost
+    noise_alone(best)
+    noise_alone(moved)
+    assert begun > best.cost + 100.0
+    assert moved.cost < best.cost + 0.01 * (begun - best.cost)
