@@ -57,7 +57,7 @@ class LiveRun:
         )
         assert self.process.stderr is not None
         address = next(found for line in self.process.stderr if (found := re.search(r"http://127\.0\.0\.1\S+", line)))
-        self.browser = Browser(CHROMIUM, folder / "profile", deadline_s=180.0)
+        self.browser = Browser(CHROMIUM, folder / "profile", patience_s=180.0)
         self.browser.open(address[0])
 
     def title(self) -> str:
