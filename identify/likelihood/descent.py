@@ -88,10 +88,10 @@ class Descent:
         self.damping = self.noise_damping = LEVENBERG_DAMPING
         self.weights = [s.weight for s in self.shots]
         self.count = int(sum(w.sum() for w in self.weights)) * p.readings
-        self.kinds = kinds_of_noise(p, structure)
-        self.alone = noise is None or not self._begins(p.within(noise))  # nobody has looked for the noise yet
+        self.kinds = kinds_of_noise(p.bounds, structure)
+        self.alone = noise is None or not self._begins(p.bounds.within(noise))  # nobody has looked for the noise yet
         if self.alone:
-            self._begins(noise_on_grid(p, lambda q: self.cost_of(self.looks_at(self.x, q, self.shots)), smooth))
+            self._begins(noise_on_grid(p.bounds, lambda q: self.cost_of(self.looks_at(self.x, q, self.shots)), smooth))
         settle_biases(self)
         if self.alone and not structure.bends:  # else every look is a prediction
             noise_alone(self)
@@ -222,13 +222,13 @@ class Descent:
         """How far parameters and numbers of the noise may be stepped down and up, (p + k,) each."""
         down, up = self.low - self.x, self.high - self.x
         down[self.still] = up[self.still] = 0.0
-        least, most = self.problem.extremes(self.noise, self.kinds[:kinds])
+        least, most = self.problem.bounds.extremes(self.noise, self.kinds[:kinds])
         fall = np.maximum(np.log(least), -MAX_LOG_STEP)
         return np.append(down, fall), np.append(up, most - 1.0)  # what rises is stepped as a density (``logs_of``)
 
     def with_logs(self, change: Array) -> Noise:
         times = zip(self.kinds, np.exp(change).tolist(), strict=False)
-        return self.problem.within(replace(self.noise, **{k: getattr(self.noise, k) * x for k, x in times}))
+        return self.problem.bounds.within(replace(self.noise, **{k: getattr(self.noise, k) * x for k, x in times}))
 
     def place(self) -> tuple[Noise, Array, list[Shots], list[Look], float]:
         """Where it stands, to go back to."""

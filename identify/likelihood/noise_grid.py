@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from identify.likelihood.noise_bounds import NoiseBounds
 from identify.model.structure import Structure
 from rig import effects
 from rig.dynamics.gains import Noise
-
-if TYPE_CHECKING:
-    from identify.likelihood.prediction_error import PredictionError
 
 INITIAL_BIAS_WALK = 1e-5  # of the rate, over a run
 WHITE_SHARES = (1.0, 0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)  # of the torque, on the grid
@@ -20,21 +17,21 @@ COLOURED_SHARES, BESIDE = (0.3, 0.03, 0.003), (1.0, 0.05)  # of the torque, and 
 LITTLE = 1e-6  # of the torque
 
 
-def kinds_of_noise(problem: PredictionError, structure: Structure) -> list[str]:
+def kinds_of_noise(bounds: NoiseBounds, structure: Structure) -> list[str]:
     """The numbers of the noise that a model has; without a low-pass nothing is ahead of it."""
     out = ["white", "slow", "time_constant_s", "smooth"]
-    if problem.gyro:
+    if bounds.gyro:
         out.append("walk")
         if any(effects.get(e).lag is not None for e in structure.effects):
             out.append("ahead")
-    elif problem.wanders:
+    elif bounds.wanders:
         out += ["walk", "walk_s"]
     return out
 
 
-def noise_on_grid(problem: PredictionError, cost: Callable[[Noise], float], smooth: Sequence[bool]) -> Noise:
+def noise_on_grid(bounds: NoiseBounds, cost: Callable[[Noise], float], smooth: Sequence[bool]) -> Noise:
     """The best of a coarse grid of noises: white alone first, then a coloured part beside it, rough or smooth."""
-    p = problem
+    p = bounds
     times_s = np.geomspace(20.0 * p.step_s, 0.3 * p.slowest_s, 3).tolist()
     gyro = (p.walk(INITIAL_BIAS_WALK), p.step_s, np.inf if p.gyro else 30.0 * p.step_s)
     little = p.slow(LITTLE)

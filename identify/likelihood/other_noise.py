@@ -45,7 +45,7 @@ def other_noise(descent: Descent, lower: bool = True) -> bool:
     ]  # fmt: skip
     others += [{"white": x, "slow": x, "smooth": x, "walk": x} for x in DISTURBANCE_START_FACTORS if wanders]
     if "walk" in descent.kinds and not wanders:
-        others += [{"walk": descent.problem.walk(share) / descent.noise.walk} for share in BIAS_WALK_STARTS]
+        others += [{"walk": descent.problem.bounds.walk(share) / descent.noise.walk} for share in BIAS_WALK_STARTS]
     for times in others:
         q = descent.noise
         _take_if_likelier(descent, replace(q, **{k: x * getattr(q, k) for k, x in times.items()}))
@@ -77,7 +77,7 @@ def noise_alone(descent: Descent) -> None:
 
 
 def _take_if_likelier(descent: Descent, noise: Noise) -> None:
-    noise = descent.problem.within(noise)
+    noise = descent.problem.bounds.within(noise)
     looks = descent.looks_at(descent.x, noise, descent.shots)
     cost = descent.cost_of(looks)
     if cost < descent.cost - COST_TOLERANCE:
@@ -96,7 +96,7 @@ def without_disturbance(descent: Descent) -> None:
     for factor in CONTINUATION_LEVELS:
         q = here[0]
         less = {kind: factor * getattr(q, kind) for kind in ("white", "slow", "smooth")}
-        descent.noise = descent.problem.within(replace(q, **less))
+        descent.noise = descent.problem.bounds.within(replace(q, **less))
         descent.looks = descent.looks_at(descent.x, descent.noise, descent.shots)
         descent.cost = descent.cost_of(descent.looks)
         begin_damping(descent)

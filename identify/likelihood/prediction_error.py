@@ -20,6 +20,7 @@ import numpy as np
 from identify.likelihood.descent import Descent
 from identify.likelihood.fit import Columns, Fit, Look
 from identify.likelihood.kept_gains import KeptGains
+from identify.likelihood.noise_bounds import NoiseBounds
 from identify.likelihood.normal_equations import COST_TOLERANCE
 from identify.likelihood.settling import settled
 from identify.likelihood.workers import Workers
@@ -34,23 +35,12 @@ from rig.dynamics.equations import Equations
 from rig.dynamics.gains import Gains, Noise, Sensing, StartVariance
 from rig.dynamics.predictor import predict_ahead
 
-LONGEST_SHARE = 0.2  # of the longest run: a disturbance slower than that is a constant
-SHORTEST_SAMPLES = 4.0  # time constant of a disturbance, in samples: a faster one is white
-MIN_DISTURBANCE, MAX_DISTURBANCE = 1e-7, 10.0  # of the torque: how large a disturbance may be
-# Of the torque, how large a smooth disturbance may be: a larger one follows the motion wherever it goes, whatever the
-# recorded torque says, and a noisy record of the torque would then be taken for no record at all.
-MAX_SMOOTH = 0.1
-MIN_BIAS_WALK, MAX_BIAS_WALK = 1e-7, 0.01  # of the rate, that a gyro's bias walks over a run
-MAX_ENCODER_ERROR = 1.0  # of the angle, that an encoder's slow error takes over a run
-# Times the variance of one reading, of a gyro's noise ahead of its low-pass.
-MIN_PREFILTER_NOISE, MAX_PREFILTER_NOISE = 1e-3, 1e8
 # Of the motion, root mean square, by which a start state may be off: the smoothed motion is worst where a run begins.
 START_RATE, START_ANGLE, UNKNOWN_ANGLE = 0.1, 0.05, 1.0
 LONG_RUN_SAMPLES = 10_000  # of a run: two threads predict such runs sooner than one
 # Of what the readings show above the motion: the sensor's noise is no smaller; nor than the other where motion reaches
 # up there and is read for noise, for beside a sensor without any noise all is disturbance.
 LEAST_VARIANCE, LEAST_UNREAD_VARIANCE = 0.5, 0.01
-FAR = 1e30  # times a number of the noise: a bound holds it
 SLOPE_CACHE_SIZE = 100  # of effects, along all runs
 
 
@@ -84,12 +74,14 @@ class PredictionError:
         least = LEAST_VARIANCE if noisy else LEAST_UNREAD_VARIANCE
         self.least_variance = least * self.reading_variance
         self.step_s = float(np.median([t.step_s for t in traces]))
-        longest = max(t.step_s * len(t.measured) for t in traces)
-        self.longest_s = longest
-        self.slowest_s = max(LONGEST_SHARE * longest, 10.0 * SHORTEST_SAMPLES * self.step_s)
+        longest = self.longest_s = max(t.step_s * len(t.measured) for t in traces)
         # A gyro's bias walks. An encoder's error (its eccentricity, stamps that wander) does, too, but matters only
         # where a small friction is to be seen in how a long decay keeps its phase.
         self.wanders = self.gyro or self.torque_free
+        self.bounds = NoiseBounds(
+            self.torque_nm, self.rate_rad_s if self.gyro else self.angle_rad, self.step_s, longest,
+            self.reading_variance, self.gyro, self.wanders,
+        )  # fmt: skip
         self.workers = Workers(traces, threads=longest > LONG_RUN_SAMPLES * self.step_s)
         self._slopes: dict[tuple[object, ...], Array] = {}
         self._slopes_lock = Lock()
@@ -110,52 +102,16 @@ class PredictionError:
             descent = Descent(self, fit.structure, fit.values, fit.noise, fit.shots, ())
             return descent.scores() if with_variance else descent.columns()
 
-    def white(self, share: float) -> float:
-        """Density of a white torque that is this share of the torque, as ``Noise`` has it."""
-        return (share * self.torque_nm) ** 2 * 2.0 * self.step_s / self.reading_variance
-
-    def slow(self, share: float) -> float:
-        """Variance of a slow torque that is this share of the torque, as ``Noise`` has it."""
-        return (share * self.torque_nm) ** 2 / self.reading_variance
-
-    def within(self, noise: Noise) -> Noise:
-        """The nearest noise that is neither absurdly large nor without effect."""
-        walks = MAX_BIAS_WALK if self.gyro else MAX_ENCODER_ERROR
-        ahead = float(np.clip(noise.ahead, MIN_PREFILTER_NOISE * self.step_s, MAX_PREFILTER_NOISE * self.step_s))
-        return Noise(
-            float(np.clip(noise.white, self.white(MIN_DISTURBANCE), self.white(MAX_DISTURBANCE))),
-            float(np.clip(noise.slow, self.slow(MIN_DISTURBANCE), self.slow(MAX_DISTURBANCE))),
-            float(np.clip(noise.time_constant_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
-            float(np.clip(noise.walk, self.walk(MIN_BIAS_WALK), self.walk(walks))) if self.wanders else 0.0,
-            ahead if self.gyro else 0.0,
-            np.inf if self.gyro else float(np.clip(noise.walk_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
-            float(np.clip(noise.smooth, self.slow(MIN_DISTURBANCE), self.slow(MAX_SMOOTH))),
-        )
-
-    def extremes(self, noise: Noise, kinds: Sequence[str]) -> tuple[Array, Array]:
-        """By how many times itself each number of the noise may be smaller and larger, (k,) each."""
-
-        def at(times: float) -> Array:
-            far = [self.within(replace(noise, **{k: times * getattr(noise, k)})) for k in kinds]
-            return np.array([getattr(q, k) / getattr(noise, k) for q, k in zip(far, kinds, strict=True)])
-
-        return at(1.0 / FAR), at(FAR)
-
     def noise_of(self, fit: Fit) -> Noise:
         """The noise of a fit to the same recording, sampled otherwise, whose readings had another variance."""
         theirs = float(np.mean([self._noises(s.trace)[0] ** 2 for s in fit.shots]))
         ratio, q = theirs / self.reading_variance, fit.noise
-        return self.within(
+        return self.bounds.within(
             replace(
                 q, white=ratio * q.white, slow=ratio * q.slow, walk=ratio * q.walk, ahead=ratio * q.ahead,
                 smooth=ratio * q.smooth,
             )
         )  # fmt: skip
-
-    def walk(self, share: float) -> float:
-        """Density of a walk that takes the gyro's bias so far over a run, of its rate, as ``Noise`` has it."""
-        moved = self.rate_rad_s if self.gyro else self.angle_rad
-        return (share * moved) ** 2 / self.longest_s / self.reading_variance
 
     def fit(
         self, structure: Structure, start: Mapping[Name, float], noise: Noise | None = None, iterations: int = 25,

@@ -93,7 +93,7 @@ class InnovationScores:
         self.problem, self.fit, self.scale = problem, fit, scale
         # A low-pass that is tried filters no noise yet: that would change the variance, and a score compares at one.
         filtered = any(effects.get(e).lag is not None for e in fit.structure.effects)
-        self.noise = fit.noise if filtered else problem.within(replace(fit.noise, ahead=0.0))
+        self.noise = fit.noise if filtered else problem.bounds.within(replace(fit.noise, ahead=0.0))
         parts = problem.columns_at(fit)
         self.own = [p.own for p in parts]
         self.base = [p.scaled for p in parts]

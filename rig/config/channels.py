@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from rig.channels import MAX_CHANNELS, Channel, ChannelKind, name_fault
 from rig.config.base import Positive, Section
-from rig.config.effects import KeyFaults
+from rig.config.parsing.suggestions import KeyFaults
 
 
 class ChannelConfig(Section):

@@ -2,33 +2,18 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated
 
 from pydantic import AfterValidator
+
+from rig.config.parsing.suggestions import KeyFaults, unknown
 
 if TYPE_CHECKING:
     from rig.effects import Effect, Parameter
 
 EffectValues = Mapping[str, Mapping[str, float]]
-
-
-def unknown(kind: str, word: str, allowed: Iterable[str]) -> str:
-    """The sentence for a word that is not in the list: the nearest one and the whole list."""
-    known = list(allowed)
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    hint = f", did you mean {near[0]!r}?" if near else ""
-    return f"unknown {kind} {word[:60]!r}{hint} (known: {', '.join(known)})"
-
-
-class KeyFaults(ValueError):
-    """Several things wrong inside one value, each with the path of its key below that value."""
-
-    def __init__(self, faults: Sequence[tuple[tuple[str | int, ...], str]]) -> None:
-        super().__init__("; ".join(text for _, text in faults))
-        self.faults = tuple(faults)
 
 
 def check_effect_names(names: Sequence[str]) -> None:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ValidationError
 
-from rig.config.effects import KeyFaults, unknown
+from rig.config.parsing.suggestions import KeyFaults, unknown
 from rig.config.parsing.yaml_text import Document, Fault, KeyPath, Place
 
 _WANTED = {

@@ -23,7 +23,7 @@ def test_a_step_of_the_noise_beside_a_backlash_changes_the_cost_as_the_derivativ
     run = sine_run(104.0, 3.0, seed=1, effects={"backlash": {"half_gap": GAP_RAD}})
     problem = PredictionError(one_noise([prepare(run, 0)], False))
     values = {(k,): v for k, v in zip(TERMS, TRUTH, strict=True)} | {("backlash", "half_gap"): 1.5 * GAP_RAD}
-    disturbed = Noise(problem.white(0.01), problem.slow(0.02), 0.05, problem.walk(1e-3))
+    disturbed = Noise(problem.bounds.white(0.01), problem.bounds.slow(0.02), 0.05, problem.bounds.walk(1e-3))
     d = Descent(problem, Structure(effects=("backlash",)), values, disturbed, None, ())  # type: ignore[arg-type]
     found = normal_equations(d._derivatives(True, True), len(d.x), len(d.kinds), d.count, problem.variance_of)
     for k, kind in enumerate(d.kinds):

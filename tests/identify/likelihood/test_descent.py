@@ -71,7 +71,7 @@ def test_the_likeliest_noise_is_found_from_decades_off(white: float, smooth: flo
     known = problem.fit(Structure(), platform)
 
     def descent(noise: Noise) -> Descent:
-        return Descent(problem, Structure(), known.values, problem.within(noise), known.shots, ())
+        return Descent(problem, Structure(), known.values, problem.bounds.within(noise), known.shots, ())
 
     best, far = descent(known.noise), known.noise
     far = replace(far, white=white * far.white, smooth=smooth * far.smooth, time_constant_s=time * far.time_constant_s)
