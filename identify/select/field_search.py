@@ -119,7 +119,7 @@ def search_in_torque(
     curves
         What curves over what that model leaves show, and how far J, C and K move with each, percent.
     refutes
-        Whether that model, which names nothing, is likelier than one found in torque.
+        Whether that model is likelier than one found in torque: the search in torque proposes, the likelihood judges.
     """
     few, parts = along_few.traces, along_few.split
     scale = scale_of(few, start.platform, ())
@@ -146,7 +146,7 @@ def search_in_torque(
         depends = bool(curves or disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on)
         best = search.run()
         better = _better(search, best, trial, depends) and not (trusted and _more_flexible(best, trial))
-        if better and not (known[0].structure.effects == structure.effects and refutes(best)):
+        if better and not refutes(best):
             by_likelihood = None
         else:
             best = trial
