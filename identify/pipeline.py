@@ -227,9 +227,12 @@ class _Identifier:
         line = standing_line(after, self.traces) if gyro and TONE in found.named else None
         if line is not None:
             words = describe(line, self.recording.axis, self.traces[0].channel)
-            found.search.mark_undetermined(TONE, words, found.search.base)
             self.say(f"not named: {TONE}; the line may come from the sensor itself")
-            found, after = found.rejected(), found.before
+            step = search.stepwise
+            bare = step.without(step.best, TONE) if TONE in step.best.structure.effects else step.best
+            found = found.without(TONE).with_lines(bare, step.problem.torque_nm)
+            after = found.after
+            found.search.mark_undetermined(TONE, words, after.fit if found.named else found.search.base)
         return self._report(found.search, found.before, after, measured=found)
 
     def _curves(self, search: Stepwise) -> list[tuple[Dependence, dict[str, float]]]:

@@ -59,13 +59,12 @@ class Found:
     after: FinalFit
     disturbance: Disturbance
     in_torque: tuple[TorqueErrors, TorqueErrors]
-    left_before: Callable[[], Disturbance]  # what the declared model leaves
+    lacking: Callable[[str], tuple[FinalFit, TorqueErrors, Disturbance]]  # the final model without an effect
 
-    def rejected(self) -> Found:
-        """The same with the declared model as the final one."""
-        return replace(
-            self, after=self.before, in_torque=(self.in_torque[0],) * 2, disturbance=self.left_before()
-        )  # fmt: skip
+    def without(self, effect: str) -> Found:
+        """The same with an effect taken back; what was found beside it stays, fitted anew."""
+        after, errors, disturbance = self.lacking(effect)
+        return replace(self, after=after, in_torque=(self.in_torque[0], errors), disturbance=disturbance)
 
     def with_lines(self, likeliest: Fit, torque_nm: float) -> Found:
         """The same with the spectral lines of what the likeliest model leaves, where that is the final one."""
@@ -180,13 +179,18 @@ def search_in_torque(
         size = regression.torque_nm
         return TorqueErrors(fit.sigma, fit.sigma / size, fit.held_nm / size, floor, cutoff)
 
+    def lacking(effect: str) -> tuple[FinalFit, TorqueErrors, Disturbance]:
+        less = final.minus(effect)
+        there = regression.solve(less, {k: v for k, v in best.shapes.items() if k in less.effects})
+        fitted, values = before, {k: v for k, v in after.values.items() if k[0] != effect}
+        if less.effects != structure.effects:
+            fitted = by_prediction_error(traces, less, values, split.final, split.everything)
+        return fitted, errors(there), disturbance_of(regression, there, floor, unit)
+
     told = _as_search(search, structure, base, best)
     if by_likelihood:
         told = replace(by_likelihood[1], contribution=told.contribution)
-    return Found(
-        told, before, after, disturbance, (errors(base), errors(best)),
-        lambda: disturbance_of(regression, base, floor, unit),
-    )  # fmt: skip
+    return Found(told, before, after, disturbance, (errors(base), errors(best)), lacking)
 
 
 def _describes(likeliest: Fit, final: FinalFit) -> bool:

@@ -40,10 +40,11 @@ BEHIND = 0.3  # of the best fall of the cost so far: what has less after a few s
 COMPARABLE = 0.3  # of the score of an effect, that another has in its place: with less it is no rival
 FOLLOWED_LINES = 2  # of the disturbance: lines at which a periodic torque is looked for beside those of what is left
 FOLLOWS = 1.1  # reduced chi-square: where a prediction errs by less, no disturbance follows the readings
+FOLLOWS_LESS = 0.5  # of the excess beside which lags were tried: only then may one show that did not before
 OTHER_START = 1.5  # times the power in torque that a look leaves: a fit that leaves more is begun from there, too
 
 
-@dataclass(frozen=True)
+@dataclass
 class TrialFits:
     """Fits of candidates.
 
@@ -63,6 +64,7 @@ class TrialFits:
     declared: Structure
     allowed: Sequence[str]
     weigher: EvidenceModel
+    _excess_with_lags: float = np.inf  # reduced chi-square above one, beside which lags were tried last
 
     def added(self, now: Fit) -> list[str]:
         """Effects that the declared model lacks."""
@@ -130,10 +132,13 @@ class TrialFits:
 
     def unseen(self, now: Fit, names: Sequence[str]) -> list[str]:
         """Lags of the gyro, of a model without one: where a large disturbance follows every reading, their scores are
-        small however long they are, and no torque goes with them.
+        small however long they are, and no torque goes with them. Once they were tried, they are again where much less
+        follows the readings.
         """
-        if now.reduced_chi_square < FOLLOWS:
+        excess = now.reduced_chi_square - 1.0
+        if excess < FOLLOWS - 1.0 or excess > FOLLOWS_LESS * self._excess_with_lags:
             return []
+        self._excess_with_lags = excess
         lags = [n for n in (*now.structure.effects, *names) if effects.get(n).lag is not None]
         return [] if set(lags) & set(now.structure.effects) else lags
 
@@ -196,10 +201,10 @@ class TrialFits:
             structure = structure.minus(special)
         fits: list[Fit] = []
 
-        def begun_where_it_stands(own: Mapping[Name, float]) -> Fit:
+        def begun_where_it_stands(own: Mapping[Name, float], below: float = least) -> Fit:
             return self.problem.fit(
                 structure.plus(name), {**rest, **own}, now.noise, TRIAL_ITERATIONS, carry=now.shots, thorough=False,
-                against=now.cost, least=least,
+                against=now.cost, least=below,
             )  # fmt: skip
 
         for start in starts:
@@ -220,7 +225,7 @@ class TrialFits:
         best = min(fits, key=lambda f: f.cost)
         if not held and not best.cost < now.cost:  # a model is no worse than what it contains: from there, then
             own = {k: v for k, v in best.values.items() if k[0] == name and k[1] not in linear}
-            fits.append(begun_where_it_stands(own))
+            fits.append(begun_where_it_stands(own, min(least, now.cost)))
             best = min(fits, key=lambda f: f.cost)
         shown = shows_a_period(name, best.values, self.problem.traces)
         return best if np.isfinite(best.cost) and shown else None
