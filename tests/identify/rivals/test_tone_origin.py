@@ -22,17 +22,22 @@ SETS = ((67.0, 6.0), (104.0, 3.0))
 SETTINGS = IdentifyConfig.model_validate({"candidates": ["periodic_disturbance", "cogging"]})
 
 
-def shaken(torque_nm: float, hertz: float, seed: int, added: float = 0.0, stands: bool = True) -> Run:
+def shaken(
+    torque_nm: float, hertz: float, seed: int, added: float = 0.0, stands: bool = True, friction_nm: float = 0.0,
+    disturbance_nm: float = 0.0, lasts_s: float = LASTS_S,
+) -> Run:  # fmt: skip
     """A sine set on a platform that a pump shakes; ``stands``: since long before."""
-    run = sine_run(torque_nm, hertz, seed=seed, duration_s=LASTS_S)
+    run = sine_run(torque_nm, hertz, seed=seed, duration_s=lasts_s)
     s, phase = 2j * np.pi * HERTZ, 0.7 + 1.9 * seed
     j, c, k = TRUTH
     turning = -TORQUE_NM * np.exp(1j * phase) / ((j + added) * s * s + c * s + k)
     start = (turning.imag, (turning * s).imag) if stands else (0.0, 0.0)
     tone = {"sine": TORQUE_NM * np.cos(phase), "cosine": TORQUE_NM * np.sin(phase), "frequency": HERTZ}
-    platform = Platform(j + added, c, k, {"periodic_disturbance": tone})
+    friction = {"coulomb_friction": {"level": friction_nm}} if friction_nm else {}
+    platform = Platform(j + added, c, k, {"periodic_disturbance": tone, **friction})
     assert run.torque_nm is not None
-    motion = simulate(platform, run.time_s, TorqueSignal(run.time_s, run.torque_nm), start=start, substeps=16)
+    torque = run.torque_nm + disturbance_nm * np.random.default_rng([seed, 9]).standard_normal(len(run.time_s))
+    motion = simulate(platform, run.time_s, TorqueSignal(run.time_s, torque), start=start, substeps=16)
     noise = NOISE_RAD_S * np.random.default_rng([seed, 5]).standard_normal(len(run.time_s))
     return replace(run, rate_rad_s=motion.rate_rad_s + noise, added_inertia_kg_m2=added)
 
@@ -54,6 +59,17 @@ def test_a_torque_that_begins_with_the_runs_is_named() -> None:
     assert found.verdict.effects == ("periodic_disturbance",)
     assert found.accepted, found.reasons
     assert not found.verdict.left_open
+
+
+@pytest.mark.slow
+def test_beside_a_torque_disturbance_only_the_tone_is_taken_back() -> None:
+    runs = [shaken(*one, seed=k, friction_nm=3.0, disturbance_nm=0.3, lasts_s=4.0) for k, one in enumerate(SETS)]
+    both = IdentifyConfig.model_validate({"candidates": ["periodic_disturbance", "coulomb_friction"]})
+    found = found_in(runs, both)
+    assert found.verdict.effects == ("coulomb_friction",)
+    assert "Hz is left open" in found.verdict.left_open
+    assert found.verdict.unexplained
+    assert found.final.effect_parameters["coulomb_friction"]["level"].value == pytest.approx(3.0, rel=0.05)
 
 
 @pytest.mark.parametrize("made", [pytest.param(shaken, marks=pytest.mark.slow), heard])
