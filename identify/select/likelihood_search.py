@@ -12,6 +12,7 @@ from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.initial_guess import Start, scale_of
 from identify.estimate.starting_point import horizon_s
 from identify.likelihood.fit import Fit
+from identify.likelihood.normal_equations import COST_TOLERANCE
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
@@ -69,8 +70,9 @@ class LikelihoodSearch:
         first = {**declared, **guessed}
         base = problem.fit(structure, first)
         if base.reduced_chi_square > AT_NOISE:  # of two minima this may be the other
-            twin = problem.fit(structure, {**guessed, **declared})
-            base = min((base, twin), key=lambda f: f.cost)
+            twin = problem.fit(structure, {**guessed, **declared}, base.noise, thorough=False)
+            if twin.cost < base.cost - COST_TOLERANCE:
+                base = min((base, problem.fit(structure, twin.values)), key=lambda f: f.cost)
         count = sum(t.count for t in traces)
         whole = None
         if count > MORE * base.count:
