@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from threading import Lock
 from typing import Any
 
@@ -137,34 +138,32 @@ class PredictionError:
         least
             Cost that it must be below after a few steps to be followed to its end.
         """
-        with np.errstate(all="ignore"):
-            descent, left = self._descended(structure, start, noise, carry, fixed, iterations, thorough, against, least)
-            # Where a run begins stuck is another place with another friction.
-            while left > 0 and descent.sticks and descent.cost < least:
-                values = dict(zip(descent.names, descent.x.tolist(), strict=True))
-                again = Descent(self, structure, values, descent.noise, descent.shots, fixed)
-                if abs(again.cost - descent.cost) < COST_TOLERANCE:
-                    break
-                left = again.minimise(left, thorough, against, least)
-                if not again.cost < descent.cost - COST_TOLERANCE:
-                    break
-                descent = again
-            return descent.found()
+        # A rough disturbance and a smooth one are two valleys, and parameters far off may stay in the wrong one: where
+        # nobody knows the noise, a thorough fit tries both.
+        valleys = ((False,), (True,)) if noise is None and thorough else ((False, True),)
 
-    def _descended(
-        self, structure: Structure, start: Mapping[Name, float], noise: Noise | None, carry: Sequence[Shots] | None,
-        fixed: Sequence[Name], iterations: int, thorough: bool, against: float | None, least: float,
-    ) -> tuple[Descent, int]:  # fmt: skip
-        """The better of the descents, and the steps it has left.
+        def down(smooth: Sequence[bool]) -> Fit | None:
+            with np.errstate(all="ignore"):
+                descent = Descent(self, structure, start, noise, carry, fixed, smooth)
+                left = descent.minimise(iterations, thorough, against, least)
+                # Where a run begins stuck is another place with another friction.
+                while left > 0 and descent.sticks and descent.cost < least:
+                    values = dict(zip(descent.names, descent.x.tolist(), strict=True))
+                    again = Descent(self, structure, values, descent.noise, descent.shots, fixed)
+                    if abs(again.cost - descent.cost) < COST_TOLERANCE:
+                        break
+                    left = again.minimise(left, thorough, against, least)
+                    if not again.cost < descent.cost - COST_TOLERANCE:
+                        break
+                    descent = again
+                ran_away = not np.isfinite(descent.cost) and len(valleys) > 1
+                return None if ran_away else descent.found()
 
-        A rough disturbance and a smooth one are two valleys, and parameters far off may stay in the wrong one: where
-        nobody knows the noise, a thorough fit tries both.
-        """
-        ends = []
-        for smooth in ((False,), (True,)) if noise is None and thorough else ((False, True),):
-            descent = Descent(self, structure, start, noise, carry, fixed, smooth)
-            ends.append((descent, descent.minimise(iterations, thorough, against, least)))
-        return min(ends, key=lambda end: end[0].cost)
+        ends = self.workers.side_by_side([partial(down, smooth) for smooth in valleys])
+        fits = [fit for fit in ends if fit is not None]
+        if not fits:
+            return self.fit(structure, start, noise, iterations, carry, fixed, False, against, least)
+        return min(fits, key=lambda fit: fit.cost)
 
     @RUNAWAY
     def look(

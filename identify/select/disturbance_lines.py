@@ -29,7 +29,9 @@ def lines_left(fit: Fit, torque_nm: float) -> Dependence | None:
 
     A bin is a line where it stands so far above the median of its neighbours that chance alone brings one in all bins
     together with the probability that any other dependence is held to (``SURE``). The power in a bin of white noise is
-    exponentially distributed, and its median is its mean times the logarithm of two.
+    exponentially distributed, and its median is its mean times the logarithm of two. They are worth a word by their
+    share of the disturbance's power or of what the readings are predicted wrongly by: a vibration that the sensor folds
+    back is no torque, and still no noise.
 
     Parameters
     ----------
@@ -44,13 +46,14 @@ def lines_left(fit: Fit, torque_nm: float) -> Dependence | None:
         return None
     false_alarm = float(norm.sf(SURE))
     above = float(np.log(count / false_alarm))
-    at_lines = together = 0.0
+    at_lines, together = np.zeros(2), np.zeros(2)
     for own, disturbance in spectra:
         level = median_filter(own, FLOOR_BINS, mode="reflect") / np.log(2.0)
-        at_lines += float(np.sum(disturbance[own > above * level]))
-        together += float(np.sum(disturbance))
-    share = at_lines / max(together, 1e-300)
-    if share < MIN_POWER_SHARE:
+        both = np.stack([disturbance, own])
+        at_lines += np.sum(both[:, own > above * level], axis=1)
+        together += np.sum(both, axis=1)
+    share, of_readings = at_lines / np.maximum(together, 1e-300)
+    if max(share, of_readings) < MIN_POWER_SHARE:
         return None
     squares = [np.mean(d[s.weight] ** 2) for d, s in zip(fit.prediction.disturbance_nm, fit.shots, strict=True)]
     rms = float(np.sqrt(share * np.mean(squares)))

@@ -23,8 +23,13 @@ SETS = ((100.0, 1.0), (95.0, 3.0), (40.0, 9.0))
 STEP_NM = 8.0
 
 
-def fitted(shaft: Callable[[Array, int], Array]) -> tuple[Fit, float]:
-    """J, C and K fitted to runs whose torque at the shaft is not the recorded one, and the size of that torque."""
+def fitted(
+    shaft: Callable[[Array, int], Array], folded: Callable[[Array, int], Array] = lambda time, number: 0.0 * time
+) -> tuple[Fit, float]:
+    """J, C and K fitted to runs whose torque at the shaft is not the recorded one, and the size of that torque.
+
+    ``folded`` is a rate that the gyro shows besides.
+    """
     runs = []
     for number, (torque_nm, frequency_hz) in enumerate(SETS):
         run = sine_run(torque_nm, frequency_hz, duration_s=5.0)
@@ -32,7 +37,7 @@ def fitted(shaft: Callable[[Array, int], Array]) -> tuple[Fit, float]:
         applied = TorqueSignal(run.time_s, shaft(run.torque_nm, number))
         rate = simulate(Platform(*TRUTH), run.time_s, applied, substeps=16).rate_rad_s
         noise = NOISE_RAD_S * np.random.default_rng(number).standard_normal(len(rate))
-        runs.append(replace(run, rate_rad_s=rate + noise))
+        runs.append(replace(run, rate_rad_s=rate + noise + folded(run.time_s, number)))
     problem = PredictionError(one_noise([prepare(run, i) for i, run in enumerate(runs)], False))
     return problem.fit(Structure(), {(k,): v for k, v in zip(TERMS, TRUTH, strict=True)}), problem.torque_nm
 
@@ -53,6 +58,21 @@ def test_a_torque_that_is_sent_in_coarse_steps_is_seen_at_its_lines() -> None:
     assert found.on == "frequency"
     assert 0.2 * STEP_NM < found.torque_rms < STEP_NM  # evenly spread over a step it is the step over the root of 12
     assert found.relative == pytest.approx(found.torque_rms / torque_nm)
+
+
+def test_a_vibration_that_the_gyro_folds_back_is_seen_though_no_torque_follows_it() -> None:
+    def folded(time: Array, number: int) -> Array:
+        return 0.003 * np.sin(2.0 * np.pi * 97.3 * time + number)
+
+    def slowly(torque: Array, number: int) -> Array:
+        return torque + lfilter(
+            [0.0005], [1.0, -1.998, 0.998001], np.random.default_rng(number).standard_normal(len(torque))
+        )
+
+    fit, torque_nm = fitted(slowly, folded)
+    found = lines_left(fit, torque_nm)
+    assert found is not None
+    assert found.relative < 0.005
 
 
 @pytest.mark.parametrize("shaft", [at_random, lambda torque, number: torque])
