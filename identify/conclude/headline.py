@@ -22,7 +22,7 @@ from identify.wording import (
 )
 
 MAX_REASONS = 2  # of a result that is not accepted; the list below has all
-AT_NOISE = 1.05**2  # reduced chi-square; the noise floor is known to a few percent
+TOLD_AT_NOISE = 1.05**2  # reduced chi-square; the noise floor is known to a few percent
 MIN_CHANGE_PERCENT = 1.0  # of a parameter: less is in the table
 UNITS = {("rotary", "rate"): "rad/s", ("rotary", "angle"): "rad", ("linear", "rate"): "m/s", ("linear", "angle"): "m"}
 
@@ -70,7 +70,7 @@ def _error(found: Identification) -> str:
     old, new, floor, its_unit = error_before_and_after(found)
     if new is None:
         return "No error could be measured on held-out data."
-    at_floor = floor and reduced_chi_square(new, floor) < AT_NOISE
+    at_floor = floor and reduced_chi_square(new, floor) < TOLD_AT_NOISE
     times = ", the noise floor" if at_floor else f", {number(new / floor, 2)} times the noise floor" if floor else ""
     if found.after is None or old is None:
         return f"Its error on held-out data is {number(new, 3)} {its_unit}{times}."

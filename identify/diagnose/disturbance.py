@@ -22,7 +22,7 @@ from rig.arrays import Array
 from rig.platform import TERMS
 
 KNOTS = 7  # inner knots of a spline, at even shares of the samples
-SURE = 4.0  # standard errors over blocks of held-out samples; by chance once in 30,000
+DEPENDENCE_SIGMAS = 4.0  # standard errors over blocks of held-out samples; by chance once in 30,000
 MIN_POWER_SHARE = 0.02  # of the power that is left: less is not worth a word
 SHOWN = 25  # places at which a term's shape is given
 OUTER = (0.8, 0.95)  # shares of the samples inside of which nothing is touched
@@ -59,7 +59,7 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
         by_size, by_ratio = regression.sureness(fit, richer)
         sure = max(by_size, by_ratio)
         share = 1.0 - richer.held_nm**2 / max(fit.held_nm**2, 1e-300)
-        if share < MIN_POWER_SHARE or sure < SURE:
+        if share < MIN_POWER_SHARE or sure < DEPENDENCE_SIGMAS:
             continue
         size = float(np.sqrt(share)) * fit.held_nm
         found.append((

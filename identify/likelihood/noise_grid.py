@@ -13,8 +13,8 @@ from rig.dynamics.gains import Noise
 
 INITIAL_BIAS_WALK = 1e-5  # of the rate, over a run
 WHITE_SHARES = (1.0, 0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)  # of the torque, on the grid
-COLOURED_SHARES, BESIDE = (0.3, 0.03, 0.003), (1.0, 0.05)  # of the torque, and times the best white beside them
-LITTLE = 1e-6  # of the torque
+COLOURED_SHARES, WHITE_BESIDE = (0.3, 0.03, 0.003), (1.0, 0.05)  # of the torque, and times the best white beside them
+LITTLE_DISTURBANCE = 1e-6  # of the torque
 
 
 def kinds_of_noise(bounds: NoiseBounds, structure: Structure) -> list[str]:
@@ -34,7 +34,7 @@ def noise_on_grid(bounds: NoiseBounds, cost: Callable[[Noise], float], smooth: S
     p = bounds
     times_s = np.geomspace(20.0 * p.step_s, 0.3 * p.slowest_s, 3).tolist()
     gyro = (p.walk(INITIAL_BIAS_WALK), p.step_s, np.inf if p.gyro else 30.0 * p.step_s)
-    little = p.slow(LITTLE)
+    little = p.slow(LITTLE_DISTURBANCE)
 
     def of(white: float, coloured: float, time_s: float, is_smooth: bool = True) -> Noise:
         slow, also = (little, coloured) if is_smooth else (coloured, little)
@@ -43,6 +43,6 @@ def noise_on_grid(bounds: NoiseBounds, cost: Callable[[Noise], float], smooth: S
     best = min((of(p.white(share), little, times_s[1]) for share in WHITE_SHARES), key=cost)
     coloured = [
         of(best.white * w, p.slow(share), t, which)
-        for which in smooth for t in times_s for share in COLOURED_SHARES for w in BESIDE
+        for which in smooth for t in times_s for share in COLOURED_SHARES for w in WHITE_BESIDE
     ]  # fmt: skip
     return min((best, *coloured), key=cost)

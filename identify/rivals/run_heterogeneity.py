@@ -29,7 +29,7 @@ from rig.recording.run import Array
 GONE = (
     0.95  # of the excess over the noise: less is foretold of what is no such run, and of a delay that is no small one
 )
-AT_NOISE = 1.05  # reduced chi-square: the noise is known to a percent or two
+RUNS_AT_NOISE = 1.05  # reduced chi-square: the noise is known to a percent or two
 AT_FLOOR = 1.1  # the same: what is there has found what there is
 ROUNDS = 3  # the change is small, but not infinitely so
 MAX_GAIN_CHANGE = 0.3  # of the torque; a run that differs by more is another campaign
@@ -69,7 +69,7 @@ def heterogeneity_of(fits: FreeRunFitter, declared: Structure, start: Mapping[Na
     if len(moved) < 2 or not set(TERMS[:1]) <= set(declared.terms):
         return None
     base = fits.fitted(declared, start)
-    if base is None or base.reduced_chi_square < AT_NOISE:
+    if base is None or base.reduced_chi_square < RUNS_AT_NOISE:
         return None
     chosen = _predicted_changes(fits, base)
     if not chosen or len({c.run for c in chosen}) == len(moved):

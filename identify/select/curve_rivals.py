@@ -16,7 +16,7 @@ from identify.likelihood.fit import Fit
 from identify.propose.free_forms import fitted, ranges
 from identify.propose.innovation_score import InnovationScores
 from identify.select.evidence import STRONG_SUPPORT, support_difference
-from identify.select.free_form_residual import ON
+from identify.select.free_form_residual import CURVE_STEPS, ON
 from identify.select.trial_fits import TRIAL_ITERATIONS
 from rig import effects
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 COMPARABLE = 0.3  # of the score of the effect, that a curve has: with less it is not fitted
 NEAR = 0.5  # of what the effect explains, that a curve has after a few steps: with less it is not followed
-STEPS = 14
 CURVES: Mapping[str, Sequence[str]] = {
     "restoring torque": ("free_angle",), "position-dependent torque": ("free_angle",), "friction": ("free_rate",),
     "drive": ("free_torque",), "surroundings": ("free_time",),
@@ -88,7 +87,7 @@ def _in_place(
     best = max((s for s in found if s is not None), key=lambda s: s.gain, default=None)
     if best is None or best.gain < COMPARABLE * score:
         return None
-    fit = fitted(problem, rest, best, STEPS, rest.cost - NEAR * (rest.cost - now.cost))
+    fit = fitted(problem, rest, best, CURVE_STEPS, rest.cost - NEAR * (rest.cost - now.cost))
     return (best.effect, fit) if np.isfinite(fit.cost) else None
 
 

@@ -14,7 +14,7 @@ from scipy.ndimage import median_filter
 from scipy.signal.windows import hann
 from scipy.stats import norm
 
-from identify.diagnose.disturbance import MIN_POWER_SHARE, SURE
+from identify.diagnose.disturbance import DEPENDENCE_SIGMAS, MIN_POWER_SHARE
 from identify.likelihood.fit import Fit
 from identify.results import Dependence
 from rig.arrays import Array
@@ -28,10 +28,10 @@ def lines_left(fit: Fit, torque_nm: float) -> Dependence | None:
     """The part of the disturbance at spectral lines of the innovations; None where it is not worth a word.
 
     A bin is a line where it stands so far above the median of its neighbours that chance alone brings one in all bins
-    together with the probability that any other dependence is held to (``SURE``). The power in a bin of white noise is
-    exponentially distributed, and its median is its mean times the logarithm of two. They are worth a word by their
-    share of the disturbance's power or of what the readings are predicted wrongly by: a vibration that the sensor folds
-    back is no torque, and still no noise.
+    together with the probability that any other dependence is held to (``DEPENDENCE_SIGMAS``). The power in a bin of
+    white noise is exponentially distributed, and its median is its mean times the logarithm of two. Lines are worth a
+    word by their share of the disturbance's power or of what the readings are predicted wrongly by: a vibration that
+    the sensor folds back is no torque, and still no noise.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def lines_left(fit: Fit, torque_nm: float) -> Dependence | None:
     count = sum(len(own) for own, _ in spectra)
     if not count:
         return None
-    false_alarm = float(norm.sf(SURE))
+    false_alarm = float(norm.sf(DEPENDENCE_SIGMAS))
     above = float(np.log(count / false_alarm))
     at_lines, together = np.zeros(2), np.zeros(2)
     for own, disturbance in spectra:

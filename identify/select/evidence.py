@@ -30,7 +30,7 @@ from rig.dynamics.gains import Noise
 from rig.effects.base import Place
 from rig.platform import TERMS
 
-BLOCKS = 30  # of all runs together, over which scores scatter: their ratio is then known to a quarter
+EVIDENCE_BLOCKS = 30  # of all runs together, over which scores scatter: their ratio is then known to a quarter
 CHANCE = 0.95  # quantile of a ratio of variances: what chance alone reaches is no sign of a wrong likelihood
 MIN_RUNS = 4  # whose scores show whether runs differ
 ALONE = 1e-3  # of a parameter's influence, that the others leave: of less only rounding is seen
@@ -173,7 +173,7 @@ def agreement(falls: Array, price: float = 0.0) -> float:
 def block_costs(fit: Fit) -> Array:
     """What blocks of the record add to the cost of a fit, (b,)."""
     p = fit.prediction
-    each = max(1, round(BLOCKS / len(p.innovations)))
+    each = max(1, round(EVIDENCE_BLOCKS / len(p.innovations)))
     out = []
     for e, v, s in zip(p.innovations, p.variance, fit.shots, strict=True):
         cost = (e**2 / (v * fit.variance) + np.log(v * fit.variance))[s.weight]
@@ -251,7 +251,7 @@ def inflation(parts: Sequence[Columns], fit: Fit, names: Sequence[Name]) -> floa
         s = (s - s.mean(axis=0)) * np.sqrt(len(s) / (len(s) - 1.0))  # a fit that has not quite arrived has a mean
         return float(np.trace(expected @ (s.T @ s))) / max(int(np.sum(known)), 1) / _by_chance(len(s) - 1)
 
-    each = max(1, round(BLOCKS / len(parts)))
+    each = max(1, round(EVIDENCE_BLOCKS / len(parts)))
     blocks = [
         x[rows].T @ z[rows]
         for x, z in zip(own, scaled, strict=True) for rows in np.array_split(np.arange(len(z)), each)

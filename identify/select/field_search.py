@@ -21,13 +21,13 @@ from identify.runs.holdout import Split
 from identify.runs.observability import can_show
 from identify.select.disturbance_lines import lines_left
 from identify.select.evidence import TRUSTED, in_band, inflation, torque_fit_of
+from identify.select.likelihood_search import MAX_CUTOFF_SHARE
 from identify.select.search_state import Search
-from identify.select.torque_search import SURE, TorqueCandidate, TorqueSearch
+from identify.select.torque_search import FALL_SIGMAS, TorqueCandidate, TorqueSearch
 from identify.signals.trace import Trace
 from rig import effects
 from rig.effects.base import Place
 
-HIGHEST = 0.2  # of the sample rate of what is searched: the low-pass cuts off no higher
 MUCH_LEFT = 0.05  # of the torque: where nothing explains that, a wider band is looked at
 # Times the cut-off at which the sensor's noise is ten times as much torque: an angle is differentiated twice.
 WIDER = {"angle": 10.0**0.4, "rate": 10.0 ** (2.0 / 3.0)}
@@ -132,7 +132,7 @@ def search_in_torque(
         acceleration = float(np.sqrt(np.mean(regression.series()[2] ** 2)))
         return TorqueSearch(regression, base, floor, acceleration, offered, say)
 
-    highest = HIGHEST / few[0].step_s
+    highest = MAX_CUTOFF_SHARE / few[0].step_s
     search = at(min(start.cutoff_hz, highest))
     trial = torque_fit_of(search.regression, known[0])
     by_likelihood: tuple[Fit, Search] | None = known
@@ -289,6 +289,6 @@ def _status(look: TorqueCandidate, chosen: TorqueCandidate | None, named: Sequen
         return "added" if look.effect in named else "added, then no longer needed"
     if look.is_significant:
         return "carries less than what was added"
-    if look.sureness >= SURE and look.weight > 0.0:
+    if look.sureness >= FALL_SIGMAS and look.weight > 0.0:
         return f"proven but small: {PERCENT * look.weight:.0f} % of what is left"
     return "no better"

@@ -28,11 +28,13 @@ if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
 
 HOPE = 20.0  # of a score, that is worth a fit
-TRIED = 2  # of the curves with the largest scores
-STEPS = 14
+CURVES_TRIED = 2  # of the curves with the largest scores
+CURVE_STEPS = 14
 SHOWN = 25  # places at which a curve is shown
-SURE = 2.0  # standard errors by which a parameter moves
-BY_CHANCE = 1e-4  # of a curve that is no name but may move a parameter: one in a thousand recordings, over ten curves
+MOVED_SIGMAS = 2.0  # standard errors by which a parameter moves
+CURVE_BY_CHANCE = (
+    1e-4  # of a curve that is no name but may move a parameter: one in a thousand recordings, over ten curves
+)
 ON = {
     "free_angle": "angle", "free_rate": "rate", "free_torque": "torque", "free_time": "time",
     "free_gain_over_time": "time", "free_gain_over_speed": "rate", "free_spring_over_time": "time",
@@ -82,9 +84,9 @@ def fit_free_forms(search: Stepwise, now: Fit) -> tuple[FreeFormFit | None, list
     problem = search.problem
     best: FreeFormFit | None = None
     others: list[FreeFormFit] = []
-    found = scores(problem, now, search.trials.scale(now), tuple(effects.free_forms()))[:TRIED]
+    found = scores(problem, now, search.trials.scale(now), tuple(effects.free_forms()))[:CURVES_TRIED]
     forms = [form for form in found if form.gain >= HOPE]
-    fits = problem.workers.side_by_side([partial(fitted, problem, now, form, STEPS) for form in forms])
+    fits = problem.workers.side_by_side([partial(fitted, problem, now, form, CURVE_STEPS) for form in forms])
     found_by = {form.effect: fit for form, fit in zip(forms, fits, strict=True)}
     if (known := search.in_place) is not None and known.structure.minus(known.structure.effects[-1]) == now.structure:
         name = known.structure.effects[-1]
@@ -97,7 +99,7 @@ def fit_free_forms(search: Stepwise, now: Fit) -> tuple[FreeFormFit | None, list
             beside = _beside(search, _from_there(search, now, fit), fit, name)
         if beside.is_significant and (best is None or fit.penalised < best.evidence.fit.penalised):
             best = beside
-        elif beside.share > 0.0 and beside.chance_level < BY_CHANCE:  # beside some, more is left than without
+        elif beside.share > 0.0 and beside.chance_level < CURVE_BY_CHANCE:  # beside some, more is left than without
             others.append(beside)
     return best, others
 
@@ -109,7 +111,7 @@ def _beside(search: Stepwise, now: Fit, fit: Fit, form: str) -> FreeFormFit:
 
 def _from_there(search: Stepwise, now: Fit, fit: Fit) -> Fit:
     """The model without the curve, begun where it stands with it: a curve is not paid for a better place."""
-    again = search.problem.fit(now.structure, {**now.values, **fit.values}, fit.noise, STEPS, carry=fit.shots)
+    again = search.problem.fit(now.structure, {**now.values, **fit.values}, fit.noise, CURVE_STEPS, carry=fit.shots)
     return min((now, again), key=lambda f: f.cost)
 
 
@@ -163,7 +165,7 @@ def dependence_on(search: Stepwise, left: FreeFormFit) -> tuple[Dependence, dict
             moved = max(moved, float(as_terms[k]), key=abs)
         elif ON[form] == "history":  # a short memory is damping and inertia itself: the platform has both together
             moved += float(as_terms[k])
-        if abs(moved) > SURE * _error(fit, (term,)):
+        if abs(moved) > MOVED_SIGMAS * _error(fit, (term,)):
             moves[term] = 100.0 * abs(moved / here)
     return Dependence(ON[form], rms, rms / problem.torque_nm, left.chance_level, tuple(at), tuple(shape)), moves
 

@@ -23,13 +23,13 @@ from identify.runs.reduced import reduced
 from identify.select.curve_rivals import CURVES
 from identify.select.evidence import STRONG_SUPPORT, EvidenceModel, support_difference
 from identify.select.search_state import Search
-from identify.select.stepwise import AT_NOISE, Stepwise
+from identify.select.stepwise import PREDICTS_TO_NOISE, Stepwise
 from identify.signals.trace import Trace, pooled_noise
 from rig import effects
 from rig.platform import TERMS
 
 SAMPLES = 10_000  # that the search looks at
-HIGHEST = 0.2  # of the sample rate: the low-pass for a first guess in torque cuts off no higher
+MAX_CUTOFF_SHARE = 0.2  # of the sample rate: the low-pass for a first guess in torque cuts off no higher
 ALL = 40_000  # samples on which rivals are parted
 MORE = 1.5  # times the samples: else there is nothing more to be seen in all of them
 
@@ -69,7 +69,7 @@ class LikelihoodSearch:
         guessed: dict[Name, float] = {(k,): v for k, v in zip(TERMS, start.platform, strict=True)}
         first = {**declared, **guessed}
         base = problem.fit(structure, first)
-        if base.reduced_chi_square > AT_NOISE:  # of two minima this may be the other
+        if base.reduced_chi_square > PREDICTS_TO_NOISE:  # of two minima this may be the other
             twin = problem.fit(structure, {**guessed, **declared}, base.noise, thorough=False)
             if twin.cost < base.cost - COST_TOLERANCE:
                 base = min((base, problem.fit(structure, twin.values)), key=lambda f: f.cost)
@@ -78,7 +78,7 @@ class LikelihoodSearch:
         if count > MORE * base.count:
             whole = PredictionError(reduced(traces, split, ALL)[0])
         offered = [n for n in allowed if n not in structure.effects and can_show(n, traces)]
-        cutoff_hz = min(start.cutoff_hz, HIGHEST / few[0].step_s)
+        cutoff_hz = min(start.cutoff_hz, MAX_CUTOFF_SHARE / few[0].step_s)
         regression = TorqueRegression(few, parts, cutoff_hz, scale_of(few, start.platform, ()))
         floor = regression.noise_floor_nm(base.values)
         weigher = EvidenceModel(problem, regression, floor)
@@ -86,7 +86,7 @@ class LikelihoodSearch:
 
     def run(self) -> bool:
         """Search; whether the last model predicts down to the sensor's noise."""
-        return self.stepwise.run().reduced_chi_square < AT_NOISE
+        return self.stepwise.run().reduced_chi_square < PREDICTS_TO_NOISE
 
     def refutes(self, fit: TorqueFit) -> bool:
         """Whether the best model is likelier than one found in torque, also where that has its own best numbers.

@@ -37,7 +37,7 @@ from rig import effects
 from rig.platform import TERMS
 
 # What decides a name. All in units of the cost (minus twice the log-likelihood) or as shares.
-AT_NOISE = 1.1  # reduced chi-square: a model that predicts as closely leaves no disturbance
+PREDICTS_TO_NOISE = 1.1  # reduced chi-square: a model that predicts as closely leaves no disturbance
 # What only costs time.
 PROMISING = 0.1  # of the score of what was added: another with less was no rival then and is not asked again
 MIN_RIVAL_SHARE = 0.1  # of what an effect explains: another that leaves more than that is no rival
@@ -269,7 +269,7 @@ class Stepwise:
     def _stiffness_may_absorb(self, now: Fit) -> bool:
         """Whether the spring is so weak that it may only soak up what is constant over a run, or pushes."""
         pull = now.values.get(("stiffness",), 0.0) * self.problem.angle_rad
-        return now.reduced_chi_square > AT_NOISE and pull < WEIGHT * self.problem.torque_nm
+        return now.reduced_chi_square > PREDICTS_TO_NOISE and pull < WEIGHT * self.problem.torque_nm
 
     def _without_absorbing_stiffness(self, now: Fit) -> Fit:
         """The same without a spring that only soaks up what is constant: gravity is a spring of its own."""

@@ -17,7 +17,7 @@ from identify.select.evidence import MAX_EFFECTS, STRONG_SUPPORT, WEIGHT
 from rig import effects
 from rig.effects.base import Place
 
-SURE = 4.0  # standard errors, over blocks of the held-out samples, by which the squared residual must fall: 3e-5
+FALL_SIGMAS = 4.0  # standard errors, over blocks of the held-out samples, by which the squared residual must fall: 3e-5
 RICHER = 0.6  # share of what its special case leaves that a richer effect has to take away to be named in its place
 AS_HEAVY = 0.05  # of what is left: candidates that differ by less carry the same torque
 RIVAL = 0.02  # of what is left: rivals carry as much as what was taken, to that
@@ -53,7 +53,7 @@ class TorqueCandidate:
     def is_significant(self) -> bool:
         """Whether it is proven and carries enough to be named."""
         flexible = effects.get(self.effect).is_flexible  # its shape was looked for on the held-out samples, too
-        return self.weight >= WEIGHT and (self.sureness_by_size if flexible else self.sureness) >= SURE
+        return self.weight >= WEIGHT and (self.sureness_by_size if flexible else self.sureness) >= FALL_SIGMAS
 
 
 @dataclass
@@ -152,7 +152,7 @@ class TorqueSearch:
         share = 1.0 - self.left(now) / self.left(without)
         by_size, by_ratio = self.regression.sureness(without, now)
         pulls = now.values[("stiffness",)] > 0.0
-        return now if pulls and share >= WEIGHT and max(by_size, by_ratio) >= SURE else without
+        return now if pulls and share >= WEIGHT and max(by_size, by_ratio) >= FALL_SIGMAS else without
 
     @staticmethod
     def as_good(look: TorqueCandidate, chosen: TorqueCandidate) -> bool:

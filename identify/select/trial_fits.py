@@ -33,7 +33,7 @@ HOPE = 20.0  # of a score, parameters paid for: less would not be added when fit
 TRIED = 4  # candidates of a round, by their scores, that are fitted
 PAIRS = 2  # pairs of a round, by their scores, that are fitted
 HEAVIEST = 3  # candidates by their weight in torque that are fitted beside those
-FAINT = 0.02  # of the best score: what promises so little is not what the round is about
+FAINT_SCORE = 0.02  # of the best score: what promises so little is not what the round is about
 TRIAL_ITERATIONS, FULL_ITERATIONS = 14, 25  # steps of a fit that is compared, and of one that is kept
 FULL_FIT_RATIO = 0.9  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
 BEHIND = 0.3  # of the best fall of the cost so far: what has less after a few steps is not followed
@@ -185,7 +185,7 @@ class TrialFits:
             return []
         plain = [v for v in worth if not simplicity(v[0].effect)]
         short = plain[:TRIED] + [v for v in worth if simplicity(v[0].effect)][:2]
-        short = [v for v in short if v[0].gain > FAINT * worth[0][0].gain]
+        short = [v for v in short if v[0].gain > FAINT_SCORE * worth[0][0].gain]
         wanted = {n for v in short for n in (*effects.get(v[0].effect).nests, *effects.get(v[0].effect).lower_order)}
         return short + [v for v in worth if v[0].effect in wanted and v not in short]
 

@@ -24,7 +24,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "likelihood/fit.py": "MAX_LINEAR_INERTIA_CHANGE",
     "likelihood/gyro_biases.py": "BIAS_STEPS",
     "likelihood/kept_gains.py": "GAIN_CACHE_SIZE SAME_STEP",
-    "likelihood/noise_grid.py": "BESIDE COLOURED_SHARES INITIAL_BIAS_WALK LITTLE WHITE_SHARES",
+    "likelihood/noise_grid.py": "WHITE_BESIDE COLOURED_SHARES INITIAL_BIAS_WALK LITTLE_DISTURBANCE WHITE_SHARES",
     "likelihood/normal_equations.py": "COST_TOLERANCE MAX_LOG_STEP MAX_NOISE_FACTOR SINGULAR",
     "likelihood/other_noise.py": "BIAS_WALK_STARTS CONTINUATION_LEVELS CONTINUATION_STEPS DISTURBANCE_START_FACTORS "
     "EXCHANGED_TIME_FACTORS LARGE_DISTURBANCE MAX_GAP_RATIO MAX_STEPS_ALONE NOISE_START_FACTORS",
@@ -38,15 +38,15 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "propose/torque_looks.py": "EVALUATIONS",
     "rivals/run_heterogeneity.py": "ROUNDS",
     "rivals/whole_runs.py": "MAX_ITERATIONS TOLERANCE",
-    "select/curve_rivals.py": "COMPARABLE NEAR STEPS",
+    "select/curve_rivals.py": "COMPARABLE NEAR",
     "select/disturbance_lines.py": "FLOOR_BINS LOWEST_BIN SHORTEST",
     "select/evidence.py": "ALONE",
     "select/field_search.py": "ANOTHER NO_WORSE PERCENT",
-    "select/free_form_residual.py": "HOPE SHOWN STEPS TRIED",
+    "select/free_form_residual.py": "HOPE SHOWN CURVE_STEPS CURVES_TRIED",
     "select/likelihood_search.py": "ALL MORE SAMPLES",
     "select/stepwise.py": "MIN_RIVAL_SHARE PROMISING",
     "select/torque_search.py": "POLISHED RIVAL",
-    "select/trial_fits.py": "BEHIND COMPARABLE FAINT FOLLOWED_LINES FOLLOWS FOLLOWS_LESS FULL_FIT_RATIO "
+    "select/trial_fits.py": "BEHIND COMPARABLE FAINT_SCORE FOLLOWED_LINES FOLLOWS FOLLOWS_LESS FULL_FIT_RATIO "
     "FULL_ITERATIONS HEAVIEST HOPE OTHER_START PAIRS TRIAL_ITERATIONS TRIED",
 }
 
