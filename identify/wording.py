@@ -239,7 +239,7 @@ def depends_on(quantity: str, axis: str) -> str:
 
 def without(times: float) -> str:
     """What an effect contributes: the held-out error without it over the one with it."""
-    if times <= 1.0:
+    if round(times, 2) <= 1.0:
         return "Without it, after refitting, the error on held-out data is no larger."
     return f"Without it, even after refitting, the error on held-out data is {number(times, 3)} times larger."
 

@@ -74,10 +74,9 @@ def _error(found: Identification) -> str:
     times = ", the noise floor" if at_floor else f", {number(new / floor, 2)} times the noise floor" if floor else ""
     if found.after is None or old is None:
         return f"Its error on held-out data is {number(new, 3)} {its_unit}{times}."
-    change = "falls" if new < old else "changes"
-    text = (
-        f"With the final model the error on held-out data {change} from {number(old, 3)} to {number(new, 3)} {its_unit}"
-    )
+    before, now = number(old, 3), number(new, 3)
+    change = f"{'falls' if new < old else 'changes'} from {before} to {now}" if now != before else f"stays at {now}"
+    text = f"With the final model the error on held-out data {change} {its_unit}"
     final = found.final.parameters
     moved = [
         f"{SYMBOLS.get(name, plain(name))} would be {off_by(1.0 + percent / 100.0)}"

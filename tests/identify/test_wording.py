@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from identify.wording import (
@@ -131,4 +133,6 @@ def test_a_large_error_is_a_factor_and_a_small_one_a_percentage(ratio: float, wo
 
 def test_an_effect_without_which_nothing_is_worse_is_not_said_to_make_it_a_fraction_of_times_larger() -> None:
     assert "no larger" in without(0.31)
+    assert "no larger" in without(1.004)
+    assert "unbounded" in without(math.inf)
     assert "478 times larger" in without(478.0)

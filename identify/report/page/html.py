@@ -75,12 +75,11 @@ def _header(identification: Identification, name: str) -> Markup:
 
 def _verdict(identification: Identification, recording: Recording, gallery: Gallery) -> Markup:
     verdict, final = identification.verdict, identification.final
-    steps = next_steps(identification)
+    steps, why = next_steps(identification), [capital(reason) for reason in identification.reasons]
     reasons = [
         element(
             "div",
-            element("h3", "Why it was not accepted"),
-            bullets([capital(reason) for reason in identification.reasons]),
+            *([element("h3", "Why it was not accepted"), bullets(why)] if why else []),
             *([element("h3", "Next"), bullets(steps)] if steps else []),
             class_="next",
         )
@@ -89,7 +88,7 @@ def _verdict(identification: Identification, recording: Recording, gallery: Gall
         "verdict",
         "Findings and parameters",
         element("div", *[paragraph(sentence) for sentence in verdict.sentences], class_="sentences"),
-        *(reasons if identification.reasons or steps else []),
+        *(reasons if why or steps else []),
         parameter_table(identification),
         _titled("Torque delay", delay_lines(identification, recording.info)),
         _titled("Dropped: not supported by the data", not_said_yet(final.dropped, identification)),

@@ -19,6 +19,12 @@ def test_what_was_found_what_it_changes_and_why_it_is_accepted_are_three_sentenc
     assert accepted == "Accepted: J, C and K are determined, and what is left is at the noise floor."
 
 
+def test_an_error_that_reads_the_same_before_and_after_does_not_fall() -> None:
+    same = replace(FOUND.before.error, holdout_rate_rms=FOUND.final.error.holdout_rate_rms)
+    _, error, _ = headline(replace(FOUND, before=replace(FOUND.before, error=same)))
+    assert "stays at" in error and "falls" not in error
+
+
 def test_without_a_change_the_model_that_stands_is_spoken_of_alone() -> None:
     plain = replace(FOUND, after=None, verdict=replace(FOUND.verdict, effects=()))
     found, error, _ = headline(plain)

@@ -77,6 +77,13 @@ def test_a_campaign_that_is_not_accepted_says_why_and_what_next() -> None:
     assert "its interval spans zero" in told
 
 
+def test_an_accepted_campaign_with_something_left_open_says_what_next_and_nothing_of_a_refusal() -> None:
+    found, recording = sample(2.0)
+    told = report_html(replace(found, verdict=replace(found.verdict, tells_apart="Add a known mass.")), recording, "x")
+    assert "Add a known mass." in told
+    assert "Why it was not accepted" not in told
+
+
 def test_names_from_outside_never_become_markup() -> None:
     told = report_html(unhappy(), sample(2.0)[1], "<i>x</i>").replace(get_plotlyjs(), "")
     assert 'document.title="owned"</script>' not in told
