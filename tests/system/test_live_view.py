@@ -88,6 +88,7 @@ def live(tmp_path: Path) -> Iterator[LiveRun]:
     pytest.fail("the machine stalled every time")
 
 
+@pytest.mark.slow  # 50 ms beside a browser need a core that no other test has
 def test_the_stop_button_takes_the_torque_off_as_the_drive_saw_it(live: LiveRun) -> None:
     page = live.browser
     page.wait_for("parseFloat(document.getElementById('peak').textContent) > 20.0")  # N m, at the crest of the set
