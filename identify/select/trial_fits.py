@@ -138,9 +138,11 @@ class TrialFits:
         excess = now.reduced_chi_square - 1.0
         if excess < FOLLOWS - 1.0 or excess > FOLLOWS_LESS * self._excess_with_lags:
             return []
-        self._excess_with_lags = excess
         lags = [n for n in (*now.structure.effects, *names) if effects.get(n).lag is not None]
-        return [] if set(lags) & set(now.structure.effects) else lags
+        if set(lags) & set(now.structure.effects):
+            return []
+        self._excess_with_lags = excess
+        return lags
 
     def start_values(self, name: str, now: Fit) -> dict[Name, float]:
         """An effect without gains, its times about a sample long."""
@@ -201,10 +203,10 @@ class TrialFits:
             structure = structure.minus(special)
         fits: list[Fit] = []
 
-        def begun_where_it_stands(own: Mapping[Name, float], below: float = least) -> Fit:
+        def begun_where_it_stands(own: Mapping[Name, float]) -> Fit:
             return self.problem.fit(
                 structure.plus(name), {**rest, **own}, now.noise, TRIAL_ITERATIONS, carry=now.shots, thorough=False,
-                against=now.cost, least=below,
+                against=now.cost, least=least,
             )  # fmt: skip
 
         for start in starts:
@@ -225,7 +227,7 @@ class TrialFits:
         best = min(fits, key=lambda f: f.cost)
         if not held and not best.cost < now.cost:  # a model is no worse than what it contains: from there, then
             own = {k: v for k, v in best.values.items() if k[0] == name and k[1] not in linear}
-            fits.append(begun_where_it_stands(own, min(least, now.cost)))
+            fits.append(begun_where_it_stands(own))
             best = min(fits, key=lambda f: f.cost)
         shown = shows_a_period(name, best.values, self.problem.traces)
         return best if np.isfinite(best.cost) and shown else None

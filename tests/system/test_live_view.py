@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import subprocess
 import sys
@@ -29,7 +30,7 @@ OVERRIDES = (
     "limits.stale_gyro_ms=500", "bench.amplifier.settings.drive_heartbeat_ms=1000",
     "identify.candidates=[coulomb_friction]",  # a search of all of them after the stop is not what is tested here
 )  # fmt: skip
-TO_ZERO_S = 0.05  # from the click to zero torque at the drive
+TO_ZERO_S = 0.05  # from the click to zero torque at the drive, where no other test takes the processor
 TRIES = 5  # a machine that others use may stall, and a stall is rightly a trip
 
 
@@ -88,8 +89,8 @@ def live(tmp_path: Path) -> Iterator[LiveRun]:
     pytest.fail("the machine stalled every time")
 
 
-@pytest.mark.slow  # 50 ms beside a browser need a core that no other test has
-def test_the_stop_button_takes_the_torque_off_as_the_drive_saw_it(live: LiveRun) -> None:
+@pytest.mark.parametrize("within_s", [math.inf, pytest.param(TO_ZERO_S, marks=pytest.mark.slow)])
+def test_the_stop_button_takes_the_torque_off_as_the_drive_saw_it(live: LiveRun, within_s: float) -> None:
     page = live.browser
     page.wait_for("parseFloat(document.getElementById('peak').textContent) > 20.0")  # N m, at the crest of the set
     assert "± " in page.evaluate("document.querySelector('#fit tbody').textContent")
@@ -109,7 +110,7 @@ def test_the_stop_button_takes_the_torque_off_as_the_drive_saw_it(live: LiveRun)
                                             " && document.getElementById('title').textContent")  # fmt: skip
     drive = read_recording_h5(live.out / "recording.h5").info["emulated_drive"]
     zero_s = [e["time_s"] for e in drive if e["event"] in ("torque_zero", "disabled") and e["time_s"] > clicked_s]
-    assert zero_s and zero_s[0] - clicked_s < TO_ZERO_S
+    assert zero_s and zero_s[0] - clicked_s < within_s
     after = [e for e in drive if e["time_s"] >= zero_s[0]]
     assert all(e["torque_nm"][1] == 0.0 for e in after if e["event"] in ("torque_zero", "disabled"))
 
