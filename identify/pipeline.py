@@ -23,6 +23,7 @@ from identify.model.structure import Structure, shape_values
 from identify.results import UNITS, Dependence, Identification, SetResult
 from identify.rivals.alternative_causes import AlternativeCauses
 from identify.rivals.coloured_noise import Colour, with_noise_known
+from identify.rivals.stand_ins import with_stand_ins
 from identify.rivals.tone_origin import TONE, describe, standing_line
 from identify.rivals.whole_runs import FreeRunFitter
 from identify.runs.clipping import full_scale_of
@@ -219,21 +220,19 @@ class _Identifier:
             self.traces, self.split, self.structure, shapes, self.start, allowed,
             UNITS[self.recording.axis]["torque"], self.say,
             (search.stepwise.best, found_there), search.stepwise.trusted, search.stepwise.weigher.regression,
-            self._curves(search.stepwise), search.refutes,
+            self._curves(search.stepwise), search.refutes, search.unsupported,
         )  # fmt: skip
         found = found.with_lines(search.stepwise.best, search.stepwise.problem.torque_nm)
-        after = found.after
         gyro = all(t.channel == "rate" and t.beside is None for t in self.traces)  # an encoder has no line of its own
-        line = standing_line(after, self.traces) if gyro and TONE in found.named else None
+        line = standing_line(found.after, self.traces) if gyro and TONE in found.named else None
         if line is not None:
             words = describe(line, self.recording.axis, self.traces[0].channel)
             self.say(f"not named: {TONE}; the line may come from the sensor itself")
             step = search.stepwise
             bare = step.without(step.best, TONE) if TONE in step.best.structure.effects else step.best
             found = found.without(TONE).with_lines(bare, step.problem.torque_nm)
-            after = found.after
-            found.search.mark_undetermined(TONE, words, after.fit if found.named else found.search.base)
-        return self._report(found.search, found.before, after, measured=found)
+            found.search.mark_undetermined(TONE, words, found.after.fit if found.named else found.search.base)
+        return self._report(found.search, found.before, found.after, measured=with_stand_ins(found, self.say))
 
     def _curves(self, search: Stepwise) -> list[tuple[Dependence, dict[str, float]]]:
         """What curves over the torque that is left show; of those hardly believed, the one J, C or K hang on."""

@@ -102,6 +102,9 @@ class Disturbance:
         What of it goes with something; the rest is noise, and in the intervals.
     moves_percent
         How far J, C and K move with the free-form terms of what it depends on beside the model.
+    moves_without_percent
+        How far they move without a named effect that is flexible enough to have taken up part of what is left, for
+        each such effect; empty where nothing is left that depends on something.
     """
 
     torque_rms: float
@@ -109,6 +112,7 @@ class Disturbance:
     relative: float
     depends_on: tuple[Dependence, ...] = ()
     moves_percent: Mapping[str, float] = field(default_factory=dict)
+    moves_without_percent: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def material_percent(self) -> float:

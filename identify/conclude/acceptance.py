@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from identify.residual import Disturbance
@@ -19,7 +19,12 @@ USUAL_CUTOFF_HZ = 50.0
 
 def of_reported(left: Disturbance, model: ModelResult) -> Disturbance:
     """Without what it does to parameters that are not reported."""
-    return replace(left, moves_percent={k: v for k, v in left.moves_percent.items() if k in model.parameters})
+
+    def reported(moves: Mapping[str, float]) -> dict[str, float]:
+        return {k: v for k, v in moves.items() if k in model.parameters}
+
+    without = {name: reported(moves) for name, moves in left.moves_without_percent.items()}
+    return replace(left, moves_percent=reported(left.moves_percent), moves_without_percent=without)
 
 
 def reasons_against_fit(searched: Sequence[GeneticRun], final: ModelResult) -> list[str]:
@@ -57,6 +62,15 @@ def reasons_against_disturbance(left: Disturbance, accept: AcceptConfig, axis: s
                 f"fitting the part of the residual {torque} that depends on the {on} changes {SYMBOLS[name]} by "
                 f"{number(moved, 2)} %; "
                 f"{number(most, 2)} % is allowed (identify.accept.{name}_percent)"
+            )
+    for effect, moves in left.moves_without_percent.items():
+        beyond = {k: v for k, v in moves.items() if v > getattr(accept, f"{k}_percent")}
+        if beyond:
+            changes = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in beyond.items()])
+            keys = joined([f"identify.accept.{k}_percent" for k in beyond])
+            out.append(
+                f"{plain(effect)} changes {changes}, and it is flexible enough to have taken up part of the {torque} "
+                f"that depends on the {on} and has no name yet; {keys} allows less"
             )
     return out
 

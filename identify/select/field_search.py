@@ -94,6 +94,7 @@ def search_in_torque(
     allowed: Sequence[str], unit: str, say: Callable[[str], None], known: tuple[Fit, Search],
     trusted: bool, along_few: TorqueRegression, curves: Sequence[tuple[Dependence, Mapping[str, float]]] = (),
     refutes: Callable[[TorqueFit], bool] = lambda fit: False,
+    unsupported: Callable[[TorqueFit], str | None] = lambda fit: None,
 ) -> Found:  # fmt: skip
     """Find what the declared model lacks, and fit both models with their disturbance.
 
@@ -117,8 +118,9 @@ def search_in_torque(
         The samples that search looked at, in torque.
     curves
         What curves over what that model leaves show, and how far J, C and K move with each, percent.
-    refutes
-        Whether that model is likelier than one found in torque: the search in torque proposes, the likelihood judges.
+    refutes, unsupported
+        Whether that model is likelier than one found in torque, and which effect of such a one the likelihood does not
+        support: the search in torque proposes, the likelihood judges.
     """
     few, parts = along_few.traces, along_few.split
     scale = scale_of(few, start.platform, ())
@@ -155,6 +157,9 @@ def search_in_torque(
         say(f"nothing found up to {start.cutoff_hz:.3g} Hz: looking up to {wider:.3g} Hz")
         search = at(wider)
         best = search.run()
+    while by_likelihood is None and (name := unsupported(best)):
+        say(f"dropped {name}: the likelihood does not support it")
+        best = search.without(best, name)
     regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
     final = by_likelihood[0].structure if by_likelihood else best.structure
     say(f"final fit with {', '.join(final.effects) or 'fewer terms'}")
@@ -278,9 +283,7 @@ def _as_search(search: TorqueSearch, structure: Structure, base: TorqueFit, best
         if term not in best.structure.terms:
             found.dropped.append((term, "on samples not fitted it carries no torque that the others do not"))
     for name in named:
-        rest = {k: v for k, v in best.shapes.items() if k != name}
-        without = search.regression.solve(best.structure.minus(name), rest)
-        found.contribution[name] = without.held_nm / max(best.held_nm, 1e-300)
+        found.contribution[name] = search.without(best, name).held_nm / max(best.held_nm, 1e-300)
     return found
 
 

@@ -144,6 +144,11 @@ class TorqueSearch:
         lower = [w for w in good if w.effect in effects.get(chosen.effect).lower_order]  # a constant before a slope
         return lower[0] if lower else chosen
 
+    def without(self, now: TorqueFit, name: str) -> TorqueFit:
+        """The same without an effect."""
+        shapes = {k: v for k, v in now.shapes.items() if k != name}
+        return self.regression.solve(now.structure.minus(name), shapes)
+
     def without_absorbing_stiffness(self, now: TorqueFit) -> TorqueFit:
         """The same without a stiffness that carries no torque of its own, or that pushes where a spring pulls."""
         if "stiffness" not in now.structure.terms:
@@ -167,8 +172,7 @@ class TorqueSearch:
                 name in effects.get(e).lower_order for e in now.structure.effects
             ):
                 continue
-            shapes = {k: v for k, v in now.shapes.items() if k != name}
-            without = self.regression.solve(now.structure.minus(name), shapes)
+            without = self.without(now, name)
             if not self.candidate(name, without, now).is_significant:
                 self.say(f"dropped {name}: the others carry its torque")
                 return self.backward_elimination(without)

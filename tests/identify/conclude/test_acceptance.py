@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import pytest
 
-from identify.conclude.acceptance import reasons_against_disturbance
+from identify.conclude.acceptance import of_reported, reasons_against_disturbance
 from identify.residual import Dependence, Disturbance
 from identify.wording import residual_torque_sentence
 from rig.config.identify import AcceptConfig
@@ -28,6 +31,16 @@ def test_each_limit_is_named_where_it_is_passed(left: Disturbance, words: str) -
     (reason,) = reasons_against_disturbance(left, AcceptConfig(), "rotary")
     assert words in reason
     assert "rate" in reason
+
+
+def test_a_flexible_effect_that_j_hangs_on_is_a_reason_while_something_is_left() -> None:
+    moves = {"flexible_mode": {"inertia": 5.8, "damping": 7.9}, "cogging": {"inertia": 0.4}}
+    left = Disturbance(0.1, "N*m", 0.1, (RATE,), {}, moves)
+    (reason,) = reasons_against_disturbance(left, AcceptConfig(), "rotary")
+    assert reason.startswith("flexible mode changes J by 5.8 %, and")
+    assert "identify.accept.inertia_percent" in reason
+    unreported = of_reported(left, cast(Any, SimpleNamespace(parameters={"damping": None})))
+    assert reasons_against_disturbance(unreported, AcceptConfig(), "rotary") == []
 
 
 def test_within_all_limits_it_is_accepted_and_told_in_a_sentence() -> None:
