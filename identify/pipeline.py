@@ -4,27 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from identify.conclude.acceptance import interrupted_reason
+from identify.conclude.acceptance import INTERRUPTED_NOTE, REJECTED_TOGETHER, interrupted_reason
 from identify.conclude.case import Case
 from identify.conclude.conclusion import conclude
 from identify.conclude.contribution import contributions
-from identify.conclude.declared_values import declared_values
+from identify.conclude.declared_values import declared_shapes, declared_values
 from identify.conclude.error_figures import floor_of, in_torque, measure
 from identify.conclude.final_models import FinalModels
 from identify.diagnose.decay_disturbance import left_of_a_decay
 from identify.estimate.final_fit import FinalFit
 from identify.estimate.initial_guess import Start, first_guess
 from identify.genetic.per_set import each_set
-from identify.model.structure import Structure, shape_values
+from identify.model.structure import Structure
 from identify.results import UNITS, Dependence, Identification, SetResult
 from identify.rivals.alternative_causes import AlternativeCauses
 from identify.rivals.coloured_noise import Colour, with_noise_known
 from identify.rivals.stand_ins import with_stand_ins
 from identify.rivals.tone_origin import TONE, describe, standing_line
+from identify.rivals.whiteness_test import fails_whiteness_test
 from identify.rivals.whole_runs import FreeRunFitter
 from identify.runs.clipping import full_scale_of
 from identify.runs.excerpts import describe_excerpts
@@ -39,7 +41,7 @@ from identify.select.free_form_residual import dependence_on, most_moving
 from identify.select.likelihood_search import LikelihoodSearch
 from identify.select.search_state import Search
 from identify.select.stepwise import Stepwise
-from identify.select.torque_choice import start_search
+from identify.select.torque_choice import filtered_above, start_search
 from identify.signals.prepare import channels_of, prepare
 from identify.signals.trace import Trace, release
 from rig import effects
@@ -47,13 +49,6 @@ from rig.config.identify import IdentifyConfig
 from rig.errors import Aborted
 from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
-
-REJECTED_TOGETHER = (
-    "rejected: together the effects found still do not explain the data, and neither does the declared model"
-)
-INTERRUPTED_NOTE = (
-    "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
-)
 
 
 def identify(
@@ -135,13 +130,14 @@ class _Identifier:
 
     def run(self) -> Identification:
         """The whole way; where somebody stops it in the middle, what there is so far."""
-        shapes = {n: shape_values(n, _plain(self.declared, n)) for n in self.structure.effects}
+        shapes = declared_shapes(self.declared, self.structure)
         search: LikelihoodSearch | None = None
         try:
             self.say("fitting the declared model")
             search = self._begun()
             at_noise = search.run() or self.colour is not None
             found = search.found
+            in_torque = partial(self._in_torque, shapes, search, found)
             fits = FreeRunFitter(*(reduced(self.traces, self.split) if self.torque_free else (self.traces, self.split)))
             causes = AlternativeCauses(self.traces, fits, self.structure, self.recording.axis, self.say)
             both = all(t.beside is not None for t in self.traces)
@@ -152,13 +148,11 @@ class _Identifier:
             if self.torque_free:
                 left = search.stepwise.left
                 self.curve = dependence_on(search.stepwise, left) if left is not None else None
-                return self._concluded(found, causes)
+                return self._concluded(found, causes, in_torque)
             if (white and nothing_left) or causes.other_cause(found):
                 release(search.stepwise.problem.traces)
-                return self._concluded(found, causes)
-            self.say("the residual holds a torque that was not recorded, in addition to the sensor's noise")
-            self.more_than_noise = True
-            return self._in_torque(shapes, search, found)
+                return self._concluded(found, causes, in_torque)
+            return in_torque()
         except (Aborted, KeyboardInterrupt):
             if search is None:
                 raise
@@ -178,20 +172,26 @@ class _Identifier:
             return search
         self.traces, self.torque_noise_above_hz = list(search.traces), cutoff_hz
         self.start = replace(first_guess(self.traces, Structure(self.declared.terms)), cutoff_hz=self.start.cutoff_hz)
-        torque = "force" if self.recording.axis == "linear" else "torque"
-        told = (
-            f"the recorded {torque} is filtered: above {cutoff_hz:.3g} Hz it is noise that the platform does not follow"
-        )
-        self.left_out = (*self.left_out, told)
-        self.say(told)
+        note = filtered_above(cutoff_hz, self.recording.axis)
+        self.left_out = (*self.left_out, note)
+        self.say(note)
         return search
 
-    def _concluded(self, search: Search, causes: AlternativeCauses) -> Identification:
-        """Final fits, what else might pass for what was found, and the report."""
+    def _concluded(
+        self, search: Search, causes: AlternativeCauses, in_torque: Callable[[], Identification]
+    ) -> Identification:  # fmt: skip
+        """Final fits, what else might pass for what was found, and the report, or ``in_torque`` for that."""
         models, changed = self._models(), search.best.structure != self.structure
         before = models.before(search)
         after = models.after(search) if changed else before
-        if taken_back := causes.mark_undetermined(search, after):
+        taken_back = causes.mark_undetermined(search, after)
+        if not taken_back and fails_whiteness_test(after, self.structure.effects):
+            if not self.torque_free:
+                return in_torque()
+            self.say("no effect is named: three flexible effects still leave more than noise")
+            search.reject_all()
+            taken_back = True
+        if taken_back:
             after = models.after(search) if search.best.structure != self.structure else before
         named = [e for e in after.structure.effects if e not in self.structure.effects]
         base = search.base.values
@@ -215,12 +215,14 @@ class _Identifier:
         self, shapes: dict[str, tuple[float, ...]], search: LikelihoodSearch, found_there: Search
     ) -> Identification:  # fmt: skip
         """The way for measured data: what the model lacks is told by the torque that it leaves."""
+        self.say("the residual holds a torque that was not recorded, in addition to the sensor's noise")
+        self.more_than_noise = True
         allowed = [n for n in self._allowed() if n not in search.stepwise.stood_for_curves]
         found = search_in_torque(
             self.traces, self.split, self.structure, shapes, self.start, allowed,
             UNITS[self.recording.axis]["torque"], self.say,
             (search.stepwise.best, found_there), search.stepwise.trusted, search.stepwise.weigher.regression,
-            self._curves(search.stepwise), search.refutes, search.unsupported,
+            self._curves(search.stepwise), search.refutes,
         )  # fmt: skip
         found = found.with_lines(search.stepwise.best, search.stepwise.problem.torque_nm)
         gyro = all(t.channel == "rate" and t.beside is None for t in self.traces)  # an encoder has no line of its own
@@ -292,8 +294,3 @@ class _Identifier:
         )  # fmt: skip
         scale = self._models().torque_scale(after) if in_full else None
         return conclude(case, search, before, after, measured_before, measured_after, floor, per_set, joint, scale)
-
-
-def _plain(declared: Platform, name: str) -> dict[str, float]:
-    effect = effects.get(name)
-    return dict(zip((p.name for p in effect.parameters), effect.values(declared.effects[name]), strict=True))

@@ -14,6 +14,12 @@ from rig.config.identify import AcceptConfig
 from rig.platform import TERMS
 
 INTERRUPTED = "the search was interrupted"
+REJECTED_TOGETHER = (
+    "rejected: together the effects found still do not explain the data, and neither does the declared model"
+)
+INTERRUPTED_NOTE = (
+    "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
+)
 USUAL_CUTOFF_HZ = 50.0
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from identify.estimate.final_fit import FinalFit
 from identify.estimate.output_error import refine
 from identify.model.parameters import Name
+from identify.model.structure import Structure, shape_values
 from identify.signals.trace import Trace
 from rig import effects
 from rig.platform import TERMS, Platform
@@ -31,6 +32,15 @@ def declared_values(declared: Platform, torque_free: bool) -> dict[Name, float]:
         for parameter, value in zip(effect.parameters, effect.values(given), strict=True):
             out[(name, parameter.name)] = value * (scale if effect.per_inertia(parameter) else 1.0)
     return out
+
+
+def declared_shapes(declared: Platform, structure: Structure) -> dict[str, tuple[float, ...]]:
+    """Shape parameters of the effects of a structure, as they were declared."""
+    given = {
+        n: zip(effects.get(n).parameters, effects.get(n).values(declared.effects[n]), strict=True)
+        for n in structure.effects
+    }
+    return {n: shape_values(n, {p.name: value for p, value in pairs}) for n, pairs in given.items()}
 
 
 def kept_as_declared(

@@ -19,7 +19,7 @@ from identify.estimate.profile_likelihood import settled, widened
 from identify.estimate.regression import Regression, Solution, residuals
 from identify.estimate.starting_point import start_values
 from identify.model.parameter_fit import ZERO_INFORMATION, ParameterFit, std_error_of
-from identify.model.parameters import Name
+from identify.model.parameters import Name, is_gain
 from identify.model.structure import Structure
 from identify.signals.trace import Trace
 from identify.simulate.sensitivities import jacobian
@@ -72,6 +72,22 @@ class FinalFit:
     def std_error(self, name: Name) -> float:
         """One standard error of a parameter."""
         return std_error_of(name, self.names, self.covariance)
+
+    def support_of(self, effect: str) -> float:
+        """By how much an effect's gains differ from none: their squares over their covariance, parameters paid for.
+
+        A Wald statistic, on the scale of twice a log-likelihood; infinite for an effect that has no gain.
+        """
+        own = [i for i, n in enumerate(self.names) if n[0] == effect]
+        at = [i for i in own if is_gain(self.names[i])]
+        covariance = self.covariance[np.ix_(at, at)]
+        if not at or not np.all(np.isfinite(covariance)):
+            return float("inf")
+        gains = np.array([self.values[self.names[i]] for i in at])
+        size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+        scaled = np.linalg.pinv(covariance / np.outer(size, size), rcond=SINGULAR, hermitian=True)
+        wald = float((gains / size) @ scaled @ (gains / size))
+        return wald - len(own) * float(np.log(max(self.fit.count, 2)))
 
     def as_uncertain_as(self, fuller: FinalFit) -> FinalFit:
         """The same where a term was left out that may be there: as uncertain as the fit that has it, if that is more.

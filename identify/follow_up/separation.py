@@ -14,11 +14,10 @@ from typing import Any, Literal
 import numpy as np
 
 from identify.bounds.cramer_rao import Information, information_of, planned_trace, vector_of
-from identify.model.parameters import bounds_of, ordered, platform_of
+from identify.model.parameters import bounds_of, is_gain, ordered, platform_of
 from identify.signals.trace import Trace
 from identify.simulate.sensitivities import nuisance_basis, sensitivities
 from identify.simulate.shots import RUNAWAY, Shots, make_shots
-from rig import effects
 from rig.dynamics import Equations
 from rig.dynamics.equations import MAX_SUBSTEPS
 from rig.excitation import PlannedSet
@@ -147,17 +146,13 @@ def settled(
     sensor = replace(sensor, noise=sensor.noise / np.sqrt(weight))
     shots = [shots_of(way.model, measured(way.truth, s, sensor)) for s in several]
     _, names, origin = vector_of(way.model, 1)
-    own = np.array([len(n) > 1 and n[0] not in way.truth.effects and _is_gain(n) for n in names])
+    own = np.array([len(n) > 1 and n[0] not in way.truth.effects and is_gain(n) for n in names])
     found = np.inf
     for share in STARTS[: 1 + 2 * bool(own.any())]:
         found = min(found, _descend(way, shots, np.where(own, share * origin, origin)))
         if found < least:
             break
     return found
-
-
-def _is_gain(name: tuple[str, ...]) -> bool:
-    return next(p.linear for p in effects.get(name[0]).parameters if p.name == name[1])
 
 
 def _descend(way: Way, several: Sequence[Shots], start: Array) -> float:

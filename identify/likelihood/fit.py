@@ -7,17 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from identify.model.parameter_fit import MIN_EIGENVALUE_RATIO, ParameterFit
-from identify.model.parameters import Name
+from identify.model.parameters import Name, is_gain
 from identify.simulate.shots import Shots
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.gains import Gains, Noise
 
 MAX_LINEAR_INERTIA_CHANGE = 0.5  # of the inertia: farther than that no first order tells how the gains follow
-
-
-def _is_gain(name: Name) -> bool:
-    return next(p.linear for p in effects.get(name[0]).parameters if p.name == name[1])
 
 
 @dataclass(frozen=True)
@@ -111,7 +107,7 @@ class Fit(ParameterFit):
 
     def without(self, name: str) -> dict[Name, float]:
         """All other parameters, gains as they follow to first order where those of a term or an effect become zero."""
-        gains = [i for i, n in enumerate(self.names) if len(n) == 1 or _is_gain(n)]
+        gains = [i for i, n in enumerate(self.names) if len(n) == 1 or is_gain(n)]
         gone, rest = ([i for i in gains if (self.names[i][0] == name) is own] for own in (True, False))
         there = {n: float(v) for n, v in zip(self.names, self.vector, strict=True) if n[0] != name}
         size = np.sqrt(np.maximum(np.diag(self.information), 1e-300))

@@ -26,6 +26,11 @@ def names_of(structure: Structure, runs: int) -> tuple[Name, ...]:
     return tuple(out)
 
 
+def is_gain(name: Name) -> bool:
+    """Whether an effect's parameter enters its torque as a factor."""
+    return next(p.linear for p in effects.get(name[0]).parameters if p.name == name[1])
+
+
 def bounds_of(name: Name) -> tuple[float, float]:
     """Bounds of a parameter: inertia is positive, damping and stiffness are free, effects say their own."""
     if len(name) == 1:

@@ -12,7 +12,6 @@ from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.rivals import run_heterogeneity
 from identify.rivals.tone_origin import TONE, describe, standing_line
-from identify.rivals.whiteness_test import fails_whiteness_test
 from identify.rivals.whole_runs import FreeRunFitter
 from identify.select.search_state import Search
 from identify.signals.trace import Trace
@@ -54,9 +53,6 @@ class AlternativeCauses:
             words = describe(line, self.axis, self.traces[0].channel)
             search.mark_undetermined(TONE, words, self._until(search, TONE))
             self.say(f"not named: {TONE}; the line may come from the sensor itself")
-        elif fails_whiteness_test(after, self.structure.effects):
-            search.reject_all()
-            self.say("no effect is named: three flexible effects still leave more than noise")
         else:
             return False
         return True

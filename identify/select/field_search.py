@@ -16,14 +16,14 @@ from identify.estimate.initial_guess import Start, scale_of
 from identify.likelihood.by_prediction_error import as_final, by_prediction_error, fitted_on_all
 from identify.likelihood.fit import Fit
 from identify.model.structure import Structure
-from identify.results import Candidate, Dependence, Disturbance
+from identify.results import Dependence, Disturbance
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
 from identify.select.disturbance_lines import lines_left
-from identify.select.evidence import TRUSTED, in_band, inflation, torque_fit_of
+from identify.select.evidence import STRONG_SUPPORT, TRUSTED, in_band, inflation, torque_fit_of
 from identify.select.likelihood_search import MAX_CUTOFF_SHARE
 from identify.select.search_state import Search
-from identify.select.torque_search import FALL_SIGMAS, TorqueCandidate, TorqueSearch
+from identify.select.torque_search import TorqueSearch
 from identify.signals.trace import Trace
 from rig import effects
 from rig.effects.base import Place
@@ -34,7 +34,6 @@ WIDER = {"angle": 10.0**0.4, "rate": 10.0 ** (2.0 / 3.0)}
 CLEARLY_LESS, ABOUT_AS_MUCH = 0.75, 1.25  # times the power that prediction error's model leaves on held-out samples
 UNFOLLOWED = 0.5  # of the residual in torque, that the likelihood takes the disturbance for
 NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
-PERCENT = 100.0
 ANOTHER = 0.5  # of the inertia, by which the likeliest platform is another than the one that is reported
 
 
@@ -94,7 +93,6 @@ def search_in_torque(
     allowed: Sequence[str], unit: str, say: Callable[[str], None], known: tuple[Fit, Search],
     trusted: bool, along_few: TorqueRegression, curves: Sequence[tuple[Dependence, Mapping[str, float]]] = (),
     refutes: Callable[[TorqueFit], bool] = lambda fit: False,
-    unsupported: Callable[[TorqueFit], str | None] = lambda fit: None,
 ) -> Found:  # fmt: skip
     """Find what the declared model lacks, and fit both models with their disturbance.
 
@@ -118,9 +116,8 @@ def search_in_torque(
         The samples that search looked at, in torque.
     curves
         What curves over what that model leaves show, and how far J, C and K move with each, percent.
-    refutes, unsupported
-        Whether that model is likelier than one found in torque, and which effect of such a one the likelihood does not
-        support: the search in torque proposes, the likelihood judges.
+    refutes
+        Whether that model is likelier than one found in torque: the search in torque proposes, the likelihood judges.
     """
     few, parts = along_few.traces, along_few.split
     scale = scale_of(few, start.platform, ())
@@ -157,21 +154,25 @@ def search_in_torque(
         say(f"nothing found up to {start.cutoff_hz:.3g} Hz: looking up to {wider:.3g} Hz")
         search = at(wider)
         best = search.run()
-    while by_likelihood is None and (name := unsupported(best)):
-        say(f"dropped {name}: the likelihood does not support it")
-        best = search.without(best, name)
     regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
     final = by_likelihood[0].structure if by_likelihood else best.structure
     say(f"final fit with {', '.join(final.effects) or 'fewer terms'}")
     before = _final(regression, base, traces, split)
-    if final == structure:
-        after = before
-    elif by_likelihood:
-        after = by_prediction_error(
-            traces, final, by_likelihood[0].values, split.final, split.everything, like=by_likelihood[0]
-        )  # fmt: skip
-    else:
-        after = _final(regression, best, traces, split)
+
+    def fitted(final: Structure) -> FinalFit:
+        if final == structure:
+            return before
+        if by_likelihood:
+            return by_prediction_error(
+                traces, final, by_likelihood[0].values, split.final, split.everything, like=by_likelihood[0]
+            )  # fmt: skip
+        return _final(regression, best, traces, split)
+
+    after, found_so_far = fitted(final), final
+    while (name := _weakest(after, structure)) is not None and after.support_of(name) < STRONG_SUPPORT:
+        say(f"dropped {name}: in the final fit it may as well be zero")
+        final, best = final.minus(name), search.without(best, name)
+        after = fitted(final)
     disturbance = disturbance_of(regression, best, floor, unit)
     lost = [e for e in final.effects if e not in best.structure.effects and effects.get(e).place is not Place.SENSOR]
     if by_likelihood and (unfollowed or lost):
@@ -192,10 +193,19 @@ def search_in_torque(
             fitted = by_prediction_error(traces, less, values, split.final, split.everything)
         return fitted, errors(there), disturbance_of(regression, there, floor, unit)
 
-    told = _as_search(search, structure, base, best)
+    told = search.as_search(best)
     if by_likelihood:
         told = replace(by_likelihood[1], contribution=told.contribution)
+        if final != found_so_far:
+            told.drop(after.fit)
     return Found(told, before, after, disturbance, (errors(base), errors(best)), lacking)
+
+
+def _weakest(final: FinalFit, declared: Structure) -> str | None:
+    """Of the effects that were found, the one that the final fit supports least; None where none was found."""
+    found = [e for e in final.structure.effects if e not in declared.effects]
+    free = [e for e in found if not any(e in effects.get(other).lower_order for other in found)]
+    return min(free, key=final.support_of, default=None)
 
 
 def _describes(likeliest: Fit, final: FinalFit) -> bool:
@@ -264,34 +274,3 @@ def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace]
         fit, values, (*names, *shapes), covariance, free, False, (*determined, *(True for _ in shapes)),
         "least squares in torque",
     )  # fmt: skip
-
-
-def _as_search(search: TorqueSearch, structure: Structure, base: TorqueFit, best: TorqueFit) -> Search:
-    """What was looked at, as the report tells it."""
-    found = Search(base, best, 0.0, search.floor_nm)
-    named = [e for e in best.structure.effects if e not in structure.effects]
-    for number, looks in enumerate(search.rounds, 1):
-        chosen = search.best_candidate(looks)
-        for look in looks:
-            found.candidates.append(Candidate(look.effect, number, -look.evidence, None, _status(look, chosen, named)))
-        if chosen is not None and chosen.effect in named:
-            rivals = [w.effect for w in looks if w is not chosen and search.as_good(w, chosen)]
-            if rivals:
-                found.rivals[chosen.effect] = tuple(r for r in rivals if r not in named)
-    found.rivals = {k: v for k, v in found.rivals.items() if v}
-    for term in structure.terms:
-        if term not in best.structure.terms:
-            found.dropped.append((term, "on samples not fitted it carries no torque that the others do not"))
-    for name in named:
-        found.contribution[name] = search.without(best, name).held_nm / max(best.held_nm, 1e-300)
-    return found
-
-
-def _status(look: TorqueCandidate, chosen: TorqueCandidate | None, named: Sequence[str]) -> str:
-    if chosen is not None and look.effect == chosen.effect:
-        return "added" if look.effect in named else "added, then no longer needed"
-    if look.is_significant:
-        return "carries less than what was added"
-    if look.sureness >= FALL_SIGMAS and look.weight > 0.0:
-        return f"proven but small: {PERCENT * look.weight:.0f} % of what is left"
-    return "no better"

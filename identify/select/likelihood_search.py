@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from identify.runs.holdout import Split
 from identify.runs.observability import can_show
 from identify.runs.reduced import reduced
 from identify.select.curve_rivals import CURVES
-from identify.select.evidence import STRONG_SUPPORT, TRUSTED, EvidenceModel, support_difference
+from identify.select.evidence import STRONG_SUPPORT, EvidenceModel, support_difference
 from identify.select.search_state import Search
 from identify.select.stepwise import PREDICTS_TO_NOISE, Stepwise
 from identify.signals.trace import Trace, pooled_noise
@@ -49,7 +49,6 @@ class LikelihoodSearch:
     stepwise: Stepwise
     traces: Sequence[Trace]
     structure: Structure
-    in_torque: dict[Structure, Fit] = field(default_factory=dict)  # models found there, fitted by the likelihood
 
     @classmethod
     def of(
@@ -101,31 +100,8 @@ class LikelihoodSearch:
         left, added = search.left, [e for e in fit.structure.effects if e not in search.base.structure.effects]
         beside = left is not None and all(left.form in CURVES.get(effects.get(e).family, ()) for e in added)
         best = left.evidence.fit if left is not None and beside else search.best
-        there = self._by_likelihood(fit)
+        there = search.problem.fit(fit.structure, fit.values)
         return bool(np.isfinite(there.cost)) and support_difference(there, best) > STRONG_SUPPORT
-
-    def unsupported(self, fit: TorqueFit) -> str | None:
-        """The effect of a model found in torque that the likelihood supports least, if too little; else None.
-
-        Only a likelihood that is right about all effects of the model can tell; else None, too.
-        """
-        search, now = self.stepwise, self._by_likelihood(fit)
-        found = [e for e in now.structure.effects if e not in search.base.structure.effects]
-        names = [e for e in found if not any(e in effects.get(other).lower_order for other in found)]
-        if not np.isfinite(now.cost) or not names:
-            return None
-        without = zip(names, search.all_without(now, names), strict=True)
-        seen = [search.weigher.evidence(name, less, now) for name, less in without]
-        weakest = min(seen, key=lambda e: e.support)
-        trusted = all(e.inflation < TRUSTED for e in seen)
-        return weakest.effect if trusted and weakest.support < STRONG_SUPPORT else None
-
-    def _by_likelihood(self, fit: TorqueFit) -> Fit:
-        """A model found in torque, with its own best numbers."""
-        known = self.in_torque.get(fit.structure)
-        if known is None:
-            known = self.in_torque[fit.structure] = self.stepwise.problem.fit(fit.structure, fit.values)
-        return known
 
     @property
     def found(self) -> Search:

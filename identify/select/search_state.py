@@ -54,6 +54,18 @@ class Search:
         ]  # fmt: skip
         self.best, self.rivals, self.rival_models, self.dropped = self.base, {}, {}, []
 
+    def drop(self, without: ParameterFit) -> None:
+        """Take back the effects that the final model does without."""
+        gone = [e for e in self.best.structure.effects if e not in without.structure.effects]
+        self.candidates = [
+            replace(c, status="added, then no longer needed") if c.status == "added" and c.effect in gone else c
+            for c in self.candidates
+        ]  # fmt: skip
+        for effect in gone:
+            self.rivals.pop(effect, None)
+            self.rival_models.pop(effect, None)
+        self.best = without
+
     def mark_undetermined(self, name: str, sentences: tuple[str, str], without: ParameterFit) -> None:
         """Take an effect back that may as well be something no library has, and what was found beside it.
 

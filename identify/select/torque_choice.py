@@ -26,3 +26,9 @@ def start_search(
     if other.stepwise.base.cost > search.stepwise.base.cost - STRONG_SUPPORT:
         return search, None
     return other, cutoff_hz
+
+
+def filtered_above(cutoff_hz: float, axis: str) -> str:
+    """That the recorded torque was filtered, as the report says it."""
+    torque = "force" if axis == "linear" else "torque"
+    return f"the recorded {torque} is filtered: above {cutoff_hz:.3g} Hz it is noise that the platform does not follow"

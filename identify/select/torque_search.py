@@ -13,7 +13,9 @@ from dataclasses import dataclass, field
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.propose.torque_looks import candidate_torques
+from identify.results import Candidate
 from identify.select.evidence import MAX_EFFECTS, STRONG_SUPPORT, WEIGHT
+from identify.select.search_state import Search
 from rig import effects
 from rig.effects.base import Place
 
@@ -178,7 +180,38 @@ class TorqueSearch:
                 return self.backward_elimination(without)
         return now
 
+    def as_search(self, best: TorqueFit) -> Search:
+        """What was looked at, as the report tells it."""
+        structure = self.base.structure
+        found = Search(self.base, best, 0.0, self.floor_nm)
+        named = [e for e in best.structure.effects if e not in structure.effects]
+        for number, looks in enumerate(self.rounds, 1):
+            chosen = self.best_candidate(looks)
+            for look in looks:
+                status = _status(look, chosen, named)
+                found.candidates.append(Candidate(look.effect, number, -look.evidence, None, status))
+            if chosen is not None and chosen.effect in named:
+                rivals = [w.effect for w in looks if w is not chosen and self.as_good(w, chosen)]
+                if others := tuple(r for r in rivals if r not in named):
+                    found.rivals[chosen.effect] = others
+        for term in structure.terms:
+            if term not in best.structure.terms:
+                found.dropped.append((term, "on samples not fitted it carries no torque that the others do not"))
+        for name in named:
+            found.contribution[name] = self.without(best, name).held_nm / max(best.held_nm, 1e-300)
+        return found
+
 
 def _holds(simple: TorqueCandidate, rich: TorqueCandidate) -> bool:
     """Whether the richer effect carries too little beside its special case to be named in its place."""
     return (1.0 - rich.weight) > (1.0 - RICHER) * (1.0 - simple.weight)
+
+
+def _status(look: TorqueCandidate, chosen: TorqueCandidate | None, named: Sequence[str]) -> str:
+    if chosen is not None and look.effect == chosen.effect:
+        return "added" if look.effect in named else "added, then no longer needed"
+    if look.is_significant:
+        return "carries less than what was added"
+    if look.sureness >= FALL_SIGMAS and look.weight > 0.0:
+        return f"proven but small: {100.0 * look.weight:.0f} % of what is left"
+    return "no better"

@@ -41,7 +41,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "select/curve_rivals.py": "COMPARABLE NEAR",
     "select/disturbance_lines.py": "FLOOR_BINS LOWEST_BIN SHORTEST",
     "select/evidence.py": "ALONE",
-    "select/field_search.py": "ANOTHER NO_WORSE PERCENT",
+    "select/field_search.py": "ANOTHER NO_WORSE",
     "select/free_form_residual.py": "HOPE SHOWN CURVE_STEPS CURVES_TRIED",
     "select/likelihood_search.py": "ALL MORE SAMPLES",
     "select/stepwise.py": "MIN_RIVAL_SHARE PROMISING",

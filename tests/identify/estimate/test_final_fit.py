@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 
@@ -9,6 +12,7 @@ from identify.estimate.final_fit import FinalFit, by_output_error, by_regression
 from identify.estimate.initial_guess import first_guess
 from identify.model.structure import Structure
 from identify.runs.holdout import split
+from identify.select.evidence import STRONG_SUPPORT
 from identify.signals.trace import Trace, pooled_noise
 from rig.recording.run import Recording
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, sine_run, traces_of, white
@@ -80,3 +84,14 @@ def test_white_noise_is_called_white_and_a_drift_is_not() -> None:
 def test_the_noise_of_several_runs_is_pooled() -> None:
     traces = traces_of(campaign(sets=TWO_SETS))
     assert pooled_noise(traces) == pytest.approx(NOISE_RAD_S, rel=0.05)
+
+
+@pytest.mark.parametrize(("level", "supported"), [(0.001, False), (0.003, False), (0.02, True)])
+def test_an_effect_is_supported_by_how_far_its_gains_are_from_none(level: float, supported: bool) -> None:
+    fitted = SimpleNamespace(structure=Structure(effects=("coulomb_friction", "torque_delay")), count=1000)
+    names = (("inertia",), ("coulomb_friction", "level"), ("torque_delay", "delay"))
+    values = {("inertia",): 1.0, ("coulomb_friction", "level"): level, ("torque_delay", "delay"): 1e-9}
+    fit = FinalFit(cast(Any, fitted), values, names, np.diag([1e-6, 1e-6, 1e-6]), None, False, (True,) * 3, "")
+    assert fit.support_of("coulomb_friction") == pytest.approx((level / 1e-3) ** 2 - np.log(1000.0))
+    assert (fit.support_of("coulomb_friction") > STRONG_SUPPORT) is supported
+    assert fit.support_of("torque_delay") == np.inf  # a delay has no gain that could be none
