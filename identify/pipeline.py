@@ -233,8 +233,9 @@ class _Identifier:
             step = search.stepwise
             bare = step.without(step.best, TONE) if TONE in step.best.structure.effects else step.best
             found = found.without(TONE).with_lines(bare, step.problem.torque_nm)
-            found.search.mark_undetermined(TONE, words, found.after.fit if found.named else found.search.base)
-        return self._report(found.search, found.before, found.after, measured=with_stand_ins(found, self.say))
+            found.search.mark_undetermined(TONE, words, found.kept)
+        found = with_stand_ins(found, self.recording.axis, self.say)
+        return self._report(found.search, found.before, found.after, measured=found)
 
     def _curves(self, search: Stepwise) -> list[tuple[Dependence, dict[str, float]]]:
         """What curves over the torque that is left show; of those hardly believed, the one J, C or K hang on."""

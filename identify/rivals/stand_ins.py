@@ -8,27 +8,60 @@ J, C and K in its place.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from identify.estimate.final_fit import FinalFit
-from identify.select.field_search import Found
+from identify.select.field_search import Found, with_free_form
 from identify.select.free_form_residual import MOVED_SIGMAS
-from identify.wording import plain
+from identify.wording import capital, depends_on, joined, plain
 from rig import effects
 from rig.platform import TERMS
 
 
-def with_stand_ins(found: Found, say: Callable[[str], None]) -> Found:
-    """The same, with how far J, C and K move without each flexible effect; unchanged where nothing is left over."""
+def with_stand_ins(found: Found, axis: str, say: Callable[[str], None]) -> Found:
+    """The same without the flexible effects that something else is left beside; unchanged where nothing is left over.
+
+    What goes with a quantity that more of the same kind would go with (other orders of cogging: the angle) speaks not
+    against the name. Then only how far J, C and K move without it is noted.
+    """
+    depends = found.disturbance.depends_on  # the largest first
     flexible = [name for name in found.named if effects.get(name).is_flexible]
-    if not flexible or not found.disturbance.depends_on:
+    if not flexible or not depends:
         return found
-    say(f"something is left over: checking how far the parameters depend on {', '.join(map(plain, flexible))}")
-    hangs_on = {effects.first_of(name): moved(found.after, found.lacking(name)[0]) for name in flexible}
+    stand_ins = [name for name in flexible if depends[0].on not in effects.get(name).goes_with]
+    if stand_ins:
+        found = _taken_back(found, stand_ins, axis)
+        say(f"not named: {_listed(stand_ins)}; what is left then still depends on the {depends[0].on}")
+        flexible = [name for name in flexible if name not in stand_ins]
+    if not flexible:
+        return found
+    say(f"something is left over: checking how far the parameters depend on {_listed(flexible)}")
+    hangs_on = {effects.first_of(name): moved(found.after, found.without(name).after) for name in flexible}
     return replace(found, disturbance=replace(found.disturbance, moves_without_percent=hangs_on))
+
+
+def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
+    """The same without effects that may only stand in; what was left beside them is left without them, too."""
+    depends = found.disturbance.depends_on
+    less = found.without(*names)
+    left = less.disturbance
+    for dependence in depends:
+        left = with_free_form(left, dependence, {})
+    search = less.search
+    words = (
+        f"{capital(_listed(names))} would explain part of what is missing, but can follow almost anything, and what "
+        f"is left then still depends on the {depends_on(depends[0].on, axis)}. Not named for that reason."
+    )
+    before = search.left_open
+    search.mark_undetermined(names[0], (f"{before} {words}".strip(), search.tells_apart), less.kept)
+    return replace(less, disturbance=left)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return joined(list(dict.fromkeys(plain(effects.first_of(name)) for name in names)))
 
 
 def moved(final: FinalFit, less: FinalFit) -> dict[str, float]:

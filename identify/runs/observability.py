@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 from identify.model.parameters import Name
@@ -32,6 +33,24 @@ def shows_a_period(name: str, values: Mapping[Name, float], traces: Sequence[Tra
         return True
     longest_s = max(len(t.measured) * t.step_s for t in traces)
     return values.get((name, repeats), 0.0) * longest_s >= 1.0
+
+
+def one_more(have: Sequence[str], values: Mapping[Name, float], traces: Sequence[Trace]) -> list[str]:
+    """One more of an effect that is there; none of waves over the angle whose longest is not seen twice.
+
+    A few orders of one that is no shorter than the travel are the Fourier series of any curve over the angle.
+    """
+    more = [m for n in have for m in effects.further(effects.first_of(n)) if m not in have]
+    return [m for m in more if _is_seen_to_repeat(effects.first_of(m), have, values, traces)][:1]
+
+
+def _is_seen_to_repeat(first: str, have: Sequence[str], values: Mapping[Name, float], traces: Sequence[Trace]) -> bool:
+    order = effects.get(first).repeats_over_angle
+    if not order:
+        return True
+    longest = min(values[n, order] for n in have if effects.first_of(n) == first)
+    travel_rad = 2.0 * math.radians(max(t.travel_deg for t in traces))
+    return longest * travel_rad >= 2.0 * math.tau
 
 
 def can_show(name: str, traces: Sequence[Trace]) -> bool:

@@ -15,6 +15,7 @@ from identify.estimate.final_fit import FinalFit, covariance_of, free_run_of
 from identify.estimate.initial_guess import Start, scale_of
 from identify.likelihood.by_prediction_error import as_final, by_prediction_error, fitted_on_all
 from identify.likelihood.fit import Fit
+from identify.model.parameter_fit import ParameterFit
 from identify.model.structure import Structure
 from identify.results import Dependence, Disturbance
 from identify.runs.holdout import Split
@@ -58,18 +59,27 @@ class Found:
     after: FinalFit
     disturbance: Disturbance
     in_torque: tuple[TorqueErrors, TorqueErrors]
-    lacking: Callable[[str], tuple[FinalFit, TorqueErrors, Disturbance]]  # the final model without an effect
+    lacking: Callable[..., tuple[FinalFit, TorqueErrors, Disturbance]]  # the final model without some effects
+    taken_back: tuple[str, ...] = ()
 
-    def without(self, effect: str) -> Found:
-        """The same with an effect taken back; what was found beside it stays, fitted anew."""
-        after, errors, disturbance = self.lacking(effect)
-        return replace(self, after=after, in_torque=(self.in_torque[0], errors), disturbance=disturbance)
+    def without(self, *several: str) -> Found:
+        """The same with effects taken back; what was found beside them stays, fitted anew."""
+        gone = (*self.taken_back, *several)
+        after, errors, disturbance = self.lacking(*gone)
+        return replace(
+            self, taken_back=gone, after=after, in_torque=(self.in_torque[0], errors), disturbance=disturbance
+        )
 
     def with_lines(self, likeliest: Fit, torque_nm: float) -> Found:
         """The same with the spectral lines of what the likeliest model leaves, where that is the final one."""
         final = _describes(likeliest, self.after) and not self.disturbance.depends_on
         lines = lines_left(likeliest, torque_nm) if final else None
         return self if lines is None else replace(self, disturbance=with_free_form(self.disturbance, lines, {}))
+
+    @property
+    def kept(self) -> ParameterFit:
+        """The model that is believed, as the search tells it."""
+        return self.after.fit if self.named else self.search.base
 
     @property
     def named(self) -> list[str]:
@@ -185,12 +195,14 @@ def search_in_torque(
         size = regression.torque_nm
         return TorqueErrors(fit.sigma, fit.sigma / size, fit.held_nm / size, floor, cutoff)
 
-    def lacking(effect: str) -> tuple[FinalFit, TorqueErrors, Disturbance]:
-        less = final.minus(effect)
-        there = regression.solve(less, {k: v for k, v in best.shapes.items() if k in less.effects})
-        fitted, values = before, {k: v for k, v in after.values.items() if k[0] != effect}
+    def lacking(*several: str) -> tuple[FinalFit, TorqueErrors, Disturbance]:
+        less, there = final, best  # without a low-pass of the gyro, which no torque shows
+        for name in several:
+            less, there = less.minus(name), search.without(there, name)
+        fitted, values = before, {k: v for k, v in after.values.items() if k[0] not in several}
         if less.effects != structure.effects:
-            fitted = by_prediction_error(traces, less, values, split.final, split.everything)
+            like = after.fit if isinstance(after.fit, Fit) else None
+            fitted = by_prediction_error(traces, less, values, split.final, split.everything, like)
         return fitted, errors(there), disturbance_of(regression, there, floor, unit)
 
     told = search.as_search(best)

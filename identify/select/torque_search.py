@@ -14,6 +14,7 @@ from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.propose.torque_looks import candidate_torques
 from identify.results import Candidate
+from identify.runs.observability import one_more
 from identify.select.evidence import MAX_EFFECTS, STRONG_SUPPORT, WEIGHT
 from identify.select.search_state import Search
 from rig import effects
@@ -123,7 +124,7 @@ class TorqueSearch:
         spring = "stiffness" in now.structure.terms
         answers = now.values.get(("inertia",), 0.0) * self.acceleration > INERTIA_MATTERS * self.regression.torque_nm
         have = now.structure.effects
-        more = [m for n in have for m in effects.further(effects.first_of(n)) if m not in have][:1]
+        more = one_more(have, now.values, self.regression.traces)
         names = [
             n for n in (*(a for a in self.allowed if a not in have), *more)
             if (spring or effects.get(n).family != "restoring torque")

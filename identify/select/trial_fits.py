@@ -20,7 +20,7 @@ from identify.model.structure import Structure
 from identify.propose.innovation_score import InnovationScores, Score
 from identify.propose.torque_looks import CandidateTorque, candidate_torques
 from identify.runs.measured_channels import simplicity
-from identify.runs.observability import shows_a_period
+from identify.runs.observability import one_more, shows_a_period
 from identify.select.evidence import WEIGHT, EvidenceModel
 from identify.signals.spectral_lines import foreign_lines_hz, ringing_hz, rings_hz
 from rig import effects
@@ -90,7 +90,7 @@ class TrialFits:
     def names(self, now: Fit) -> list[str]:
         """What may be added, or put in the place of a special case; of an effect that is there, one more of it."""
         have = now.structure.effects
-        more = [m for n in have for m in effects.further(effects.first_of(n)) if m not in have][:1]
+        more = one_more(have, now.values, self.problem.traces)
         return [n for n in (*self.allowed, *more) if n not in have]
 
     def score_round(self, now: Fit) -> tuple[list[Score], dict[str, Fit]]:

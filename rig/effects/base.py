@@ -150,12 +150,15 @@ class Effect:
     # By rival of never_separable, from its own values: the values of that rival, and what the change adds to J, C, K.
     as_rival: Mapping[str, Callable[[tuple[float, ...]], LargeStart]] | None = None
     repeats: str = ""  # its parameter that is a frequency in time: a run has to show a period of it
+    repeats_over_angle: str = ""  # one that is a frequency over the angle: more of it only if it is seen to repeat
     needs_added_inertia: bool = False  # determined only if some runs have a known inertia mounted
     # From (J, C, K) and the scale: starting values of the platform and of the effect if the effect is large.
     large_starts: Callable[[tuple[float, float, float], Scale], tuple[LargeStart, ...]] | None = None
     # From fitted (J, C, K), fitted own values and the scale: starting values near other possible minima.
     other_minima: Callable[[tuple[float, float, float], tuple[float, ...], Scale], tuple[LargeStart, ...]] | None = None
     is_flexible: bool = False  # flexible enough to fit the residual that another missing effect leaves
+    # Of a flexible one: quantities that a residual may depend on beside it, since more of its own kind would.
+    goes_with: tuple[str, ...] = ()
     sought_alone: bool = False  # never proposed in a pair: with some shape it fits what any other effect leaves
     separated_by: str = ""  # "from RIVAL: experiment, as an imperative; from ..."
     reads: Channel | None = None  # the measured channel that it is an effect of

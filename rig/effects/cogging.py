@@ -40,6 +40,8 @@ EFFECT = Effect(
     kernel=_torque,
     formula="sine_nm * sin(order * angle_rad) + cosine_nm * cos(order * angle_rad)",
     is_flexible=True,
+    goes_with=("angle",),
+    repeats_over_angle="order",
     sought_alone=True,
     separated_by="from backlash and cubic stiffness: excite at several amplitudes, and move slowly through the whole "
     "travel",

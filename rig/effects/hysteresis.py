@@ -53,6 +53,7 @@ EFFECT = Effect(
     follows_within_rad=lambda values: values[4] / values[5],
     nests=("presliding_friction",),
     is_flexible=True,
+    goes_with=("history", "direction"),
     stays="the initial deflection of the contact is not known before the run",
     separated_by="from presliding friction: repeat at several amplitudes",
 )

@@ -41,6 +41,7 @@ EFFECT = Effect(
     fastest_rad_s=lambda values: 2.0 * math.pi * values[5],
     large_starts=_large,
     is_flexible=True,
+    goes_with=("time", "frequency"),
     repeats="frequency",
     foreseen=False,
     stays="its phase in a run is not known before it",

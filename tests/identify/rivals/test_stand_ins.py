@@ -1,4 +1,4 @@
-"""How far J, C and K hang on a named effect that may have taken up part of what is left."""
+"""Named effects that may have taken up part of what is left: taken back, or noted how far J, C and K hang on them."""
 
 from __future__ import annotations
 
@@ -10,41 +10,76 @@ import pytest
 
 from identify.model.structure import Structure
 from identify.residual import Dependence, Disturbance
+from identify.results import Candidate
 from identify.rivals.stand_ins import moved, with_stand_ins
 from identify.select.field_search import Found
+from identify.select.search_state import Search
 
 LINES = Dependence("frequency", 0.01, 0.01, 1e-9)
+ANGLE = Dependence("angle", 0.02, 0.02, 1e-9)
+PAST = Dependence("history", 0.03, 0.03, 1e-9)
 
 
 def final(inertia: float, error: float, *effects: str) -> Any:
+    structure = Structure(effects=effects)
     return SimpleNamespace(
         values={("inertia",): inertia, ("damping",): 1.0}, names=(("inertia",), ("damping",)),
-        std_error=lambda name: error, structure=Structure(effects=effects),
+        std_error=lambda name: error, structure=structure, fit=SimpleNamespace(structure=structure),
     )  # fmt: skip
 
 
-def found(effects: tuple[str, ...], *depends: Dependence) -> tuple[Found, list[str]]:
-    """A final model whose inertia is 6 % larger without any of its effects, and which of them were taken out."""
-    asked: list[str] = []
-    left = Disturbance(0.01, "N*m", 0.01, depends)
+def found(effects: tuple[str, ...], *depends: Dependence) -> tuple[Found, list[tuple[str, ...]]]:
+    """A final model whose inertia is 6 % larger without any of its effects, and which were taken out together."""
+    asked: list[tuple[str, ...]] = []
 
-    def lacking(effect: str) -> Any:
-        asked.append(effect)
-        return final(1.06, 1e-3), None, left
+    def lacking(*several: str) -> Any:
+        asked.append(several)
+        return final(1.06, 1e-3, *(e for e in effects if e not in several)), None, Disturbance(0.05, "N*m", 0.05)
 
-    nothing = cast(Any, None)
-    return Found(nothing, final(1.06, 1e-3), final(1.0, 1e-3, *effects), left, nothing, lacking), asked
+    left, nothing = Disturbance(0.01, "N*m", 0.01, depends), cast(Any, None)
+    search = Search(final(1.06, 1e-3).fit, final(1.0, 1e-3, *effects).fit, 0.0, 0.0)
+    search.candidates = [Candidate(name, 1, -100.0, None, "added") for name in effects]
+    return Found(search, final(1.06, 1e-3), final(1.0, 1e-3, *effects), left, (nothing, nothing), lacking), asked
 
 
-def test_only_flexible_effects_are_taken_out_and_only_where_something_is_left() -> None:
-    both, asked = found(("flexible_mode", "coulomb_friction"), LINES)
-    left = with_stand_ins(both, lambda text: None).disturbance
-    assert asked == ["flexible_mode"]
-    assert left.moves_without_percent["flexible_mode"]["inertia"] == pytest.approx(6.0)
-    for effects, depends in ((("flexible_mode",), ()), (("coulomb_friction",), (LINES,))):
-        other, asked = found(effects, *depends)
-        assert with_stand_ins(other, lambda text: None) is other
-        assert asked == []
+def looked_at(begun: Found) -> Found:
+    return with_stand_ins(begun, "rotary", lambda text: None)
+
+
+def test_a_flexible_effect_beside_which_something_else_is_left_is_not_named() -> None:
+    begun, asked = found(("flexible_mode", "coulomb_friction"), LINES)
+    less = looked_at(begun)
+    assert less.named == ["coulomb_friction"]
+    assert asked == [("flexible_mode",)]
+    assert less.after.values["inertia",] == 1.06
+    assert [d.on for d in less.disturbance.depends_on] == ["frequency"]  # not forgotten, though it is not seen any more
+    assert "Flexible mode would explain part" in less.search.left_open
+    assert "frequency" in less.search.left_open
+    assert {c.effect: c.status for c in less.search.candidates}["flexible_mode"] == "left open"
+
+
+def test_more_of_its_own_kind_does_not_speak_against_a_name_but_how_far_j_hangs_on_it_is_noted() -> None:
+    begun, asked = found(("cogging", "coulomb_friction"), ANGLE, LINES)
+    kept = looked_at(begun)
+    assert kept.named == ["cogging", "coulomb_friction"]
+    assert asked == [("cogging",)]
+    assert kept.disturbance.moves_without_percent["cogging"]["inertia"] == pytest.approx(6.0)
+
+
+def test_what_was_taken_back_is_not_in_the_model_that_the_others_are_judged_beside() -> None:
+    begun, asked = found(("creep", "cogging"), PAST)
+    kept = looked_at(begun)
+    assert kept.named == ["creep"]
+    assert asked == [("cogging",), ("cogging", "creep")]
+
+
+@pytest.mark.parametrize(("effects", "depends"), [(("flexible_mode",), ()), (("coulomb_friction",), (LINES,))])
+def test_where_nothing_is_left_or_nothing_is_flexible_nothing_changes(
+    effects: tuple[str, ...], depends: tuple[Dependence, ...]
+) -> None:
+    begun, asked = found(effects, *depends)
+    assert looked_at(begun) is begun
+    assert asked == []
 
 
 def test_a_move_within_what_the_fits_are_uncertain_by_is_none() -> None:
