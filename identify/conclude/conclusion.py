@@ -47,8 +47,8 @@ from rig import effects
 from rig.effects.base import Place
 
 DIVERGED = 3.0**2  # reduced chi-square: a free run with friction may have gone astray
-ROUNDING_FLOOR = 1e-6  # of the torque: what a model leaves where neither noise nor an effect is
-UNEXPLAINED = 1.1**2  # reduced chi-square in free run: above it, something is left that no effect here explains
+EXACT_MODEL_SHARE = 1e-6  # of the torque: what a model leaves where neither noise nor an effect is
+UNEXPLAINED_CHI_SQUARE = 1.1**2  # reduced chi-square in free run: above it, something is left that no effect explains
 
 
 def conclude(
@@ -71,8 +71,8 @@ def conclude(
     chi_square = _reduced_chi_square(case, after, search)
     measured = case.disturbance  # of runs that a torque limits; else the sensor's noise does
     left = measured_after.errors.holdout_torque_relative
-    exact = left is not None and left < ROUNDING_FLOOR  # as in a file that has no noise
-    unexplained = chi_square > UNEXPLAINED and not exact if measured is None else bool(measured.depends_on)
+    exact = left is not None and left < EXACT_MODEL_SHARE  # as in a file that has no noise
+    unexplained = chi_square > UNEXPLAINED_CHI_SQUARE and not exact if measured is None else bool(measured.depends_on)
     verdict = Verdict(
         effects=tuple(
             dict.fromkeys(effects.first_of(e) for e in search.best.structure.effects if e not in case.structure.effects)

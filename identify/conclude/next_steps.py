@@ -92,7 +92,7 @@ COLOURED = (
 REPEAT = "Play the campaign again and compare the results; `rig check` predicts what each set can determine."
 RECORD_AGAIN = "Record the campaign again and compare the results."
 IDENTIFY_AGAIN = "Identify this recording again and let the search come to its end; nothing has to be played for it."
-NOISE_LIMITED = 4.0**2  # reduced chi-square
+NEAR_NOISE_CHI_SQUARE = 4.0**2  # reduced chi-square up to which a residual is little above an estimated floor
 START_SAMPLES = 3  # of a run: the first ones
 MAX_START_RATE_SHARE = 0.1  # of its largest rate, that they may have
 
@@ -170,7 +170,7 @@ def _to_explain(found: Identification) -> list[str]:
 def _coloured(found: Identification) -> list[str]:
     """A residual little above an estimated floor may be noise that is slower than what the estimate looks at."""
     error, floor = found.final.error.holdout_rate_rms, found.noise_floor
-    near = error is not None and reduced_chi_square(error, floor.holdout_rate_rms) < NOISE_LIMITED
+    near = error is not None and reduced_chi_square(error, floor.holdout_rate_rms) < NEAR_NOISE_CHI_SQUARE
     return [COLOURED] if near and floor.source == "estimated" else []
 
 

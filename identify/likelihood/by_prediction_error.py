@@ -17,7 +17,7 @@ from identify.runs.reduced import thinned
 from identify.signals.trace import Trace
 
 MAX_SAMPLES = 60_000  # of the final fit: longer recordings are filtered and decimated, all of them
-MAX_ITERATIONS = 25
+FINAL_FIT_ITERATIONS = 25  # steps of that fit
 
 
 def by_prediction_error(
@@ -44,7 +44,7 @@ def fitted_on_all(
     """The likelihood on all samples that fit, and the model fitted by it."""
     few, masks = thinned(traces, use, MAX_SAMPLES)
     problem = PredictionError(few, masks)
-    return problem, problem.fit(structure, start, problem.noise_of(like) if like else None, MAX_ITERATIONS)
+    return problem, problem.fit(structure, start, problem.noise_of(like) if like else None, FINAL_FIT_ITERATIONS)
 
 
 def as_final(problem: PredictionError, fit: Fit, traces: Sequence[Trace], everything: Sequence[Any]) -> FinalFit:

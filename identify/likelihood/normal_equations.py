@@ -13,7 +13,7 @@ from identify.simulate.shots import Shots, moved, with_bias
 from rig.arrays import Array
 
 VarianceOf = Callable[[float, int], tuple[float, bool]]
-SINGULAR = 1e-9  # of the largest singular value of a scaled normal matrix
+NORMAL_RCOND = 1e-9  # of the largest singular value of a scaled normal matrix
 COST_TOLERANCE = 0.5  # fall of the cost below which a fit has arrived
 MAX_LOG_STEP = 4.0  # by which a logarithm of the noise may fall in one step
 MAX_NOISE_FACTOR = 1e12  # times itself, that a number of the noise may become in one step
@@ -92,11 +92,11 @@ def bounded_step(matrix: Array, right: Array, low: Array, high: Array) -> Array:
     """
     step, free = np.zeros(len(right)), high > low
     part = matrix[np.ix_(free, free)]
-    step[free] = np.linalg.lstsq(part, right[free], rcond=SINGULAR)[0]
+    step[free] = np.linalg.lstsq(part, right[free], rcond=NORMAL_RCOND)[0]
     if np.all((step >= low) & (step <= high)):
         return step
     values, vectors = np.linalg.eigh(part)
-    told = values > SINGULAR * max(float(values[-1]), 0.0)
+    told = values > NORMAL_RCOND * max(float(values[-1]), 0.0)
     root, along = np.sqrt(values[told]), vectors[:, told].T
     found = lsq_linear(root[:, None] * along, (along @ right[free]) / root, (low[free], high[free]), "bvls")
     step[free] = np.clip(found.x, low[free], high[free])

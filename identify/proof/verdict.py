@@ -28,10 +28,10 @@ REFUTED = 0.7
 # Times the error of another name by which it is no better and no worse: less than the models' own numbers move it.
 MIN_ERROR_RATIO = 1.1
 # Error without compensation over the announced one: from here on the name explains less than a quarter of its power.
-UNEXPLAINED = 2.0
+UNEXPLAINED_ERROR_RATIO = 2.0
 # Share of the error without a name that is left with it, all fitted anew to the runs without compensation, up to
 # which not the name is to blame for what compensation left, but its numbers or those of J, C and K.
-EXPLAINS = 0.3
+MAX_REFITTED_SHARE = 0.3
 
 
 def judge(plan: ProofPlan, recording: Recording, model: Platform) -> Proof:
@@ -171,7 +171,7 @@ def _numbers_or_name(
             continue
         without = replace(model, effects={n: v for n, v in model.effects.items() if n != name})
         left = explained_left(runs, model, without, recording.noise)
-        if left <= EXPLAINS:
+        if left <= MAX_REFITTED_SHARE:
             why = (
                 f"{one.why.split('. ')[0]}. After refitting, however, the effect explains all but {_percent(left)} of "
                 "the error without compensation: its parameters, or J, C and K, are inaccurate. Identify again from "
@@ -186,7 +186,7 @@ def _numbers_or_name(
 
 def _of_little(announced: float, over_announced: float, told: str) -> tuple[ProofStatus, str]:
     """Of a name of which by its own model most stays."""
-    if over_announced > UNEXPLAINED:
+    if over_announced > UNEXPLAINED_ERROR_RATIO:
         return (
             "refuted",
             f"the error without compensation is {over_announced:.2g} times the error that this effect predicts",

@@ -13,7 +13,7 @@ from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace
 from rig.arrays import Array
 from rig.decimation import REACH, SAMPLES_A_PERIOD, keeps_white, sharp
 
-ENOUGH = 20_000  # samples, where nothing else is asked for
+DEFAULT_REDUCED_SAMPLES = 20_000  # samples, where nothing else is asked for
 HARMONICS = 5.0  # of a decay's swing: it moves no faster, whatever its noise does
 TURNS = 0.02  # of the largest rate, below which a turn may be noise
 SHORTEST_SPAN = 1_500  # samples: slow effects need a span to show in
@@ -22,7 +22,7 @@ PLACES = 12  # where a span may begin
 LEAD = 0.25  # of a span, that is measured ahead of it: ``identify.likelihood.settling`` leaves it out again
 
 
-def reduced(traces: Sequence[Trace], split: Split, enough: int = ENOUGH) -> tuple[list[Trace], Split]:
+def reduced(traces: Sequence[Trace], split: Split, enough: int = DEFAULT_REDUCED_SAMPLES) -> tuple[list[Trace], Split]:
     """The same runs with about ``enough`` samples, and the split of these.
 
     Every run is first filtered and decimated, all of it; what is still too long is cut to the span in which inertia,
