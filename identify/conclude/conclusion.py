@@ -130,8 +130,8 @@ def _about_damping(case: Case, after: FinalFit, final: ModelResult) -> tuple[str
     if final.platform is None or name not in after.names or "damping" not in final.parameters:
         return ()
     fitted = [t for t in case.traces if t.number in runs_fitted(case)]
-    told = lag_for_damping(final.platform, after.std_error(name), fitted, case.recording.axis)
-    return (told,) if told else ()
+    sentence = lag_for_damping(final.platform, after.std_error(name), fitted, case.recording.axis)
+    return (sentence,) if sentence else ()
 
 
 def _note(case: Case, after: FinalFit) -> str:

@@ -185,13 +185,13 @@ def _by_dependence(found: Identification) -> list[str]:
             "before the torque."
         ]
     free = torque_free(found)
-    name, told = _dependence(found)
+    name, sentence = _dependence(found)
     runs = DECAY_RUN if free else RUN
     if name not in runs:
         line = _at_a_line(found)
         return [*late, line or (INDEPENDENT_DECAY if free else INDEPENDENT)]
     keys = () if free or found.recorded else KEYS.get(name, ())
-    advice = f"{told}{runs[name]}{_named_in_yaml(keys)}"
+    advice = f"{sentence}{runs[name]}{_named_in_yaml(keys)}"
     if found.axis == "linear":
         for rotary, linear in LINEAR.items():
             advice = advice.replace(f" {rotary}", f" {linear}")
@@ -207,8 +207,8 @@ def _dependence(found: Identification) -> tuple[str, str]:
     if share >= MIN_SHARE:
         return name, f"{number(100.0 * share, 2)} % of the residual's power depends on the {name}. "
     left = _diagnosis(found)
-    told = {} if left is None else {"direction": left.direction, "history": left.memory}
-    seen = {on: s.share for on, s in told.items() if s is not None and is_significant(s, MIN_SHARE)}
+    parts = {} if left is None else {"direction": left.direction, "history": left.memory}
+    seen = {on: s.share for on, s in parts.items() if s is not None and is_significant(s, MIN_SHARE)}
     return (max(seen, key=seen.__getitem__), "") if seen else ("", "")
 
 

@@ -95,13 +95,13 @@ class FinalFit:
         """
         at = [fuller.names.index(n) for n in self.names]
         theirs = fuller.covariance[np.ix_(at, at)]
-        told = tuple(a and fuller.determined[i] for a, i in zip(self.determined, at, strict=True))
+        both = tuple(a and fuller.determined[i] for a, i in zip(self.determined, at, strict=True))
         size = np.sqrt(np.maximum(np.diag(theirs), 1e-300))
         if not (np.all(np.isfinite(theirs)) and np.all(np.isfinite(self.covariance))):
-            return replace(self, covariance=np.where(np.isfinite(theirs), self.covariance, theirs), determined=told)
+            return replace(self, covariance=np.where(np.isfinite(theirs), self.covariance, theirs), determined=both)
         values, vectors = np.linalg.eigh((theirs - self.covariance) / np.outer(size, size))
         more = (vectors * np.maximum(values, 0.0)) @ vectors.T
-        return replace(self, covariance=self.covariance + more * np.outer(size, size), determined=told)
+        return replace(self, covariance=self.covariance + more * np.outer(size, size), determined=both)
 
 
 def by_regression(

@@ -135,10 +135,10 @@ def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table, least
 def _too_little(pair: Pair, reached: float) -> str:
     """Why a pair has no part in the plan."""
     cure = effects.get(pair.effect).separated_by
-    told = f" (to distinguish it {cure})" if cure.startswith("from ") else ""
+    cure_note = f" (to distinguish it {cure})" if cure.startswith("from ") else ""
     return (
         f"no excitation within the limits separates them: the best reaches a chi-square of {number(reached, 2)}, "
-        f"{MIN_CHI_SQUARE:g} is needed{told}"
+        f"{MIN_CHI_SQUARE:g} is needed{cure_note}"
     )
 
 
@@ -172,5 +172,5 @@ def with_follow_up(found: Identification, planned: FollowUp | None) -> Identific
     before = found.follow_up
     if before is not None:
         planned = replace(before, plan=planned.plan, unparted=planned.unparted, note="")
-    told = (*found.verdict.sentences, *verdict_sentences(planned, found.verdict.never_separable))
-    return replace(found, follow_up=planned, verdict=replace(found.verdict, sentences=told))
+    sentences = (*found.verdict.sentences, *verdict_sentences(planned, found.verdict.never_separable))
+    return replace(found, follow_up=planned, verdict=replace(found.verdict, sentences=sentences))

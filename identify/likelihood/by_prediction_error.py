@@ -51,7 +51,7 @@ def as_final(problem: PredictionError, fit: Fit, traces: Sequence[Trace], everyt
     """The same as a final fit: the runs simulated freely, and what the likelihood knows of each number."""
     structure = fit.structure
     held = free_run_of(traces, structure, fit.values, everything)
-    told = [i for i, n in enumerate(fit.names) if n != ("inertia",) or not problem.torque_free]
-    determined = tuple(bool(x > ZERO_INFORMATION) for x in np.diag(fit.information)[told])
-    names, covariance = tuple(fit.names[i] for i in told), fit.covariance[np.ix_(told, told)]
+    reported = [i for i, n in enumerate(fit.names) if n != ("inertia",) or not problem.torque_free]
+    determined = tuple(bool(x > ZERO_INFORMATION) for x in np.diag(fit.information)[reported])
+    names, covariance = tuple(fit.names[i] for i in reported), fit.covariance[np.ix_(reported, reported)]
     return FinalFit(fit, fit.values, names, covariance, held, False, determined, "prediction error")

@@ -73,13 +73,13 @@ def normal_equations(
 def _spanned(own: Array) -> tuple[Array, Array]:
     """An orthonormal basis of what a run's own unknowns do, (n, r), and the unknowns for each of it, (k, r)."""
     size = np.linalg.norm(own, axis=0)
-    told = np.flatnonzero(size > 0.0)
-    follow = np.zeros((own.shape[1], len(told)))
-    if not len(told):
-        return own[:, told], follow
-    basis, upper = np.linalg.qr(own[:, told] / size[told])
+    nonzero = np.flatnonzero(size > 0.0)
+    follow = np.zeros((own.shape[1], len(nonzero)))
+    if not len(nonzero):
+        return own[:, nonzero], follow
+    basis, upper = np.linalg.qr(own[:, nonzero] / size[nonzero])
     inverse = np.linalg.pinv(upper, rcond=1e-12)
-    follow[told] = inverse / size[told, None]
+    follow[nonzero] = inverse / size[nonzero, None]
     return basis, follow
 
 
@@ -96,8 +96,8 @@ def bounded_step(matrix: Array, right: Array, low: Array, high: Array) -> Array:
     if np.all((step >= low) & (step <= high)):
         return step
     values, vectors = np.linalg.eigh(part)
-    told = values > NORMAL_RCOND * max(float(values[-1]), 0.0)
-    root, along = np.sqrt(values[told]), vectors[:, told].T
+    regular = values > NORMAL_RCOND * max(float(values[-1]), 0.0)
+    root, along = np.sqrt(values[regular]), vectors[:, regular].T
     found = lsq_linear(root[:, None] * along, (along @ right[free]) / root, (low[free], high[free]), "bvls")
     step[free] = np.clip(found.x, low[free], high[free])
     return step

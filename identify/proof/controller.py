@@ -84,8 +84,8 @@ def controller_of(model: Platform, recording: Recording, most_torque_nm: float) 
         else:
             left_out[name] = _why_not(name)
     if not terms:
-        told = "; ".join(f"{name}: {why}" for name, why in left_out.items()) or "it has none"
-        raise UsageError(f"no effect of this model is a function of angle, rate and torque: {told}")
+        reasons = "; ".join(f"{name}: {why}" for name, why in left_out.items()) or "it has none"
+        raise UsageError(f"no effect of this model is a function of angle, rate and torque: {reasons}")
     angle, rate = _reach(recording.runs)
     noise = min((_rate_noise(run) for run in recording.runs), default=0.0)
     version = hashlib.sha256(model_yaml(model).encode()).hexdigest()[:VERSION_DIGITS]

@@ -130,7 +130,7 @@ def plan_proof(
     allowed = allowed._replace(travel_deg=RESERVE * allowed.travel_deg, rate_deg_s=RESERVE * allowed.rate_deg_s)
     runs: list[PlannedRun] = []
     scales: dict[str, float] = {}
-    told: dict[str, dict[str, Announced]] = {variant: {} for variant in models}
+    announcements: dict[str, dict[str, Announced]] = {variant: {} for variant in models}
     for number, asked in enumerate(sets):
         run = next((r for r in recorded if r.name == asked.name), None)
         made, factor = _within(asked, models, allowed, drive, prefix, run)
@@ -140,8 +140,8 @@ def plan_proof(
         runs += [PlannedRun(asked.name, variant, made[variant]) for variant in order]
         for variant, (of, _) in models.items():
             without, better = pair_of(variant)
-            told[variant][asked.name] = announced(of, made[without], made[better], drive, angle)
-    return ProofPlan(tuple(runs), {v: of for v, (of, _) in models.items()}, told, scales)
+            announcements[variant][asked.name] = announced(of, made[without], made[better], drive, angle)
+    return ProofPlan(tuple(runs), {v: of for v, (of, _) in models.items()}, announcements, scales)
 
 
 def pair_of(variant: str) -> tuple[str, str]:

@@ -105,9 +105,9 @@ class InnovationScores:
             return
         size = np.sqrt(np.maximum(np.sum(columns**2, axis=0), 1e-300))
         u, s, v = np.linalg.svd(columns / size, full_matrices=False)
-        told = s > 1e-7 * max(float(s[0]) if len(s) else 0.0, 1e-300)
-        self.basis = u[:, told]
-        self.follow = -(v[told].T / s[told]) / size[:, None]  # of the model's parameters, for what is projected out
+        kept = s > 1e-7 * max(float(s[0]) if len(s) else 0.0, 1e-300)
+        self.basis = u[:, kept]
+        self.follow = -(v[kept].T / s[kept]) / size[:, None]  # of the model's parameters, for what is projected out
         self.residual = rest - self.basis @ (self.basis.T @ rest)
         self.square = float(self.residual @ self.residual)
 

@@ -176,8 +176,8 @@ def _why_not(channel: Channel, traces: Sequence[Trace]) -> dict[str, str]:
     share = _own_share(acting, traces)
     if share <= MAX_OWN_MOTION_SHARE:
         return {}
-    told = number(100.0 * share, 5)
-    return {"": f"{told} % of {name} is the platform's own motion (its angle, rate and acceleration) in these runs"}
+    percent = number(100.0 * share, 5)
+    return {"": f"{percent} % of {name} is the platform's own motion (its angle, rate and acceleration) in these runs"}
 
 
 def _at_samples(channel: Channel, trace: Trace) -> Array:

@@ -193,12 +193,12 @@ def search_in_torque(
             fitted = by_prediction_error(traces, less, values, split.final, split.everything)
         return fitted, errors(there), disturbance_of(regression, there, floor, unit)
 
-    told = search.as_search(best)
+    reported = search.as_search(best)
     if by_likelihood:
-        told = replace(by_likelihood[1], contribution=told.contribution)
+        reported = replace(by_likelihood[1], contribution=reported.contribution)
         if final != found_so_far:
-            told.drop(after.fit)
-    return Found(told, before, after, disturbance, (errors(base), errors(best)), lacking)
+            reported.drop(after.fit)
+    return Found(reported, before, after, disturbance, (errors(base), errors(best)), lacking)
 
 
 def _weakest(final: FinalFit, declared: Structure) -> str | None:

@@ -197,10 +197,10 @@ def most_moving(
     search: Stepwise, curves: Sequence[FreeFormFit], most_percent: Mapping[str, float]
 ) -> tuple[Dependence, dict[str, float]] | None:
     """Of curves beside a model the one that moves J, C or K farthest beyond what is allowed; None where none does."""
-    told = [dependence_on(search, c) for c in curves]
+    dependences = [dependence_on(search, c) for c in curves]
 
     def excess(curve: tuple[Dependence, dict[str, float]]) -> float:
         return max((moved / most_percent[term] for term, moved in curve[1].items()), default=0.0)
 
-    worst = max(told, key=excess, default=None)
+    worst = max(dependences, key=excess, default=None)
     return worst if worst is not None and excess(worst) > 1.0 else None
