@@ -34,7 +34,7 @@ def conclude(
 ) -> int:
     """Write the results and the summary; returns 0, 1, or 130 where somebody asked to stop."""
     from commands.terminal.exit_codes import NOT_ACCEPTED, OK, STOPPED
-    from identify.report.summary import WIDTH, summary
+    from identify.report.summary import PLAIN_WIDTH, summary
 
     late = context.stops.outstanding()  # by the loss of the terminal, or in a library that swallows what is raised
     if late is not None and not found.aborted:
@@ -45,7 +45,7 @@ def conclude(
         context.terminal.flush()
         if not context.options.quiet:
             is_terminal = sys.stdout.isatty()
-            width = shutil.get_terminal_size().columns if is_terminal else WIDTH
+            width = shutil.get_terminal_size().columns if is_terminal else PLAIN_WIDTH
             where = f"\nResults: {folder.path}" if folder.existing_path() else ""
             sys.stdout.write(f"{summary(found, width, is_terminal, recording.info)}{where}\n")
     if found.accepted:

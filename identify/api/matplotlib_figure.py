@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 WIDTH_IN, PER_IN = 9.0, 96.0  # inches wide, and the report's pixels to an inch of height
 LEFT, LEFT_OF_NAMES, RIGHT, BOTTOM_IN, TOP_IN = 0.1, 0.19, 0.97, 0.95, 0.4  # of the area that the panels share
-POINTS = 0.75  # a pixel in points
+POINTS_PER_PIXEL = 0.75  # a pixel in points
 STYLES = {"solid": "-", "dash": "--", "dot": ":", "dashdot": "-."}
 MARKERS = {"circle-open": "o", "triangle-up": "^", "square": "s", "x-thin-open": "x"}
 _RGBA = re.compile(r"rgba\((\d+),(\d+),(\d+),([\d.]+)\)")
@@ -85,7 +85,7 @@ class _Page:
         if "lines" in trace["mode"]:
             line = trace["line"]
             style |= {"color": _colour(line["color"]), "linestyle": STYLES[line["dash"]]}
-            panel.plot(x, y, linewidth=POINTS * line["width"], **style)
+            panel.plot(x, y, linewidth=POINTS_PER_PIXEL * line["width"], **style)
         else:
             panel.plot(x, y, linestyle="none", **{**style, **_marker(trace["marker"])})
         if "error_x" in trace:
@@ -172,7 +172,7 @@ class _Page:
         up = {"top": "top", "bottom": "bottom"}.get(note.get("yanchor", "middle"), "center")
         panel.text(
             x, note["y"], _plain(note["text"]), transform=transform, clip_on=False, ha=note.get("xanchor", "center"),
-            va=up, fontsize=POINTS * font.get("size", 12), color=_colour(font.get("color", "#1d2430")),
+            va=up, fontsize=POINTS_PER_PIXEL * font.get("size", 12), color=_colour(font.get("color", "#1d2430")),
         )  # fmt: skip
 
 
@@ -189,7 +189,11 @@ def _values(given: Any) -> Array:
 
 def _marker(given: Mapping[str, Any]) -> dict[str, Any]:
     symbol = given.get("symbol", "circle")
-    style = {"marker": MARKERS.get(symbol, "o"), "markersize": POINTS * given["size"], "color": _colour(given["color"])}
+    style = {
+        "marker": MARKERS.get(symbol, "o"),
+        "markersize": POINTS_PER_PIXEL * given["size"],
+        "color": _colour(given["color"]),
+    }
     style |= {"markerfacecolor": "none"} if symbol == "circle-open" else {}
     return style | ({"alpha": given["opacity"]} if "opacity" in given else {})
 

@@ -12,7 +12,7 @@ from identify.wording import SYMBOLS, joined, number, plain
 from rig import effects
 from rig.platform import TERMS
 
-WELL_KNOWN = 0.05  # relative standard error up to which a parameter counts as determined
+DETERMINED_RELATIVE_ERROR = 0.05  # relative standard error up to which a parameter counts as determined
 AIM = 0.01  # relative standard error that advice on the torque aims at
 SEPARATE = 200.0  # amplification of the model's errors beyond which inertia and stiffness cannot be separated
 DETECTABLE = 1.96  # standard errors: a smaller value cannot be distinguished from 0
@@ -73,7 +73,7 @@ def weak(information: Information) -> list[Name]:
         if information.values[i] == 0.0:
             if not np.isfinite(information.std_error(name)):
                 out.append(name)
-        elif information.relative(name) > WELL_KNOWN or _entangled(information, name):
+        elif information.relative(name) > DETERMINED_RELATIVE_ERROR or _entangled(information, name):
             out.append(name)
     return out
 
@@ -89,7 +89,7 @@ def _entangled(information: Information, name: Name) -> bool:
 def below_noise(information: Information) -> bool:
     """Whether the motion is quieter than the sensor and nothing that is not zero comes out well."""
     errors = [information.relative(n) for i, n in enumerate(information.names) if information.values[i] != 0.0]
-    return information.loudness < 1.0 and all(e > WELL_KNOWN for e in errors)
+    return information.loudness < 1.0 and all(e > DETERMINED_RELATIVE_ERROR for e in errors)
 
 
 def of_set(information: Information, others: Sequence[Information] = ()) -> str:
@@ -196,7 +196,7 @@ def of_delay(each: Sequence[Information]) -> str:
     bent = total.relative(damping)
     if below_noise(total):
         return ""
-    if not np.isfinite(error) or bent > WELL_KNOWN:
+    if not np.isfinite(error) or bent > DETERMINED_RELATIVE_ERROR:
         return (
             "a torque delay cannot be separated from damping here, and an undeclared delay biases C: "
             "add sets at other frequencies, or one that starts abruptly"

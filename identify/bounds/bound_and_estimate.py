@@ -14,7 +14,7 @@ import numpy as np
 
 from identify.bounds import advice
 from identify.bounds.cramer_rao import Information, information_of, together
-from identify.bounds.recorded import MIN_SAMPLES, silent
+from identify.bounds.recorded import MIN_INFORMATIVE_SAMPLES, silent
 from identify.model.parameters import Name
 from identify.results import Identification, ParameterEstimate
 from identify.signals.prepare import one_noise, prepare
@@ -77,7 +77,7 @@ def compare_with_bound(found: Identification, recording: Recording) -> tuple[Bou
 def usable_traces(recording: Recording) -> list[Trace]:
     """The runs that are long enough to tell anything, all with one noise."""
     found = [prepare(silent(run), i, recording.noise) for i, run in enumerate(recording.runs)]
-    usable = [t for t in found if t.stretches and t.count > MIN_SAMPLES]
+    usable = [t for t in found if t.stretches and t.count > MIN_INFORMATIVE_SAMPLES]
     return one_noise(usable, recording.noise is not None)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from identify.model.parameters import Name, names_of
 from identify.model.structure import Structure
 from identify.signals.trace import UPSAMPLING, Trace
-from identify.simulate.sensitivities import nuisance_basis, sensitivities
+from identify.simulate.sensitivities import INFORMATION_RCOND, nuisance_basis, sensitivities
 from identify.simulate.shots import make_shots
 from rig import effects
 from rig.dynamics import Equations, TorqueSignal, simulate
@@ -27,7 +27,6 @@ from rig.excitation import PlannedSet
 from rig.platform import Platform
 from rig.recording.run import Array, Run
 
-SINGULAR = 1e-11  # smallest over largest eigenvalue of the scaled information: differences see no less
 DELAY = "torque_delay"
 
 
@@ -82,7 +81,7 @@ class Information:
     @property
     def _empty(self) -> Array:
         power = self._axes[1]
-        return np.asarray(power <= SINGULAR * max(float(power[-1]), 1e-300))
+        return np.asarray(power <= INFORMATION_RCOND * max(float(power[-1]), 1e-300))
 
     @property
     def rank(self) -> int:
@@ -114,7 +113,7 @@ class Information:
     def correlation(self) -> Array:
         """Correlation of the estimates, (p, p)."""
         length, power, axes = self._axes
-        kept = np.maximum(power, SINGULAR * max(float(power[-1]), 1e-300))
+        kept = np.maximum(power, INFORMATION_RCOND * max(float(power[-1]), 1e-300))
         inverse = (axes / kept) @ axes.T / np.outer(length, length)
         size = np.sqrt(np.diag(inverse))
         return np.asarray(inverse / np.outer(size, size))

@@ -18,9 +18,8 @@ from rig.platform import Platform
 SLOW_SET_RATIO = 0.5  # of the natural frequency: faster sets tell one from the other
 LAGS = ("torque_delay", "actuator_lag", "sensor_lag")
 LATE_S = 1e-3  # the example in the sentence
-WELL_KNOWN_INERTIA = (
-    1e-4  # relative standard error of the inertia: what tells that so well tells damping from a delay as well
-)
+# Relative standard error of the inertia: what tells that so well tells damping from a delay as well.
+WELL_KNOWN_INERTIA = 1e-4
 MIN_RELATIVE_ERROR = 0.02  # relative standard error of C beside an unknown delay
 
 

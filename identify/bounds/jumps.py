@@ -18,11 +18,9 @@ from rig import effects
 from rig.arrays import Array
 from rig.effects.base import Place
 
-SLOPE_STEP, JUMP_STEP = (
-    1e-7,
-    0.3,
-)  # of the value: only a slope shows it; it moves a jump past samples
-POINTS = 400  # of the measured motion at which the torque is looked at
+SLOPE_STEP = 1e-7  # of the value: only a slope shows it
+JUMP_STEP = 0.3  # of the value: it moves a jump past samples
+TORQUE_VALUES_A_RUN = 400  # places of the measured motion at which the torque is looked at
 JUMP = "jumps"
 
 
@@ -68,10 +66,10 @@ def _jumps(fitted: FinalFit, name: Name, traces: Sequence[Trace]) -> bool:
 
 
 def _torque_nm(effect: str, p: Sequence[float], traces: Sequence[Trace]) -> Array:
-    """Torque of the effect along the measured motion, N m, about POINTS values a run."""
+    """Torque of the effect along the measured motion, N m, about ``TORQUE_VALUES_A_RUN`` values a run."""
     out = []
     for trace in traces:
-        every = max(1, len(trace.fine[0]) // POINTS)
+        every = max(1, len(trace.fine[0]) // TORQUE_VALUES_A_RUN)
         angle, rate, time, torque = (np.ascontiguousarray(x[::every]) for x in trace.fine[:4])
         along = np.zeros(len(angle))
         torque_along(

@@ -17,14 +17,14 @@ from identify.signals.trace import Trace
 from rig.platform import Platform
 from rig.recording.run import Recording, Run
 
-MIN_SAMPLES = 40  # samples
+MIN_INFORMATIVE_SAMPLES = 40  # samples of a run: a run with no more is left out
 
 
 def of_recorded_campaign(recording: Recording, declared: Platform) -> list[str]:
     """Lines on every run and on all together, at J, C, K that a quick regression finds in the data itself."""
     usable = [r for r in recording.runs if r.use != "holdout"] or list(recording.runs)
     traces = [prepare(silent(r), i, recording.noise) for i, r in enumerate(usable)]
-    traces = [t for t in traces if t.stretches and t.count > MIN_SAMPLES]
+    traces = [t for t in traces if t.stretches and t.count > MIN_INFORMATIVE_SAMPLES]
     if not traces or not any(np.ptp(t.measured) > 0.0 for t in traces):
         return []
     structure = Structure(declared.terms)

@@ -12,7 +12,7 @@ from identify.wording import number
 
 TIED = 0.95  # correlation beyond which two parameters are one
 OPEN_RAD = 0.5  # standard error of a phase beyond which it is open
-WIDE = 0.5  # of its value: a standard error that says nothing of a term
+UNDETERMINED_RELATIVE_ERROR = 0.5  # of its value: a standard error that says nothing of a term
 
 
 def undetermined(fitted: FinalFit, runs: Set[int], alone: bool) -> dict[Name, str]:
@@ -26,7 +26,7 @@ def undetermined(fitted: FinalFit, runs: Set[int], alone: bool) -> dict[Name, st
             continue
         value, error, term = fitted.values[name], fitted.std_error(name), len(name) == 1
         tied = _undetermined_partner(fitted, i, alone) if term else ""
-        wide = term and (not np.isfinite(error) or error > WIDE * abs(value))
+        wide = term and (not np.isfinite(error) or error > UNDETERMINED_RELATIVE_ERROR * abs(value))
         if tied:
             out[name] = f"only its combination with {tied} is determined; add a set at another frequency"
         elif not fitted.determined[i] or wide:
@@ -77,7 +77,7 @@ def _undetermined_partner(fitted: FinalFit, i: int, alone: bool) -> str:
     for k, name in enumerate(fitted.names):
         if k == i or len(name) > 1:
             continue
-        lost = not fitted.determined[k] or not size[k] <= WIDE * abs(fitted.values[name])
+        lost = not fitted.determined[k] or not size[k] <= UNDETERMINED_RELATIVE_ERROR * abs(fitted.values[name])
         pair = alone and {name[0], fitted.names[i][0]} == {"inertia", "stiffness"}
         one = abs(fitted.covariance[i, k]) > TIED * size[i] * size[k]
         if lost and fitted.determined[i] and (pair or one):

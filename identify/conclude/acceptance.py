@@ -20,7 +20,7 @@ REJECTED_TOGETHER = (
 INTERRUPTED_NOTE = (
     "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
 )
-USUAL_CUTOFF_HZ = 50.0
+USUAL_CUTOFF_HZ = 50.0  # where the residual passed no low-pass
 
 
 def of_reported(left: Disturbance, model: ModelResult) -> Disturbance:

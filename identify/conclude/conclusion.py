@@ -47,8 +47,8 @@ from rig import effects
 from rig.effects.base import Place
 
 DIVERGED = 3.0**2  # reduced chi-square: a free run with friction may have gone astray
-ROUNDING_FLOOR = 1e-6  # of the torque: what a model leaves where neither noise nor an effect is
-UNEXPLAINED = 1.1**2  # reduced chi-square in free run: above it, something is left that no effect here explains
+EXACT_MODEL_SHARE = 1e-6  # of the torque: what a model leaves where neither noise nor an effect is
+UNEXPLAINED_CHI_SQUARE = 1.1**2  # reduced chi-square in free run: above it, something is left that no effect explains
 
 
 def conclude(
@@ -71,8 +71,8 @@ def conclude(
     chi_square = _reduced_chi_square(case, after, search)
     measured = case.disturbance  # of runs that a torque limits; else the sensor's noise does
     left = measured_after.errors.holdout_torque_relative
-    exact = left is not None and left < ROUNDING_FLOOR  # as in a file that has no noise
-    unexplained = chi_square > UNEXPLAINED and not exact if measured is None else bool(measured.depends_on)
+    exact = left is not None and left < EXACT_MODEL_SHARE  # as in a file that has no noise
+    unexplained = chi_square > UNEXPLAINED_CHI_SQUARE and not exact if measured is None else bool(measured.depends_on)
     verdict = Verdict(
         effects=tuple(
             dict.fromkeys(effects.first_of(e) for e in search.best.structure.effects if e not in case.structure.effects)
@@ -130,8 +130,8 @@ def _about_damping(case: Case, after: FinalFit, final: ModelResult) -> tuple[str
     if final.platform is None or name not in after.names or "damping" not in final.parameters:
         return ()
     fitted = [t for t in case.traces if t.number in runs_fitted(case)]
-    told = lag_for_damping(final.platform, after.std_error(name), fitted, case.recording.axis)
-    return (told,) if told else ()
+    sentence = lag_for_damping(final.platform, after.std_error(name), fitted, case.recording.axis)
+    return (sentence,) if sentence else ()
 
 
 def _note(case: Case, after: FinalFit) -> str:

@@ -14,7 +14,7 @@ from identify.rivals import whole_runs
 from identify.rivals.whole_runs import FreeRunFitter
 from rig.platform import TERMS
 
-MAX_ITERATIONS = 4  # of a fit that begins where the rest stands: the ratio to a few percent is what is asked for
+CONTRIBUTION_STEPS = 4  # of a fit that begins where the rest stands: the ratio to a few percent is what is asked for
 
 
 def contributions(
@@ -60,4 +60,4 @@ def _without(
 
 
 def _steps(fits: FreeRunFitter) -> int:
-    return whole_runs.MAX_ITERATIONS if fits.torque_free else MAX_ITERATIONS
+    return whole_runs.WHOLE_RUN_STEPS if fits.torque_free else CONTRIBUTION_STEPS

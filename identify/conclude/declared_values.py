@@ -18,7 +18,7 @@ from identify.signals.trace import Trace
 from rig import effects
 from rig.platform import TERMS, Platform
 
-MAX_ITERATIONS = 12
+DECLARED_FIT_ITERATIONS = 12  # steps of a fit with declared numbers held
 MAX_CHI_SQUARE_RISE = 9.0  # three standard errors, by which a declared number does not contradict the runs
 
 
@@ -55,10 +55,10 @@ def kept_as_declared(
     if not asked or not fitted.sensor_limited:
         return values
     held: list[Name] = [("inertia",)] if all(t.torque is None for t in traces) else []
-    free = refine(traces, fitted.structure, values, None, MAX_ITERATIONS, use, fixed=held)
+    free = refine(traces, fitted.structure, values, None, DECLARED_FIT_ITERATIONS, use, fixed=held)
     for name in asked:
         start = {**values, name: declared[name]}
-        trial = refine(traces, fitted.structure, start, None, MAX_ITERATIONS, use, fixed=[*held, name])
+        trial = refine(traces, fitted.structure, start, None, DECLARED_FIT_ITERATIONS, use, fixed=[*held, name])
         if (trial.sigma**2 - free.sigma**2) * free.count < MAX_CHI_SQUARE_RISE * free.sigma**2:
             held.append(name)
             values = dict(trial.values)

@@ -15,10 +15,10 @@ from identify.model.structure import Structure
 from identify.results import Errors, ModelResult, NoiseFloor
 from identify.runs.holdout import Split
 from identify.select.field_search import TorqueErrors
+from identify.signals.low_pass import EDGE_PERIODS
 from identify.signals.trace import Trace, pooled_noise
 from rig.recording.run import Array
 
-EDGE_PERIODS = 3.0  # of the cut-off, left out at both ends of a run
 MAX_ERROR_GROWTH = 1.02  # times the declared model's error: less is chance
 
 

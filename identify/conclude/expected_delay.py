@@ -16,13 +16,13 @@ EFFECT, PARAMETER = "torque_delay", "delay"
 
 def delay_lines(identification: Identification, info: Mapping[str, Any]) -> tuple[str, ...]:
     """What was fitted, what is expected, and what follows; nothing where the recording expects nothing."""
-    told = info.get(KEY)
-    expected_s = told.get("delay_s") if isinstance(told, Mapping) else None
-    if not isinstance(told, Mapping) or not isinstance(expected_s, int | float) or not math.isfinite(expected_s):
+    expectation = info.get(KEY)
+    expected_s = expectation.get("delay_s") if isinstance(expectation, Mapping) else None
+    if not isinstance(expectation, Mapping) or not isinstance(expected_s, int | float) or not math.isfinite(expected_s):
         return ()
     found = identification.final.effect_parameters.get(EFFECT, {}).get(PARAMETER)
     fitted = "None is supported by these data" if found is None else f"Fitted: {with_interval(_in_ms(found))} ms (95 %)"
-    corrections = told.get("corrections")
+    corrections = expectation.get("corrections")
     made = [str(one) for one in corrections] if isinstance(corrections, list | tuple) else []
     after = f", their own corrections made ({', '.join(made)})" if made else ""
     expects = f"{fitted}; the drivers expect {number(1e3 * expected_s, 3)} ms{after}."

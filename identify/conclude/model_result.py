@@ -79,8 +79,8 @@ def to_build_on(case: Case, fitted: FinalFit, model: ModelResult) -> ModelResult
     lost, declared = _lost(case, fitted), declared_values(case.declared, case.torque_free)
     values = kept_as_declared(case.traces, case.split.final, fitted, lost, declared)
     missing = tuple(
-        replace(told, as_declared=name in declared and values[name] == declared[name])
-        for name, told in zip(lost, model.not_determined, strict=True)
+        replace(parameter, as_declared=name in declared and values[name] == declared[name])
+        for name, parameter in zip(lost, model.not_determined, strict=True)
     )
     return replace(model, not_determined=missing, platform=_platform(case, fitted, values))
 

@@ -92,7 +92,7 @@ COLOURED = (
 REPEAT = "Play the campaign again and compare the results; `rig check` predicts what each set can determine."
 RECORD_AGAIN = "Record the campaign again and compare the results."
 IDENTIFY_AGAIN = "Identify this recording again and let the search come to its end; nothing has to be played for it."
-NOISE_LIMITED = 4.0**2  # reduced chi-square
+NEAR_NOISE_CHI_SQUARE = 4.0**2  # reduced chi-square up to which a residual is little above an estimated floor
 START_SAMPLES = 3  # of a run: the first ones
 MAX_START_RATE_SHARE = 0.1  # of its largest rate, that they may have
 
@@ -170,7 +170,7 @@ def _to_explain(found: Identification) -> list[str]:
 def _coloured(found: Identification) -> list[str]:
     """A residual little above an estimated floor may be noise that is slower than what the estimate looks at."""
     error, floor = found.final.error.holdout_rate_rms, found.noise_floor
-    near = error is not None and reduced_chi_square(error, floor.holdout_rate_rms) < NOISE_LIMITED
+    near = error is not None and reduced_chi_square(error, floor.holdout_rate_rms) < NEAR_NOISE_CHI_SQUARE
     return [COLOURED] if near and floor.source == "estimated" else []
 
 
@@ -185,13 +185,13 @@ def _by_dependence(found: Identification) -> list[str]:
             "before the torque."
         ]
     free = torque_free(found)
-    name, told = _dependence(found)
+    name, sentence = _dependence(found)
     runs = DECAY_RUN if free else RUN
     if name not in runs:
         line = _at_a_line(found)
         return [*late, line or (INDEPENDENT_DECAY if free else INDEPENDENT)]
     keys = () if free or found.recorded else KEYS.get(name, ())
-    advice = f"{told}{runs[name]}{_named_in_yaml(keys)}"
+    advice = f"{sentence}{runs[name]}{_named_in_yaml(keys)}"
     if found.axis == "linear":
         for rotary, linear in LINEAR.items():
             advice = advice.replace(f" {rotary}", f" {linear}")
@@ -207,8 +207,8 @@ def _dependence(found: Identification) -> tuple[str, str]:
     if share >= MIN_SHARE:
         return name, f"{number(100.0 * share, 2)} % of the residual's power depends on the {name}. "
     left = _diagnosis(found)
-    told = {} if left is None else {"direction": left.direction, "history": left.memory}
-    seen = {on: s.share for on, s in told.items() if s is not None and is_significant(s, MIN_SHARE)}
+    parts = {} if left is None else {"direction": left.direction, "history": left.memory}
+    seen = {on: s.share for on, s in parts.items() if s is not None and is_significant(s, MIN_SHARE)}
     return (max(seen, key=seen.__getitem__), "") if seen else ("", "")
 
 

@@ -22,7 +22,8 @@ DECLARED_TOLERANCE = math.log(1.15)  # of a factor, either way: what a declared 
 COMMON_FACTOR_TOLERANCE = math.log(1.02)
 MIN_SCALE, MAX_SCALE = math.log(1.05), math.log(2.0)  # a torque constant's tolerance; beyond, it is no calibration
 MAX_RELATIVE_INTERVAL = 0.1  # half the 95 % interval over the value: worse says nothing of a factor
-DEGREES, TURN, RPM, GRAVITY, THOUSAND = 180.0 / math.pi, 2.0 * math.pi, 30.0 / math.pi, 9.80665, 1e3
+DEGREES, TURN, RPM = 180.0 / math.pi, 2.0 * math.pi, 30.0 / math.pi
+GRAVITY, THOUSAND = 9.80665, 1e3  # newtons to a kgf; a prefix: milli, or kilo
 FREQUENCY = TURN**2
 Channel = Literal["rate", "angle"]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from identify.bounds.advice import WELL_KNOWN
+from identify.bounds.advice import DETERMINED_RELATIVE_ERROR
 from identify.conclude.acceptance import of_reported, opposite_signs
 from identify.conclude.next_steps import to_determine, torque_free
 from identify.results import Identification
@@ -97,7 +97,7 @@ def _nothing_named(found: Identification) -> str:
 def _poorly_determined(found: Identification, damping_said: bool) -> list[str]:
     """J, C and K that are given and yet say little, with what would tell more."""
     given = found.final.parameters
-    wide = [name for name, p in given.items() if p.value and p.std_error > WELL_KNOWN * abs(p.value)]
+    wide = [name for name, p in given.items() if p.value and p.std_error > DETERMINED_RELATIVE_ERROR * abs(p.value)]
     wide = [name for name in wide if not (damping_said and name == "damping")]
     if not wide or not found.accepted:
         return []  # what else is wrong comes first

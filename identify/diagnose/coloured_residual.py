@@ -9,8 +9,8 @@ from scipy.signal import find_peaks
 
 from rig.arrays import Array
 
-ORDER = 24  # of the autoregression: six periods of the cut-off, at four samples each
-ROUNDS = 3  # of fitting the autoregression and the parameters in turn
+AUTOREGRESSION_ORDER = 24  # of the autoregression: six periods of the cut-off, at four samples each
+AUTOREGRESSION_ROUNDS = 3  # of fitting the autoregression and the parameters in turn
 LINES = 4  # that are looked for in a run
 
 
@@ -64,7 +64,7 @@ def bounded(normal: Array, right_side: Array, low: Array) -> Array:
 def coloured_cost(columns: Array, target: Array, run: Array, gains: Array, given: Array | None) -> tuple[float, Array]:
     """Minus twice the log-likelihood with an autoregressive residual, parameters refitted behind its filter once."""
     residual = target - columns @ gains
-    order = min(ORDER, len(residual) // 50)
+    order = min(AUTOREGRESSION_ORDER, len(residual) // 50)
     if order < 1:
         return float(len(residual) * np.log(max(float(np.mean(residual * residual)), 1e-300))), np.ones(1)
     filters = autoregression(residual, run, order) if given is None else given
@@ -86,7 +86,7 @@ def coloured_cost(columns: Array, target: Array, run: Array, gains: Array, given
         return np.concatenate(out)
 
     best = np.inf
-    for _ in range(1 if given is not None else ROUNDS):
+    for _ in range(1 if given is not None else AUTOREGRESSION_ROUNDS):
         e = whitened(target)
         if columns.shape[1]:
             w = np.column_stack([whitened(columns[:, k]) for k in range(columns.shape[1])])

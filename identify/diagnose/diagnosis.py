@@ -16,16 +16,15 @@ from identify.diagnose.free_lines import free_lines, without_lines
 from identify.diagnose.harmonics import Repeated, harmonics
 from identify.diagnose.memory import Moved, direction_power, memory_power
 from identify.diagnose.moments import moments
-from identify.diagnose.torque_residual import EDGE_PERIODS
 from identify.results import UNITS, Harmonics, Identification, ResidualDiagnosis, RunTraces, Share
-from identify.signals.low_pass import low_pass
+from identify.signals.low_pass import EDGE_PERIODS, low_pass
 from identify.signals.period import torque_period_s
 from rig.platform import Platform
 from rig.recording.run import Array
 
-DRAWS = 8
+DRAWS = 8  # of white noise, for what the sensor alone would leave
 SURE = 8.0  # standard deviations above what the draws show on average
-MIN_SAMPLES = 500  # samples
+MIN_DIAGNOSED_SAMPLES = 500  # samples of all runs: of fewer nothing is told
 OVERSAMPLED = 8.0  # samples in a period of the low-pass's cut-off: more tell nothing more
 MIN_HARMONIC_SHARE = 0.01  # of the residual's power: a single multiple with less is not told
 ASTRAY = 0.5  # of the motion
@@ -56,7 +55,8 @@ def diagnose(
     if not traces or (torque and sensor.platform is None):
         return ()
     runs = [_run(t, sensor, torque, i) for i, t in enumerate(traces)]
-    if sum(int(np.sum(r.use)) for r in runs) < MIN_SAMPLES or not all(np.all(np.isfinite(r.left)) for r in runs):
+    count = sum(int(np.sum(r.use)) for r in runs)
+    if count < MIN_DIAGNOSED_SAMPLES or not all(np.all(np.isfinite(r.left)) for r in runs):
         return ()
     total = np.mean(np.concatenate([r.left[r.use] for r in runs]) ** 2, axis=0)
     if not np.all(total[:2] > 0.0):

@@ -21,12 +21,12 @@ from identify.results import Dependence, Disturbance
 from rig.arrays import Array
 from rig.platform import TERMS
 
-KNOTS = 7  # inner knots of a spline, at even shares of the samples
+SPLINE_KNOTS = 7  # inner knots of a spline, at even shares of the samples
 DEPENDENCE_SIGMAS = 4.0  # standard errors over blocks of held-out samples; by chance once in 30,000
 MIN_POWER_SHARE = 0.02  # of the power that is left: less is not worth a word
-SHOWN = 25  # places at which a term's shape is given
+SHAPE_POINTS = 25  # places at which a curve's shape is given
 OUTER = (0.8, 0.95)  # shares of the samples inside of which nothing is touched
-PAST_S = (0.05, 0.5)  # of the run: time constants with which a rate is remembered
+PAST_RUN_SHARES = (0.05, 0.5)  # of the run: time constants with which a rate is remembered
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class FreeForm:
     on: str
     columns: Array  # (n, k)
     at: Array
-    shape: Array  # (SHOWN, k)
+    shape: Array  # (SHAPE_POINTS, k)
 
 
 def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float, unit: str) -> Disturbance:
@@ -138,7 +138,7 @@ def _over_time(time: Array) -> FreeForm:
 
 def _free_splines(x: Array) -> tuple[Callable[[Array], Array] | None, Array]:
     """Splines with knots at even shares of the values, and places at which to show them; None of too few values."""
-    inner = np.unique(np.quantile(x, np.linspace(0.0, 1.0, KNOTS + 2)))
+    inner = np.unique(np.quantile(x, np.linspace(0.0, 1.0, SPLINE_KNOTS + 2)))
     if len(inner) < 4:
         return None, np.zeros(0)
     knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
@@ -153,7 +153,8 @@ def _free_splines(x: Array) -> tuple[Callable[[Array], Array] | None, Array]:
     line = np.linalg.lstsq(straight(x), columns, rcond=None)[0]
     _, s, v = np.linalg.svd(columns - straight(x) @ line, full_matrices=False)
     kept = v[s > 1e-6 * s[0]].T
-    return lambda values: (basis(values) - straight(values) @ line) @ kept, np.linspace(inner[0], inner[-1], SHOWN)
+    at = np.linspace(inner[0], inner[-1], SHAPE_POINTS)
+    return lambda values: (basis(values) - straight(values) @ line) @ kept, at
 
 
 def _beyond(on: str, regression: TorqueRegression) -> FreeForm:
@@ -165,7 +166,7 @@ def _beyond(on: str, regression: TorqueRegression) -> FreeForm:
     def hinges(values: Array) -> Array:
         return np.stack([s * np.maximum(s * (values - middle) - b, 0.0) for s, b in starts], axis=1)
 
-    at = np.linspace(float(np.min(x)), float(np.max(x)), SHOWN)
+    at = np.linspace(float(np.min(x)), float(np.max(x)), SHAPE_POINTS)
     return FreeForm(on, regression.along(on, hinges), at, hinges(at))
 
 
@@ -181,12 +182,12 @@ def _changing(time: Array, series: Sequence[Array]) -> FreeForm:
 def _history(rate: Array, run: Array, regression: TorqueRegression) -> FreeForm:
     """The direction of the motion as it was a while ago, with two lengths of memory."""
     direction = np.tanh(rate / (0.05 * float(np.sqrt(np.mean(rate**2))) + 1e-300))
-    out = np.zeros((len(rate), len(PAST_S)))
+    out = np.zeros((len(rate), len(PAST_RUN_SHARES)))
     for k in np.unique(run):
         here = np.nonzero(run == k)[0]
-        for j, share in enumerate(PAST_S):
+        for j, share in enumerate(PAST_RUN_SHARES):
             memory, decay = 0.0, float(np.exp(-1.0 / max(share * 0.1 * len(here), 1.0)))
             for i in here:
                 memory = decay * memory + (1.0 - decay) * direction[i]
                 out[i, j] = memory
-    return FreeForm("history", out, np.zeros(0), np.zeros((0, len(PAST_S))))
+    return FreeForm("history", out, np.zeros(0), np.zeros((0, len(PAST_RUN_SHARES))))

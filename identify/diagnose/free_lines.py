@@ -9,20 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from identify.diagnose.harmonics import RINGING_SHARE
 from identify.diagnose.memory import Moved
 from identify.results import FreeLine
+from identify.signals.spectral_lines import RESONANCE_BAND_SHARE
 from rig.recording.run import Array
 
-SETTLED = 0.3  # of a run, left out: there it still rings
-STANDS_OUT = 20.0  # times the power around, and times that of the sensor's noise
+FREE_LINE_POWER_RATIO = 20.0  # times the power around, and times that of the sensor's noise
 STEADY = 2.0  # ratio of the amplitudes in both halves
 MAX_AMPLITUDE_RATIO = 3.0  # ratio of the amplitudes in two runs
-OWN = 0.03  # of the natural frequency: a line that near is the platform's own ring
-SWING, SWINGS = 0.1, 4  # the same of a free swing, whose frequency moves with its amplitude, and of its multiples
-BLOCK = 40  # bins whose median is what stands around
+SWING, SWINGS = 0.1, 4  # of the frequency of a free swing, which moves with its amplitude, and of its multiples
+MEDIAN_BLOCK_BINS = 40  # bins whose median is what stands around
 BESIDE, FOOT = 0.003, 30  # of a stronger line's power within that many bins: its foot, no line
-SHORTEST = 256  # samples
-MOST, PEAKS = 3, 6
+MIN_FREE_LINE_SAMPLES = 256  # samples: a shorter run is not looked at
+MOST, PEAKS = 3, 6  # lines that are told of all runs, and peaks that are looked at in one
 
 
 @dataclass(frozen=True)
@@ -64,9 +64,9 @@ def _lines(
     run: Moved, period_s: float | None, number: int, natural_hz: float, cutoff_hz: float | None
 ) -> tuple[list[_Line], list[_Line]]:
     """The steady lines of one run in the residual of either model."""
-    left, step = run.left[int(SETTLED * len(run.use)) :], run.step_s
+    left, step = run.left[int(RINGING_SHARE * len(run.use)) :], run.step_s
     n = len(left)
-    if n < SHORTEST:
+    if n < MIN_FREE_LINE_SAMPLES:
         return [], []
     size = fft.next_fast_len(2 * n, real=True)
     power = np.abs(fft.rfft(left.T * np.hanning(n), size)) ** 2
@@ -74,7 +74,7 @@ def _lines(
     width = 1.0 / (n * step)
     noise = np.convolve(np.mean(power[2:], axis=0), np.full(9, 1.0 / 9.0), "same")
     use = (hertz > 3.0 * width) & (hertz < (cutoff_hz or np.inf))
-    use &= np.abs(hertz - natural_hz) > max(OWN * natural_hz, 2.0 * width)
+    use &= np.abs(hertz - natural_hz) > max(RESONANCE_BAND_SHARE * natural_hz, 2.0 * width)
     if not np.any(run.torque):
         use &= ~_of_swing(hertz, run, width)
     out: tuple[list[_Line], list[_Line]] = ([], [])
@@ -104,17 +104,17 @@ def _peaks(power: Array, noise: Array, use: NDArray[np.bool_]) -> list[int]:
     around = np.maximum(_around(power), noise)
     inner = np.arange(1, len(power) - 1)
     peak = inner[(power[inner] > power[inner - 1]) & (power[inner] >= power[inner + 1])]
-    peak = peak[use[peak] & (power[peak] > STANDS_OUT * around[peak])]
+    peak = peak[use[peak] & (power[peak] > FREE_LINE_POWER_RATIO * around[peak])]
     peak = peak[np.argsort(-power[peak])]
     return [int(k) for k in peak if power[k] > BESIDE * np.max(power[max(k - FOOT, 0) : k + FOOT + 1])][:PEAKS]
 
 
 def _around(power: Array) -> Array:
     """Mean power of noise about each bin, from medians of blocks, (m,)."""
-    blocks = max(1, len(power) // BLOCK)
-    whole = power[: blocks * BLOCK] if len(power) >= BLOCK else power
+    blocks = max(1, len(power) // MEDIAN_BLOCK_BINS)
+    whole = power[: blocks * MEDIAN_BLOCK_BINS] if len(power) >= MEDIAN_BLOCK_BINS else power
     median = np.median(whole.reshape(blocks, -1), axis=1) / np.log(2.0)
-    return np.interp(np.arange(len(power)), (np.arange(blocks) + 0.5) * BLOCK, median)
+    return np.interp(np.arange(len(power)), (np.arange(blocks) + 0.5) * MEDIAN_BLOCK_BINS, median)
 
 
 def _top(three: Array, at: float, step: float) -> float:
@@ -138,7 +138,7 @@ def _locked(hertz: float, run: Moved, period_s: float | None, width: float) -> b
 
 def _grouped(lines: Sequence[_Line], runs: Sequence[Moved]) -> tuple[FreeLine, ...]:
     found, left = [], sorted(lines, key=lambda line: -line.size)
-    width = max((1.0 / ((1.0 - SETTLED) * len(r.use) * r.step_s) for r in runs), default=0.0)
+    width = max((1.0 / ((1.0 - RINGING_SHARE) * len(r.use) * r.step_s) for r in runs), default=0.0)
     while left:
         lead = left[0]
         near = [x for x in left if abs(x.hertz - lead.hertz) < width]

@@ -11,12 +11,12 @@ from scipy import fft
 from identify.diagnose.memory import Moved
 from rig.recording.run import Array
 
-SETTLED = 0.3  # of a run, left out where at least two periods remain: there it still rings
+RINGING_SHARE = 0.3  # of a run, left out where enough is left without it: there it still rings
 PLAYED = 1e-4  # of the torque's power: a multiple with more was played
-HIGHEST = 60  # multiples looked at
-ORDERS = 11
+HIGHEST_MULTIPLE = 60  # multiples looked at
+ORDERS = 11  # multiples whose powers are told one by one
 BETWEEN = 12  # bins around a multiple that say what stands there anyway
-STANDS_OUT = 9.0  # times that
+HARMONIC_POWER_RATIO = 9.0  # times that
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def _of_run(run: Moved, period_s: float) -> list[Repeated]:
     values = np.array([np.interp(at, known, y[known]) for y in (run.torque, *run.left.T)])
     power = np.abs(fft.rfft(values - values.mean(axis=1, keepdims=True))).T ** 2 * (2.0 / len(at))
     torque, left = power[:, 0], power[:, 1:]
-    highest = min(HIGHEST, (len(power) - 1) // periods)
+    highest = min(HIGHEST_MULTIPLE, (len(power) - 1) // periods)
     excess = np.array([_excess(left, k * periods, periods) for k in range(1, highest + 1)])
     at_multiples = torque[periods : highest * periods + 1 : periods]
     order = np.arange(1, highest + 1)
@@ -77,7 +77,7 @@ def _whole_periods(run: Moved, period_s: float) -> tuple[Array, int] | None:
     if len(known) < 2 or length < 4.0:
         return None
     span = float(known[-1] - known[0])
-    periods = int((1.0 - SETTLED) * span / length)
+    periods = int((1.0 - RINGING_SHARE) * span / length)
     if periods < 2:
         periods = int(span / length)
     if periods < 2 or np.mean(run.use) < 0.5:
@@ -92,5 +92,6 @@ def _excess(power: Array, at: int, periods: int) -> Array:
     around = np.arange(max(at - reach, 1), min(at + reach + 1, len(power)))
     around = around[around % periods != 0]
     anyway = np.mean(power[around], axis=0) if len(around) else np.zeros(power.shape[1])
-    least = STANDS_OUT * np.maximum(anyway, np.mean(power[at, 2:]))  # the draws of noise know the slope of a drift
+    # The draws of noise know the slope of a drift.
+    least = HARMONIC_POWER_RATIO * np.maximum(anyway, np.mean(power[at, 2:]))
     return np.where(power[at] > least, power[at] - anyway, 0.0)

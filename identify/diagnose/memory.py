@@ -18,15 +18,15 @@ from scipy import signal
 
 from rig.recording.run import Array
 
-KNOTS = 9
-ROWS = 16_000  # of all runs together: enough for some fifty columns
-PAST_S = (0.004, 0.02, 0.1, 0.5)
+HAT_KNOTS = 9  # of a piecewise linear function, at even shares of the samples
+MAX_MEMORY_ROWS = 16_000  # of all runs together: enough for some fifty columns
+MEMORY_TIMES_S = (0.004, 0.02, 0.1, 0.5)  # time constants of first-order lags
 PAST_TRAVEL = (0.02, 0.1, 0.4)  # of the travel
-BLOCKS = 16  # a run
+ALTERNATING_BLOCKS = 16  # a run; two folds take them in turn
 LONGEST = 400_000  # steps along the path of one run
-RIDGE = 1e-7
+MEMORY_RIDGE = 1e-7  # a sample, on columns scaled to a mean square of one
 ANGLES = 16  # bins in which the two directions are compared
-MIN_BIN_SAMPLES = 8  # samples of either direction in a bin
+MIN_DIRECTION_BIN_SAMPLES = 8  # samples of either direction in a bin
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ def memory_power(runs: Sequence[Moved]) -> Array:
     past the measured present betrays what drives them apart (a spring that drifts); the model's own present is late
     or early at every reversal where friction acts.
     """
-    thin = max(1, -(-sum(len(r.angle) for r in runs) // ROWS))
+    thin = max(1, -(-sum(len(r.angle) for r in runs) // MAX_MEMORY_ROWS))
     rows = [np.flatnonzero(r.use)[::thin] for r in runs]
-    fold = np.concatenate([at * BLOCKS // len(r.angle) % 2 for at, r in zip(rows, runs, strict=True)])
+    fold = np.concatenate([at * ALTERNATING_BLOCKS // len(r.angle) % 2 for at, r in zip(rows, runs, strict=True)])
 
     def joined(of: str) -> Array:
         return np.concatenate([getattr(r, of)[at] for at, r in zip(rows, runs, strict=True)])
@@ -86,7 +86,7 @@ def _left_square(columns: Array, left: Array, fold: NDArray[np.intp]) -> Array:
     normal = [(c.T @ c, c.T @ y) for c, y in halves]
     for k, (c, y) in enumerate(halves):
         gram, moment = normal[1 - k]
-        found = np.linalg.solve(gram + RIDGE * len(left) * np.eye(len(gram)), moment)
+        found = np.linalg.solve(gram + MEMORY_RIDGE * len(left) * np.eye(len(gram)), moment)
         square += np.sum((y - c @ found) ** 2, axis=0)
     return np.asarray(square / len(left))
 
@@ -94,11 +94,11 @@ def _left_square(columns: Array, left: Array, fold: NDArray[np.intp]) -> Array:
 def _past(run: Moved, travel: float) -> Array:
     """What was a while ago, (n, k), less what is now."""
     moved = (run.angle_by_model, run.rate_by_model, run.torque)
-    columns = [delayed(x, tau, run.step_s) - x for x in moved for tau in PAST_S]
+    columns = [delayed(x, tau, run.step_s) - x for x in moved for tau in MEMORY_TIMES_S]
     return np.column_stack([*columns, *(came_from(run.angle_by_model, share * travel) for share in PAST_TRAVEL)])
 
 
-def hats(x: Array, knots: int = KNOTS) -> Array:
+def hats(x: Array, knots: int = HAT_KNOTS) -> Array:
     """Piecewise linear functions of x, (n, knots - 1): any continuous function, less its constant."""
     at = np.unique(np.quantile(x, np.linspace(0.0, 1.0, knots)))
     if len(at) < 3:
@@ -139,14 +139,14 @@ def direction_power(runs: Sequence[Moved]) -> Array:
     """
     angle, rate = (np.concatenate([getattr(r, of)[r.use] for r in runs]) for of in ("angle", "rate"))
     left = np.concatenate([r.left[r.use] for r in runs])
-    fold = np.concatenate([np.flatnonzero(r.use) * BLOCKS // len(r.angle) % 2 for r in runs])
+    fold = np.concatenate([np.flatnonzero(r.use) * ALTERNATING_BLOCKS // len(r.angle) % 2 for r in runs])
     edges = np.unique(np.quantile(angle, np.linspace(0.0, 1.0, ANGLES + 1)))
     bins = np.clip(np.searchsorted(edges, angle, side="right") - 1, 0, ANGLES - 1)
     cell = bins + ANGLES * (rate > 0.0) + 2 * ANGLES * fold
     count = np.bincount(cell, minlength=4 * ANGLES)
     sums = np.column_stack([np.bincount(cell, y, minlength=4 * ANGLES) for y in left.T])
     mean = (sums / np.maximum(count, 1)[:, None]).reshape(2, 2, ANGLES, -1)
-    known = np.all(count.reshape(4, ANGLES) >= MIN_BIN_SAMPLES, axis=0)
+    known = np.all(count.reshape(4, ANGLES) >= MIN_DIRECTION_BIN_SAMPLES, axis=0)
     half = 0.5 * (mean[:, 1] - mean[:, 0])  # fold, bin, residual
     weight = np.where(known, np.bincount(bins, minlength=ANGLES), 0.0) / len(angle)
     return np.asarray(weight @ (half[0] * half[1]))

@@ -10,7 +10,7 @@ from identify.diagnose.memory import Moved
 from identify.results import Moment
 from rig.recording.run import Array
 
-WINDOW_S = 0.25
+WINDOW_S = 0.25  # length of a window
 MIN_WINDOWS = 12  # windows in a run: of fewer none is a moment
 EVENT_POWER_RATIO = 10.0  # times the median power of the run's windows
 MIN_TOTAL_SHARE = 0.5  # of the residual's power of all runs that they hold together

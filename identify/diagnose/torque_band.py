@@ -17,7 +17,7 @@ from identify.diagnose.torque_residual import at_samples, motion
 from identify.model.parameters import Name
 from identify.model.structure import UNIT, Shapes, Structure
 from identify.runs.holdout import Split
-from identify.signals.low_pass import low_pass
+from identify.signals.low_pass import EDGE_PERIODS, low_pass
 from identify.signals.trace import UPSAMPLING, Trace
 from rig import effects
 from rig.arrays import Array
@@ -25,9 +25,8 @@ from rig.effects.base import Effect, Place, Scale
 from rig.platform import TERMS
 
 SAMPLES_A_PERIOD = 4.0  # of the cut-off: what the low-pass passed needs no more
-EDGE_PERIODS = 3.0  # of the cut-off, left out at both ends of a run
-FOLDS, BLOCKS = 3, 9  # a third of the runs, or of the blocks of each run, is held out in turn
-STILL, STILL_PERIODS = 5.0, 0.5  # standard deviations of the smoothed rate, for so many periods of the cut-off
+FOLDS, FOLD_BLOCKS = 3, 9  # a third of the runs, or of the blocks of each run, is held out in turn
+STILL_SIGMAS, STILL_PERIODS = 5.0, 0.5  # standard deviations of the smoothed rate, for so many periods of the cut-off
 AROUND_REVERSAL, MAX_REVERSAL_SHARE = 0.6, 0.35  # periods of the cut-off left out either side, up to a share of samples
 
 _QUANTITIES = {"angle": 0, "rate": 1, "torque": 3}  # of a trace's fine motion
@@ -73,7 +72,7 @@ class TorqueBand:
 
     def _block_of(self, i: int) -> Any:
         """Which block of its run every sample belongs to."""
-        return np.minimum(self._rows[i] * BLOCKS // max(len(self.traces[i].measured), 1), BLOCKS - 1)
+        return np.minimum(self._rows[i] * FOLD_BLOCKS // max(len(self.traces[i].measured), 1), FOLD_BLOCKS - 1)
 
     def _rows_of(self, t: Trace, step: int) -> Any:
         edge = int(np.ceil(EDGE_PERIODS / (self.cutoff_hz * t.step_s)))
@@ -90,7 +89,7 @@ class TorqueBand:
         little else is left, those moments stay.
         """
         rate, left = t.fine[1][::UPSAMPLING], t.fine[4]
-        slow = np.abs(rate) < STILL * left
+        slow = np.abs(rate) < STILL_SIGMAS * left
         shortest = max(3, int(STILL_PERIODS / (self.cutoff_hz * t.step_s)))
         out = np.zeros(len(slow), dtype=bool)
         edges = np.diff(np.concatenate([[0], slow.astype(np.int8), [0]]))

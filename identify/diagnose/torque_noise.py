@@ -8,7 +8,7 @@ from identify.results import Identification
 from identify.signals.noise import noise_of
 from identify.wording import number
 
-ENOUGH = 0.5  # of what is left, that it has to make
+MIN_TORQUE_NOISE_SHARE = 0.5  # of what is left, that it has to make
 SENTENCE = (
     "The recorded {torque} contains noise of {noise} {unit} rms a sample; {passed} {unit} of it lies below {cutoff:g} "
     "Hz, where the residual is {left} {unit}. Record the commanded {torque} instead, or measure it with less noise: "
@@ -27,7 +27,7 @@ def describe(found: Identification) -> str:
     nyquists = [0.5 / float(np.median(np.diff(t.time_s))) for t in runs]
     passed = [n * np.sqrt(min(1.0, cutoff / f)) for n, f in zip(noise, nyquists, strict=True)]
     whole, below = (float(np.sqrt(np.mean(np.square(several)))) for several in (noise, passed))
-    if not below > ENOUGH * left:
+    if not below > MIN_TORQUE_NOISE_SHARE * left:
         return ""
     linear = found.axis == "linear"
     return SENTENCE.format(

@@ -24,8 +24,8 @@ from identify.model.structure import Shapes, Structure
 from rig import effects
 from rig.arrays import Array
 
-BLOCK, BLOCKS_A_RUN, MIN_BLOCKS = 8, 24, 8  # samples behind the low-pass in a block, and how many blocks
-RIDGE = 1e-9  # of their own size, on the gains of free-form columns: two of them may be alike
+BLOCK_SAMPLES, BLOCKS_A_RUN, MIN_BLOCKS = 8, 24, 8  # samples behind the low-pass in a block, and how many blocks
+CURVE_RIDGE = 1e-9  # of their own size, on the gains of free-form columns: two of them may be alike
 LEAST_PASSED_ON = 1e6  # times: a drive that passes on less passes on nothing
 MIN_FOR_LINES, MIN_TRAVEL_RAD = 64, 0.5  # samples, and travel to show a line against the angle
 
@@ -53,7 +53,7 @@ class TorqueRegression(TorqueBand):
         def gains(rows: Any) -> Array:
             a = columns[rows]
             return bounded(
-                a.T @ a + RIDGE * np.eye(a.shape[1]) * float(np.mean(np.sum(a * a, axis=0))), a.T @ r[rows], low
+                a.T @ a + CURVE_RIDGE * np.eye(a.shape[1]) * float(np.mean(np.sum(a * a, axis=0))), a.T @ r[rows], low
             )
 
         g = gains(self._fitted)
@@ -81,7 +81,7 @@ class TorqueRegression(TorqueBand):
         wide = np.column_stack([a, columns])
         low = np.array([self._low(n) for n in names] + [-np.inf] * (extra + columns.shape[1]))
         ridge = np.zeros(wide.shape[1])
-        ridge[a.shape[1] :] = RIDGE * float(np.mean(np.sum(columns * columns, axis=0)))
+        ridge[a.shape[1] :] = CURVE_RIDGE * float(np.mean(np.sum(columns * columns, axis=0)))
         own = np.arange(wide.shape[1])
         free = (own >= len(names)) & (own < a.shape[1])
         x, held, _ = self._with_folds(wide, y, low, self._folds(names, extra), free, ridge)
@@ -257,7 +257,7 @@ class TorqueRegression(TorqueBand):
         for old, new, judged in zip(base.held, richer.held, np.split(self._judged, ends), strict=True):
             before, after = old[judged] ** 2, new[judged] ** 2
             if len(before):
-                count = max(1, min(BLOCKS_A_RUN, len(before) // BLOCK))
+                count = max(1, min(BLOCKS_A_RUN, len(before) // BLOCK_SAMPLES))
                 pairs = zip(np.array_split(before, count), np.array_split(after, count), strict=True)
                 powers = np.array([(np.mean(x), np.mean(y)) for x, y in pairs])
                 fall += (powers[:, 0] - powers[:, 1]).tolist()

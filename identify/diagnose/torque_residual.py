@@ -17,14 +17,13 @@ from scipy.interpolate import make_interp_spline
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.results import RunTraces
-from identify.signals.low_pass import low_pass
+from identify.signals.low_pass import EDGE_PERIODS, low_pass
 from identify.signals.trace import UPSAMPLING, Trace
 from rig import effects
 from rig.effects.base import Place
 from rig.recording.run import Array
 
-EDGE_PERIODS = 3.0  # of the low-pass: that much at either end of a run it has not settled
-BINS = 30
+DEPENDENCE_BINS = 30  # of a quantity, in which the residual is averaged
 MIN_BIN_SAMPLES = 20  # samples in a bin
 
 
@@ -171,7 +170,7 @@ def dependence(traces: Sequence[RunTraces], cutoff_hz: float) -> dict[str, float
         left.append(np.where(use, values, 0.0))
         known.append(use)
     use = np.concatenate(known) if known else np.zeros(0, dtype=bool)
-    if int(np.sum(use)) < MIN_BIN_SAMPLES * BINS:
+    if int(np.sum(use)) < MIN_BIN_SAMPLES * DEPENDENCE_BINS:
         return {}
     y = np.concatenate(left)[use]
 
@@ -190,7 +189,7 @@ def dependence(traces: Sequence[RunTraces], cutoff_hz: float) -> dict[str, float
 
 def _share(x: Array, y: Array) -> float:
     """Share of the mean square of y, (n,), that its mean over bins of x explains; scatter taken off."""
-    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
+    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, DEPENDENCE_BINS + 1)))
     if len(edges) < 3 or not np.mean(y * y) > 0.0:
         return 0.0
     at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)

@@ -21,7 +21,7 @@ from identify.simulate.sensitivities import linearise
 from identify.simulate.shots import RUNAWAY, Shots, losses_of, moved, predict
 from rig.recording.run import Array
 
-SETTLE = 6  # rounds in which start states are fitted at fixed parameters
+START_STATE_ROUNDS = 6  # rounds in which start states are fitted at fixed parameters
 OWN_STEPS = 6  # in which the gains that a run has of its own are fitted at fixed parameters
 
 
@@ -83,7 +83,7 @@ def settled(shots: Shots, structure: Structure, names: Sequence[Name], x: Array)
     equations = equations_of(structure, names, x, shots.number, shots.added)
     losses = losses_of(shots, shots.trace.measured - predict(shots, equations, shots.starts, shots.bias))
     share = np.ones(len(shots.first))  # of the full step that each shot dares
-    for _ in range(SETTLE):
+    for _ in range(START_STATE_ROUNDS):
         part = linearise(shots, structure, names, x, np.ones(len(x)), still, np.inf)
         step, bias = part.back(np.zeros(len(x)))
         trial = moved(shots, (step * share[:, None], bias))

@@ -22,17 +22,16 @@ from identify.model.parameter_fit import ZERO_INFORMATION, ParameterFit, std_err
 from identify.model.parameters import Name, is_gain
 from identify.model.structure import Structure
 from identify.signals.trace import Trace
-from identify.simulate.sensitivities import jacobian
+from identify.simulate.sensitivities import INFORMATION_RCOND, jacobian
 from identify.simulate.shots import Shots
 from rig.recording.run import Array
 
 NEAR_FLOOR = 1.3**2  # reduced chi-square: close enough for a free run over the whole set
 FEW_NOISES = 5.0**2  # reduced chi-square of a free run: disturbed moments, not a wrong model
-STEPS = 12  # of a fit
+OUTPUT_ERROR_STEPS = 12  # steps of a fit
 FREER = 0.95**2  # of the mean square of the free run
-BLOCKS_PER_RUN = 20
-SEGMENT = 256  # samples of a stretch whose spectrum is averaged
-SINGULAR = 1e-11  # smallest over largest eigenvalue of the scaled information
+BLOCKS_PER_RUN = 20  # blocks at most, over which scores scatter
+RESIDUAL_SEGMENT_SAMPLES = 256  # samples of a stretch whose spectrum is averaged
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ class FinalFit:
             return float("inf")
         gains = np.array([self.values[self.names[i]] for i in at])
         size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-        scaled = np.linalg.pinv(covariance / np.outer(size, size), rcond=SINGULAR, hermitian=True)
+        scaled = np.linalg.pinv(covariance / np.outer(size, size), rcond=INFORMATION_RCOND, hermitian=True)
         wald = float((gains / size) @ scaled @ (gains / size))
         return wald - len(own) * float(np.log(max(self.fit.count, 2)))
 
@@ -96,13 +95,13 @@ class FinalFit:
         """
         at = [fuller.names.index(n) for n in self.names]
         theirs = fuller.covariance[np.ix_(at, at)]
-        told = tuple(a and fuller.determined[i] for a, i in zip(self.determined, at, strict=True))
+        both = tuple(a and fuller.determined[i] for a, i in zip(self.determined, at, strict=True))
         size = np.sqrt(np.maximum(np.diag(theirs), 1e-300))
         if not (np.all(np.isfinite(theirs)) and np.all(np.isfinite(self.covariance))):
-            return replace(self, covariance=np.where(np.isfinite(theirs), self.covariance, theirs), determined=told)
+            return replace(self, covariance=np.where(np.isfinite(theirs), self.covariance, theirs), determined=both)
         values, vectors = np.linalg.eigh((theirs - self.covariance) / np.outer(size, size))
         more = (vectors * np.maximum(values, 0.0)) @ vectors.T
-        return replace(self, covariance=self.covariance + more * np.outer(size, size), determined=told)
+        return replace(self, covariance=self.covariance + more * np.outer(size, size), determined=both)
 
 
 def by_regression(
@@ -155,16 +154,16 @@ def by_output_error(
         values: Mapping[Name, float], *, rests: bool = False, held: Sequence[Name] = (),
         carry: Sequence[Shots] | None = None,
     ) -> OutputErrorFit:  # fmt: skip
-        return refine(traces, structure, values, None, STEPS, use, carry, [*fixed, *held], rests=rests)
+        return refine(traces, structure, values, None, OUTPUT_ERROR_STEPS, use, carry, [*fixed, *held], rests=rests)
 
     at_once, valley = settled(refit(start), refit)
     best = at_once
     straight = best.reduced_chi_square <= NEAR_FLOOR  # the search came close enough: no ladder of horizons needed
     if not straight:
-        best = refine(traces, structure, start, horizon, STEPS, use, fixed=fixed)
+        best = refine(traces, structure, start, horizon, OUTPUT_ERROR_STEPS, use, fixed=fixed)
     whole_runs = [at_once]
     for longer in () if straight else (4.0 * horizon, None):
-        trial = refine(traces, structure, best.values, longer, STEPS, use, fixed=fixed)
+        trial = refine(traces, structure, best.values, longer, OUTPUT_ERROR_STEPS, use, fixed=fixed)
         whole_runs += [trial] if longer is None else []
         if trial.reduced_chi_square <= NEAR_FLOOR:
             best = trial
@@ -192,7 +191,7 @@ def _inverse(information: Array) -> tuple[Array, tuple[bool, ...]]:
     """Inverse of an information matrix and which parameters it determines."""
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     power, axes = np.linalg.eigh(information / np.outer(scale, scale))
-    empty = power < SINGULAR * max(power[-1], 1e-300)
+    empty = power < INFORMATION_RCOND * max(power[-1], 1e-300)
     inverse = axes[:, ~empty] @ np.diag(1.0 / power[~empty]) @ axes[:, ~empty].T
     touched = np.any(np.abs(axes[:, empty]) > 0.05, axis=1) if np.any(empty) else np.zeros(len(scale), dtype=bool)
     dead = np.diag(information) <= ZERO_INFORMATION
@@ -232,7 +231,7 @@ def covariance_of(parts: Sequence[tuple[Array, Array]], fitted: int) -> tuple[Ar
 def _coloured(columns: Array, residual: Array) -> Array:
     """Variance of the scores of one run where its residual is stationary, (p, p): columns weighed by its spectrum."""
     n = len(residual)
-    f, power = signal.welch(residual, nperseg=min(n, SEGMENT), detrend=False)
+    f, power = signal.welch(residual, nperseg=min(n, RESIDUAL_SEGMENT_SAMPLES), detrend=False)
     transformed = np.fft.rfft(columns, 2 * n, axis=0)
     level = np.interp(np.fft.rfftfreq(2 * n), f[1:-1], 0.5 * power[1:-1])  # two-sided
     weight = level * np.where(np.arange(n + 1) % n == 0, 1.0, 2.0) / (2 * n)

@@ -22,8 +22,8 @@ from identify.simulate.sensitivities import at_residual, linearise
 from identify.simulate.shots import RUNAWAY, Shots, moved, residual_at
 from rig.recording.run import Array
 
-FINER = 4
-STEPS = 2
+GRID_REFINEMENT_FACTOR = 4  # times the simulator's steps
+GRID_REFINEMENT_STEPS = 2  # steps of the fit on the finer grid
 NOTHING = 0.05  # standard errors: by less than that nothing is changed
 
 
@@ -54,11 +54,11 @@ def sharpened(
 
         x = fit.vector
         scale = np.where(np.abs(x) > 0, np.abs(x), 1.0)
-        shots = shots_for(traces, structure, names, x, None, use, fit.shots, coarse=False, finer=FINER)
+        shots = shots_for(traces, structure, names, x, None, use, fit.shots, coarse=False, finer=GRID_REFINEMENT_FACTOR)
         parts = list(workers.map(lambda s: linearise(s, structure, names, fit.vector, scale, still, np.inf), fit.shots))
         left, begun = residuals(shots, x)
         cost = begun
-        for number in range(STEPS):
+        for number in range(GRID_REFINEMENT_STEPS):
             parts = [at_residual(q, s, r, np.inf) for q, s, r in zip(parts, shots, left, strict=True)]
             a, b = np.sum([q.a for q in parts], axis=0), np.sum([q.b for q in parts], axis=0)
             dx = _solved(a, b, ~still)

@@ -20,7 +20,7 @@ from identify.simulate.shots import Shots
 from rig.recording.run import Array
 
 DOUBT = 4.0  # standard errors by which a start state may be off
-GRID = 25  # points across the ellipse, either way
+ELLIPSE_GRID_POINTS = 25  # points across the ellipse, either way
 
 
 def least_std_errors(shots: Shots, fit: OutputErrorFit, names: Sequence[Name], sigma: float) -> Array:
@@ -47,7 +47,7 @@ def least_std_errors(shots: Shots, fit: OutputErrorFit, names: Sequence[Name], s
     gram = np.array([[a.T @ b for b in parts] for a in parts])
     if not np.all(np.isfinite(gram)):  # a model that runs away tells nothing about itself
         return np.full(len(keep), np.inf)
-    reach = np.linspace(-DOUBT, DOUBT, GRID)
+    reach = np.linspace(-DOUBT, DOUBT, ELLIPSE_GRID_POINTS)
     points = np.array([(1.0, u, v) for u in reach for v in reach if np.hypot(u, v) <= DOUBT])
     size = np.sqrt(np.maximum(np.diag(gram[0, 0]), 1e-300))
     scaled = np.einsum("ka,kb,abij->kij", points, points, gram) / np.outer(size, size)

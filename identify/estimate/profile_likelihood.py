@@ -34,9 +34,9 @@ INITIAL_STEP_SIGMAS = 2.0  # standard errors beside the fit, to begin with
 MAX_DOUBLINGS = 10  # doublings of that
 RISE = 25.0  # of chi square at either end of what is looked at: dents are half as deep
 BOUND = 4.0  # of chi square at an end beyond which nothing is to be looked at: a 95 % interval ends before it
-LOOKS = 11  # between the ends
+INNER_GRID_POINTS = 11  # between the ends
 COARSE = (0.5, 0.71, 0.84, 1.19, 1.41, 2.0)  # times the inertia: a deep dent may lie far from the bottom
-REACH = 100.0  # standard errors: no dent is deeper in that
+MAX_DENT_SIGMAS = 100.0  # standard errors: no dent is deeper in that
 DEEP = 20.0  # of chi square: no chance makes a dent of that
 MAX_GRID_POINTS = 800  # a damping ratio apart, which is how narrow a ring makes them
 MIN_INERTIA_SHARE = 1e-3  # of the inertia: less is not looked at
@@ -120,7 +120,7 @@ def _bottom(fit: OutputErrorFit, refit: Refit) -> tuple[OutputErrorFit, ProfileL
         return refit({**e.values, INERTIA: value}, rests=rests, held=[INERTIA], carry=e.shots)
 
     error, inertia = inertia_std_error(fit), fit.values[INERTIA]
-    looks = [times * inertia for times in COARSE if abs(times - 1.0) * inertia < REACH * error]
+    looks = [times * inertia for times in COARSE if abs(times - 1.0) * inertia < MAX_DENT_SIGMAS * error]
     centre = min((fit, *(beside(fit, look) for look in looks)), key=lambda e: e.cost)
     step = INITIAL_STEP_SIGMAS * error
     least = MIN_INERTIA_SHARE * inertia
@@ -147,7 +147,7 @@ def _bottom(fit: OutputErrorFit, refit: Refit) -> tuple[OutputErrorFit, ProfileL
 
 def _between(sides: Sequence[OutputErrorFit]) -> list[float]:
     below, above = (s.values[INERTIA] for s in sides)
-    return np.linspace(below, above, LOOKS + 2)[1:-1].tolist()
+    return np.linspace(below, above, INNER_GRID_POINTS + 2)[1:-1].tolist()
 
 
 def _vertex(

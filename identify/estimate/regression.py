@@ -23,7 +23,7 @@ from rig.effects.base import Effect, Place
 from rig.platform import TERMS
 from rig.recording.run import Array
 
-ITERATIONS = 4
+ITERATIONS = 4  # times that the denominator is rebuilt from the estimate
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,10 @@ from identify.simulate.shots import Shots, may_rest
 from rig.dynamics import Equations
 
 WEAK = 1e-3  # relative standard error of the inertia beyond which a ring of noise may decide it
-NOISE_LIMITED = 2.0  # reduced chi-square up to which the noise, not the model, is in the way
+NOISE_LIMITED_CHI_SQUARE = 2.0  # reduced chi-square up to which the noise, not the model, is in the way
 BY_CHANCE = 15.0  # fall of chi square that two start values a run make of noise, their ring free to find its place
-ROUNDS = 3  # the place of rest moves with the model
-SETTLED = 0.1  # of chi square, between rounds
+REST_ROUNDS = 3  # the place of rest moves with the model
+SETTLED_CHI_SQUARE_FALL = 0.1  # of chi square, between rounds
 QUASI_STATIC_RATIO = 0.1  # of the natural frequency: what shakes no faster hardly tells the inertia but by a ring
 INERTIA: Name = ("inertia",)
 
@@ -59,12 +59,12 @@ def with_fixed_initial_state(free: OutputErrorFit, refit: Refit) -> OutputErrorF
         return free
     resting = sum(may_rest(s.trace, Equations(free.platform(s.number, s.added))) for s in free.shots)
     best, before = free, np.inf
-    for _ in range(ROUNDS if resting else 0):
+    for _ in range(REST_ROUNDS if resting else 0):
         held = refit(best.values, rests=True)
         if not held.cost <= free.cost + BY_CHANCE * resting:
             break
         best = held
-        if before - held.cost < SETTLED:
+        if before - held.cost < SETTLED_CHI_SQUARE_FALL:
             break
         before = held.cost
     return best
@@ -79,7 +79,7 @@ def depends_on_ringing(fit: OutputErrorFit) -> bool:
 
 def near(fit: OutputErrorFit) -> bool:
     """Whether the noise, not the model, is in the way."""
-    return fit.reduced_chi_square < NOISE_LIMITED
+    return fit.reduced_chi_square < NOISE_LIMITED_CHI_SQUARE
 
 
 def is_quasi_static(fit: OutputErrorFit) -> bool:

@@ -19,7 +19,7 @@ MIN_CHI_SQUARE = 25.0  # chi square that a plan has to promise: five standard er
 GOOD = 400.0  # from which more sets are not worth their time
 BEST = 1e4  # from which more of it proves nothing more
 EQUIVALENT_SCORE_RATIO = 0.5  # of the best score: the shorter of two such sets is played
-MAX_SETS = 4
+MAX_SETS = 4  # of a plan
 PROOFS = 3  # sets that are put to the proof in a round
 LOOKED_AT = 14  # candidates of a pair whose sensitivities are taken
 

@@ -17,10 +17,10 @@ from rig.preflight import Peaks, predict
 from rig.recording.run import Array
 
 AMPLITUDES = (1.0, 0.3, 0.1, 0.03)  # of what the limits allow
-SHORTEST_S, LONGEST_S = 5.0, 15.0
-PERIODS = 100.0  # of the platform's own oscillation in a set
+SHORTEST_S, LONGEST_S = 5.0, 15.0  # of a set
+SET_PERIODS = 100.0  # of the platform's own oscillation in a set
 DRIFT_SET_S = 40.0  # a set long enough for what drifts
-HIGHEST = 0.08  # of the sample rate: beyond, what happens between the samples is part of the answer
+MAX_SINE_FREQUENCY_SHARE = 0.08  # of the sample rate: beyond, what happens between the samples is part of the answer
 TONES = (
     (0.017, "a slow sine"),
     (0.1, "a slow sine"),
@@ -28,10 +28,10 @@ TONES = (
     (0.7, "a sine"),
     (0.95, "a sine near resonance"),
 )
-ABOVE = ((1.6, "a sine above resonance"), (2.5, "a sine above resonance"))
+HIGH_TONES = ((1.6, "a sine above resonance"), (2.5, "a sine above resonance"))
 FILL = 0.93  # of the limits that the largest amplitude is brought to
-WIDE = 1.02  # of it that still counts as there
-ATTEMPTS = 8
+FILL_TOLERANCE_RATIO = 1.02  # of it that still counts as there
+SCALING_ATTEMPTS = 8  # torques that are tried on the way to the limits
 
 
 @dataclass(frozen=True)
@@ -71,9 +71,9 @@ class Candidate:
 
 def shapes(natural_hz: float, sample_rate_hz: float) -> tuple[Shape, ...]:
     """What to choose from, for a platform that swings at ``natural_hz`` and a sensor read at ``sample_rate_hz``."""
-    length = float(np.clip(math.ceil(PERIODS / natural_hz), SHORTEST_S, LONGEST_S))
-    top = HIGHEST * sample_rate_hz
-    out = [_sine(f * natural_hz, length, words) for f, words in (*TONES, *ABOVE) if f * natural_hz < top]
+    length = float(np.clip(math.ceil(SET_PERIODS / natural_hz), SHORTEST_S, LONGEST_S))
+    top = MAX_SINE_FREQUENCY_SHARE * sample_rate_hz
+    out = [_sine(f * natural_hz, length, words) for f, words in (*TONES, *HIGH_TONES) if f * natural_hz < top]
     out.append(_sine(0.31 * natural_hz, DRIFT_SET_S, "a long sine", (1.0,)))
     for low, high, words in (
         (0.02, 0.5, "a slow multisine"), (0.1, 2.0, "a multisine around resonance"),
@@ -167,11 +167,11 @@ class _Bench:
         """The peak torque that stays within the limits on every platform; None where none is found."""
         torque, best = self._allowed.torque_nm / max(self._peak, 1e-300), None
         most = torque
-        for _ in range(ATTEMPTS):
+        for _ in range(SCALING_ATTEMPTS):
             strain = self.play(torque).strain
             if strain <= 1.0:
                 best = torque
-                if strain >= FILL / WIDE or torque >= most:
+                if strain >= FILL / FILL_TOLERANCE_RATIO or torque >= most:
                     break
             # Not in proportion where there are effects: try again with what it should have been.
             factor = FILL / strain if math.isfinite(strain) and strain > 0.0 else 0.1

@@ -16,7 +16,7 @@ from identify.signals.trace import Trace
 from rig import effects
 from rig.platform import TERMS, Platform
 
-MAX_PAIRS = 4
+MAX_PAIRS = 4  # of an effect and a rival, that are planned for at once
 EXCLUDED = 25.0  # chi square by which the data have excluded a rival already
 REFIT = 10  # iterations in which a rival is fitted into the finished model
 

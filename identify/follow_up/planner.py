@@ -28,12 +28,12 @@ from rig.platform import Platform
 from rig.preflight import Peaks
 from rig.recording.run import Recording
 
-FAINT = 0.005  # of the largest torque played so far: drives take torque in steps of about a thousandth
-LOOKS = 30.0  # samples a period of the platform's own oscillation: no shape goes beyond three times its frequency
+FAINTEST_TORQUE_SHARE = 0.005  # of the largest torque played so far: drives take torque in steps of about a thousandth
+FIRST_LOOK_SAMPLES_A_PERIOD = 30.0  # of the platform's own oscillation: no shape goes beyond three times its frequency
 USUAL_HZ = 5.0  # where nothing swings
 MIN_DAMPING_SHARE = 0.05  # of the identified one, where the runs hardly tell it
 IN_DOUBT = 3.0  # times its interval
-WELL_KNOWN = 0.8  # of it, that far below
+WELL_KNOWN_DAMPING_SHARE = 0.8  # of it, that far below
 CAP = 1.3  # times the predicted travel: what a set may reach on a rig whose declared model is another one
 
 
@@ -82,7 +82,7 @@ def plan_follow_up(
             return FollowUp(None, tuple(without))
         sensor = Sensor(sample_rate_hz, noise, traces[0].channel)
         played = max(float(np.max(np.abs(r.torque_nm))) for r in recording.runs if r.torque_nm is not None)
-        table = Table(allowed, sensor, rest_s, prefix, found.axis == "linear", FAINT * played)
+        table = Table(allowed, sensor, rest_s, prefix, found.axis == "linear", FAINTEST_TORQUE_SHARE * played)
         return _planned(pairs, without, table, _least_damping(found))
 
 
@@ -107,9 +107,9 @@ def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table, least
     models: list[Platform] = []
     models += [m for p in pairs for m in p.models if m not in models]
     lighter = [replace(m, damping_nm_s_rad=least_damping * m.damping_nm_s_rad) for m in models]
-    bearing = [*models, *(lighter if least_damping < WELL_KNOWN else [])]
+    bearing = [*models, *(lighter if least_damping < WELL_KNOWN_DAMPING_SHARE else [])]
     own_hz = natural_hz(models[0])
-    look, weight = coarser(table.sensor, LOOKS * own_hz)
+    look, weight = coarser(table.sensor, FIRST_LOOK_SAMPLES_A_PERIOD * own_hz)
     several = shapes(own_hz, table.sensor.sample_rate_hz)
     choice = candidates(several, bearing, table.allowed, look, table.least_torque_nm)
     if not choice:
@@ -135,10 +135,10 @@ def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table, least
 def _too_little(pair: Pair, reached: float) -> str:
     """Why a pair has no part in the plan."""
     cure = effects.get(pair.effect).separated_by
-    told = f" (to distinguish it {cure})" if cure.startswith("from ") else ""
+    cure_note = f" (to distinguish it {cure})" if cure.startswith("from ") else ""
     return (
         f"no excitation within the limits separates them: the best reaches a chi-square of {number(reached, 2)}, "
-        f"{MIN_CHI_SQUARE:g} is needed{told}"
+        f"{MIN_CHI_SQUARE:g} is needed{cure_note}"
     )
 
 
@@ -172,5 +172,5 @@ def with_follow_up(found: Identification, planned: FollowUp | None) -> Identific
     before = found.follow_up
     if before is not None:
         planned = replace(before, plan=planned.plan, unparted=planned.unparted, note="")
-    told = (*found.verdict.sentences, *verdict_sentences(planned, found.verdict.never_separable))
-    return replace(found, follow_up=planned, verdict=replace(found.verdict, sentences=told))
+    sentences = (*found.verdict.sentences, *verdict_sentences(planned, found.verdict.never_separable))
+    return replace(found, follow_up=planned, verdict=replace(found.verdict, sentences=sentences))

@@ -20,7 +20,7 @@ from rig.platform import Platform
 from rig.preflight import Peaks
 from rig.recording.run import Recording
 
-MORE = 1.0  # times as much as before that a further plan has to promise
+SEPARATION_GAIN = 1.0  # times as much as before that a further plan has to promise
 
 
 def after_playing(
@@ -55,7 +55,7 @@ def promises_more(found: Identification) -> bool:
     if not follow_up.rounds:
         return True
     before = {(p.effect, p.rival): p.separation for p in follow_up.rounds[-1].plan.partings}
-    return any(p.separation > MORE * before.get((p.effect, p.rival), 0.0) for p in follow_up.plan.partings)
+    return any(p.separation > SEPARATION_GAIN * before.get((p.effect, p.rival), 0.0) for p in follow_up.plan.partings)
 
 
 @np.errstate(all="ignore")

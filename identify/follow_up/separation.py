@@ -24,9 +24,9 @@ from rig.excitation import PlannedSet
 from rig.platform import Platform
 from rig.recording.run import Array
 
-SETTLE = 8  # rounds in which a model is fitted to what the other would have shown
+SEPARATION_ROUNDS = 8  # rounds in which a model is fitted to what the other would have shown
 TRIES = 5  # of a step, each shorter than the one before
-ENOUGH = 0.05  # of chi square by which a round has to gain
+MIN_ROUND_GAIN = 0.05  # of chi square by which a round has to gain
 STARTS = (1.0, 0.1, 0.0)  # of the gains of the model's own effects
 
 
@@ -169,7 +169,7 @@ def _descend(way: Way, several: Sequence[Shots], start: Array) -> float:
     values = start
     total, cost = at(values)
     damping = 0.0
-    for _ in range(SETTLE):
+    for _ in range(SEPARATION_ROUNDS):
         before = cost
         for _try in range(TRIES):
             trial = values.copy()
@@ -180,7 +180,7 @@ def _descend(way: Way, several: Sequence[Shots], start: Array) -> float:
                 values, total, cost, damping = trial, share, new, 0.1 * damping
                 break
             damping = max(10.0 * damping, 1e-3)
-        if before - cost < ENOUGH * cost:
+        if before - cost < MIN_ROUND_GAIN * cost:
             break
     return cost if cost > 0.0 else np.inf
 

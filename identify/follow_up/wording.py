@@ -20,8 +20,8 @@ def why_of(partings: Sequence[Parting], sets: Sequence[Candidate]) -> str:
     """One sentence: what the sets are, and what they part."""
     words = joined(list(dict.fromkeys(c.words for c in sets)))
     parts = "separates" if len({c.words for c in sets}) == 1 else "separate"
-    told = joined([f"{plain(p.effect)} from {plain(p.rival)} (expected chi-square {size(p)})" for p in partings])
-    return f"{capital(words)} {parts} {told}."
+    separated = joined([f"{plain(p.effect)} from {plain(p.rival)} (expected chi-square {size(p)})" for p in partings])
+    return f"{capital(words)} {parts} {separated}."
 
 
 def size(parting: Parting) -> str:
@@ -29,10 +29,10 @@ def size(parting: Parting) -> str:
     return f"{float(f'{parting.separation:.2g}'):,.0f}" if parting.separation < PLENTY else f"over {PLENTY:,.0f}"
 
 
-def verdict_sentences(follow_up: FollowUp, told: Collection[str] = ()) -> list[str]:
+def verdict_sentences(follow_up: FollowUp, inseparable: Collection[str] = ()) -> list[str]:
     """What the verdict adds: the plan, and the pairs that no plan parts for want of limits.
 
-    ``told`` are the pairs ("actuator_lag / sensor_lag") of which the verdict says already that nothing parts them.
+    ``inseparable``: pairs ("actuator_lag / sensor_lag") of which the verdict says already that nothing parts them.
     """
     out = []
     if follow_up.plan is not None:
@@ -40,7 +40,7 @@ def verdict_sentences(follow_up: FollowUp, told: Collection[str] = ()) -> list[s
     out += [
         f"No follow-up for {plain(one.effect)} and {plain(one.rival)}: {one.reason}."
         for one in follow_up.unparted
-        if not {f"{one.effect} / {one.rival}", f"{one.rival} / {one.effect}"} & set(told)
+        if not {f"{one.effect} / {one.rival}", f"{one.rival} / {one.effect}"} & set(inseparable)
     ]
     return out
 

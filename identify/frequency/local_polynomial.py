@@ -15,7 +15,7 @@ from identify.frequency.spectra import Complex, Record, Response, chosen, excite
 from rig.recording.run import Array
 
 NEIGHBOURS = 5  # bins either way behind a local polynomial
-ORDER = 2
+POLYNOMIAL_ORDER = 2  # degree of that polynomial
 DISTINCT = 0.3  # share of a line's torque that no parabola over the bins takes for a transient
 
 
@@ -51,7 +51,7 @@ def _local(spectra: Sequence[tuple[Complex, ...]], k: int, last: int) -> tuple[c
     """Response, coherence, relative error and degrees of freedom at one bin; None where U passes for a transient."""
     begin = int(np.clip(k - NEIGHBOURS, 1, last - 2 * NEIGHBOURS))
     bins = np.arange(begin, begin + 2 * NEIGHBOURS + 1)
-    powers = np.vander((bins - k) / NEIGHBOURS, ORDER + 1, increasing=True)
+    powers = np.vander((bins - k) / NEIGHBOURS, POLYNOMIAL_ORDER + 1, increasing=True)
     scale = max(float(np.max(np.abs(u[bins]))) for u, _ in spectra)
     through = np.concatenate([powers * (u[bins] / scale)[:, None] for u, _ in spectra])
     starts = np.kron(np.eye(len(spectra)), powers)

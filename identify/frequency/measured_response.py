@@ -41,7 +41,7 @@ RINGS = 2.0  # times the ring that a segment has to hold: shorter ones blur a re
 SMOOTHING_BINS = 3  # bins either way over which the power of a segment is smoothed before segments are counted
 HANN_OVERLAP = 1.056  # half-overlapping Hann segments over independent ones (Bendat & Piersol, chapter 11)
 CORRECTED = {"whole periods": coherence_over_periods, "segments": coherence_over_segments}
-MIN_SAMPLES = 64  # samples
+MIN_RESPONSE_SAMPLES = 64  # samples of a run
 
 
 def measured_response(records: Sequence[Record], settle_s: float) -> Response | None:
@@ -57,7 +57,7 @@ def measured_response(records: Sequence[Record], settle_s: float) -> Response | 
     """
     first = records[0]
     usable = [r for r in records if np.all(np.isfinite(r.motion)) and np.all(np.isfinite(r.torque_nm))]
-    if not usable or len(first.torque_nm) < MIN_SAMPLES or np.ptp(first.torque_nm) == 0.0:
+    if not usable or len(first.torque_nm) < MIN_RESPONSE_SAMPLES or np.ptp(first.torque_nm) == 0.0:
         return None
     period = period_of(first.torque_nm, first.step_s)
     found = None

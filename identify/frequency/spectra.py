@@ -15,7 +15,7 @@ from scipy import fft, signal
 from rig.recording.run import Array
 
 Complex = NDArray[np.complexfloating[Any, Any]]
-TRUSTED = 0.8  # coherence below which a line is drawn pale
+MIN_COHERENCE = 0.8  # coherence below which a line is drawn pale
 MAX_GAIN_ERROR = 0.25  # relative error of the gain (2 dB) above which it is drawn pale as well
 EXCITED = 1e-4  # of the strongest line's power (-40 dB): what lies below is not excited
 MAX_LINES = 240  # lines of one response
@@ -75,8 +75,8 @@ class Response:
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
-        """Lines whose coherence reaches ``TRUSTED`` and whose error stays below ``MAX_GAIN_ERROR``, shape (m,)."""
-        return np.asarray((self.coherence >= TRUSTED) & (self.relative_error <= MAX_GAIN_ERROR))
+        """Lines whose coherence reaches ``MIN_COHERENCE`` and whose error is below ``MAX_GAIN_ERROR``, shape (m,)."""
+        return np.asarray((self.coherence >= MIN_COHERENCE) & (self.relative_error <= MAX_GAIN_ERROR))
 
 
 def decibel(response: Complex) -> Array:

@@ -26,9 +26,9 @@ from rig.recording.run import Array
 Objective = Callable[[Array], Array]
 
 FIRST_STEP = 0.1  # standard deviation of a mutation, as a share of the range
-LAST_STEP = 1e-6
+LAST_STEP = 1e-6  # the same in the last generation, where mutations shrink
 OVERSHOOT = 1.0  # of the parents' distance, beyond either: outweighs the pull of 1/J, which spans decades at first
-EDGE = 1e-3  # of the range: closer than this the best individual leans on its bound
+BOUND_MARGIN = 1e-3  # of the range: closer than this the best individual leans on its bound
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def search(
         accepted = j_dec is None or best_value < j_dec
         if accepted:
             break
-    near = EDGE * (high - low)
+    near = BOUND_MARGIN * (high - low)
     at_edge = (high > low) & ((best - low < near) | (high - best < near))
     return Outcome(best, best_value, history, repeat, accepted, tuple(bool(e) for e in at_edge))
 

@@ -13,7 +13,7 @@ from identify.simulate.shots import Shots, make_shots
 from rig.dynamics import TorqueSignal
 from rig.dynamics.equations import MAX_SUBSTEPS
 
-FINER = 4  # times the simulator's steps: a jump's mean over its step must still ring the platform as the jump did
+SUBSTEP_FACTOR = 4  # times the simulator's steps: a jump's mean over one must still ring the platform as the jump did
 
 
 def effect_free(trace: Trace, shots: Shots, fit: OutputErrorFit) -> Trace:
@@ -22,7 +22,7 @@ def effect_free(trace: Trace, shots: Shots, fit: OutputErrorFit) -> Trace:
     Along that motion friction knows when it sticks; a noisy measured rate does not.
     """
     equations = equations_of(fit.structure, fit.names, fit.vector, shots.number, shots.added)
-    substeps = min(MAX_SUBSTEPS, FINER * equations.substeps(trace.step_s))
+    substeps = min(MAX_SUBSTEPS, SUBSTEP_FACTOR * equations.substeps(trace.step_s))
     fine_shots = make_shots(trace, substeps, None, None, equations)
     if np.array_equal(fine_shots.first, shots.first):
         shots, fine_shots.starts = fine_shots, shots.starts

@@ -31,13 +31,12 @@ from rig.platform import TERMS
 from rig.recording.run import Array
 
 ALLOWANCE = 1.2  # J_dec over the objective that the sensor's noise alone makes
-ARRIVED = (
-    1.02  # the same over the closed form's, where that lies higher and yet is near the noise: no search gets lower
-)
+# The same over the closed form's, where that lies higher and yet is near the noise: no search gets lower.
+ARRIVED = 1.02
 NEAR_NOISE = 2.0  # times the objective that the noise makes
 SIMULATED = 8  # iterations of the fit that a set's values are held against
 MAX_SIGMAS = 3.0  # standard errors from it: further off, the distance is the error
-WELL_KNOWN = 0.05  # relative standard error up to which a set alone determines a parameter
+SET_DETERMINED_RELATIVE_ERROR = 0.05  # relative standard error up to which a set alone determines a parameter
 KEYS = {"inertia": "inertia_kg_m2", "damping": "damping_nm_s_rad", "stiffness": "stiffness_nm_rad"}
 
 
@@ -181,7 +180,7 @@ def _by_motion(trace: Trace, values: Mapping[str, float], labels: Sequence[Name]
 
 
 def _is_known(value: float, error: float) -> bool:
-    return error < WELL_KNOWN * max(abs(value), 1e-300)
+    return error < SET_DETERMINED_RELATIVE_ERROR * max(abs(value), 1e-300)
 
 
 def _tied(

@@ -17,7 +17,7 @@ from identify.runs.reduced import thinned
 from identify.signals.trace import Trace
 
 MAX_SAMPLES = 60_000  # of the final fit: longer recordings are filtered and decimated, all of them
-MAX_ITERATIONS = 25
+FINAL_FIT_ITERATIONS = 25  # steps of that fit
 
 
 def by_prediction_error(
@@ -44,14 +44,14 @@ def fitted_on_all(
     """The likelihood on all samples that fit, and the model fitted by it."""
     few, masks = thinned(traces, use, MAX_SAMPLES)
     problem = PredictionError(few, masks)
-    return problem, problem.fit(structure, start, problem.noise_of(like) if like else None, MAX_ITERATIONS)
+    return problem, problem.fit(structure, start, problem.noise_of(like) if like else None, FINAL_FIT_ITERATIONS)
 
 
 def as_final(problem: PredictionError, fit: Fit, traces: Sequence[Trace], everything: Sequence[Any]) -> FinalFit:
     """The same as a final fit: the runs simulated freely, and what the likelihood knows of each number."""
     structure = fit.structure
     held = free_run_of(traces, structure, fit.values, everything)
-    told = [i for i, n in enumerate(fit.names) if n != ("inertia",) or not problem.torque_free]
-    determined = tuple(bool(x > ZERO_INFORMATION) for x in np.diag(fit.information)[told])
-    names, covariance = tuple(fit.names[i] for i in told), fit.covariance[np.ix_(told, told)]
+    reported = [i for i, n in enumerate(fit.names) if n != ("inertia",) or not problem.torque_free]
+    determined = tuple(bool(x > ZERO_INFORMATION) for x in np.diag(fit.information)[reported])
+    names, covariance = tuple(fit.names[i] for i in reported), fit.covariance[np.ix_(reported, reported)]
     return FinalFit(fit, fit.values, names, covariance, held, False, determined, "prediction error")

@@ -50,8 +50,8 @@ def step_down(d: Descent, found: Step, of_noise: bool, enough: float) -> bool:
     size: Array = np.sqrt(np.maximum(np.diag(found.matrix), 1e-300))
     scaled, right = found.matrix / np.outer(size, size), found.right / size
     low, high = (bound * size for bound in d.room(len(size) - len(d.x)))
-    told = np.diag(found.matrix) > 0.0
-    low, high = np.where(told, low, 0.0), np.where(told, high, 0.0)
+    seen = np.diag(found.matrix) > 0.0
+    low, high = np.where(seen, low, 0.0), np.where(seen, high, 0.0)
     best = bounded_step(scaled, right, low, high)
     if found.promised + float((2.0 * right - scaled @ best) @ best) < max(0.2 * COST_TOLERANCE, enough):
         return False  # what a step promises is not worth taking

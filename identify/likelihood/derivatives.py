@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 NOISE_STEP = 0.02  # of a logarithm of the noise, in its differences
 GAIN_STEP = 0.02  # of a parameter's scale, in differences of gains: those are cut off where they have settled
-RAN_AWAY = 1e6  # standard deviations that innovations move by with a step: gains that follow no motion
+RUNAWAY_SIGMAS = 1e6  # standard deviations that innovations move by with a step: gains that follow no motion
 BIAS_STEP, START_STEP = 1e-4, 1e-6  # of the motion, of a bias and of a start state
 
 
@@ -158,7 +158,7 @@ def _of_run(
             pulled[:, k] = followed(replace(base.gains, gain=gains.gain, variance=gains.variance), step, predict=False)
         spread[:, k] = (np.log(gains.variance[w] / base.variance[w]) / step).ravel()
         far = float(np.max(np.abs(step * pulled[:, k]), initial=0.0))
-        if not (far < RAN_AWAY and np.all(np.isfinite(spread[:, k]))):
+        if not (far < RUNAWAY_SIGMAS and np.all(np.isfinite(spread[:, k]))):
             pulled[:, k] = spread[:, k] = 0.0  # the linear part runs away there: its gains tell nothing
     for k, kind in enumerate(kinds, len(at.x)):
         changed = replace(at.noise, **{kind: getattr(at.noise, kind) * float(np.exp(NOISE_STEP))})

@@ -51,10 +51,10 @@ class Columns:
 def orthogonal_part(own: Array, values: Array) -> Array:
     """Columns (n, m) without what a run's own unknowns, (n, k), can follow."""
     size: Array = np.linalg.norm(own, axis=0)
-    told = size > 0.0
-    if not np.any(told):
+    nonzero = size > 0.0
+    if not np.any(nonzero):
         return values
-    basis = np.linalg.qr(own[:, told] / size[told])[0]
+    basis = np.linalg.qr(own[:, nonzero] / size[nonzero])[0]
     return np.asarray(values - basis @ (basis.T @ values))
 
 

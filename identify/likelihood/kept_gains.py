@@ -59,8 +59,8 @@ class KeptGains:
         """
         keep = np.asarray(trace.keep, dtype=bool)
         seen = np.flatnonzero(keep)
-        told = [(a, b) for a, b in spans if np.any(keep[a : b + 1])]
-        if len(told) == 1 and seen[-1] - seen[0] + 1 == len(seen):
+        usable = [(a, b) for a, b in spans if np.any(keep[a : b + 1])]
+        if len(usable) == 1 and seen[-1] - seen[0] + 1 == len(seen):
             n, lead = self.longest, int(seen[0])
-            return np.arange(n) >= lead, [(told[0][0], n - 1)], (lead,)
+            return np.arange(n) >= lead, [(usable[0][0], n - 1)], (lead,)
         return keep, spans, (keep.tobytes(),)

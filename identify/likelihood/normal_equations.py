@@ -13,7 +13,7 @@ from identify.simulate.shots import Shots, moved, with_bias
 from rig.arrays import Array
 
 VarianceOf = Callable[[float, int], tuple[float, bool]]
-SINGULAR = 1e-9  # of the largest singular value of a scaled normal matrix
+NORMAL_RCOND = 1e-9  # of the largest singular value of a scaled normal matrix
 COST_TOLERANCE = 0.5  # fall of the cost below which a fit has arrived
 MAX_LOG_STEP = 4.0  # by which a logarithm of the noise may fall in one step
 MAX_NOISE_FACTOR = 1e12  # times itself, that a number of the noise may become in one step
@@ -73,13 +73,13 @@ def normal_equations(
 def _spanned(own: Array) -> tuple[Array, Array]:
     """An orthonormal basis of what a run's own unknowns do, (n, r), and the unknowns for each of it, (k, r)."""
     size = np.linalg.norm(own, axis=0)
-    told = np.flatnonzero(size > 0.0)
-    follow = np.zeros((own.shape[1], len(told)))
-    if not len(told):
-        return own[:, told], follow
-    basis, upper = np.linalg.qr(own[:, told] / size[told])
+    nonzero = np.flatnonzero(size > 0.0)
+    follow = np.zeros((own.shape[1], len(nonzero)))
+    if not len(nonzero):
+        return own[:, nonzero], follow
+    basis, upper = np.linalg.qr(own[:, nonzero] / size[nonzero])
     inverse = np.linalg.pinv(upper, rcond=1e-12)
-    follow[told] = inverse / size[told, None]
+    follow[nonzero] = inverse / size[nonzero, None]
     return basis, follow
 
 
@@ -92,12 +92,12 @@ def bounded_step(matrix: Array, right: Array, low: Array, high: Array) -> Array:
     """
     step, free = np.zeros(len(right)), high > low
     part = matrix[np.ix_(free, free)]
-    step[free] = np.linalg.lstsq(part, right[free], rcond=SINGULAR)[0]
+    step[free] = np.linalg.lstsq(part, right[free], rcond=NORMAL_RCOND)[0]
     if np.all((step >= low) & (step <= high)):
         return step
     values, vectors = np.linalg.eigh(part)
-    told = values > SINGULAR * max(float(values[-1]), 0.0)
-    root, along = np.sqrt(values[told]), vectors[:, told].T
+    regular = values > NORMAL_RCOND * max(float(values[-1]), 0.0)
+    root, along = np.sqrt(values[regular]), vectors[:, regular].T
     found = lsq_linear(root[:, None] * along, (along @ right[free]) / root, (low[free], high[free]), "bvls")
     step[free] = np.clip(found.x, low[free], high[free])
     return step

@@ -27,8 +27,8 @@ from rig.platform import Platform
 
 # Of a torque that is read between the ticks by a spline: a jump of it is spread so far that the spline follows.
 ROUNDED_TICKS = 0.75  # standard deviation, in ticks: -3 dB at 0.18 of the tick rate
-REACH = 4.0  # standard deviations over which that reaches
-ROUNDS = 4  # for friction that grows with the torque it is compensated by; each is smaller by its factor (at most 0.5)
+GAUSSIAN_REACH_SIGMAS = 4.0  # standard deviations over which that reaches
+FRICTION_ROUNDS = 4  # for friction that grows with its own compensation; each is smaller by its factor (at most 0.5)
 SOFT = 2e-3  # of the largest rate: below it the sign of the rate is not foreseen
 
 
@@ -118,7 +118,7 @@ def _lead_s(platform: Platform, active: list[str], drive: Drive) -> float:
     """By how much earlier than the set its run begins, in whole ticks; a slope is known one tick ahead."""
     early = (drive.latency_s + _early_s(platform, active)) / drive.tick_s
     slope = 1.0 if any(effects.get(n).inverse is not None for n in active) else 0.0
-    spread = 2.0 * REACH * ROUNDED_TICKS if drive.hold == "band_limited" else 0.0
+    spread = 2.0 * GAUSSIAN_REACH_SIGMAS * ROUNDED_TICKS if drive.hold == "band_limited" else 0.0
     return math.ceil(early + slope + spread - 1e-9) * drive.tick_s
 
 
@@ -134,7 +134,7 @@ def _resistance(platform: Platform, active: list[str], time_s: Array, motion: Mo
     """Torque of the effects on the shaft along a motion, less what the spring holds at rest, (n,)."""
     on_shaft = [n for n in active if effects.get(n).place in (Place.LOAD, Place.FRICTION)]
     total = np.zeros(len(time_s))
-    for _ in range(ROUNDS if any(feeds_on_torque(n) for n in on_shaft) else 1):
+    for _ in range(FRICTION_ROUNDS if any(feeds_on_torque(n) for n in on_shaft) else 1):
         shaft = wanted_nm + total
         total = np.zeros(len(time_s))
         for name in on_shaft:
@@ -233,5 +233,5 @@ def _unbent(torque_nm: Array, factor: float) -> Array:
 
 
 def _rounded(torque_nm: Array) -> Array:
-    out: Array = gaussian_filter1d(torque_nm, ROUNDED_TICKS * PARTS, truncate=REACH, mode="constant")
+    out: Array = gaussian_filter1d(torque_nm, ROUNDED_TICKS * PARTS, truncate=GAUSSIAN_REACH_SIGMAS, mode="constant")
     return out

@@ -21,9 +21,9 @@ from rig.errors import UsageError
 from rig.platform import Platform
 from rig.recording.run import Recording, Run
 
-VERSION_DIGITS = 12
+VERSION_DIGITS = 12  # hexadecimal digits of the model's SHA-256
 NOISES = 3.0  # of the sensor: a rate below is no direction
-GRID = 41  # values of angle and of rate in the table
+TABLE_GRID_POINTS = 41  # values of angle and of rate in the table
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,8 @@ def controller_of(model: Platform, recording: Recording, most_torque_nm: float) 
         else:
             left_out[name] = _why_not(name)
     if not terms:
-        told = "; ".join(f"{name}: {why}" for name, why in left_out.items()) or "it has none"
-        raise UsageError(f"no effect of this model is a function of angle, rate and torque: {told}")
+        reasons = "; ".join(f"{name}: {why}" for name, why in left_out.items()) or "it has none"
+        raise UsageError(f"no effect of this model is a function of angle, rate and torque: {reasons}")
     angle, rate = _reach(recording.runs)
     noise = min((_rate_noise(run) for run in recording.runs), default=0.0)
     version = hashlib.sha256(model_yaml(model).encode()).hexdigest()[:VERSION_DIGITS]
@@ -152,6 +152,6 @@ def value(controller: Controller, angle_rad: float, rate_rad_s: float, torque_nm
 
 def table_of(controller: Controller) -> list[tuple[float, float, float]]:
     """Rows of angle in rad, rate in rad/s and compensating torque in N m, without torque on the shaft."""
-    angles = np.linspace(-controller.most_angle_rad, controller.most_angle_rad, GRID).tolist()
-    rates = np.linspace(-controller.most_rate_rad_s, controller.most_rate_rad_s, GRID).tolist()
+    angles = np.linspace(-controller.most_angle_rad, controller.most_angle_rad, TABLE_GRID_POINTS).tolist()
+    rates = np.linspace(-controller.most_rate_rad_s, controller.most_rate_rad_s, TABLE_GRID_POINTS).tolist()
     return [(a, w, value(controller, a, w)) for a, w in itertools.product(angles, rates)]

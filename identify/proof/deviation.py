@@ -20,8 +20,8 @@ from rig.excitation import CompensatedSet, PlannedSet
 from rig.platform import Platform
 from rig.recording.run import Run
 
-BLOCKS = 20  # of a set, each left out once for the interval (Quenouille 1956): far longer than what the noise remembers
-Z95 = 1.96
+JACKKNIFE_BLOCKS = 20  # of a set, each left out once (Quenouille 1956): far longer than what the noise remembers
+Z95 = 1.96  # standard errors to either end of a 95 % interval
 NO_MORE_THAN_NOISE = 1.1  # root mean square over noise: below it an error is too small for a share of it
 
 
@@ -53,9 +53,9 @@ class Deviation:
 
     def squares(self, duration_s: float) -> tuple[Array, Array]:
         """Sum of squares less that of the noise, and number of samples, in each of the blocks of a set."""
-        block = np.clip((self.time_s / duration_s * BLOCKS).astype(int), 0, BLOCKS - 1)
-        counts = np.bincount(block[self.keep], minlength=BLOCKS).astype(float)
-        squares = np.bincount(block[self.keep], self.error[self.keep] ** 2, minlength=BLOCKS)
+        block = np.clip((self.time_s / duration_s * JACKKNIFE_BLOCKS).astype(int), 0, JACKKNIFE_BLOCKS - 1)
+        counts = np.bincount(block[self.keep], minlength=JACKKNIFE_BLOCKS).astype(float)
+        squares = np.bincount(block[self.keep], self.error[self.keep] ** 2, minlength=JACKKNIFE_BLOCKS)
         return squares - self.noise**2 * counts, counts
 
 

@@ -18,7 +18,8 @@ PARTS = 8  # of a tick: a torque that jumps is placed to an eighth of one, and i
 NO_LATENCY = 0.02  # of a tick: the rounding of commands
 MAX_LATENCY_S = 0.05  # later than that it is another torque
 UNLIKE = 0.1  # of a recorded torque that may differ from the planned one
-MIN_SAMPLES, LAG_STEPS = 100, 4
+MIN_LATENCY_SAMPLES = 100  # samples of the torque of a run
+LAG_STEPS = 4  # Gauss-Newton steps of the latency
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ def latency_of(recording: Recording, sets: Sequence[PlannedSet], tick_s: float) 
 
 def _lag(time_s: Array | None, torque_nm: Array | None, planned: PlannedSet) -> float | None:
     """By how much a recorded torque follows a planned one, by least squares (Gauss-Newton); None where it does not."""
-    if time_s is None or torque_nm is None or len(time_s) < MIN_SAMPLES:
+    if time_s is None or torque_nm is None or len(time_s) < MIN_LATENCY_SAMPLES:
         return None
     lag_s = 0.0
     for _ in range(LAG_STEPS):

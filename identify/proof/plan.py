@@ -19,7 +19,7 @@ from rig.recording.run import Run
 
 ALL, PLAIN = "all", "plain"
 MIN_TORQUE_SHARE = 0.02  # share of a set's torque below which it is not worth playing
-ATTEMPTS = 12
+PLANNING_ATTEMPTS = 12  # torques of one set that are tried, each smaller than the one before
 # Of the travel and the rate that a campaign may use. A compensated platform is damped less than before, so that it
 # rings on from wherever friction or a gap held it when the set began: with 1 N m on 681 N m/rad that took 0.25 deg of a
 # travel of 10 deg (`rig prove` on the default campaign), and the guard adds what the gyro may have drifted.
@@ -130,7 +130,7 @@ def plan_proof(
     allowed = allowed._replace(travel_deg=RESERVE * allowed.travel_deg, rate_deg_s=RESERVE * allowed.rate_deg_s)
     runs: list[PlannedRun] = []
     scales: dict[str, float] = {}
-    told: dict[str, dict[str, Announced]] = {variant: {} for variant in models}
+    announcements: dict[str, dict[str, Announced]] = {variant: {} for variant in models}
     for number, asked in enumerate(sets):
         run = next((r for r in recorded if r.name == asked.name), None)
         made, factor = _within(asked, models, allowed, drive, prefix, run)
@@ -140,8 +140,8 @@ def plan_proof(
         runs += [PlannedRun(asked.name, variant, made[variant]) for variant in order]
         for variant, (of, _) in models.items():
             without, better = pair_of(variant)
-            told[variant][asked.name] = announced(of, made[without], made[better], drive, angle)
-    return ProofPlan(tuple(runs), {v: of for v, (of, _) in models.items()}, told, scales)
+            announcements[variant][asked.name] = announced(of, made[without], made[better], drive, angle)
+    return ProofPlan(tuple(runs), {v: of for v, (of, _) in models.items()}, announcements, scales)
 
 
 def pair_of(variant: str) -> tuple[str, str]:
@@ -159,7 +159,7 @@ def _within(
 ) -> tuple[dict[str, PlannedSet], float]:
     """All variants of a set with the largest torque, of those tried, that passes on all; and the factor on it."""
     factor = 1.0
-    for _ in range(ATTEMPTS):
+    for _ in range(PLANNING_ATTEMPTS):
         made = _made(asked.scaled(factor), models, drive, prefix)
         worst = min(_allowed_share(s, variant, models, allowed) for variant, s in made.items())
         if run is not None:

@@ -17,7 +17,7 @@ from rig.platform import Platform
 from rig.preflight import Peaks
 from rig.recording.run import Run
 
-STEP_S = 1e-3
+STEP_S = 1e-3  # of the grid on which peaks are foretold
 MAX_TORQUE_RATIO = 1.05  # of the torque of a recorded set to which it speaks for a larger one
 
 

@@ -28,10 +28,10 @@ REFUTED = 0.7
 # Times the error of another name by which it is no better and no worse: less than the models' own numbers move it.
 MIN_ERROR_RATIO = 1.1
 # Error without compensation over the announced one: from here on the name explains less than a quarter of its power.
-UNEXPLAINED = 2.0
+UNEXPLAINED_ERROR_RATIO = 2.0
 # Share of the error without a name that is left with it, all fitted anew to the runs without compensation, up to
 # which not the name is to blame for what compensation left, but its numbers or those of J, C and K.
-EXPLAINS = 0.3
+MAX_REFITTED_SHARE = 0.3
 
 
 def judge(plan: ProofPlan, recording: Recording, model: Platform) -> Proof:
@@ -115,8 +115,8 @@ def _announced(rows: list[ProofSet]) -> float:
 
 def _over_announced(rows: list[ProofSet]) -> float:
     before = sum(max(r.error_without**2 - r.noise**2, 0.0) for r in rows)
-    told = sum(r.announced_error**2 for r in rows)
-    return float(np.sqrt(before / told)) if told > 0.0 else np.inf
+    expected = sum(r.announced_error**2 for r in rows)
+    return float(np.sqrt(before / expected)) if expected > 0.0 else np.inf
 
 
 def _reduced_chi_square(rows: Sequence[ProofSet]) -> float:
@@ -143,16 +143,16 @@ def status_of(
     if share is None:
         return "cannot be told", "without compensation, the error does not exceed the sensor's noise"
     went = f"{_percent(share.gone)} of the error was cancelled ({_interval(share)})"
-    told = f"{went}; {_percent(1.0 - announced)} was predicted"
+    sentence = f"{went}; {_percent(1.0 - announced)} was predicted"
     near = max(CONFIRMED, AS_ANNOUNCED * announced)
     if announced > REFUTED:
-        return _of_little(announced, over_announced, told)
+        return _of_little(announced, over_announced, sentence)
     if share.left <= near or chi_square <= AT_NOISE:
-        return "confirmed", told
+        return "confirmed", sentence
     far = max(REFUTED, AS_ANNOUNCED * announced)
     if share.ci95[0] > far:
-        return "refuted", f"{told}. If this effect were the cause, it would have been cancelled"
-    return "partly", f"{told}. The rest has another cause"
+        return "refuted", f"{sentence}. If this effect were the cause, it would have been cancelled"
+    return "partly", f"{sentence}. The rest has another cause"
 
 
 def _numbers_or_name(
@@ -171,7 +171,7 @@ def _numbers_or_name(
             continue
         without = replace(model, effects={n: v for n, v in model.effects.items() if n != name})
         left = explained_left(runs, model, without, recording.noise)
-        if left <= EXPLAINS:
+        if left <= MAX_REFITTED_SHARE:
             why = (
                 f"{one.why.split('. ')[0]}. After refitting, however, the effect explains all but {_percent(left)} of "
                 "the error without compensation: its parameters, or J, C and K, are inaccurate. Identify again from "
@@ -184,14 +184,14 @@ def _numbers_or_name(
     return total, out
 
 
-def _of_little(announced: float, over_announced: float, told: str) -> tuple[ProofStatus, str]:
+def _of_little(announced: float, over_announced: float, sentence: str) -> tuple[ProofStatus, str]:
     """Of a name of which by its own model most stays."""
-    if over_announced > UNEXPLAINED:
+    if over_announced > UNEXPLAINED_ERROR_RATIO:
         return (
             "refuted",
             f"the error without compensation is {over_announced:.2g} times the error that this effect predicts",
         )
-    return "cannot be told", f"{told}. No torque can cancel more of it"
+    return "cannot be told", f"{sentence}. No torque can cancel more of it"
 
 
 def _percent(share: float) -> str:
@@ -215,18 +215,20 @@ def _compared(
     for pair, rival in rivals.items():
         effect, name = pair.split(" / ")
         ratio, low, high = _ratio(plan, pair, sets, found)
-        told = f"the error left by compensating {plain_words(name)} is {ratio:.2g} times that of {plain_words(effect)}"
+        reason = (
+            f"the error left by compensating {plain_words(name)} is {ratio:.2g} times that of {plain_words(effect)}"
+        )
         if low <= 1.0 <= high or not _material(ratio, rival, total):
-            why = f"{told}, a difference within chance and noise"
+            why = f"{reason}, a difference within chance and noise"
             out[pair] = replace(rival, status="cannot be told", why=why)
             if effect in single and single[effect].status == "confirmed":
                 single[effect] = replace(single[effect], status="cannot be told", why=f"confirmed, but {why}")
         elif ratio > 1.0:
-            out[pair] = replace(rival, status="refuted", why=told)
+            out[pair] = replace(rival, status="refuted", why=reason)
         else:
             out[pair] = rival
             if effect in single:
-                single[effect] = replace(single[effect], status="refuted", why=told)
+                single[effect] = replace(single[effect], status="refuted", why=reason)
     return total, single, out
 
 

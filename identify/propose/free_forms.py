@@ -19,7 +19,7 @@ from rig import effects
 from rig.arrays import Array
 from rig.effects.base import Place, Scale
 
-EDGE = 0.005  # share of the samples beyond either end of a curve, which goes straight on there
+CURVE_EDGE_QUANTILE = 0.005  # share of the samples beyond either end of a curve, which goes straight on there
 FASTEST_MEMORY = 0.1  # of the time in which the motion turns by a radian
 
 Range = tuple[float, float]
@@ -43,7 +43,7 @@ def ranges(problem: PredictionError, fit: Fit) -> dict[str, Range]:
     turning = float(np.sqrt(np.mean(rate**2) / max(float(np.var(angle)), 1e-300)))
 
     def inner(values: Array) -> Range:
-        low, high = np.quantile(values, [EDGE, 1.0 - EDGE])
+        low, high = np.quantile(values, [CURVE_EDGE_QUANTILE, 1.0 - CURVE_EDGE_QUANTILE])
         return float(low), float(high)
 
     over = {"rad": inner(angle), "rad/s": inner(rate), "N*m": inner(torque), "s": time}

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.likelihood.fit import MAX_LINEAR_INERTIA_CHANGE, Fit, orthogonal_part
+from identify.likelihood.normal_equations import NORMAL_RCOND
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name, bounds_of, names_of
 from identify.propose.shape_grids import grid_of
@@ -26,7 +27,6 @@ LITTLE = 1e-3  # of the torque: how much of a candidate is tried
 SCALED = (0.1, 10.0)  # by how much a score may scale a shape that means "none" at zero
 SHAPES = 3  # of a candidate that are kept to begin a fit from
 SYNERGY = 2.0  # times what both are worth alone, that two at once are worth: else one leads to the other
-SINGULAR = 1e-9  # of the largest eigenvalue
 
 Push = tuple[dict[Name, float], bool]  # parameter values of a little of a candidate, and whether it may turn its sign
 
@@ -105,9 +105,9 @@ class InnovationScores:
             return
         size = np.sqrt(np.maximum(np.sum(columns**2, axis=0), 1e-300))
         u, s, v = np.linalg.svd(columns / size, full_matrices=False)
-        told = s > 1e-7 * max(float(s[0]) if len(s) else 0.0, 1e-300)
-        self.basis = u[:, told]
-        self.follow = -(v[told].T / s[told]) / size[:, None]  # of the model's parameters, for what is projected out
+        kept = s > 1e-7 * max(float(s[0]) if len(s) else 0.0, 1e-300)
+        self.basis = u[:, kept]
+        self.follow = -(v[kept].T / s[kept]) / size[:, None]  # of the model's parameters, for what is projected out
         self.residual = rest - self.basis @ (self.basis.T @ rest)
         self.square = float(self.residual @ self.residual)
 
@@ -283,7 +283,7 @@ def bounded(square: Array, along: Array, lowest: Array) -> tuple[Array, float]:
         x[:] = 0.0
         if not np.any(active):
             break
-        x[active] = np.linalg.pinv(square[np.ix_(active, active)], rcond=SINGULAR, hermitian=True) @ along[active]
+        x[active] = np.linalg.pinv(square[np.ix_(active, active)], rcond=NORMAL_RCOND, hermitian=True) @ along[active]
         wrong = active & (x < lowest)
         if not np.any(wrong):
             break

@@ -39,7 +39,7 @@ from rig.recording.hdf5 import write_recording_h5
 from rig.recording.journal_reader import JournalContents
 from rig.recording.run import Recording
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 1  # of result.json
 
 
 def result_json(identification: Identification) -> dict[str, Any]:

@@ -24,9 +24,9 @@ from rig.recording.memory import at_most
 
 FILE = "report_data.h5"
 FORMAT = "isp-rig report data"
-VERSION = 1
+VERSION = 1  # of the format of this file
 MAX_VALUES = 60_000_000  # half a gigabyte; a longer campaign keeps no report data
-MAX_BYTES = 2 << 30
+MAX_BYTES = 2 << 30  # of memory that reading may take
 # What h5py and json raise over a damaged file; a link that leads nowhere reads as None.
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, MemoryError, RecursionError)
 

@@ -37,7 +37,7 @@ from identify.wording import (
     with_interval,
 )
 
-WIDTH = 96
+PLAIN_WIDTH = 96  # characters, where no terminal says how wide it is
 # Rules of plain dashes: a log file and a Windows console show them as they are.
 RULES = box.Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
 
@@ -46,7 +46,7 @@ NO_INFO: Mapping[str, Any] = {}
 
 
 def summary(
-    identification: Identification, width: int = WIDTH, colour: bool = False, info: Mapping[str, Any] = NO_INFO
+    identification: Identification, width: int = PLAIN_WIDTH, colour: bool = False, info: Mapping[str, Any] = NO_INFO
 ) -> str:
     """The whole summary as text of at most ``width`` columns; with ``colour`` in ANSI colours, for a terminal.
 

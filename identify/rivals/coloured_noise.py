@@ -25,7 +25,7 @@ from rig.recording.run import Array
 
 TOP = 0.98  # of Nyquist
 MIN_BINS = 8  # of an octave
-REPEATS = 8  # of the torque in a run, so that there are bins between its harmonics
+MIN_TORQUE_PERIODS = 8  # of the torque in a run, so that there are bins between its harmonics
 HARMONIC_GUARD_BINS = 2.5  # bins from a harmonic, which a window spreads that far
 # Of a period, by which another run's has to differ: what answers to a torque is alike under the same one.
 MIN_PERIOD_DIFFERENCE = 0.05
@@ -35,8 +35,8 @@ AGREEMENT_SIGMAS, AGREEMENT_SHARE = 4.0, 0.15
 MIN_PASSBAND_RATIO = 0.3  # of the density: what the sensor has to pass still where the platform moves
 MIN_ROLL_OFF = 1.5  # times the density at the top
 NO_FLOOR = 1e3  # the same, where a model is far off: nothing but a filter leaves so little there
-MOVES = 1.3  # times the natural frequency or the torque's
-MIN_SAMPLES = 512
+MAX_MOTION_FREQUENCY_RATIO = 1.3  # times the natural frequency or the torque's
+MIN_DENSITY_SAMPLES = 512  # samples of a run whose density is read
 
 
 class Colour(NamedTuple):
@@ -158,7 +158,7 @@ def _spectrum_of(found: Identification) -> _Spectrum | None:
     pooled = np.sum(density * bins, axis=0) / np.sum(bins, axis=0)
     natural_hz = float(np.sqrt(max(platform.stiffness_nm_rad, 0.0) / platform.inertia_kg_m2)) / (2.0 * np.pi)
     fastest_hz = max(natural_hz, *(_highest_torque_hz(t) for t in found.traces))
-    moving = top_hz < 2.0 * MOVES * fastest_hz  # the octaves that begin below that
+    moving = top_hz < 2.0 * MAX_MOTION_FREQUENCY_RATIO * fastest_hz  # the octaves that begin below that
     if not np.any(moving) or np.all(moving) or not np.all(pooled > 0.0):
         return None
     return _Spectrum(top_hz, density, bins, pooled, moving)
@@ -217,7 +217,7 @@ def _bands(trace: RunTraces, period_s: float) -> _Bands | None:
     first, last = _longest((trace.keep > 0.0) & np.isfinite(left))
     n = last - first
     step = float(np.median(np.diff(trace.time_s)))
-    if n < MIN_SAMPLES or n * step < REPEATS * period_s:
+    if n < MIN_DENSITY_SAMPLES or n * step < MIN_TORQUE_PERIODS * period_s:
         return None
     part, window = left[first:last], np.hanning(n)
     power = np.abs(np.fft.rfft((part - np.mean(part)) * window)) ** 2 / float(np.sum(window**2))

@@ -18,7 +18,7 @@ from identify.estimate.output_error import OutputErrorFit, refine
 from identify.model.parameter_fit import reduced_chi_square
 from identify.model.parameters import Name
 from identify.model.structure import Structure
-from identify.rivals.whole_runs import MAX_ITERATIONS, TOLERANCE, FreeRunFitter
+from identify.rivals.whole_runs import TOLERANCE, WHOLE_RUN_STEPS, FreeRunFitter
 from identify.signals.trace import Trace
 from identify.simulate.sensitivities import sensitivities
 from identify.wording import joined, number
@@ -26,14 +26,13 @@ from rig.dynamics import TorqueSignal
 from rig.platform import TERMS
 from rig.recording.run import Array
 
-GONE = (
-    0.95  # of the excess over the noise: less is foretold of what is no such run, and of a delay that is no small one
-)
+# Of the excess over the noise: less is foretold of what is no such run, and of a delay that is no small one.
+GONE = 0.95
 RUNS_AT_NOISE = 1.05  # reduced chi-square: the noise is known to a percent or two
 AT_FLOOR = 1.1  # the same: what is there has found what there is
-ROUNDS = 3  # the change is small, but not infinitely so
+RUN_CHANGE_ROUNDS = 3  # the change is small, but not infinitely so
 MAX_GAIN_CHANGE = 0.3  # of the torque; a run that differs by more is another campaign
-LATEST_S = 0.05
+LATEST_S = 0.05  # largest delay of one run
 
 
 class Change(NamedTuple):
@@ -75,7 +74,7 @@ def heterogeneity_of(fits: FreeRunFitter, declared: Structure, start: Mapping[Na
     if not chosen or len({c.run for c in chosen}) == len(moved):
         return None  # of all runs alike it would be an effect
     traces, fit, total = fits.fitting, base, dict.fromkeys([(c.run, c.kind) for c in chosen], 0.0)
-    for _ in range(ROUNDS):
+    for _ in range(RUN_CHANGE_ROUNDS):
         rests, columns = _columns(fit, fits.use)
         wanted = [_items(len(fits.fitting)).index(key) for key in total]
         step = _solved(np.column_stack([columns[0], columns[1][:, wanted]]), rests)[columns[0].shape[1] :]
@@ -85,7 +84,7 @@ def heterogeneity_of(fits: FreeRunFitter, declared: Structure, start: Mapping[Na
         traces = [_changed(t, i, total) for i, t in enumerate(fits.fitting)]
         before = fit.sigma
         fit = refine(
-            traces, declared, fit.values, None, MAX_ITERATIONS, fits.use, fit.shots, fits.fixed, TOLERANCE, coarse=True
+            traces, declared, fit.values, None, WHOLE_RUN_STEPS, fits.use, fit.shots, fits.fixed, TOLERANCE, coarse=True
         )  # fmt: skip
         if not fit.sigma < 0.999 * before:
             break

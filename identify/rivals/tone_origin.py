@@ -33,7 +33,7 @@ MAX_AMPLITUDE_SCATTER = 0.3  # of the scatter of the other: amplitudes that are 
 SOON_S = 0.1  # a run whose first sample that counts comes later does not show how it began
 
 
-FOLDS = (
+FOLDS_BACK = (
     "Look for a vibration above half of the sample rate that folds back (record once at another rate: it moves), or "
     "for pickup on the cable."
 )
@@ -141,7 +141,7 @@ def describe(line: SpectralLine, axis: str, channel: str = "rate") -> tuple[str,
         return (
             f"{name}, {rate}, comes from the sensor and is no {'force' if linear else 'torque'}: in runs with a "
             "known added mass it is as large as in the others."
-        ), FOLDS
+        ), FOLDS_BACK
     if line.of_torque:
         one, what = len(line.only) == 1, "force" if linear else "torque"
         return (

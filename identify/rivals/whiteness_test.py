@@ -17,8 +17,8 @@ from rig import effects
 
 SO_MANY = 3  # effects beside those declared
 BANDS = (0.05, 0.1, 0.2, 0.4)  # of Nyquist: where a platform may move
-ABOVE = (0.5, 0.98)  # of Nyquist: where it does not
-COLOURED = 5.0  # standard errors by which a band may stand out
+MOTIONLESS_BAND = (0.5, 0.98)  # of Nyquist: where it does not
+COLOURED_SIGMAS = 5.0  # standard errors by which a band may stand out
 
 
 def fails_whiteness_test(fitted: FinalFit, declared: Sequence[str]) -> bool:
@@ -26,7 +26,7 @@ def fails_whiteness_test(fitted: FinalFit, declared: Sequence[str]) -> bool:
     found = [e for e in fitted.structure.effects if e not in declared]
     if len(found) < SO_MANY or not any(effects.get(e).is_flexible for e in found):
         return False
-    return not fitted.sensor_limited or coloured(fitted) > COLOURED
+    return not fitted.sensor_limited or coloured(fitted) > COLOURED_SIGMAS
 
 
 def coloured(fitted: FinalFit) -> float:
@@ -44,7 +44,7 @@ def coloured(fitted: FinalFit) -> float:
             inside = (f > 0.0) & (f < top)
             low[i] += float(np.sum(power[inside]))
             count[i] += int(np.sum(inside))
-        outside = (f > ABOVE[0]) & (f < ABOVE[1])
+        outside = (f > MOTIONLESS_BAND[0]) & (f < MOTIONLESS_BAND[1])
         high, beside = high + float(np.sum(power[outside])), beside + int(np.sum(outside))
     ratio = (low / np.maximum(count, 1)) / (high / max(beside, 1))
     return float(np.max((ratio - 1.0) / np.sqrt(1.0 / np.maximum(count, 1) + 1.0 / max(beside, 1))))

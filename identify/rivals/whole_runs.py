@@ -14,8 +14,8 @@ from identify.model.structure import Structure
 from identify.runs.holdout import Split
 from identify.signals.trace import Trace, pooled_noise
 
-TOLERANCE = 3e-4
-MAX_ITERATIONS = 15
+TOLERANCE = 3e-4  # of a fit: ``refine`` says of what
+WHOLE_RUN_STEPS = 15  # steps of a fit
 
 
 class FreeRunFitter:
@@ -36,7 +36,7 @@ class FreeRunFitter:
         self.fixed: list[Name] = [("inertia",)] if self.torque_free else []
 
     def fitted(
-        self, structure: Structure, start: Mapping[Name, float], steps: int = MAX_ITERATIONS,
+        self, structure: Structure, start: Mapping[Name, float], steps: int = WHOLE_RUN_STEPS,
         horizon_s: float | None = None,
     ) -> OutputErrorFit | None:  # fmt: skip
         """A structure fitted from a start; None where it runs away.

@@ -12,9 +12,9 @@ import numpy as np
 
 from rig.recording.run import Array
 
-SHORTEST = 3  # samples that are equal to the last bit
+MIN_PLATEAU_SAMPLES = 3  # samples that are equal to the last bit
 MIN_PLATEAUS = 3  # plateaus in all runs: what is cut off once may be something else
-STEPS = 5.0  # of the sensor's resolution that a plateau cuts off at least
+MIN_CUT_OFF_STEPS = 5.0  # of the sensor's resolution that a plateau cuts off at least
 CURVE = 4.0  # a parabola of slope s at both ends and length n is s * n / 4 high
 
 
@@ -46,11 +46,11 @@ def _plateaus(rate: Array, top: float) -> int:
     for first, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
         length = int(end - first)
         reach = max(1, length // 4)
-        if length < SHORTEST or first < reach + 1 or end + reach >= len(rate):
+        if length < MIN_PLATEAU_SAMPLES or first < reach + 1 or end + reach >= len(rate):
             continue
         up = (rate[first - 1] - rate[first - 1 - reach]) / reach
         down = (rate[end] - rate[end + reach]) / reach
-        count += int(min(up, down) * length / CURVE > STEPS * resolution)
+        count += int(min(up, down) * length / CURVE > MIN_CUT_OFF_STEPS * resolution)
     return count
 
 

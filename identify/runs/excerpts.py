@@ -12,9 +12,9 @@ def describe_excerpts(runs: Sequence[Run], say: Callable[[str], None]) -> tuple[
     each = [_describe(run) for run in runs if run.excerpt is not None]
     if not each:
         return ()
-    told = f"Long recordings are used in part: {'; '.join(each)}. Raise recorded.most_samples to use more"
-    say(told)
-    return (told,)
+    sentence = f"Long recordings are used in part: {'; '.join(each)}. Raise recorded.most_samples to use more"
+    say(sentence)
+    return (sentence,)
 
 
 def _describe(run: Run) -> str:

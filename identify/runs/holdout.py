@@ -10,7 +10,7 @@ import numpy as np
 
 from identify.signals.trace import Trace
 
-BLOCKS, JUDGING = 10, (3, 6, 9)  # of a run that is split; which judge, where nobody says how many
+HOLDOUT_BLOCKS, JUDGING = 10, (3, 6, 9)  # of a run that is split; which judge, where nobody says how many
 FINE_BLOCKS = 20  # of a run of which a share that somebody asked for judges
 
 
@@ -63,7 +63,7 @@ def split(traces: Sequence[Trace], share: float | Literal["auto"] = "auto") -> S
 def _blocks(share: float | Literal["auto"]) -> tuple[int, tuple[int, ...]]:
     """In how many blocks a run is cut, and which of them, counted from one, judge: never the first, a run's start."""
     if share == "auto":
-        return BLOCKS, JUDGING
+        return HOLDOUT_BLOCKS, JUDGING
     count = max(1, round(share * FINE_BLOCKS))
     return FINE_BLOCKS, tuple(1 + int((i + 0.5) * FINE_BLOCKS / count) for i in range(count))
 

@@ -20,7 +20,7 @@ from rig.recording.run import Array, Run
 
 MAX_OWN_MOTION_SHARE = 0.999  # of a channel, explained by angle, rate and acceleration: it is the platform's own motion
 CONSTANT_TOLERANCE = 1e-9  # of its largest reading: a channel that moves by less does not move
-FAINT = 0.05  # of the largest current: below, its noise is what the ratio shows
+MIN_CURRENT_SHARE = 0.05  # of the largest current: below, its noise is what the ratio shows
 REFUSED = "refused: "  # how the status of such a candidate begins
 
 
@@ -125,7 +125,7 @@ def _torque_of_an_ampere(channel: Channel, runs: Sequence[Run]) -> float:
     if not pairs:
         return 0.0
     x, torque = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-    plain = np.abs(x) > FAINT * float(np.max(np.abs(x), initial=0.0))
+    plain = np.abs(x) > MIN_CURRENT_SHARE * float(np.max(np.abs(x), initial=0.0))
     return float(np.median(torque[plain] / x[plain])) if plain.any() else 0.0
 
 
@@ -176,8 +176,8 @@ def _why_not(channel: Channel, traces: Sequence[Trace]) -> dict[str, str]:
     share = _own_share(acting, traces)
     if share <= MAX_OWN_MOTION_SHARE:
         return {}
-    told = number(100.0 * share, 5)
-    return {"": f"{told} % of {name} is the platform's own motion (its angle, rate and acceleration) in these runs"}
+    percent = number(100.0 * share, 5)
+    return {"": f"{percent} % of {name} is the platform's own motion (its angle, rate and acceleration) in these runs"}
 
 
 def _at_samples(channel: Channel, trace: Trace) -> Array:

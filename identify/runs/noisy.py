@@ -10,12 +10,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.signals.noise import SCATTER, UPPER, least_of, noise_of
+from identify.signals.noise import NOISE_SCATTER, UPPER, least_of, noise_of
 from identify.signals.trace import Trace
 from identify.wording import number
 
 NOISY_RATIO = 1.2  # times the noise of the other runs: less is fitted with them and hardly shows
-CERTAIN = 5.0  # standard errors
+NOISY_SIGMAS = 5.0  # standard errors of a reading of the noise: what differs by less is alike
 MIN_QUIET_RUNS = 2  # quiet runs without which nobody knows which ones are noisy
 MAX_NOISY_SHARE = 0.5  # of the runs
 
@@ -43,8 +43,8 @@ def describe_noisy_runs(runs: Sequence[tuple[str, float]]) -> str:
 
 
 def _is_louder(trace: Trace, quiet: float) -> bool:
-    chance = SCATTER / float(np.sqrt(len(trace.measured)))
-    return trace.noise > quiet * max(NOISY_RATIO, 1.0 + CERTAIN * chance)
+    chance = NOISE_SCATTER / float(np.sqrt(len(trace.measured)))
+    return trace.noise > quiet * max(NOISY_RATIO, 1.0 + NOISY_SIGMAS * chance)
 
 
 def _is_white(trace: Trace) -> bool:
@@ -52,5 +52,5 @@ def _is_white(trace: Trace) -> bool:
     first, last = max(trace.stretches, key=lambda ab: ab[1] - ab[0])
     values, middle = trace.measured[first : last + 1], 0.5 * (UPPER[0] + UPPER[1])
     low, high = noise_of(values, (UPPER[0], middle)), noise_of(values, (middle, UPPER[1]))
-    chance = SCATTER * float(np.sqrt(2.0 / len(values)))  # of either half
-    return abs(low - high) < CERTAIN * chance * (low + high) / np.sqrt(2.0)
+    chance = NOISE_SCATTER * float(np.sqrt(2.0 / len(values)))  # of either half
+    return abs(low - high) < NOISY_SIGMAS * chance * (low + high) / np.sqrt(2.0)

@@ -13,7 +13,7 @@ from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace
 from rig.arrays import Array
 from rig.decimation import REACH, SAMPLES_A_PERIOD, keeps_white, sharp
 
-ENOUGH = 20_000  # samples, where nothing else is asked for
+DEFAULT_REDUCED_SAMPLES = 20_000  # samples, where nothing else is asked for
 HARMONICS = 5.0  # of a decay's swing: it moves no faster, whatever its noise does
 TURNS = 0.02  # of the largest rate, below which a turn may be noise
 SHORTEST_SPAN = 1_500  # samples: slow effects need a span to show in
@@ -22,7 +22,7 @@ PLACES = 12  # where a span may begin
 LEAD = 0.25  # of a span, that is measured ahead of it: ``identify.likelihood.settling`` leaves it out again
 
 
-def reduced(traces: Sequence[Trace], split: Split, enough: int = ENOUGH) -> tuple[list[Trace], Split]:
+def reduced(traces: Sequence[Trace], split: Split, enough: int = DEFAULT_REDUCED_SAMPLES) -> tuple[list[Trace], Split]:
     """The same runs with about ``enough`` samples, and the split of these.
 
     Every run is first filtered and decimated, all of it; what is still too long is cut to the span in which inertia,
@@ -43,10 +43,10 @@ def reduced(traces: Sequence[Trace], split: Split, enough: int = ENOUGH) -> tupl
         picked = {*_spread(fitting, count), *_spread(judging, max(1, count // 3))}
         chosen = sorted(picked)  # type: ignore[assignment]
     out, fits, judges = [], [], []
-    told: Array = 1e-6 * np.eye(COLUMNS)
+    information: Array = 1e-6 * np.eye(COLUMNS)
     for i in chosen:
         t = few[i]
-        first, last, told = _span(t, wanted, told)
+        first, last, information = _span(t, wanted, information)
         lead = min(first, int(LEAD * wanted))  # in it what is inside the platform settles
         fit[i][:first] = judge[i][:first] = False
         first -= lead
@@ -126,7 +126,7 @@ def _every(mask: Any, factor: int, count: int) -> Any:
     return (whole == 0)[::factor][:count]
 
 
-def _span(trace: Trace, wanted: int, told: Array) -> tuple[int, int, Array]:
+def _span(trace: Trace, wanted: int, information: Array) -> tuple[int, int, Array]:
     """First and last sample of the span of a length that adds most to what other runs tell, and that with it."""
     n = len(trace.measured)
     angle, rate, time, _torque, _ = (x[::UPSAMPLING] if isinstance(x, np.ndarray) else x for x in trace.fine)
@@ -138,10 +138,10 @@ def _span(trace: Trace, wanted: int, told: Array) -> tuple[int, int, Array]:
 
     def with_span(first: int) -> Array:
         part = columns[first : first + wanted]
-        return np.asarray(told + part.T @ part / wanted)
+        return np.asarray(information + part.T @ part / wanted)
 
     if n <= 1.25 * wanted:
-        return 0, n - 1, told + columns.T @ columns / wanted
+        return 0, n - 1, information + columns.T @ columns / wanted
     places = np.linspace(0, n - wanted, PLACES).astype(int).tolist()
     first = max(places, key=lambda at: float(np.linalg.slogdet(with_span(at))[1]))
     return first, first + wanted - 1, with_span(first)

@@ -9,7 +9,7 @@ import numpy as np
 from identify.signals.trace import Trace
 from rig.errors import RecordingError
 
-MIN_SAMPLES = 100  # samples: of 50 a stiffness was told thirty times more closely than they knew it
+MIN_USABLE_SAMPLES = 100  # samples: of 50 a stiffness was told thirty times more closely than they knew it
 MIN_SIGNAL_TO_NOISE = 3.0  # times the sensor's noise that a motion has to reach
 
 
@@ -45,10 +45,10 @@ def refuse_too_short(traces: Sequence[Trace]) -> None:
         Where all runs together hold too few samples.
     """
     count = sum(t.count for t in traces)
-    if count < MIN_SAMPLES:
+    if count < MIN_USABLE_SAMPLES:
         raise RecordingError(
-            f"{count} usable samples in all (needed: {MIN_SAMPLES}): too few to separate J, C and K from the initial "
-            "states: record at least a few periods of the platform's natural oscillation"
+            f"{count} usable samples in all (needed: {MIN_USABLE_SAMPLES}): too few to separate J, C and K from the "
+            "initial states: record at least a few periods of the platform's natural oscillation"
         )
 
 

@@ -14,13 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from identify.results import RunTraces
-from identify.signals.low_pass import low_pass
+from identify.signals.low_pass import EDGE_PERIODS, low_pass
 from rig.recording.run import Array
 
-CLEARLY = 4.0  # standard errors from zero
-EXPLAINS = 0.5  # share of the torque's power that the regression has to explain
-BLOCKS = 24  # stretches that are taken as independent: a residual is never white here
-EDGE_PERIODS = 3.0  # of the cut-off, left out at either end of a run
+SIGN_SIGMAS = 4.0  # standard errors from zero
+MIN_EXPLAINED_SHARE = 0.5  # share of the torque's power that the regression has to explain
+INDEPENDENT_BLOCKS = 24  # stretches that are taken as independent: a residual is never white here
 
 SENTENCE = (
     "torque and rate have opposite sign conventions (the platform seems to turn against the torque): check "
@@ -58,9 +57,9 @@ class Signs:
     @property
     def opposite(self) -> bool:
         """Whether torque and motion have opposite sign conventions."""
-        if self.explained < EXPLAINS or max(self.inertia, self.stiffness) > CLEARLY:
+        if self.explained < MIN_EXPLAINED_SHARE or max(self.inertia, self.stiffness) > SIGN_SIGMAS:
             return False
-        return min(self.inertia, self.stiffness) < -CLEARLY
+        return min(self.inertia, self.stiffness) < -SIGN_SIGMAS
 
 
 def signs(traces: Sequence[RunTraces], cutoff_hz: float) -> Signs | None:
@@ -83,7 +82,7 @@ def signs(traces: Sequence[RunTraces], cutoff_hz: float) -> Signs | None:
     inverse = np.linalg.pinv(x.T @ x, rcond=1e-9, hermitian=True)
     values = inverse @ (x.T @ y)
     left = y - x @ values
-    stretches = zip(np.array_split(x, BLOCKS), np.array_split(left, BLOCKS), strict=True)
+    stretches = zip(np.array_split(x, INDEPENDENT_BLOCKS), np.array_split(left, INDEPENDENT_BLOCKS), strict=True)
     scores = np.stack([part.T @ rest for part, rest in stretches])
     error = np.sqrt(np.maximum(np.diag(inverse @ (scores.T @ scores) @ inverse), 1e-300))
     ratio = values / error
@@ -101,7 +100,7 @@ def equations(swing: Swing, cutoff_hz: float) -> tuple[Array, Array] | None:
     keep = swing.keep > 0.0
     if len(keep) > 20 * edge > 0:
         keep[:edge] = keep[-edge:] = False
-    if int(np.sum(keep)) < 4 * BLOCKS or not np.all(np.isfinite(columns)):
+    if int(np.sum(keep)) < 4 * INDEPENDENT_BLOCKS or not np.all(np.isfinite(columns)):
         return None
     unknown = np.stack([np.ones(len(keep)), np.linspace(-1.0, 1.0, len(keep))], axis=1)[keep]
     clean = columns[keep] - unknown @ np.linalg.lstsq(unknown, columns[keep])[0]

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import signal
 
-from identify.signals.noise import SCATTER
+from identify.signals.noise import NOISE_SCATTER
 from identify.signals.trace import UPSAMPLING, Trace
 from identify.wording import joined, number
 
-CERTAIN = 5.0  # standard errors of the noise: what is louder has moved
-FOLLOWS = 4.0  # standard errors: what goes along with the torque by that much has moved, hidden in the noise
+MOTION_SIGMAS = 5.0  # standard errors of the noise: what is louder has moved
+RESPONSE_SIGMAS = 4.0  # standard errors: what goes along with the torque by that much has moved, hidden in the noise
 
 
 def still_runs(traces: Sequence[Trace]) -> list[Trace]:
@@ -45,13 +45,13 @@ def _stood(trace: Trace) -> bool:
     if trace.torque is None or not float(np.ptp(trace.torque.torque_nm)) > 0.0:
         return False
     kept = trace.measured[trace.keep] - np.mean(trace.measured[trace.keep])
-    if np.std(kept) > trace.noise * (1.0 + CERTAIN * SCATTER / float(np.sqrt(len(kept)))):
+    if np.std(kept) > trace.noise * (1.0 + MOTION_SIGMAS * NOISE_SCATTER / float(np.sqrt(len(kept)))):
         return False
     torque = trace.fine[3][::UPSAMPLING]
     both = signal.hilbert(torque - np.mean(torque))[trace.keep]  # in phase and a quarter of a period late
     for part in (both.real, both.imag):
         shape = part - np.mean(part)
         size = float(np.linalg.norm(shape))
-        if size > 0.0 and abs(float(shape @ kept)) > FOLLOWS * trace.noise * size:
+        if size > 0.0 and abs(float(shape @ kept)) > RESPONSE_SIGMAS * trace.noise * size:
             return False
     return True

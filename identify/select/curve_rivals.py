@@ -17,13 +17,12 @@ from identify.propose.free_forms import fitted, ranges
 from identify.propose.innovation_score import InnovationScores
 from identify.select.evidence import STRONG_SUPPORT, support_difference
 from identify.select.free_form_residual import CURVE_STEPS, ON
-from identify.select.trial_fits import TRIAL_ITERATIONS
+from identify.select.trial_fits import COMPARABLE, TRIAL_ITERATIONS
 from rig import effects
 
 if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
 
-COMPARABLE = 0.3  # of the score of the effect, that a curve has: with less it is not fitted
 NEAR = 0.5  # of what the effect explains, that a curve has after a few steps: with less it is not followed
 CURVES: Mapping[str, Sequence[str]] = {
     "restoring torque": ("free_angle",), "position-dependent torque": ("free_angle",), "friction": ("free_rate",),

@@ -21,7 +21,7 @@ from rig.arrays import Array
 
 FLOOR_BINS = 81  # of a spectrum, whose median is its level without lines
 LOWEST_BIN = 3  # cycles in a stretch: what turns more slowly is a drift and no line
-SHORTEST = 4 * FLOOR_BINS  # samples: a shorter stretch shows no line
+MIN_LINE_SAMPLES = 4 * FLOOR_BINS  # samples: a shorter stretch shows no line
 
 
 def lines_left(fit: Fit, torque_nm: float) -> Dependence | None:
@@ -68,7 +68,7 @@ def _spectra(fit: Fit) -> Iterator[tuple[Array, Array]]:
     ):
         scaled = innovations / np.sqrt(variance)
         for first, last in _stretches(shots.weight):
-            if last - first >= SHORTEST:
+            if last - first >= MIN_LINE_SAMPLES:
                 yield _power(scaled[first:last]), _power(torque[first:last])
 
 

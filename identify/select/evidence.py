@@ -19,6 +19,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.stats import chi2, rankdata
 
+from identify.bounds.cramer_rao import DELAY
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.likelihood.fit import Columns, Fit, orthogonal_part
@@ -39,8 +40,7 @@ STRONG_SUPPORT = 10.0  # support that parts two models (Kass and Raftery 1995: v
 WEIGHT = 0.20  # share of the disturbance that an effect takes away to be named: below, it is true but small
 MAX_EFFECTS = 6  # that one recording is believed to show
 MAX_UNFOLLOWED_SHARE = 0.5  # of what a prediction errs by beyond the sensor's noise
-TRUSTED = 1.5  # inflation up to which what the likelihood takes the disturbance for is believed
-DELAY = "torque_delay"
+MAX_TRUSTED_INFLATION = 1.5  # inflation up to which what the likelihood takes the disturbance for is believed
 SHOWS = 0.1  # of the disturbance in the band, that its white part is: what becomes of less is chance
 
 
@@ -101,7 +101,7 @@ class EvidenceModel:
         if torqueless and not self.regression.by_gyro:
             weight = 1.0
         else:
-            weight = self.explained_share(now, new, inflated < TRUSTED, torqueless)
+            weight = self.explained_share(now, new, inflated < MAX_TRUSTED_INFLATION, torqueless)
         price = (new.penalised - new.cost) - (now.penalised - now.cost)
         return Evidence(effect, new, now.cost - new.cost, inflated, price, weight, unfollowed_share(now, new))
 

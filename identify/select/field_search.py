@@ -21,7 +21,7 @@ from identify.results import Dependence, Disturbance
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
 from identify.select.disturbance_lines import lines_left
-from identify.select.evidence import STRONG_SUPPORT, TRUSTED, in_band, inflation, torque_fit_of
+from identify.select.evidence import MAX_TRUSTED_INFLATION, STRONG_SUPPORT, in_band, inflation, torque_fit_of
 from identify.select.likelihood_search import MAX_CUTOFF_SHARE
 from identify.select.search_state import Search
 from identify.select.torque_search import TorqueSearch
@@ -205,12 +205,12 @@ def search_in_torque(
             fitted = by_prediction_error(traces, less, values, split.final, split.everything, like)
         return fitted, errors(there), disturbance_of(regression, there, floor, unit)
 
-    told = search.as_search(best)
+    reported = search.as_search(best)
     if by_likelihood:
-        told = replace(by_likelihood[1], contribution=told.contribution)
+        reported = replace(by_likelihood[1], contribution=reported.contribution)
         if final != found_so_far:
-            told.drop(after.fit)
-    return Found(told, before, after, disturbance, (errors(base), errors(best)), lacking)
+            reported.drop(after.fit)
+    return Found(reported, before, after, disturbance, (errors(base), errors(best)), lacking)
 
 
 def _weakest(final: FinalFit, declared: Structure) -> str | None:
@@ -273,7 +273,7 @@ def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace]
     problem, likely = fitted_on_all(traces, fit.structure, fit.values, split.final)
     fitted = as_final(problem, likely, traces, split.everything)
     left = regression.left_by(fit.structure, fitted.values)
-    believed = inflation(problem.columns_at(likely, with_variance=True), likely, likely.names) < TRUSTED
+    believed = inflation(problem.columns_at(likely, with_variance=True), likely, likely.names) < MAX_TRUSTED_INFLATION
     if left <= NO_WORSE * fit.sigma or believed:
         return fitted
     columns, residuals, names = regression.linear_parts(fit.structure, fit.values)

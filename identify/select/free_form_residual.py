@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2
 
+from identify.diagnose.disturbance import SHAPE_POINTS
 from identify.likelihood.fit import Fit
 from identify.model.parameters import Name
 from identify.propose.free_forms import fitted, scores, states_of, torque_of
@@ -27,14 +28,12 @@ from rig.platform import TERMS
 if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
 
-HOPE = 20.0  # of a score, that is worth a fit
+MIN_CURVE_SCORE = 20.0  # of a score, that is worth a fit
 CURVES_TRIED = 2  # of the curves with the largest scores
-CURVE_STEPS = 14
-SHOWN = 25  # places at which a curve is shown
+CURVE_STEPS = 14  # iterations of the fit of a curve
 MOVED_SIGMAS = 2.0  # standard errors by which a parameter moves
-CURVE_BY_CHANCE = (
-    1e-4  # of a curve that is no name but may move a parameter: one in a thousand recordings, over ten curves
-)
+# Of a curve that is no name but may move a parameter: one in a thousand recordings, over ten curves.
+CURVE_BY_CHANCE = 1e-4
 ON = {
     "free_angle": "angle", "free_rate": "rate", "free_torque": "torque", "free_time": "time",
     "free_gain_over_time": "time", "free_gain_over_speed": "rate", "free_spring_over_time": "time",
@@ -85,7 +84,7 @@ def fit_free_forms(search: Stepwise, now: Fit) -> tuple[FreeFormFit | None, list
     best: FreeFormFit | None = None
     others: list[FreeFormFit] = []
     found = scores(problem, now, search.trials.scale(now), tuple(effects.free_forms()))[:CURVES_TRIED]
-    forms = [form for form in found if form.gain >= HOPE]
+    forms = [form for form in found if form.gain >= MIN_CURVE_SCORE]
     fits = problem.workers.side_by_side([partial(fitted, problem, now, form, CURVE_STEPS) for form in forms])
     found_by = {form.effect: fit for form, fit in zip(forms, fits, strict=True)}
     if (known := search.in_place) is not None and known.structure.minus(known.structure.effects[-1]) == now.structure:
@@ -190,7 +189,7 @@ def _shape(form: str, fit: Fit) -> tuple[list[float], list[float]]:
     own: Array = np.array([fit.values[(form, p.name)] for p in effects.get(form).parameters])
     places = np.linspace(own[0], own[1], len(own) - 1)  # begin, end, constant, inner values
     values = np.concatenate([[0.0], own[3:], [0.0]])
-    at = np.linspace(own[0], own[1], SHOWN)
+    at = np.linspace(own[0], own[1], SHAPE_POINTS)
     return at.tolist(), np.interp(at, places, values).tolist()
 
 
@@ -198,10 +197,10 @@ def most_moving(
     search: Stepwise, curves: Sequence[FreeFormFit], most_percent: Mapping[str, float]
 ) -> tuple[Dependence, dict[str, float]] | None:
     """Of curves beside a model the one that moves J, C or K farthest beyond what is allowed; None where none does."""
-    told = [dependence_on(search, c) for c in curves]
+    dependences = [dependence_on(search, c) for c in curves]
 
     def excess(curve: tuple[Dependence, dict[str, float]]) -> float:
         return max((moved / most_percent[term] for term, moved in curve[1].items()), default=0.0)
 
-    worst = max(told, key=excess, default=None)
+    worst = max(dependences, key=excess, default=None)
     return worst if worst is not None and excess(worst) > 1.0 else None

@@ -30,8 +30,8 @@ from rig.platform import TERMS
 
 SAMPLES = 10_000  # that the search looks at
 MAX_CUTOFF_SHARE = 0.2  # of the sample rate: the low-pass for a first guess in torque cuts off no higher
-ALL = 40_000  # samples on which rivals are parted
-MORE = 1.5  # times the samples: else there is nothing more to be seen in all of them
+RIVAL_SAMPLES = 40_000  # samples on which rivals are parted
+MIN_MORE_SAMPLES_RATIO = 1.5  # times the samples: else there is nothing more to be seen in all of them
 
 
 @dataclass
@@ -75,8 +75,8 @@ class LikelihoodSearch:
                 base = min((base, problem.fit(structure, twin.values)), key=lambda f: f.cost)
         count = sum(t.count for t in traces)
         whole = None
-        if count > MORE * base.count:
-            whole = PredictionError(reduced(traces, split, ALL)[0])
+        if count > MIN_MORE_SAMPLES_RATIO * base.count:
+            whole = PredictionError(reduced(traces, split, RIVAL_SAMPLES)[0])
         offered = [n for n in allowed if n not in structure.effects and can_show(n, traces)]
         cutoff_hz = min(start.cutoff_hz, MAX_CUTOFF_SHARE / few[0].step_s)
         regression = TorqueRegression(few, parts, cutoff_hz, scale_of(few, start.platform, ()))

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 
 from identify.likelihood.fit import Fit
 from identify.runs.measured_channels import simplicity
-from identify.select.evidence import TRUSTED, Evidence, EvidenceModel
+from identify.select.evidence import MAX_TRUSTED_INFLATION, Evidence, EvidenceModel
 from rig import effects
 from rig.effects.base import Place
 
-AS_HEAVY = 0.05  # of the disturbance: what a richer effect carries besides, to be preferred where nothing else is sure
+MIN_RICHER_WEIGHT_GAIN = 0.05  # of the disturbance: what a richer effect carries besides, where nothing else is sure
 SPECIAL = 0.8  # of the fall of the cost with a richer effect, parameters paid for: its special case is preferred
 
 
@@ -42,7 +42,7 @@ def prefers_special_case(special: Evidence, rich: Evidence) -> bool:
     It is if most of the fall of the cost is its own; and where the likelihood cannot be trusted, if it carries as much
     torque. Inflations are left out: those of two that are nearly alike differ by chance.
     """
-    as_heavy = rich.inflation >= TRUSTED and special.weight > rich.weight - AS_HEAVY
+    as_heavy = rich.inflation >= MAX_TRUSTED_INFLATION and special.weight > rich.weight - MIN_RICHER_WEIGHT_GAIN
     return explains_most(special, rich) or as_heavy
 
 

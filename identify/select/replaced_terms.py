@@ -12,7 +12,7 @@ from identify.select.trial_fits import TRIAL_ITERATIONS
 if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
 
-CERTAIN = 30.0  # standard errors beyond which a term is needed, and no effect is tried in its place
+NEEDED_TERM_SIGMAS = 30.0  # standard errors beyond which a term is needed, and no effect is tried in its place
 
 
 def replace_linear_terms(search: Stepwise, now: Fit) -> Fit:
@@ -21,7 +21,7 @@ def replace_linear_terms(search: Stepwise, now: Fit) -> Fit:
     Beside the term such an effect explains little, and the other way round.
     """
     for term in ("damping", "stiffness"):
-        if term not in now.structure.terms or abs(now.values[(term,)]) >= CERTAIN * now.std_error((term,)):
+        if term not in now.structure.terms or abs(now.values[(term,)]) >= NEEDED_TERM_SIGMAS * now.std_error((term,)):
             continue
         rest = search.without(now, term)
         fits = search.trials.score_round(rest)[1]

@@ -21,8 +21,8 @@ from identify.propose.innovation_score import Score
 from identify.select.curve_rivals import against_curves
 from identify.select.evidence import (
     ADDED_SUPPORT,
+    MAX_TRUSTED_INFLATION,
     STRONG_SUPPORT,
-    TRUSTED,
     WEIGHT,
     Evidence,
     EvidenceModel,
@@ -31,7 +31,7 @@ from identify.select.evidence import (
 from identify.select.forward_selection import Round, add_effects
 from identify.select.free_form_residual import FreeFormFit, fit_free_forms, redundant_given
 from identify.select.preference import no_possible_gain, prefers_special_case, simplest
-from identify.select.replaced_terms import CERTAIN, replace_linear_terms
+from identify.select.replaced_terms import NEEDED_TERM_SIGMAS, replace_linear_terms
 from identify.select.trial_fits import FULL_ITERATIONS, TRIAL_ITERATIONS, TrialFits
 from rig import effects
 from rig.platform import TERMS
@@ -124,7 +124,7 @@ class Stepwise:
     @property
     def trusted(self) -> bool:
         """Whether the likelihood is right about every effect of its model, and so about the disturbance it leaves."""
-        return all(self.inflation.get(e, 1.0) < TRUSTED for e in self.trials.added(self.best))
+        return all(self.inflation.get(e, 1.0) < MAX_TRUSTED_INFLATION for e in self.trials.added(self.best))
 
     def score_candidates(self, now: Fit) -> tuple[list[Score], dict[str, Evidence]]:
         """All candidates' scores, and the evidence for the most promising, fitted."""
@@ -286,8 +286,8 @@ class Stepwise:
         if name == "stiffness" and self._stiffness_may_absorb(now):
             return True
         if name in TERMS:
-            return abs(now.values[(name,)]) < CERTAIN * now.std_error((name,))
-        return self._needed.get(name, 0.0) < CERTAIN**2
+            return abs(now.values[(name,)]) < NEEDED_TERM_SIGMAS * now.std_error((name,))
+        return self._needed.get(name, 0.0) < NEEDED_TERM_SIGMAS**2
 
 
 def _key(structure: Structure) -> _Key:

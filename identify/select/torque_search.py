@@ -22,7 +22,7 @@ from rig.effects.base import Place
 
 FALL_SIGMAS = 4.0  # standard errors, over blocks of the held-out samples, by which the squared residual must fall: 3e-5
 RICHER = 0.6  # share of what its special case leaves that a richer effect has to take away to be named in its place
-AS_HEAVY = 0.05  # of what is left: candidates that differ by less carry the same torque
+EQUAL_WEIGHT_MARGIN = 0.05  # of what is left: candidates that differ by less carry the same torque
 RIVAL = 0.02  # of what is left: rivals carry as much as what was taken, to that
 INERTIA_MATTERS = 0.2  # of the torque: below, the motion hardly shows the inertia
 POLISHED = 8  # candidates whose shapes are searched for beside those of a grid
@@ -141,7 +141,7 @@ class TorqueSearch:
         if not good:
             return None
         heaviest = max(good, key=lambda w: w.weight)
-        near = [w for w in good if w.weight > heaviest.weight - AS_HEAVY]
+        near = [w for w in good if w.weight > heaviest.weight - EQUAL_WEIGHT_MARGIN]
         near += [w for w in good if w.effect in effects.get(heaviest.effect).nests and _holds(w, heaviest)]
         chosen = min(near, key=lambda w: (len(w.fit.values), -w.evidence))
         lower = [w for w in good if w.effect in effects.get(chosen.effect).lower_order]  # a constant before a slope

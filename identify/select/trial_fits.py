@@ -29,7 +29,7 @@ from rig.platform import TERMS
 
 _Item = TypeVar("_Item")
 
-HOPE = 20.0  # of a score, parameters paid for: less would not be added when fitted
+MIN_TRIAL_SCORE = 20.0  # of a score, parameters paid for: less would not be added when fitted
 TRIED = 4  # candidates of a round, by their scores, that are fitted
 PAIRS = 2  # pairs of a round, by their scores, that are fitted
 HEAVIEST = 3  # candidates by their weight in torque that are fitted beside those
@@ -37,7 +37,7 @@ FAINT_SCORE = 0.02  # of the best score: what promises so little is not what the
 TRIAL_ITERATIONS, FULL_ITERATIONS = 14, 25  # steps of a fit that is compared, and of one that is kept
 FULL_FIT_RATIO = 0.9  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
 BEHIND = 0.3  # of the best fall of the cost so far: what has less after a few steps is not followed
-COMPARABLE = 0.3  # of the score of an effect, that another has in its place: with less it is no rival
+COMPARABLE = 0.3  # of the score of an effect, that another or a curve has in its place: with less no rival
 FOLLOWED_LINES = 2  # of the disturbance: lines at which a periodic torque is looked for beside those of what is left
 FOLLOWS = 1.1  # reduced chi-square: where a prediction errs by less, no disturbance follows the readings
 FOLLOWS_LESS = 0.5  # of the excess beside which lags were tried: only then may one show that did not before
@@ -118,7 +118,7 @@ class TrialFits:
         price = float(np.log(max(now.count, 2)))
         worth = [
             (one, other) for one, other, gain in InnovationScores(self.problem, now, self.scale(now)).pairs(torque)
-            if gain > HOPE + price * sum(len(effects.get(s.effect).parameters) for s in (one, other))
+            if gain > MIN_TRIAL_SCORE + price * sum(len(effects.get(s.effect).parameters) for s in (one, other))
         ][:PAIRS]  # fmt: skip
 
         def fitted(one: Score, other: Score) -> Fit:
@@ -182,7 +182,7 @@ class TrialFits:
     def shortlist(self, now: Fit, looks: Sequence[list[Score]]) -> list[list[Score]]:
         """The largest gains beyond their penalty, with their special cases and what comes first by order."""
         price = float(np.log(max(now.count, 2)))
-        worth = [v for v in looks if v[0].gain > HOPE + price * len(effects.get(v[0].effect).parameters)]
+        worth = [v for v in looks if v[0].gain > MIN_TRIAL_SCORE + price * len(effects.get(v[0].effect).parameters)]
         if not worth:
             return []
         plain = [v for v in worth if not simplicity(v[0].effect)]

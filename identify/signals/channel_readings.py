@@ -12,13 +12,13 @@ from scipy.signal import istft, savgol_filter, stft
 from rig.channels import Channel
 from rig.recording.run import Array, Run
 
-FINER = 8  # entries of a table a sample: straight between them a 29 Hz acceleration at 1 kHz is right to 4e-5
+TABLE_ENTRIES_A_SAMPLE = 8  # of a table: straight between them a 29 Hz acceleration at 1 kHz is right to 4e-5
 BRIDGED_S = 0.05  # of lost readings that a straight line may stand for
 SMOOTHING_S = 1.0  # no temperature changes faster: readings are smoothed over this, so that their noise does not act
 CLEAR = 2.0  # times the noise's power, which is taken off a reading's spectrum: hardly any of it stays
 AROUND = 5  # lines, and stretches, over which a reading's power is averaged
 STRETCH = 2048  # samples
-OWN_STEPS = 2.5  # times a channel's own spacing that is no loss: a thermometer is read once a second
+MAX_SPACING_RATIO = 2.5  # times a channel's own spacing that is no loss: a thermometer is read once a second
 
 
 def _spacing_s(time_s: Array) -> float:
@@ -33,7 +33,7 @@ def lost(run: Run) -> Any:
         at = run.time_s[known]
         if known.all() or len(at) < 2:
             continue
-        longest = max(BRIDGED_S, OWN_STEPS * _spacing_s(at))
+        longest = max(BRIDGED_S, MAX_SPACING_RATIO * _spacing_s(at))
         wide = np.nonzero(np.diff(at) > longest)[0]
         for a, b in zip(at[wide], at[wide + 1], strict=True):
             out |= (run.time_s > a) & (run.time_s < b)
@@ -50,7 +50,7 @@ def table_of(run: Run, channel: Channel, step_s: float) -> tuple[Array, float]:
     """
     values = run.channels.get(channel.name)
     known = np.isfinite(values) if values is not None else np.zeros(0, dtype=bool)
-    per_s = FINER / step_s
+    per_s = TABLE_ENTRIES_A_SAMPLE / step_s
     if values is None or known.sum() < 2:
         return np.zeros(2), per_s
     time, x = run.time_s[known] - run.time_s[0], values[known]
@@ -70,9 +70,9 @@ def table_of(run: Run, channel: Channel, step_s: float) -> tuple[Array, float]:
         fine = straight
         per_s = 1.0 / step_s
     elif _spacing_s(time) < 1.5 * step_s:
-        fine = np.asarray(CubicSpline(samples, straight)(np.arange(n * FINER + 1) / per_s))
+        fine = np.asarray(CubicSpline(samples, straight)(np.arange(n * TABLE_ENTRIES_A_SAMPLE + 1) / per_s))
     else:
-        fine = np.interp(np.arange(n * FINER + 1) / per_s, samples, straight)
+        fine = np.interp(np.arange(n * TABLE_ENTRIES_A_SAMPLE + 1) / per_s, samples, straight)
     factor = 1.0 if channel.factor is None else channel.factor
     return np.ascontiguousarray(factor * (fine - (channel.reference or 0.0))), per_s
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from rig.recording.run import Array
 
-FEW = 8  # in one run; more of them are something that the platform or its surroundings do
+MAX_GLITCHES = 8  # in one run; more of them are something that the platform or its surroundings do
 GLITCH_SIGMAS = 30.0  # times the noise
 GLITCH_STEP_RATIO = 4.0  # times the largest of what the run does more often
 INSIDE = np.array([1.0, -6.0, 15.0, 0.0, 15.0, -6.0, 1.0]) / 20.0  # a quintic through three neighbours on each side
@@ -73,7 +73,7 @@ def _torn_end(values: Array, usable: Any, noise: float) -> bool:
 def _highest(apart: Array) -> tuple[list[int], float]:
     """Where a few samples stand out most, and how far the next one does; each shows in some beside it."""
     left, peaks = apart.copy(), []
-    for _ in range(FEW):
+    for _ in range(MAX_GLITCHES):
         peaks.append(int(np.argmax(left)))
         left[max(0, peaks[-1] - 5) : peaks[-1] + 6] = 0.0
     return peaks, float(np.max(left))

@@ -9,6 +9,8 @@ from scipy import signal
 
 from rig.recording.run import Array
 
+EDGE_PERIODS = 3.0  # of the cut-off: so much at either end of a run the filter has not settled
+
 
 @lru_cache(maxsize=64)
 def _sections(wn: float) -> Array:

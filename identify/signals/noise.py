@@ -12,18 +12,19 @@ from rig.recording.run import Array
 
 LOWER = 0.8  # of the periodogram's values
 LOWER_MEAN = (1.0 - (1.0 - LOWER) * (1.0 - np.log(1.0 - LOWER))) / LOWER  # of an exponential distribution, its mean one
-SCATTER = 1.55  # of ``noise_of`` over the root of the number of samples, as a share of itself
+NOISE_SCATTER = 1.55  # of ``noise_of`` over the root of the number of samples, as a share of itself
 
 MIN_LEVELS = 8  # of a channel, for its steps to be seen
-SAME, WHOLE = 1e-12, 0.02  # of the largest value, and of a step: as near as a file's digits bring them
+LEVEL_TOLERANCE = 1e-12  # of the largest value: levels that are no farther apart are one
+STEP_TOLERANCE = 0.02  # of a step: as near as a file's digits bring them
 
-AGREEMENT_SIGMAS = 3.0  # standard errors by which two readings of one noise may differ
+NOISE_AGREEMENT_SIGMAS = 3.0  # standard errors by which two readings of one noise may differ
 WINDOW, TINY = 40, 1e-12  # bins of a spectrum; of their mean, what a bin without power counts as
 MAX_LOG_FLATNESS = 1.0  # of a window; 0.58 +- 0.13 for noise, 3.6 to 5.4 for sines bent by friction
 
 
 UPPER = (0.5, 0.98)  # of Nyquist: where the noise is read
-SHORTEST = 64  # samples whose spectrum is looked at
+MIN_SPECTRUM_SAMPLES = 64  # samples whose spectrum is looked at
 
 
 def noise_of(values: Array, band: tuple[float, float] = UPPER) -> float:
@@ -32,7 +33,7 @@ def noise_of(values: Array, band: tuple[float, float] = UPPER) -> float:
     The mean of the lower four fifths of the periodogram there is blind to lines and to a signal below, and scatters
     less than its median; a third difference first takes away what a steep low-frequency signal would leak.
     """
-    if len(values) < SHORTEST:
+    if len(values) < MIN_SPECTRUM_SAMPLES:
         return float(np.std(np.diff(values, 3)) / np.sqrt(20.0))
     return float(np.sqrt(_mean_of_lower(_power_in(values, band))))
 
@@ -45,7 +46,7 @@ def is_noise(values: Array, band: tuple[float, float] = UPPER) -> bool:
     beside any colour, the logarithm of the mean is Euler's constant above the mean of the logarithm for noise (a
     flatness of the spectrum: Gray and Markel 1974).
     """
-    if len(values) < SHORTEST:
+    if len(values) < MIN_SPECTRUM_SAMPLES:
         return True
     windows = np.array_split(power := _power_in(values, band), max(1, len(power) // WINDOW))
     above = [np.log(np.mean(p)) - np.mean(np.log(np.maximum(p, TINY * np.mean(p)))) for p in windows]
@@ -75,10 +76,10 @@ def rounding_of(values: Array) -> float | None:
     if len(levels) < MIN_LEVELS:
         return None
     apart = np.diff(levels)
-    apart = apart[apart > SAME * float(np.max(np.abs(levels)))]
+    apart = apart[apart > LEVEL_TOLERANCE * float(np.max(np.abs(levels)))]
     step = float(np.min(apart, initial=np.inf))
     steps = apart / step
-    whole = bool(np.all(np.abs(steps - np.rint(steps)) < WHOLE * steps))
+    whole = bool(np.all(np.abs(steps - np.rint(steps)) < STEP_TOLERANCE * steps))
     return step / float(np.sqrt(12.0)) if len(apart) and whole else 0.0
 
 
@@ -101,8 +102,8 @@ def least_of(found: Sequence[tuple[float, int]]) -> float:
     """
     value, weight = 0.0, 0
     for noise, count in sorted(found):
-        apart = SCATTER * np.sqrt(1.0 / count + (1.0 / weight if weight else 0.0))
-        if weight and noise > value * (1.0 + AGREEMENT_SIGMAS * apart):
+        apart = NOISE_SCATTER * np.sqrt(1.0 / count + (1.0 / weight if weight else 0.0))
+        if weight and noise > value * (1.0 + NOISE_AGREEMENT_SIGMAS * apart):
             break
         value, weight = (value * weight + noise * count) / (weight + count), weight + count
     return float(value)

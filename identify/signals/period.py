@@ -8,8 +8,8 @@ from scipy import fft, signal
 from identify.results import RunTraces
 from rig.recording.run import Array
 
-STILL = 0.03  # the same at its later multiples, where noise and a slow change of amplitude add up
-REPEATS = 3e-3  # of the torque's power: a torque that differs by less from itself a period later repeats
+MAX_LATER_DIFFERENCE = 0.03  # the same at its later multiples, where noise and a slow change of amplitude add up
+MAX_REPEAT_DIFFERENCE = 3e-3  # of the torque's power: a torque that differs by less from itself a period later repeats
 
 
 def period_of(values: Array, step_s: float) -> float | None:
@@ -34,7 +34,7 @@ def period_of(values: Array, step_s: float) -> float | None:
     dips = begin + signal.find_peaks(-apart[begin:])[0]
     for dip in dips[apart[dips] < 0.2]:
         lag, depth = _lowest(apart, int(dip))
-        sharp = _sharpened(apart, lag) if depth < REPEATS else None
+        sharp = _sharpened(apart, lag) if depth < MAX_REPEAT_DIFFERENCE else None
         if sharp is not None:
             return step_s * sharp
     return None
@@ -56,7 +56,7 @@ def _sharpened(apart: Array, lag: float) -> float | None:
         at = round(times * lag)
         near = at - 2 + int(np.argmin(apart[at - 2 : at + 3]))
         place, depth = _lowest(apart, near)
-        if depth > STILL or abs(place - times * lag) > 2.5:
+        if depth > MAX_LATER_DIFFERENCE or abs(place - times * lag) > 2.5:
             return None
         lag = place / times
     return lag

@@ -198,11 +198,11 @@ def one_noise(traces: Sequence[Trace], known: bool) -> list[Trace]:
 
 def above_steps(traces: Sequence[Trace]) -> list[Trace]:
     """The runs with no less noise than the steps make, in which one sensor reads: a run of few steps tells none."""
-    told: dict[str, list[float]] = {"rate": [], "angle": []}
+    roundings: dict[str, list[float]] = {"rate": [], "angle": []}
     for t in traces:
         values = t.run.rate_rad_s if t.channel == "rate" else t.run.angle_rad
         assert values is not None
         rounding = rounding_of(values[t.run.valid & np.isfinite(values)])
         if rounding is not None:
-            told[t.channel].append(rounding)
-    return [replace(t, noise=max(t.noise, min(told[t.channel], default=0.0))) for t in traces]
+            roundings[t.channel].append(rounding)
+    return [replace(t, noise=max(t.noise, min(roundings[t.channel], default=0.0))) for t in traces]

@@ -20,16 +20,16 @@ from identify.signals.noise import bandwidth_of, noise_of
 from rig.errors import RecordingError
 from rig.recording.run import Array
 
-EVEN = 0.02  # of a period: samples so close to the beat are on it
-SCATTER = 0.9  # of a period: stamps that scatter by more have no beat
+BEAT_TOLERANCE = 0.02  # of a period: samples so close to the beat are on it
+MAX_BEAT_SCATTER = 0.9  # of a period: stamps that scatter by more have no beat
 HOLE = 1.9  # periods between two samples beyond which one is missing
 WANDERING = 0.3  # of a period: spacings that scatter by more belong to no beat, however slow its wander
 MAX_SAMPLE_DISTANCE = 1.5  # periods: instants that lie no farther from samples on both sides are read off a spline
 MAX_MISSING_RATIO = 20  # times as many missing samples as there are
-MOVES = 4  # each along the motion that the one before made out
+RETIMING_PASSES = 4  # each along the motion that the one before made out
 MOTION_BAND = 0.5  # of the Nyquist frequency: motion above it is not followed when samples are moved
-ABOVE = 2.0  # times the highest frequency that stands out of the noise: the low-pass must leave the motion as it is
-FEW = 64  # samples that tell nothing about their noise
+LOWPASS_CUTOFF_RATIO = 2.0  # times the highest frequency above the noise: the low-pass must leave the motion as it is
+MIN_BEAT_SAMPLES = 64  # samples that tell nothing about their noise
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def beat_of(name: str, time_s: Array) -> Beat:
             f"{name}: {len(time_s)} samples {step:.3g} s apart span {time_s[-1]:.6g} s, with a gap of "
             f"{spacing[widest]:.6g} s after {time_s[widest]:.6g} s: split it into two runs with from_s and to_s"
         )
-    if np.max(np.abs(time_s / step - index)) < EVEN * min(1.0, step / 1e-9):
+    if np.max(np.abs(time_s / step - index)) < BEAT_TOLERANCE * min(1.0, step / 1e-9):
         return Beat(float(time_s[-1] / index[-1]), 0.0, index)
     beat = _scattered(time_s, step)
     if beat is None:  # stamps of a software loop that wander: samples lie anywhere, and none is missing but in holes
@@ -109,10 +109,10 @@ def _scattered(time_s: Array, step: float) -> Beat | None:
     """A beat that the stamps scatter about; None where they do not."""
     counted = np.arange(len(time_s))
     period, offset = np.polyfit(counted, time_s, 1)
-    if np.max(np.abs(time_s - offset - period * counted)) < SCATTER * period:
+    if np.max(np.abs(time_s - offset - period * counted)) < MAX_BEAT_SCATTER * period:
         return Beat(float(period), float(offset), counted, scattered=True)
     # Some are missing. A median spacing is too rough to count to the end by; a part of the record makes it finer.
-    period, offset, known = step, 0.0, FEW
+    period, offset, known = step, 0.0, MIN_BEAT_SAMPLES
     while True:
         counted = np.rint((time_s - offset) / period).astype(np.int64)
         if known >= 2 * len(time_s):
@@ -136,17 +136,17 @@ def sampled(beat: Beat, time_s: Array, values: Array, good: Any) -> Sampled:
     there = np.zeros(beat.count, dtype=bool)
     near = good & (beat.scattered | (np.abs(late_s) < 0.5 * beat.step_s))
     there[beat.index[near]] = True
-    if not beat.scattered and np.any(np.abs(late_s) > EVEN * beat.step_s):
+    if not beat.scattered and np.any(np.abs(late_s) > BEAT_TOLERANCE * beat.step_s):
         there |= _beside(grid, time_s[good], MAX_SAMPLE_DISTANCE * beat.step_s)
     scatter_s = float(np.sqrt(np.mean(late_s[near] ** 2))) if np.any(near) else 0.0
     splined = np.asarray(CubicSpline(time_s[good], values[good])(grid), dtype=float)
-    if not beat.scattered or np.sum(near) < FEW:
+    if not beat.scattered or np.sum(near) < MIN_BEAT_SAMPLES:
         return Sampled(beat, splined, there, scatter_s, False)
     on = beat.index[near]
     even = np.where(there, 0.0, splined)
     even[on] = values[near]
     moved = even.copy()
-    for _ in range(MOVES):
+    for _ in range(RETIMING_PASSES):
         motion = _followed(moved, beat.step_s, bandwidth_of(moved, beat.step_s))
         moved[on] = values[near] - (motion(time_s[near] - beat.offset_s) - motion(beat.step_s * on))
     wrong = noise_of(even) < noise_of(moved)
@@ -174,7 +174,7 @@ def torque_instants(torque_time_s: Array, time_s: Array, laid: Sampled) -> Array
 
 def _followed(values: Array, step_s: float, cutoff_hz: float) -> Any:
     """The motion in a channel, as a function of the time since its first instant."""
-    wn = min(2.0 * ABOVE * cutoff_hz * step_s, MOTION_BAND)
+    wn = min(2.0 * LOWPASS_CUTOFF_RATIO * cutoff_hz * step_s, MOTION_BAND)
     sos = signal.butter(3, wn, output="sos")
     slow = signal.sosfiltfilt(sos, values, padlen=min(len(values) - 1, int(10.0 / wn)))
     return make_interp_spline(step_s * np.arange(len(values)), slow, k=5)

@@ -10,11 +10,11 @@ from scipy import signal
 from identify.signals.trace import UPSAMPLING, Trace
 from rig.recording.run import Array
 
-OWN = 0.03  # of the natural frequency: a line that near is the platform's own
-TONE = 0.8  # of the torque's power in one line
+RESONANCE_BAND_SHARE = 0.03  # of the natural frequency: a line that near is the platform's own ring
+TONE_POWER_SHARE = 0.8  # of the torque's power in one line
 START_S = 0.5  # in which a sharp mode that nothing excites later has rung
-STANDS_OUT = 5.0  # times the median power
-MAX_RINGS = 2
+RING_POWER_RATIO = 5.0  # times the median power
+MAX_RINGS = 2  # frequencies, the strongest
 LINE = 4.0  # times the noise at which a spectral line is one: e^-16 is the chance of a bin
 
 
@@ -42,7 +42,7 @@ def foreign_lines_hz(
         f = np.fft.rfftfreq(8 * len(x), trace.step_s)
         width = 2.0 / (trace.step_s * len(x))
         size[f < width] = 0.0
-        size[np.abs(f - natural_hz) < max(OWN * natural_hz, width)] = 0.0
+        size[np.abs(f - natural_hz) < max(RESONANCE_BAND_SHARE * natural_hz, width)] = 0.0
         played = played_hz(trace)
         if played is not None:
             size[np.abs(f - played * np.maximum(np.rint(f / played), 1.0)) < width] = 0.0
@@ -64,7 +64,7 @@ def rings_hz(traces: Sequence[Trace], residuals: Sequence[Array], natural_hz: fl
             power += np.abs(np.fft.rfft(x * window, 4 * length)) ** 2
     f = np.fft.rfftfreq(4 * length, traces[0].step_s)
     power[(np.abs(f - natural_hz) < 2.0 / START_S) | (f < 2.0 / START_S)] = 0.0
-    peaks = signal.find_peaks(power, height=STANDS_OUT * float(np.median(power)))[0]
+    peaks = signal.find_peaks(power, height=RING_POWER_RATIO * float(np.median(power)))[0]
     return tuple(float(f[k]) for k in peaks[np.argsort(-power[peaks])][:MAX_RINGS])
 
 
@@ -75,7 +75,7 @@ def ringing_hz(traces: Sequence[Trace], natural_hz: float) -> float:
         x = np.where(trace.keep, trace.measured, 0.0)
         size = np.abs(np.fft.rfft((x - np.mean(x)) * signal.windows.hann(len(x)), 8 * len(x)))
         f = np.fft.rfftfreq(8 * len(x), trace.step_s)
-        near = np.flatnonzero(np.abs(f - natural_hz) < OWN * natural_hz)
+        near = np.flatnonzero(np.abs(f - natural_hz) < RESONANCE_BAND_SHARE * natural_hz)
         if near.size:
             k = near[np.argmax(size[near])]
             found.append((float(size[k]), float(f[k])))
@@ -92,7 +92,7 @@ def played_hz(trace: Trace) -> float | None:
     power = np.abs(np.fft.rfft((torque - np.mean(torque)) * signal.windows.hann(len(torque)))) ** 2
     k = int(np.argmax(power))
     around = slice(max(k - 2, 0), k + 3)
-    if np.sum(power[around]) < TONE * np.sum(power):
+    if np.sum(power[around]) < TONE_POWER_SHARE * np.sum(power):
         return None
     f = np.fft.rfftfreq(len(torque), trace.step_s)
     return float(np.sum(f[around] * power[around]) / np.sum(power[around]))

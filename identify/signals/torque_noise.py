@@ -17,13 +17,13 @@ from scipy import signal
 from identify.signals.trace import Trace
 from rig.dynamics import TorqueSignal
 
-SEGMENT = 1024  # samples of a stretch whose spectrum is averaged
-FLOOR = 0.7  # of the Nyquist frequency: above it stands the floor
-ABOVE = 8.0  # times the floor's power: a torque that is no noise
+TORQUE_SEGMENT_SAMPLES = 1024  # samples of a stretch whose spectrum is averaged
+FLOOR_START_SHARE = 0.7  # of the Nyquist frequency: above it stands the floor
+SIGNAL_POWER_RATIO = 8.0  # times the floor's power: a torque that is no noise
 MARGIN = 1.5  # times the highest frequency of such a torque: above it there is none
-HIGHEST = 0.6  # of the Nyquist frequency: a floor that begins higher is no matter
+MAX_FLOOR_START_SHARE = 0.6  # of the Nyquist frequency: a floor that begins higher is no matter
 MIN_NOISE_RATIO = 1e-4  # of the torque: less noise is none
-BINS = 6  # of the spectrum to either side over which it is averaged
+DENSITY_SMOOTHING_BINS = 6  # of the spectrum to either side over which it is averaged
 SURELY = 3.0  # times the floor, below which a part counts as noise
 
 
@@ -35,19 +35,19 @@ def quieter(traces: Sequence[Trace]) -> tuple[list[Trace], float] | None:
     highest, nyquist = 0.0, np.inf
     floors: list[float] = []
     for t in traces:
-        if t.torque is None or t.torque.hold == "zero_order" or len(t.torque.torque_nm) < SEGMENT // 4:
+        if t.torque is None or t.torque.hold == "zero_order" or len(t.torque.torque_nm) < TORQUE_SEGMENT_SAMPLES // 4:
             return None
         half = 0.5 / t.torque.shortest_s
         values = t.torque.torque_nm
-        f, power = signal.welch(values, fs=2.0 * half, nperseg=min(len(values), SEGMENT))
-        floor = float(np.median(power[f > FLOOR * half]))
+        f, power = signal.welch(values, fs=2.0 * half, nperseg=min(len(values), TORQUE_SEGMENT_SAMPLES))
+        floor = float(np.median(power[f > FLOOR_START_SHARE * half]))
         if np.sqrt(floor * half) < MIN_NOISE_RATIO * float(np.std(values)):
             return None
         floors.append(floor)
-        over = f[power > ABOVE * floor]
+        over = f[power > SIGNAL_POWER_RATIO * floor]
         highest, nyquist = max(highest, float(over[-1]) if len(over) else 0.0), min(nyquist, half)
     cutoff_hz = MARGIN * highest
-    if not 0.0 < cutoff_hz < HIGHEST * nyquist:
+    if not 0.0 < cutoff_hz < MAX_FLOOR_START_SHARE * nyquist:
         return None
     pairs = zip(traces, floors, strict=True)
     return [replace(t, torque=_without_noise(t.torque, q), motion=None, _series={}) for t, q in pairs], cutoff_hz
@@ -65,7 +65,8 @@ def _without_noise(torque: TorqueSignal | None, floor: float) -> TorqueSignal:
     whole = np.concatenate([2.0 * values[0] - values[:0:-1], values, 2.0 * values[-1] - values[-2::-1]])
     spectrum = np.fft.rfft(whole)
     density = 2.0 * np.abs(spectrum) ** 2 * torque.shortest_s / len(whole)
-    smooth = np.convolve(np.pad(density, BINS, mode="reflect"), np.ones(2 * BINS + 1) / (2 * BINS + 1), "valid")
+    width = 2 * DENSITY_SMOOTHING_BINS + 1
+    smooth = np.convolve(np.pad(density, DENSITY_SMOOTHING_BINS, mode="reflect"), np.ones(width) / width, "valid")
     weight = np.maximum(1.0 - SURELY * floor / np.maximum(smooth, 1e-300), 0.0)
     quiet = np.fft.irfft(weight * spectrum, len(whole))[n - 1 : 2 * n - 1]
     return TorqueSignal(torque.time_s, quiet, torque.hold)

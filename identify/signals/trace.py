@@ -25,9 +25,9 @@ from rig.recording.run import Array, Run
 
 UPSAMPLING = 4  # nonlinear torques have corners between samples
 SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than it tells
-LEAD_S = 0.1
+LEAD_S = 0.1  # of torque ahead of a piece of a run, for a drive with memory
 STRAIGHT = 0.1  # of the sensor's noise
-RAN_AWAY = 1e100  # torque of an effect along a noisy motion, in any unit: it was integrated beyond all bounds
+RUNAWAY_TORQUE = 1e100  # torque of an effect along a noisy motion, in any unit: it was integrated beyond all bounds
 MOST_BIAS_RAD_S = 0.05  # of a gyro: what its integral runs away faster with is the motion itself
 STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
 
@@ -252,7 +252,7 @@ class Trace:
         )  # fmt: skip
         if not np.any(out):
             return None
-        ran_away = ~(np.abs(out) < RAN_AWAY)
+        ran_away = ~(np.abs(out) < RUNAWAY_TORQUE)
         return linear_pieces(np.where(ran_away, 0.0, out), fine)
 
 

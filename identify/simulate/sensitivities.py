@@ -16,6 +16,7 @@ from identify.simulate.shots import RUNAWAY, Shots, losses_of, predict
 from rig.dynamics import Equations
 from rig.recording.run import Array
 
+INFORMATION_RCOND = 1e-11  # smallest over largest eigenvalue of the scaled information: differences see no less
 STEP = 1e-6  # relative step of the differences: simulations repeat to 1e-13
 STUCK = 0.05  # of what a start rate shows on a free platform: one that shows less is taken up by friction
 

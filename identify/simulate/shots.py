@@ -16,7 +16,7 @@ from rig.dynamics import Equations, Grid
 from rig.dynamics.low_pass import low_pass_kernel, mean_rate, smoothed
 from rig.recording.run import Array
 
-SOON_S = 0.02  # a first stretch that begins by then is simulated from the beginning of the run
+LATEST_FIRST_STRETCH_S = 0.02  # a first stretch that begins by then is simulated from the beginning of the run
 AT_REST = 5e-3  # of the run's highest rate: below it, a gyro's bias included, a run begins at rest
 SENSOR_LEAD_S = 0.02  # longer than a gyro's filter remembers
 RUNAWAY = np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a simulation may; its error is then infinite
@@ -81,7 +81,7 @@ def make_shots(
     begins = [0]  # every usable stretch begins anew: what happened in between is not to be predicted
     soon = rests or (equations is not None and _begins_with_the_run(equations, trace))
     for a, b in trace.stretches:
-        if soon and a * trace.step_s <= SOON_S:
+        if soon and a * trace.step_s <= LATEST_FIRST_STRETCH_S:
             a = 0  # noqa: PLW2901
         inside = np.arange(a, b + 1, length) if length else np.array([a])
         if length and len(inside) > 1 and b + 1 - inside[-1] < length // 2:
@@ -190,7 +190,7 @@ def motion(shots: Shots, equations: Equations, starts: Array, push: Array | None
     n = len(shots.trace.measured)
     on = shots.active
     remembers = equations.states or equations.sensor.names
-    if remembers and len(on) > 1 and not on[0] and shots.first[1] * shots.trace.step_s <= SOON_S:
+    if remembers and len(on) > 1 and not on[0] and shots.first[1] * shots.trace.step_s <= LATEST_FIRST_STRETCH_S:
         on = np.concatenate([[True], on[1:]])  # what remembers begins where the run does, not where samples count
     active = [(a * ratio, min(b, n - 1) * ratio) for (a, b), used in zip(shots.edges, on, strict=True) if used]
     fine = equations.integrate_shots(torque, grid.step_s, active, starts[on], shots.trace.offset_s, shots.trace)

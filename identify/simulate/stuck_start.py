@@ -15,10 +15,10 @@ from rig.dynamics import Equations
 from rig.effects.base import Place
 from rig.recording.run import Array
 
-LOOKS = 21  # at starts within the band, which holds a few false minima
+STUCK_START_GRID_POINTS = 21  # at starts within the band, which holds a few false minima
 CLOSER = (-0.75, -0.5, -0.25, 0.25, 0.5, 0.75)  # of the way to the next look
-SPAN_S, PERIODS = 0.5, 8.0  # of a run that are looked at, whichever is longer: the ring after it broke loose
-CLEARLY = 0.5  # of the squares that another start has to leave at most
+SPAN_S, SPAN_PERIODS = 0.5, 8.0  # of a run that are looked at, whichever is longer: the ring after it broke loose
+BETTER_START_RATIO = 0.5  # of the squares that another start has to leave at most
 SLOW_TO_BREAK = 3.0  # times the torque that holds: by then it has broken loose
 
 
@@ -44,12 +44,12 @@ def stuck_initial_state(shots: Shots, equations: Equations) -> None:
         return
     begin = shots.starts[:shared].copy()
     cut.starts[:shared] = begin
-    now, step = _loss(cut, equations, 0.0), 2.0 * reach / (LOOKS - 1)
-    looks = {move: _loss(cut, equations, move) for move in np.linspace(-reach, reach, LOOKS).tolist()}
+    now, step = _loss(cut, equations, 0.0), 2.0 * reach / (STUCK_START_GRID_POINTS - 1)
+    looks = {move: _loss(cut, equations, move) for move in np.linspace(-reach, reach, STUCK_START_GRID_POINTS).tolist()}
     near = min(looks, key=lambda m: looks[m])
     looks |= {near + x * step: _loss(cut, equations, near + x * step) for x in CLOSER if abs(near + x * step) <= reach}
     best = min(looks, key=lambda m: looks[m])
-    if looks[best] < CLEARLY * now:
+    if looks[best] < BETTER_START_RATIO * now:
         shots.starts[:, 0] += best
 
 
@@ -77,7 +77,7 @@ def _looked_at(shots: Shots, equations: Equations) -> int:
     """The last sample of the part of a run that shows how it began."""
     trace = shots.trace
     inertia, _, stiffness = equations.jck.tolist()
-    span = max(SPAN_S, PERIODS * 2.0 * np.pi * float(np.sqrt(inertia / stiffness)))
+    span = max(SPAN_S, SPAN_PERIODS * 2.0 * np.pi * float(np.sqrt(inertia / stiffness)))
     pushed = np.abs(trace.fine[3]) > SLOW_TO_BREAK * holding_nm(equations)
     breaks = trace.fine[2][int(np.argmax(pushed))] - trace.offset_s if np.any(pushed) else 0.0
     return min(len(trace.measured) - 1, int(np.ceil((breaks + span) / trace.step_s)))

@@ -17,15 +17,15 @@ PACKAGES = ("select", "likelihood", "propose", "rivals")
 ORIGINS = ("derivation: ", "reference: ", "calibration run: ", "set by hand")
 # Judged by hand: these cost time, guard the arithmetic, or shape what is shown. None of them gives another name.
 DECIDE_NOTHING: Mapping[str, str] = {
-    "likelihood/by_prediction_error.py": "MAX_ITERATIONS MAX_SAMPLES",
-    "likelihood/derivatives.py": "BIAS_STEP GAIN_STEP NOISE_STEP RAN_AWAY START_STEP",
+    "likelihood/by_prediction_error.py": "FINAL_FIT_ITERATIONS MAX_SAMPLES",
+    "likelihood/derivatives.py": "BIAS_STEP GAIN_STEP NOISE_STEP RUNAWAY_SIGMAS START_STEP",
     "likelihood/damped_step.py": "LEAST_DAMPING LEVENBERG_DAMPING MAX_STEP_TRIALS",
     "likelihood/descent.py": "COARSE_TOLERANCE DIFFERENCE_STEP EARLY_STEPS STALLED_STEPS",
     "likelihood/fit.py": "MAX_LINEAR_INERTIA_CHANGE",
     "likelihood/gyro_biases.py": "BIAS_STEPS",
     "likelihood/kept_gains.py": "GAIN_CACHE_SIZE SAME_STEP",
     "likelihood/noise_grid.py": "WHITE_BESIDE COLOURED_SHARES INITIAL_BIAS_WALK LITTLE_DISTURBANCE WHITE_SHARES",
-    "likelihood/normal_equations.py": "COST_TOLERANCE MAX_LOG_STEP MAX_NOISE_FACTOR SINGULAR",
+    "likelihood/normal_equations.py": "COST_TOLERANCE MAX_LOG_STEP MAX_NOISE_FACTOR NORMAL_RCOND",
     "likelihood/other_noise.py": "BIAS_WALK_STARTS CONTINUATION_LEVELS CONTINUATION_STEPS DISTURBANCE_START_FACTORS "
     "EXCHANGED_TIME_FACTORS LARGE_DISTURBANCE MAX_GAP_RATIO MAX_STEPS_ALONE NOISE_START_FACTORS",
     "likelihood/noise_bounds.py": "FAR MAX_DISTURBANCE MAX_ENCODER_ERROR MAX_PREFILTER_NOISE MIN_BIAS_WALK "
@@ -34,20 +34,20 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "UNKNOWN_ANGLE",
     "likelihood/settling.py": "LARGEST_SHARE LEAD_SHARE LONGEST_LEAD SETTLING_SAMPLES",
     "likelihood/workers.py": "PATIENCE SHORTEST_WAIT_S",
-    "propose/innovation_score.py": "LITTLE SCALED SHAPES SINGULAR",
+    "propose/innovation_score.py": "LITTLE SCALED SHAPES",
     "propose/torque_looks.py": "EVALUATIONS",
-    "rivals/run_heterogeneity.py": "ROUNDS",
-    "rivals/whole_runs.py": "MAX_ITERATIONS TOLERANCE",
-    "select/curve_rivals.py": "COMPARABLE NEAR",
-    "select/disturbance_lines.py": "FLOOR_BINS LOWEST_BIN SHORTEST",
+    "rivals/run_heterogeneity.py": "RUN_CHANGE_ROUNDS",
+    "rivals/whole_runs.py": "WHOLE_RUN_STEPS TOLERANCE",
+    "select/curve_rivals.py": "NEAR",
+    "select/disturbance_lines.py": "FLOOR_BINS LOWEST_BIN MIN_LINE_SAMPLES",
     "select/evidence.py": "ALONE",
     "select/field_search.py": "ANOTHER NO_WORSE",
-    "select/free_form_residual.py": "HOPE SHOWN CURVE_STEPS CURVES_TRIED",
-    "select/likelihood_search.py": "ALL MORE SAMPLES",
+    "select/free_form_residual.py": "MIN_CURVE_SCORE CURVE_STEPS CURVES_TRIED",
+    "select/likelihood_search.py": "RIVAL_SAMPLES MIN_MORE_SAMPLES_RATIO SAMPLES",
     "select/stepwise.py": "MIN_RIVAL_SHARE PROMISING",
     "select/torque_search.py": "POLISHED RIVAL",
     "select/trial_fits.py": "BEHIND COMPARABLE FAINT_SCORE FOLLOWED_LINES FOLLOWS FOLLOWS_LESS FULL_FIT_RATIO "
-    "FULL_ITERATIONS HEAVIEST HOPE OTHER_START PAIRS TRIAL_ITERATIONS TRIED",
+    "FULL_ITERATIONS HEAVIEST MIN_TRIAL_SCORE OTHER_START PAIRS TRIAL_ITERATIONS TRIED",
 }
 
 

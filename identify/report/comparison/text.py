@@ -14,10 +14,10 @@ from identify.report.comparison.section import Section
 from identify.report.summary import RULES
 from identify.wording import printable
 
-WIDTH = 120  # of a file: two numbers with their intervals and what lies between them
+TEXT_WIDTH = 120  # characters of a file: two numbers with their intervals and what lies between them
 
 
-def comparison_text(sections: Sequence[Section], width: int = WIDTH, colour: bool = False) -> str:
+def comparison_text(sections: Sequence[Section], width: int = TEXT_WIDTH, colour: bool = False) -> str:
     """All sections as text of at most ``width`` columns; with ``colour`` headings in bold, for a terminal."""
     console = Console(
         file=io.StringIO(), width=width, force_terminal=colour, color_system="standard" if colour else None,

@@ -15,8 +15,8 @@ from identify.results import Identification, RunTraces
 from identify.wording import SYMBOLS, bias_percent, half_interval, half_of, number, percent, plain, unit, value_of
 from rig.arrays import Array
 
-PERIODS = 3.0  # of the excitation that are shown
-RUN_SHARE, MIN_SAMPLES = 0.05, 200  # of a run without a frequency, and samples
+SHOWN_PERIODS = 3.0  # of the excitation that are shown
+RUN_SHARE, MIN_SHOWN_SAMPLES = 0.05, 200  # of a run without a frequency, and samples
 ROOM = 1.35  # of the measured motion: a simulation that runs away leaves the plot
 
 
@@ -95,8 +95,8 @@ def _strongest(trace: RunTraces, measured: Array, before: Array, after: Array) -
     """Where the two models differ most, over the size of the measured there: (ratio, first, end)."""
     count = len(measured)
     step = float(trace.time_s[-1] - trace.time_s[0]) / max(count - 1, 1)
-    span = PERIODS / trace.frequency_hz / step if trace.frequency_hz else RUN_SHARE * count
-    width = int(min(count, max(span, MIN_SAMPLES)))
+    span = SHOWN_PERIODS / trace.frequency_hz / step if trace.frequency_hz else RUN_SHARE * count
+    width = int(min(count, max(span, MIN_SHOWN_SAMPLES)))
     size = np.nanmax(np.abs(measured)) if np.any(np.isfinite(measured)) else 1.0
     same = np.array_equal(before, after)
     differ = np.clip(np.nan_to_num(before - (measured if same else after)), -size, size)

@@ -20,7 +20,7 @@ from rig.arrays import Array
 # The BIC counts two numbers for a change, its place and its level: 2 ln n. The place costs one more (Zhang and Siegmund
 # 2007).
 PENALTY = 3.0
-SHORTEST = 2  # campaigns of a level; a single one that is off is an outlier
+MIN_LEVEL_CAMPAIGNS = 2  # campaigns of a level; a single one that is off is an outlier
 MIN_CAMPAIGNS = 6  # campaigns: with fewer, the scatter is not known
 # The median of few steps is often too small, and every deviation then seems a change: its square is raised by this
 # over n. Of 100 series of 8 campaigns without a change 14 showed one without it, 7 do with it
@@ -104,8 +104,8 @@ def _cuts(values: Array, weights: Array) -> list[int]:
     penalty = PENALTY * math.log(n)
     best, came_from = np.full(n + 1, np.inf), np.zeros(n + 1, dtype=int)
     best[0] = -penalty
-    for end in range(SHORTEST, n + 1):
-        start = np.arange(0, end - SHORTEST + 1)
+    for end in range(MIN_LEVEL_CAMPAIGNS, n + 1):
+        start = np.arange(0, end - MIN_LEVEL_CAMPAIGNS + 1)
         cost = (wxx[end] - wxx[start]) - (wx[end] - wx[start]) ** 2 / (w[end] - w[start])
         total = best[start] + cost + penalty
         came_from[end] = int(np.argmin(total))

@@ -15,7 +15,7 @@ from identify.report.trend.series import Campaign, Estimate, Series, has_dates, 
 from identify.results import ParameterEstimate
 from identify.wording import joined, number, percent, plain, printable, unit, with_interval
 
-PANEL_PX, MARGIN_PX = 170, 90
+TREND_PANEL_PX, MARGIN_PX = 170, 90  # height of a panel, and of what lies above and below all panels
 RULE = (
     "A change is a jump from one constant level to another, each held by at least two campaigns, that the scatter "
     "between campaigns and their intervals do not explain (BIC)."
@@ -103,7 +103,7 @@ def _figure(name: str, campaigns: Sequence[Campaign], found: Sequence[Series]) -
         + ("" if dated else "Some campaigns have no date, so all are sorted by path."),
         traces=traces,
         layout=layout,
-        height=PANEL_PX * len(panels) + MARGIN_PX,
+        height=TREND_PANEL_PX * len(panels) + MARGIN_PX,
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from identify.estimate.final_fit import FinalFit, by_output_error
 from identify.model.structure import Structure
-from identify.rivals.whiteness_test import COLOURED, coloured, fails_whiteness_test
+from identify.rivals.whiteness_test import COLOURED_SIGMAS, coloured, fails_whiteness_test
 from rig.platform import TERMS
 from rig.recording.run import Array, Recording
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
@@ -34,8 +34,8 @@ def named(fit: FinalFit, *names: str) -> FinalFit:
 
 
 def test_white_noise_is_not_coloured_and_a_twentieth_of_its_power_low_down_is() -> None:
-    assert abs(coloured(fitted())) < COLOURED
-    assert coloured(fitted(LINE)) > COLOURED
+    assert abs(coloured(fitted())) < COLOURED_SIGMAS
+    assert coloured(fitted(LINE)) > COLOURED_SIGMAS
 
 
 @pytest.mark.parametrize(

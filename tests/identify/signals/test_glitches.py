@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identify.signals.glitches import FEW, GLITCH_SIGMAS, describe, glitches
+from identify.signals.glitches import GLITCH_SIGMAS, MAX_GLITCHES, describe, glitches
 from identify.signals.prepare import prepare
 from rig.dynamics import TorqueSignal, simulate
 from rig.platform import Platform
@@ -46,7 +46,7 @@ def test_what_the_platform_does_is_no_glitch(effects: dict[str, dict[str, float]
 
 def test_what_comes_often_is_no_glitch() -> None:
     values = measured()
-    values[500 :: len(values) // (FEW + 2)] += 100 * NOISE
+    values[500 :: len(values) // (MAX_GLITCHES + 2)] += 100 * NOISE
     assert found(values) == []
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.signals.noise import SCATTER, bandwidth_of, least_of, noise_of
+from identify.signals.noise import NOISE_SCATTER, bandwidth_of, least_of, noise_of
 from identify.signals.prepare import one_noise, prepare
 from identify.signals.trace import UPSAMPLING
 from rig import effects
@@ -220,7 +220,7 @@ def test_the_noise_of_several_runs_is_neither_the_least_nor_the_largest_that_cha
 
 def test_the_noise_of_several_runs_is_known_to_a_percent_and_a_run_that_moves_too_fast_does_not_count() -> None:
     rng = np.random.default_rng(3)
-    each = 1.0 + SCATTER / math.sqrt(10_000) * rng.standard_normal((400, 5))
+    each = 1.0 + NOISE_SCATTER / math.sqrt(10_000) * rng.standard_normal((400, 5))
     pooled = np.array([least_of([(x, 10_000) for x in five]) for five in each])
     assert np.mean(pooled) == pytest.approx(1.0, abs=0.002)
     assert np.std(pooled) < 0.01

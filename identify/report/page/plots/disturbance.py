@@ -12,7 +12,7 @@ from identify.results import Identification
 from identify.wording import depends_on, number
 
 DIRECTIONS = {"tickvals": [-1, 1], "ticktext": ["backward", "forward"], "range": [-1.5, 1.5]}
-MIN_FOR_A_CURVE = 3
+MIN_FOR_A_CURVE = 3  # points: fewer are drawn as points
 
 
 def disturbance_table(identification: Identification) -> Markup:

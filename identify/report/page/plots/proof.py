@@ -11,8 +11,8 @@ from identify.report.page.plots.thinning import line
 from identify.report.page.quantities import QUANTITIES, axis
 from identify.results import Identification
 
-POINTS = 2500  # of one line
-PANEL_PX = 190
+PROOF_LINE_POINTS = 2500  # of one line
+PROOF_PANEL_PX = 190  # height of a panel
 
 
 def proof_section(identification: Identification, gallery: Gallery) -> Markup:
@@ -43,12 +43,12 @@ def proof_figure(identification: Identification, proof: Proof) -> Figure:
         caption="Dashed green: twice the noise of the sensor. Linear model: J, C and K alone, given the same set.",
         traces=once_in_legend(drawn),
         layout=layout,
-        height=PANEL_PX * len(panels) + 60,
+        height=PROOF_PANEL_PX * len(panels) + 60,
     )
 
 
 def _of_set(one: ProofLines, panel: int) -> list[dict[str, object]]:
     return [
-        lines(*line(one.time_s, one.without, POINTS), "without compensation", BEFORE, panel, width=0.9),
-        lines(*line(one.time_s, one.compensated, POINTS), "with compensation", AFTER, panel, width=0.9),
+        lines(*line(one.time_s, one.without, PROOF_LINE_POINTS), "without compensation", BEFORE, panel, width=0.9),
+        lines(*line(one.time_s, one.compensated, PROOF_LINE_POINTS), "with compensation", AFTER, panel, width=0.9),
     ]

@@ -25,12 +25,12 @@ from identify.report.page.plots.motion import motion_error
 from identify.report.page.plots.thinning import binned_mean, cloud, line
 from identify.report.page.quantities import QUANTITIES, axis
 from identify.results import Identification, RunTraces
+from identify.signals.low_pass import EDGE_PERIODS
 from rig.recording.run import Array
 
-LINE_POINTS = 4000
+LINE_POINTS = 4000  # drawn against time, of all runs together
 SMOOTH_BINS = 60  # of a run: the slow part of what is left
-CLOUD_POINTS = 1500
-EDGE_PERIODS = 3.0  # of the low-pass, not drawn at either end of a run: there the filter looks into nothing
+CLOUD_POINTS = 1500  # drawn of a cloud
 SHORTEST_EDGES = 20.0  # a run has to be this many times longer
 FORWARD, BACKWARD = SETS[2], SETS[3]
 Which = Literal["before", "after"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from identify.frequency.measured_response import measured_response
 from identify.frequency.model_response import Size, linear_response
-from identify.frequency.spectra import MAX_GAIN_ERROR, TRUSTED, Complex, Record, Response, decibel
+from identify.frequency.spectra import MAX_GAIN_ERROR, MIN_COHERENCE, Complex, Record, Response, decibel
 from identify.report.page.plots.figure import (
     AFTER,
     BEFORE,
@@ -29,11 +29,11 @@ from identify.wording import joined, plain
 from rig.platform import Platform
 from rig.recording.run import Array, Recording, Run
 
-WHOLE = 0.95  # share of a run's samples that have to count for its simulation to be one piece
-SAME = 1e-3  # relative: torques closer than this are repeats of one set
-SETTLED = 4.0  # time constants after which a start transient is taken to be over (2 % are left)
+MIN_COUNTED_SHARE = 0.95  # share of a run's samples that have to count for its simulation to be one piece
+REPEAT_TOLERANCE = 1e-3  # relative: torques closer than this are repeats of one set
+SETTLING_TIME_CONSTANTS = 4.0  # time constants after which a start transient is taken to be over (2 % are left)
 FINE = 700  # frequencies of a drawn line
-WIDER = 1.3  # the line goes on to this many times the highest and lowest measured frequency
+LINE_SPAN_RATIO = 1.3  # the line goes on to this many times the highest and lowest measured frequency
 TICKS_HZ = [digit * 10.0**decade for decade in range(-3, 4) for digit in (1, 2, 5)]
 HOW = {
     "whole periods": "over whole periods, without the first",
@@ -61,7 +61,7 @@ def set_responses(identification: Identification, recording: Recording) -> list[
         first = repeats[0]
 
         def of(which: str, repeats: Sequence[RunTraces] = repeats) -> Response | None:
-            if which != "measured" and any(float(np.mean(t.keep)) < WHOLE for t in repeats):
+            if which != "measured" and any(float(np.mean(t.keep)) < MIN_COUNTED_SHARE for t in repeats):
                 return None  # a simulation that begins anew behind every gap jumps there
             records = [_record(t, getattr(t, which), runs.get(t.name)) for t in repeats]
             return measured_response(records, settle)
@@ -77,7 +77,7 @@ def settle_s(platform: Platform | None) -> float:
     """How long the start of a run rings."""
     if platform is None or platform.damping_nm_s_rad <= 0.0 or platform.inertia_kg_m2 <= 0.0:
         return 0.0
-    return SETTLED * 2.0 * platform.inertia_kg_m2 / platform.damping_nm_s_rad
+    return SETTLING_TIME_CONSTANTS * 2.0 * platform.inertia_kg_m2 / platform.damping_nm_s_rad
 
 
 def _same_lines(found: Response | None, measured: Response) -> Response | None:
@@ -103,7 +103,7 @@ def _alike(one: RunTraces, other: RunTraces) -> bool:
         return False
     if abs(_step(one) - _step(other)) > 1e-9 * _step(one):
         return False
-    return bool(np.linalg.norm(a - b) < SAME * np.linalg.norm(a))
+    return bool(np.linalg.norm(a - b) < REPEAT_TOLERANCE * np.linalg.norm(a))
 
 
 def _step(trace: RunTraces) -> float:
@@ -157,11 +157,11 @@ def _size(traces: Sequence[RunTraces]) -> Size:
 
 def _frequencies(sets: Sequence[SetResponse], platform: Platform) -> Array:
     """Evenly over the logarithm, denser around the resonance where it lies in sight."""
-    low = min(float(s.measured.frequency_hz[0]) for s in sets) / WIDER
-    high = max(float(s.measured.frequency_hz[-1]) for s in sets) * WIDER
+    low = min(float(s.measured.frequency_hz[0]) for s in sets) / LINE_SPAN_RATIO
+    high = max(float(s.measured.frequency_hz[-1]) for s in sets) * LINE_SPAN_RATIO
     natural = np.sqrt(max(platform.stiffness_nm_rad, 0.0) / platform.inertia_kg_m2) / (2.0 * np.pi)
     if low < natural < 4.0 * high:
-        high = max(high, WIDER * natural)
+        high = max(high, LINE_SPAN_RATIO * natural)
     f = np.geomspace(low, high, FINE)
     near = natural * (1.0 + np.sinh(np.linspace(-4.0, 4.0, 201)) / np.sinh(4.0) * 0.2)
     return np.unique(np.concatenate([f, near[(near > low) & (near < high)]]))
@@ -185,7 +185,7 @@ def _measured_points(one: SetResponse, f: Array, model: Complex) -> list[Trace]:
         at = found.trusted == trusted
         if not np.any(at):
             continue
-        name = "measured" if trusted else f"measured, coherence < {TRUSTED:g}"
+        name = "measured" if trusted else f"measured, coherence < {MIN_COHERENCE:g}"
         style = {"size": 6 if trusted else 5, "opacity": 0.95 if trusted else 0.45}
         phase = _beside(found, f, model)
         for panel, values, unit in ((1, found.gain_db, "dB"), (2, phase, "deg"), (4, found.coherence, "")):
@@ -244,7 +244,7 @@ def _figure(
     layout["xaxis4"] |= {"tickvals": TICKS_HZ, "ticktext": [f"{hz:g}" for hz in TICKS_HZ]}
     for number in ("", "2", "3"):
         layout[f"xaxis{number}"] |= {"tickvals": TICKS_HZ}
-    layout["shapes"] = [level(TRUSTED, MEASURED, 4, dash="dot")]
+    layout["shapes"] = [level(MIN_COHERENCE, MEASURED, 4, dash="dot")]
     return Figure(
         label=f"Frequency response from {q.torque} to {q.rate}: gain, phase, deviation of the models and coherence",
         heading="",
@@ -266,7 +266,7 @@ def _caption(sets: Sequence[SetResponse], left_out: Sequence[str]) -> str:
     pale = sum(int(np.sum(~s.measured.trusted)) for s in sets)
     caption += "Off by: difference between simulation and measurement, relative to the larger of the two. "
     caption += (
-        f"Dotted: coherence {TRUSTED:g}. Pale crosses: coherence below it, or a standard error above "
+        f"Dotted: coherence {MIN_COHERENCE:g}. Pale crosses: coherence below it, or a standard error above "
         f"{100 * MAX_GAIN_ERROR:g} %"
     )
     return caption + (

@@ -29,7 +29,7 @@ from rig.platform import Platform
 from rig.recording.run import Array
 
 SEGMENT = 4096  # samples of one Welch segment at most
-INDEPENDENT = 0.5  # of the segments, which overlap by half
+INDEPENDENT_SEGMENT_SHARE = 0.5  # of the segments, which overlap by half
 CONFIDENCE = 0.95  # of the band of noise
 ODD, EVEN, FREE = SETS[7], SETS[1], SETS[6]
 
@@ -79,7 +79,7 @@ def noise_band(identification: Identification, hertz: Array) -> tuple[Array, Arr
     white = identification.noise_floor.holdout_rate_rms * float(np.sqrt(2.0 * np.median(_steps_s(traces))))
     density = white * np.abs(torque_per_reading(platform, hertz, traces[0].channel))
     segments = sum(max(1.0, 2.0 * len(t.time_s) / SEGMENT - 1.0) for t in traces)
-    freedom = 2.0 * max(1.0, INDEPENDENT * segments + 0.5)
+    freedom = 2.0 * max(1.0, INDEPENDENT_SEGMENT_SHARE * segments + 0.5)
     low, high = (float(np.sqrt(chi2.ppf(q, freedom) / freedom)) for q in (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2))
     return low * density, high * density
 
