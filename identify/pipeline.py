@@ -26,7 +26,7 @@ from identify.rivals.alternative_causes import AlternativeCauses
 from identify.rivals.coloured_noise import Colour, with_noise_known
 from identify.rivals.stand_ins import with_stand_ins
 from identify.rivals.tone_origin import TONE, describe, standing_line
-from identify.rivals.whiteness_test import fails_whiteness_test
+from identify.rivals.whiteness_test import fails_whiteness_test, leaves_more_than_noise
 from identify.rivals.whole_runs import FreeRunFitter
 from identify.runs.clipping import full_scale_of
 from identify.runs.excerpts import describe_excerpts
@@ -149,6 +149,8 @@ class _Identifier:
                 left = search.stepwise.left
                 self.curve = dependence_on(search.stepwise, left) if left is not None else None
                 return self._concluded(found, causes, in_torque)
+            if white and not nothing_left:  # a curve that a free run does not show is none of the platform's
+                nothing_left = not leaves_more_than_noise(self._models().after(found))
             if (white and nothing_left) or causes.other_cause(found):
                 release(search.stepwise.problem.traces)
                 return self._concluded(found, causes, in_torque)
@@ -234,7 +236,7 @@ class _Identifier:
             bare = step.without(step.best, TONE) if TONE in step.best.structure.effects else step.best
             found = found.without(TONE).with_lines(bare, step.problem.torque_nm)
             found.search.mark_undetermined(TONE, words, found.kept)
-        found = with_stand_ins(found, self.recording.axis, self.say)
+        found = with_stand_ins(found, self.traces, self.recording.axis, self.say)
         return self._report(found.search, found.before, found.after, measured=found)
 
     def _curves(self, search: Stepwise) -> list[tuple[Dependence, dict[str, float]]]:

@@ -14,24 +14,30 @@ from dataclasses import replace
 import numpy as np
 
 from identify.estimate.final_fit import FinalFit
+from identify.runs.observability import is_seen_to_repeat
 from identify.select.field_search import Found, with_free_form
 from identify.select.free_form_residual import MOVED_SIGMAS
+from identify.signals.trace import Trace
 from identify.wording import capital, depends_on, joined, plain
 from rig import effects
 from rig.platform import TERMS
 
 
-def with_stand_ins(found: Found, axis: str, say: Callable[[str], None]) -> Found:
+def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callable[[str], None]) -> Found:
     """The same without the flexible effects that something else is left beside; unchanged where nothing is left over.
 
     What goes with a quantity that more of the same kind would go with (other orders of cogging: the angle) speaks not
-    against the name. Then only how far J, C and K move without it is noted.
+    against the name, unless it is a wave that is not seen to repeat. Then only how far J, C and K move without it is
+    noted.
     """
     depends = found.disturbance.depends_on  # the largest first
     flexible = [name for name in found.named if effects.get(name).is_flexible]
     if not flexible or not depends:
         return found
-    stand_ins = [name for name in flexible if depends[0].on not in effects.get(name).goes_with]
+    waves = {
+        name: is_seen_to_repeat(effects.first_of(name), found.named, found.after.values, traces) for name in flexible
+    }
+    stand_ins = [name for name in flexible if depends[0].on not in effects.get(name).goes_with or not waves[name]]
     if stand_ins:
         found = _taken_back(found, stand_ins, axis)
         say(f"not named: {_listed(stand_ins)}; what is left then still depends on the {depends[0].on}")

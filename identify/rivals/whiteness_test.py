@@ -26,6 +26,11 @@ def fails_whiteness_test(fitted: FinalFit, declared: Sequence[str]) -> bool:
     found = [e for e in fitted.structure.effects if e not in declared]
     if len(found) < SO_MANY or not any(effects.get(e).is_flexible for e in found):
         return False
+    return leaves_more_than_noise(fitted)
+
+
+def leaves_more_than_noise(fitted: FinalFit) -> bool:
+    """Whether a free run over whole runs leaves more than white noise of the sensor."""
     return not fitted.sensor_limited or coloured(fitted) > COLOURED_SIGMAS
 
 

@@ -41,10 +41,11 @@ def one_more(have: Sequence[str], values: Mapping[Name, float], traces: Sequence
     A few orders of one that is no shorter than the travel are the Fourier series of any curve over the angle.
     """
     more = [m for n in have for m in effects.further(effects.first_of(n)) if m not in have]
-    return [m for m in more if _is_seen_to_repeat(effects.first_of(m), have, values, traces)][:1]
+    return [m for m in more if is_seen_to_repeat(effects.first_of(m), have, values, traces)][:1]
 
 
-def _is_seen_to_repeat(first: str, have: Sequence[str], values: Mapping[Name, float], traces: Sequence[Trace]) -> bool:
+def is_seen_to_repeat(first: str, have: Sequence[str], values: Mapping[Name, float], traces: Sequence[Trace]) -> bool:
+    """Whether the travel shows two periods of the longest wave of a kind; True where it is none over the angle."""
     order = effects.get(first).repeats_over_angle
     if not order:
         return True

@@ -23,8 +23,9 @@ PAST = Dependence("history", 0.03, 0.03, 1e-9)
 def final(inertia: float, error: float, *effects: str) -> Any:
     structure = Structure(effects=effects)
     return SimpleNamespace(
-        values={("inertia",): inertia, ("damping",): 1.0}, names=(("inertia",), ("damping",)),
-        std_error=lambda name: error, structure=structure, fit=SimpleNamespace(structure=structure),
+        values={("inertia",): inertia, ("damping",): 1.0, ("cogging", "order"): 7.0},
+        names=(("inertia",), ("damping",)), std_error=lambda name: error, structure=structure,
+        fit=SimpleNamespace(structure=structure),
     )  # fmt: skip
 
 
@@ -42,8 +43,8 @@ def found(effects: tuple[str, ...], *depends: Dependence) -> tuple[Found, list[t
     return Found(search, final(1.06, 1e-3), final(1.0, 1e-3, *effects), left, (nothing, nothing), lacking), asked
 
 
-def looked_at(begun: Found) -> Found:
-    return with_stand_ins(begun, "rotary", lambda text: None)
+def looked_at(begun: Found, travel_deg: float = 360.0) -> Found:
+    return with_stand_ins(begun, cast(Any, [SimpleNamespace(travel_deg=travel_deg)]), "rotary", lambda text: None)
 
 
 def test_a_flexible_effect_beside_which_something_else_is_left_is_not_named() -> None:
@@ -64,6 +65,11 @@ def test_more_of_its_own_kind_does_not_speak_against_a_name_but_how_far_j_hangs_
     assert kept.named == ["cogging", "coulomb_friction"]
     assert asked == [("cogging",)]
     assert kept.disturbance.moves_without_percent["cogging"]["inertia"] == pytest.approx(6.0)
+
+
+def test_a_wave_that_is_not_seen_to_repeat_is_a_curve_over_the_angle_like_any_other() -> None:
+    begun, _ = found(("cogging", "coulomb_friction"), ANGLE)
+    assert looked_at(begun, travel_deg=10.0).named == ["coulomb_friction"]
 
 
 def test_what_was_taken_back_is_not_in_the_model_that_the_others_are_judged_beside() -> None:
