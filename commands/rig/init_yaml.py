@@ -87,7 +87,7 @@ def bench_yaml(gyro: str | None, can: Mapping[str, str] | None, seen: Sequence[s
     channel = can["channel"] if can else None
     return "\n".join(
         [
-            "# Made by `rig init`. Lines marked GUESS or FILL IN need your look; then",
+            "# Made by `rig init`. Check the lines marked GUESS and complete those marked FILL IN; then",
             "#",
             f"#     identify-run {plain(config)} --emulate   on emulated devices; nothing moves",
             f"#     rig check {plain(config)}                everything but torque, on the real ones",

@@ -70,7 +70,7 @@ class AmplifierConfig(Section):
     node: Annotated[int, Field(ge=0, le=127)] = 1
     """Address of the drive on the CAN bus."""
     watchdog_ms: Annotated[int, Field(ge=5, le=5000)] = 100
-    """After so long without a sign of life of this computer the drive cuts the torque by itself, ms."""
+    """The drive switches the torque off by itself if it hears nothing from this computer for this long, ms."""
     gear_ratio: Positive = 1.0
     """Shaft torque over motor torque, losses included."""
     invert: bool = False

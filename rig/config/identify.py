@@ -75,9 +75,9 @@ class IdentifyConfig(Section):
     candidates: tuple[str, ...] | None = None
     """Effects to try, by name; all known effects if left out."""
     follow_up: Literal["auto", "ask", "never"] = "ask"
-    """Whether the excitation that separates effects which the data do not is played."""
+    """Whether to play a further excitation that separates effects which the data cannot tell apart."""
     prove: Literal["auto", "ask", "never"] = "never"
-    """Whether every set is played again with and without the torque that cancels the named effects (see rig prove)."""
+    """Whether to play every set again, with and without the torque that cancels the named effects (see rig prove)."""
     holdout: Literal["auto"] | Annotated[float, Field(ge=0.05, le=0.5)] = "auto"
     """Share of the samples held out, or auto."""
     lowpass_hz: Annotated[float, Field(ge=1e-3, le=1e6)] | None = None

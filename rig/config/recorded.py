@@ -125,19 +125,19 @@ class RecordedConfig(Section):
     runs: tuple[RecordedRun, ...]
     """The files, one entry a run."""
     columns: Columns = Columns()
-    """Names of the columns where they are not the default ones."""
+    """Names of the columns, where they differ from the default names."""
     scale: Scale = Scale()
     """Factors from the file's numbers to SI units."""
     axis: Literal["rotary", "linear"] = "rotary"
-    """linear: kg, N and m in the place of kg m^2, N m and rad."""
+    """linear: mass in kg, force in N and position in m instead of kg m^2, N m and rad."""
     torque_hold: Literal["band_limited", "zero_order"] = "band_limited"
     """zero_order: each torque was held until the next sample; band_limited: it varies between samples."""
     noise: Annotated[float, Field(ge=1e-30, le=1e12)] | None = None
     """One standard deviation of the measured channel, in its SI unit; estimated if left out."""
     min_rate_rad_s: NonNegative = 0.0
-    """Slower samples of all runs are left out of the error and the fit, rad/s."""
+    """Samples slower than this are left out of the error and the fit, in all runs, rad/s."""
     most_samples: Annotated[int, Field(ge=2_000, le=100_000_000)] = MOST_SAMPLES
-    """Longer recordings are low-passed, decimated and, if need be, cut to so many samples in all."""
+    """Longer recordings are low-passed, decimated and, if need be, cut to this many samples in all."""
 
     @field_validator("runs")
     @classmethod
