@@ -68,7 +68,8 @@ DECAY_RUN = {  # the same without a motor
         "clamping."
     ),
     "history": (
-        "To separate hysteresis and creep, release the platform once immediately and once after holding it for a minute."
+        "To separate hysteresis and creep, release the platform once immediately, and once after holding it for a "
+        "minute."
     ),
 }
 DECAY_RUN["direction"] = DECAY_RUN["rate"]

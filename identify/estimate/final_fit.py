@@ -16,7 +16,7 @@ from identify.estimate.initial_guess import Start, best_rho
 from identify.estimate.initial_state_sensitivity import least_std_errors
 from identify.estimate.output_error import OutputErrorFit, refine
 from identify.estimate.profile_likelihood import settled, widened
-from identify.estimate.regression import Regression, Solution, residuals
+from identify.estimate.regression import Regression, RegressionFit, residuals
 from identify.estimate.starting_point import start_values
 from identify.model.parameter_fit import ZERO_INFORMATION, ParameterFit, std_error_of
 from identify.model.parameters import Name, is_gain
@@ -271,7 +271,7 @@ def _output_covariance(fit: OutputErrorFit, names: tuple[Name, ...]) -> tuple[Ar
 
 
 def _regression_covariance(
-    traces: Sequence[Trace], solution: Solution, use: Sequence[Any]
+    traces: Sequence[Trace], solution: RegressionFit, use: Sequence[Any]
 ) -> tuple[Array, tuple[bool, ...]]:
     regression = Regression(traces, solution.structure)
     blocks = regression.blocks(solution.denominator, solution.shapes)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from identify.estimate.regression import Regression, Solution, fit, normal, solve
+from identify.estimate.regression import Regression, RegressionFit, fit, normal, solve
 from identify.model.structure import Shapes, Structure
 from identify.signals.prefilter import Denominator
 from identify.signals.trace import Trace, pooled_noise
@@ -69,7 +69,7 @@ def _torque_size(traces: Sequence[Trace], inertia: float) -> float:
 
 def best_rho(
     traces: Sequence[Trace], structure: Structure, shapes: Shapes, start: Start, use: Sequence[Any] | None = None
-) -> Solution:
+) -> RegressionFit:
     """The solution at the ratio of torque disturbance to sensor noise that predicts best."""
     regression = Regression(traces, structure)
     platform = start.platform

@@ -158,7 +158,7 @@ class Regression:
 
 
 @dataclass(frozen=True)
-class Solution(ParameterFit):
+class RegressionFit(ParameterFit):
     """A solved regression.
 
     Its residual is prefiltered. The cost counts the gain of the prefilter (its logarithmic mean over frequency): so
@@ -257,7 +257,7 @@ def fit(
     rho: float,
     iterations: int = ITERATIONS,
     use: Sequence[Any] | None = None,
-) -> Solution:
+) -> RegressionFit:
     """Solve at a fixed rho and fixed shapes, the denominator rebuilt from the estimate ``iterations`` times.
 
     ``start`` are J, C, K of the first denominator.
@@ -285,7 +285,7 @@ def fit(
     variance = rss / max(n, 1)
     gain = log_gain(platform, denominator, regression.traces[0].step_s)
     cost = n * (float(np.log(max(variance, 1e-300))) - 2.0 * gain)
-    return Solution(
+    return RegressionFit(
         regression.structure, regression.labels, x, n, variance, cost, equations.a, dict(shapes), denominator, rho,
         platform,
     )  # fmt: skip

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.estimate.regression import Solution
+from identify.estimate.regression import RegressionFit
 from identify.model.parameters import Name, names_of
 from identify.model.structure import Shapes
 from identify.signals.trace import Trace
@@ -27,7 +27,7 @@ def horizon_s(platform: tuple[float, float, float], traces: Sequence[Trace]) -> 
     return float(np.clip(wanted, shortest, max(longest, shortest)))
 
 
-def start_values(solution: Solution, shapes: Shapes, runs: int) -> dict[Name, float]:
+def start_values(solution: RegressionFit, shapes: Shapes, runs: int) -> dict[Name, float]:
     """A start for output error from a solved regression."""
     inertia, damping, stiffness = solution.jck
     terms = {"inertia": inertia, "damping": damping, "stiffness": stiffness}

@@ -18,7 +18,7 @@ from identify.estimate.final_fit import FinalFit, _regression_covariance
 from identify.estimate.initial_guess import Start
 from identify.estimate.initial_state_sensitivity import least_std_errors
 from identify.estimate.output_error import refine
-from identify.estimate.regression import Regression, Solution, fit, normal
+from identify.estimate.regression import Regression, RegressionFit, fit, normal
 from identify.genetic.algorithm import QuadraticObjective, search
 from identify.genetic.linear_traces import linear_traces
 from identify.model.parameters import Name, platform_of
@@ -48,7 +48,7 @@ class Condensed:
     terms: tuple[str, ...]
     count: int
     floor: float  # sum of squares that the sensor's noise makes
-    solution: Solution | None  # that its filter comes from, unless it is plain
+    solution: RegressionFit | None  # that its filter comes from, unless it is plain
 
 
 def condense(
@@ -56,7 +56,7 @@ def condense(
 ) -> Condensed:
     """Normal equations of the linear model, prefiltered to white (or, ``plain``, as bare equation error)."""
     regression = Regression(traces, Structure(terms))
-    solution: Solution | None = None
+    solution: RegressionFit | None = None
     if plain:
         w = 2.0 * np.pi * start.cutoff_hz  # a low-pass on both sides, as section 3 of the paper filters
         denominator = Denominator(1.0, 1.4 * w, w * w)
@@ -218,7 +218,7 @@ def _bounds(traces: Sequence[Trace], fitted: FinalFit) -> list[dict[str, float]]
 
 
 def _result(
-    trace: Trace, run: GeneticRun, solution: Solution, terms: tuple[str, ...],
+    trace: Trace, run: GeneticRun, solution: RegressionFit, terms: tuple[str, ...],
     platform: tuple[float, float, float], axis: str, bound: Mapping[str, float],
 ) -> SetResult:  # fmt: skip
     mask = [trace.keep]

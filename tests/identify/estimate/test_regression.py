@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identify.estimate.initial_guess import best_rho, first_guess
-from identify.estimate.regression import Regression, Solution, fit, normal, residuals, solve
+from identify.estimate.regression import Regression, RegressionFit, fit, normal, residuals, solve
 from identify.model.structure import Structure
 from identify.signals.prefilter import Denominator
 from identify.signals.trace import Trace
@@ -19,12 +19,12 @@ from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, decay_run, si
 from tests.rig.effects.values import VALUES
 
 
-def solved(traces: list[Trace], effects: tuple[str, ...] = (), **shapes: tuple[float, ...]) -> Solution:
+def solved(traces: list[Trace], effects: tuple[str, ...] = (), **shapes: tuple[float, ...]) -> RegressionFit:
     start = first_guess(traces, Structure()).platform
     return fit(Regression(traces, Structure(effects=effects)), shapes, start, 0.0, 8)
 
 
-def bound_of(solution: Solution) -> np.ndarray:
+def bound_of(solution: RegressionFit) -> np.ndarray:
     """Cramer-Rao bound of the parameters for the gyro's noise, shape (p,)."""
     scale = np.sqrt(np.diag(solution.information))
     inverse = np.linalg.inv(solution.information / np.outer(scale, scale))
