@@ -6,6 +6,7 @@ A short list is drawn up by how far apart both models run and scored to first or
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -21,6 +22,7 @@ BEST = 1e4  # from which more of it proves nothing more
 EQUIVALENT_SCORE_RATIO = 0.5  # of the best score: the shorter of two such sets is played
 MAX_SETS = 4  # of a plan
 PROOFS = 3  # sets that are put to the proof in a round
+AT_ONCE = 2  # of them: the compiled simulations run side by side
 LOOKED_AT = 14  # candidates of a pair whose sensitivities are taken
 
 
@@ -122,11 +124,7 @@ def choose(looks: Looks) -> list[int]:
         )
         others = sorted((i for i in gains if i not in alike), key=lambda i: -gains[i])
         order = _varied(looks, [*alike, *others])
-        proofs: dict[int, list[float]] = {}
-        for i in order[:PROOFS]:
-            proofs[i] = looks.proved([*chosen, i], stands)
-            if min(proofs[i]) >= GOOD:
-                break
+        proofs = _proofs(looks, chosen, order[:PROOFS], stands)
         winner = max(proofs, key=lambda i: _worth(proofs[i]))
         if chosen and _worth(proofs[winner]) < reached + 0.1:  # of the logarithm: nothing that would be seen
             break
@@ -136,6 +134,25 @@ def choose(looks: Looks) -> list[int]:
         if min(stands) >= GOOD:
             break
     return chosen
+
+
+def _proofs(
+    looks: Looks, chosen: Sequence[int], several: Sequence[int], stands: Sequence[float]
+) -> dict[int, list[float]]:
+    """Chi square of every pair with each of several sets added, two at a time until one parts all of them well."""
+
+    def proof(i: int) -> list[float]:
+        with np.errstate(all="ignore"):  # which a thread does not inherit
+            return looks.proved([*chosen, i], stands)
+
+    found: dict[int, list[float]] = {}
+    with ThreadPoolExecutor(AT_ONCE) as workers:
+        for begin in range(0, len(several), AT_ONCE):
+            some = several[begin : begin + AT_ONCE]
+            found |= zip(some, workers.map(proof, some), strict=True)
+            if any(min(found[i]) >= GOOD for i in some):
+                break
+    return found
 
 
 def _varied(looks: Looks, order: Sequence[int]) -> list[int]:

@@ -80,6 +80,7 @@ def test_the_error_falls_to_the_noise_and_nothing_stays_unexplained() -> None:
     assert not found.verdict.unexplained
 
 
+@pytest.mark.slow
 def test_declared_models_a_hundred_times_apart_end_at_the_same_numbers() -> None:
     low, high = found_from("low"), found_from("high")
     assert low.verdict.effects == high.verdict.effects
@@ -229,7 +230,7 @@ def test_who_stops_before_anything_is_fitted_gets_nothing() -> None:
         identify(campaign(duration_s=2.5), LOW, SETTINGS, interrupt)
 
 
-@pytest.mark.parametrize(("scale", "named"), [(1.0, ()), (1.05, ("torque_scale",))])
+@pytest.mark.parametrize(("scale", "named"), [pytest.param(1.0, (), marks=pytest.mark.slow), (1.05, ("torque_scale",))])
 def test_a_known_added_inertia_tells_the_torque_scale(scale: float, named: tuple[str, ...]) -> None:
     time = np.arange(2501) * 1e-3
     runs = []
@@ -253,7 +254,8 @@ def test_a_known_added_inertia_tells_the_torque_scale(scale: float, named: tuple
     assert found.set_scatter["stiffness"] < 1.0
 
 
-@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), 3])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 3])
 def test_without_damping_that_may_be_there_the_inertia_is_not_told_from_noise(seed: int) -> None:
     """A soft start hardly rings. A model without damping rings on and on, and follows the noise with any inertia."""
     run = sine_run(50.0, 0.5, duration_s=8.0, noise=0.004, seed=seed, soft_s=6.0, jck=(0.02, 0.05, 650.0))

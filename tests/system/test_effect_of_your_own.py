@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 PAGE = Path(__file__).parents[2] / "docs" / "effects" / "your-own.md"
 COMMAND = Path(sys.executable).parent / "identify-run"
 CAMPAIGN = """
@@ -32,6 +34,7 @@ def rebuilt(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([str(rig), "report", str(folder), *options], capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_an_effect_of_the_users_own_is_simulated_named_and_reported(tmp_path: Path) -> None:
     example = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[0]
     (tmp_path / "my_effect.py").write_text(example, encoding="utf-8")

@@ -152,6 +152,7 @@ def test_what_is_written_passes_the_check_and_nothing_is_written_over(
     assert "rig.yaml exists and is never overwritten: give another name with --out" in again.stderr
 
 
+@pytest.mark.slow
 def test_what_is_written_is_identified_as_it_stands(tmp_path: Path) -> None:
     (tmp_path / "r.csv").write_text(FILES["drive_trace.csv"][0], encoding="utf-8")
     made(tmp_path, "r.csv")

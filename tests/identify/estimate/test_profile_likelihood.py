@@ -35,7 +35,8 @@ def fitted(traces: Sequence[Trace], inertia: float) -> FinalFit:
     return by_output_error(traces, Structure(), start, 0.1, use, use)
 
 
-@pytest.mark.parametrize("begun", [pytest.param(0.5, marks=pytest.mark.slow), 2.0])
+@pytest.mark.slow
+@pytest.mark.parametrize("begun", [0.5, 2.0])
 def test_an_inertia_that_shows_in_rings_of_noise_comes_out_within_its_interval(begun: float) -> None:
     off = []
     for seed in range(5):

@@ -84,6 +84,7 @@ def beside(run: Run, counts: int, seed: int, white: bool = False) -> Run:
     return replace(run, angle_rad=angle, rate_rad_s=run.rate_rad_s + NOISE_RAD_S * rng.standard_normal(len(true)))
 
 
+@pytest.mark.slow
 def test_a_gyro_and_an_encoder_are_read_together_and_know_more_than_either() -> None:
     runs = [beside(sine_run(m, f, seed=i, noise=0.0), 20_000, i, white=True) for i, (m, f) in enumerate(SETS)]
     found = channels_of(runs)

@@ -58,7 +58,8 @@ def found_without_its_effect() -> tuple[Identification, list[str]]:
     return found_in(recorded(passed(2, 100.0), CUBIC), [])
 
 
-@pytest.mark.parametrize(("order", "hertz"), [pytest.param(2, 50.0, marks=pytest.mark.slow), (1, 60.0)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("order", "hertz"), [(2, 50.0), (1, 60.0)])
 def test_noise_that_the_gyro_filters_is_no_missing_effect(order: int, hertz: float) -> None:
     found, said = found_in(recorded(passed(order, hertz), duration_s=4.0, sets=SETS[2:]), [])
     assert found.accepted
@@ -90,6 +91,7 @@ def test_an_effect_beside_such_noise_is_named(order: int, hertz: float, name: st
     )
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_not_offered_is_no_noise() -> None:
     found, said = found_without_its_effect()
     assert found.verdict.unexplained

@@ -156,10 +156,11 @@ def test_nothing_is_named_that_was_only_found_beside_an_open_line() -> None:
     assert "13.37 Hz is left open" in found.verdict.left_open
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("gain", "late", "said"),
     [
-        pytest.param(1.01, 0, "was smaller by 0.99 % in 15 Hz", marks=pytest.mark.slow),
+        (1.01, 0, "was smaller by 0.99 % in 15 Hz"),
         (1.0, 1, "(only in 15 Hz) is no disturbance"),
     ],
 )

@@ -142,6 +142,7 @@ def test_the_noise_of_a_measured_current_pushes_the_platform_and_bends_no_value(
     assert_terms(found)
 
 
+@pytest.mark.slow
 def test_the_measured_current_takes_the_place_of_the_torque_asked_of_a_drive_that_sags() -> None:
     found = identified(sagging(2.5, reading_noise=0.0001, duration_s=2.0))
     assert found.accepted, found.reasons
@@ -163,6 +164,7 @@ def test_where_channel_and_library_do_as_well_the_library_is_named_and_the_chann
     assert found.final.effect_parameters["stiffness_drift"]["slope"].value == pytest.approx(-2.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_temperature_that_wanders_is_not_named_on_clean_data() -> None:
     found = identified(played(WINDING, random_walk(7), reading_noise=0.0, duration_s=2.0))
     assert found.accepted, found.reasons
