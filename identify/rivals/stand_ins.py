@@ -26,9 +26,9 @@ from rig.platform import TERMS
 def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callable[[str], None]) -> Found:
     """The same without the flexible effects that something else is left beside; unchanged where nothing is left over.
 
-    What goes with a quantity that more of the same kind would go with (other orders of cogging: the angle) speaks not
-    against the name, unless it is a wave that is not seen to repeat. Then only how far J, C and K move without it is
-    noted.
+    A residual that depends on what more of the same kind would depend on (other orders of cogging: the angle) does not
+    speak against the name, unless it is a wave that is not seen to repeat. Then only how far J, C and K move without
+    the effect is noted.
     """
     depends = found.disturbance.depends_on  # the largest first
     flexible = [name for name in found.named if effects.get(name).is_flexible]
@@ -61,8 +61,10 @@ def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
         f"{capital(_listed(names))} would explain part of what is missing, but can follow almost anything, and what "
         f"is left then still depends on the {depends_on(depends[0].on, axis)}. Not named for that reason."
     )
-    before = search.left_open
-    search.mark_undetermined(names[0], (f"{before} {words}".strip(), search.tells_apart), less.kept)
+    search.drop(less.kept, "left open")
+    search.left_open = f"{search.left_open} {words}".strip()
+    if not less.named:  # the declared model has all of its terms
+        search.dropped = []
     return replace(less, disturbance=left)
 
 

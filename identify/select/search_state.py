@@ -54,12 +54,11 @@ class Search:
         ]  # fmt: skip
         self.best, self.rivals, self.rival_models, self.dropped = self.base, {}, {}, []
 
-    def drop(self, without: ParameterFit) -> None:
-        """Take back the effects that the final model does without."""
+    def drop(self, without: ParameterFit, status: str = "added, then no longer needed") -> None:
+        """Take back the effects that the final model does without; the report gives them this status."""
         gone = [e for e in self.best.structure.effects if e not in without.structure.effects]
         self.candidates = [
-            replace(c, status="added, then no longer needed") if c.status == "added" and c.effect in gone else c
-            for c in self.candidates
+            replace(c, status=status) if c.status == "added" and c.effect in gone else c for c in self.candidates
         ]  # fmt: skip
         for effect in gone:
             self.rivals.pop(effect, None)
