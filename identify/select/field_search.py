@@ -214,10 +214,13 @@ def search_in_torque(
 
 
 def _weakest(final: FinalFit, declared: Structure) -> str | None:
-    """Of the effects that were found, the one that the final fit supports least; None where none was found."""
-    found = [e for e in final.structure.effects if e not in declared.effects]
-    free = [e for e in found if not any(e in effects.get(other).lower_order for other in found)]
-    return min(free, key=final.support_of, default=None)
+    """Of the effects that were found and can follow almost anything, the one that the final fit supports least.
+
+    None where none was found. Of another effect a slow disturbance may leave the final fit unsure (a constant torque)
+    though samples that were not fitted show it.
+    """
+    found = [e for e in final.structure.effects if e not in declared.effects and effects.get(e).is_flexible]
+    return min(found, key=final.support_of, default=None)
 
 
 def _describes(likeliest: Fit, final: FinalFit) -> bool:

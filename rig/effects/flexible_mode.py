@@ -85,7 +85,6 @@ EFFECT = Effect(
     fastest_rad_s=lambda values: 2.0 * math.pi * values[4] * (1.0 + values[3] / values[0]) ** 0.5,
     large_starts=_large,
     is_flexible=True,
-    goes_with=("history",),
     other_minima=_others,
     separated_by="from inertia: excite with a multisine or chirp, below and above the frequency of the mode",
 )

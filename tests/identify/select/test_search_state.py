@@ -28,9 +28,8 @@ def test_a_dropped_effect_is_no_longer_told_as_added_and_leaves_its_rivals() -> 
     assert search.rival_models == {}
 
 
-def test_the_weakest_is_found_and_no_effect_that_another_builds_on() -> None:
-    found = fit("torque_offset", "quadratic_stiffness", torque_offset=-5.0, quadratic_stiffness=90.0)
-    assert _weakest(found, Structure()) == "quadratic_stiffness"
-    both = fit("coulomb_friction", "cogging", coulomb_friction=40.0, cogging=3.0)
-    assert _weakest(both, Structure()) == "cogging"
-    assert _weakest(both, both.structure) is None
+def test_the_weakest_is_found_among_the_flexible_ones() -> None:
+    found = fit("torque_offset", "creep", "cogging", torque_offset=-5.0, creep=90.0, cogging=3.0)
+    assert _weakest(found, Structure()) == "cogging"
+    assert _weakest(found, Structure(effects=("cogging",))) == "creep"
+    assert _weakest(fit("torque_offset", torque_offset=-5.0), Structure()) is None
