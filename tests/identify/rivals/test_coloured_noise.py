@@ -74,12 +74,13 @@ def test_noise_that_the_gyro_filters_is_no_missing_effect(order: int, hertz: flo
     assert dense == pytest.approx(0.05, rel=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("order", "hertz", "name", "hidden"),
     [
         (2, 100.0, "cubic_stiffness", {"factor": 300.0}),
         # No noise where it is read: the search is far off first.
-        pytest.param(8, 100.0, "creep", {"stiffness": 30.0, "time": 0.1}, marks=pytest.mark.slow),
+        (8, 100.0, "creep", {"stiffness": 30.0, "time": 0.1}),
     ],
 )
 def test_an_effect_beside_such_noise_is_named(order: int, hertz: float, name: str, hidden: dict[str, float]) -> None:

@@ -17,14 +17,8 @@ FEW = ("backlash", "coulomb_friction", "cubic_stiffness")
 MORE = (*FEW, "cogging", "unbalance")
 
 
-@pytest.mark.parametrize(
-    ("share", "offered"),
-    [
-        pytest.param(0.003, MORE, marks=pytest.mark.slow),
-        pytest.param(0.01, MORE, marks=pytest.mark.slow),
-        (0.01, FEW),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("share", "offered"), [(0.003, MORE), (0.01, MORE), (0.01, FEW)])
 def test_an_effect_is_named_beside_a_small_torque_that_nobody_recorded(share: float, offered: tuple[str, ...]) -> None:
     runs = []
     for seed, (torque_nm, hertz) in enumerate(SETS):
