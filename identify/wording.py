@@ -241,7 +241,8 @@ def without(times: float) -> str:
     """What an effect contributes: the held-out error without it over the one with it."""
     if round(times, 2) <= 1.0:
         return "Without it, after refitting, the error on held-out data is no larger."
-    return f"Without it, even after refitting, the error on held-out data is {number(times, 3)} times larger."
+    more = f"{number(100.0 * (times - 1.0), 2)} %" if times < MANY_TIMES else f"{number(times, 3)} times"
+    return f"Without it, even after refitting, the error on held-out data is {more} larger."
 
 
 def how_to_separate(how: str) -> str:

@@ -18,8 +18,8 @@ Resume = Annotated[
     Path | None,
     typer.Option(metavar="DIR", help="Play only the sets that the campaign in DIR did not finish; DIR stays as it is."),
 ]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="The same campaign on the simulated backend.")]
-Emulate = Annotated[bool, typer.Option("--emulate", help="The bench against devices emulated at wire level.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Play the campaign on the simulated rig; nothing moves.")]
+Emulate = Annotated[bool, typer.Option("--emulate", help="Bench drivers on emulated devices; nothing moves.")]
 Live = Annotated[
     bool, typer.Option("--live", help="Serve a page on this machine that shows the campaign and has a stop button.")
 ]

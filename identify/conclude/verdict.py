@@ -73,7 +73,8 @@ def sentences_of(found: Identification, damping_said: bool = False) -> tuple[str
                 f"{capital(plain(name))} is relative to {number(read.reference, 5)}: J, C and K are the values there."
             )
         elif read is not None and read.kind == "current":
-            out.append(f"{capital(plain(read.name))}: one ampere acts as {number(read.factor, 5)} N m.")
+            given = f"{number(read.factor, 5)} {'N of force' if found.axis == 'linear' else 'N m of torque'}"
+            out.append(f"{capital(plain(read.name))}: one ampere gives {given}.")
     out += [
         f"{capital(joined([plain(n) for n in pair.split(' / ')]))} cannot be separated: {why}."
         for pair, why in found.verdict.never_separable.items()
@@ -88,7 +89,8 @@ def _decided_in_torque(found: Identification) -> bool:
 def _nothing_named(found: Identification) -> str:
     """Why no effect is named."""
     if _decided_in_torque(found):
-        return f"no candidate explains {100.0 * WEIGHT:.0f} % of the residual torque throughout the record."
+        torque = "force" if found.axis == "linear" else "torque"
+        return f"every candidate explains less than {100.0 * WEIGHT:.0f} % of the residual {torque}."
     if found.verdict.unexplained:
         return "no candidate explains the residual."
     return "the declared model already reaches the noise floor."

@@ -22,7 +22,7 @@ BEST = 1e4  # from which more of it proves nothing more
 EQUIVALENT_SCORE_RATIO = 0.5  # of the best score: the shorter of two such sets is played
 MAX_SETS = 4  # of a plan
 PROOFS = 3  # sets that are put to the proof in a round
-AT_ONCE = 2  # of them: the compiled simulations run side by side
+PARALLEL_PROOFS = 2  # of them: the compiled simulations run side by side
 LOOKED_AT = 14  # candidates of a pair whose sensitivities are taken
 
 
@@ -146,9 +146,9 @@ def _proofs(
             return looks.proved([*chosen, i], stands)
 
     found: dict[int, list[float]] = {}
-    with ThreadPoolExecutor(AT_ONCE) as workers:
-        for begin in range(0, len(several), AT_ONCE):
-            some = several[begin : begin + AT_ONCE]
+    with ThreadPoolExecutor(PARALLEL_PROOFS) as workers:
+        for begin in range(0, len(several), PARALLEL_PROOFS):
+            some = several[begin : begin + PARALLEL_PROOFS]
             found |= zip(some, workers.map(proof, some), strict=True)
             if any(min(found[i]) >= GOOD for i in some):
                 break

@@ -191,7 +191,7 @@ def _of_little(announced: float, over_announced: float, sentence: str) -> tuple[
             "refuted",
             f"the error without compensation is {over_announced:.2g} times the error that this effect predicts",
         )
-    return "cannot be told", f"{sentence}. No torque can cancel more of it"
+    return "cannot be told", f"{sentence}. A compensating torque cannot cancel more of it"
 
 
 def _percent(share: float) -> str:

@@ -18,7 +18,7 @@ from identify.runs.observability import is_seen_to_repeat
 from identify.select.field_search import Found, with_free_form
 from identify.select.free_form_residual import MOVED_SIGMAS
 from identify.signals.trace import Trace
-from identify.wording import capital, depends_on, joined, plain
+from identify.wording import depends_on, joined, plain
 from rig import effects
 from rig.platform import TERMS
 
@@ -58,8 +58,8 @@ def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
         left = with_free_form(left, dependence, {})
     search = less.search
     words = (
-        f"{capital(_listed(names))} would explain part of what is missing, but can follow almost anything, and what "
-        f"is left then still depends on the {depends_on(depends[0].on, axis)}. Not named for that reason."
+        f"Not named: {_listed(names)}. This would explain part of what is missing, but can follow almost any torque, "
+        f"and with it the residual still depends on the {depends_on(depends[0].on, axis)}."
     )
     search.drop(less.kept, "left open")
     search.left_open = f"{search.left_open} {words}".strip()

@@ -24,7 +24,7 @@ def _describe(run: Run) -> str:
     if taken.whole:
         what = f"all of its {count} samples"
     else:
-        what = f"{taken.begin_s:.6g} to {taken.end_s:.6g} s of {count} samples, the span that tells most"
+        what = f"{taken.begin_s:.6g} to {taken.end_s:.6g} s of {count} samples, the most informative span"
     how = f", low-passed and every {_ordinal(taken.factor)} kept" if taken.factor > 1 else ""
     return f"{run.name}: {what}{how}"
 

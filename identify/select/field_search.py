@@ -180,7 +180,7 @@ def search_in_torque(
 
     after, found_so_far = fitted(final), final
     while (name := _weakest(after, structure)) is not None and after.support_of(name) < STRONG_SUPPORT:
-        say(f"dropped {name}: in the final fit it may as well be zero")
+        say(f"dropped {name}: in the final fit it does not differ significantly from zero")
         final, best = final.minus(name), search.without(best, name)
         after = fitted(final)
     disturbance = disturbance_of(regression, best, floor, unit)

@@ -97,6 +97,6 @@ def _carries_its_share(search: Stepwise, name: str) -> bool:
 
 def _without_trial(search: Stepwise, name: str, before: Fit) -> Fit:
     """The model without an effect that carries nothing still: as it was, or with what was found since."""
-    search.dropped.append((name, "it carries no torque that the others do not"))
+    search.dropped.append((name, "the other terms already explain its torque"))
     found = len(search.best.structure.effects) > len(before.structure.effects) + 1
     return search.without(search.best, name, FULL_ITERATIONS) if found else before

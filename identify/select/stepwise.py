@@ -115,7 +115,7 @@ class Stepwise:
             name = redundant_given(self, left, self.trials.added(now))
             if name is None:
                 break
-            self.dropped.append((name, "beside a curve over what no effect explains, it explains nothing"))
+            self.dropped.append((name, "a free-form curve explains its share as well, so it is not needed"))
             self.stood_for_curves.add(name)
             self.say(f"took {name} back: a curve over what is left explains it")
             now = self.without(now, name, FULL_ITERATIONS)
@@ -260,7 +260,7 @@ class Stepwise:
                 continue
             why = f"the log-likelihood changes by {-0.5 * evidence.gain:+.2g} without it"
             if term and light:
-                why = "it carries no torque that the others do not"
+                why = "the other terms already explain its torque"
             self.dropped.append((name, why))
             self.say(f"dropped {name}")
             now = without

@@ -197,7 +197,7 @@ class TorqueSearch:
                     found.rivals[chosen.effect] = others
         for term in structure.terms:
             if term not in best.structure.terms:
-                found.dropped.append((term, "on samples not fitted it carries no torque that the others do not"))
+                found.dropped.append((term, "on held-out samples the other terms already explain its torque"))
         for name in named:
             found.contribution[name] = self.without(best, name).held_nm / max(best.held_nm, 1e-300)
         return found

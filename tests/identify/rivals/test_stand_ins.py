@@ -54,7 +54,7 @@ def test_a_flexible_effect_beside_which_something_else_is_left_is_not_named() ->
     assert asked == [("flexible_mode",)]
     assert less.after.values["inertia",] == 1.06
     assert [d.on for d in less.disturbance.depends_on] == ["frequency"]  # not forgotten, though it is not seen any more
-    assert "Flexible mode would explain part" in less.search.left_open
+    assert "Not named: flexible mode." in less.search.left_open
     assert "frequency" in less.search.left_open
     assert {c.effect: c.status for c in less.search.candidates}["flexible_mode"] == "left open"
 
