@@ -179,7 +179,7 @@ def search_in_torque(
         return _final(regression, best, traces, split)
 
     after, found_so_far = fitted(final), final
-    while (name := _weakest(after, structure)) is not None and after.support_of(name) < STRONG_SUPPORT:
+    while name := _unsupported(after, structure, bool(by_likelihood)):
         say(f"dropped {name}: in the final fit it does not differ significantly from zero")
         final, best = final.minus(name), search.without(best, name)
         after = fitted(final)
@@ -213,14 +213,18 @@ def search_in_torque(
     return Found(reported, before, after, disturbance, (errors(base), errors(best)), lacking)
 
 
-def _weakest(final: FinalFit, declared: Structure) -> str | None:
-    """Of the effects that were found and can follow almost anything, the one that the final fit supports least.
+def _unsupported(final: FinalFit, declared: Structure, by_likelihood: bool) -> str | None:
+    """Of the effects that were found, the one that the final fit supports least, if too little; else None.
 
-    None where none was found. Of another effect a slow disturbance may leave the final fit unsure (a constant torque)
-    though samples that were not fitted show it.
+    The final fit asks again what the likelihood has named. Of what the search in torque has named it is asked only
+    about effects that can follow almost anything: of others a slow disturbance may leave it unsure (a constant torque)
+    though samples that were not fitted show them.
     """
-    found = [e for e in final.structure.effects if e not in declared.effects and effects.get(e).is_flexible]
-    return min(found, key=final.support_of, default=None)
+    found = [e for e in final.structure.effects if e not in declared.effects]
+    builds_on = {lower for e in found for lower in effects.get(e).lower_order}
+    asked = [e for e in found if e not in builds_on and (by_likelihood or effects.get(e).is_flexible)]
+    weakest = min(asked, key=final.support_of, default=None)
+    return weakest if weakest is not None and final.support_of(weakest) < STRONG_SUPPORT else None
 
 
 def _describes(likeliest: Fit, final: FinalFit) -> bool:
