@@ -75,8 +75,8 @@ def reasons_against_disturbance(left: Disturbance, accept: AcceptConfig, axis: s
             changes = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in beyond.items()])
             keys = joined([f"identify.accept.{k}_percent" for k in beyond])
             out.append(
-                f"{plain(effect)} changes {changes}, and it is flexible enough to have taken up part of the {torque} "
-                f"that depends on the {on} and has no name yet; {keys} allows less"
+                f"{plain(effect)} changes {changes}, more than is allowed ({keys}), and it can follow almost any "
+                f"{torque}: it may have taken up part of what depends on the {on} and has no name yet"
             )
     return out
 
