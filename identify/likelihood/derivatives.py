@@ -12,6 +12,7 @@ from identify.likelihood.fit import Columns, Look
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.simulate.shots import RUNAWAY, Shots, moved, with_bias
+from rig import effects
 from rig.arrays import Array
 from rig.dynamics.gains import Gains, Noise, innovations_with
 
@@ -149,7 +150,8 @@ def _of_run(
     for k, step in through_gains.items():
         there = at.x.copy()
         there[k] += step
-        if len(at.names[k]) > 1:  # of the sensor, whose own states are corrected, and pass that on
+        # The states of a sensor's low-pass are corrected, and pass that on.
+        if len(at.names[k]) > 1 and effects.get(at.names[k][0]).lag is not None:
             other = p.look(s, at.structure, at.names, there, at.noise)
             change = ((base.innovations[w] - other.innovations[w]) / (step * root)).ravel()
             pulled[:, k], gains = change - columns[:, k], other.gains

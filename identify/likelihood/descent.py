@@ -197,8 +197,8 @@ class Descent:
 
     @staticmethod
     def _shapes_gains(name: Name) -> bool:
-        """Whether a parameter is one of the linear part or of the sensor: what effects do to the gains is little."""
-        return len(name) == 1 or effects.get(name[0]).lag is not None
+        """Whether a parameter is one of the linear part or of the sensor: what others do to the gains is little."""
+        return len(name) == 1 or effects.get(name[0]).lag is not None or effects.get(name[0]).has_linear_states
 
     def _solvable(self, of_noise: bool, of_gains: bool = True) -> Step:
         """The normal equations where the descent stands; the information of the parameters is kept."""

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from identify.signals.trace import Trace
-from rig.arrays import Array
 from rig.dynamics.gains import Gains, Noise, Sensing, StartVariance, gains_of
+from rig.dynamics.linear_part import LinearPart
 
 SAME_STEP = 1e-5  # relative: what steps of runs differ by and are the same to a gain
 GAIN_CACHE_SIZE = 12  # of runs that were sampled alike
@@ -32,18 +32,18 @@ class KeptGains:
         self._gains: dict[tuple[object, ...], tuple[dict[tuple[object, ...], Gains], Lock]] = {}
 
     def of(
-        self, trace: Trace, jck: Array, noise: Noise, sensing: Sensing, spans: list[tuple[int, int]]
+        self, trace: Trace, linear: LinearPart, noise: Noise, sensing: Sensing, spans: list[tuple[int, int]]
     ) -> Gains:  # fmt: skip
         """A run's gains; the last few are kept, because most looks change an effect and not the linear part."""
         keep, spans, group = self._same_sampling(trace, spans)
         even = abs(trace.step_s / self.step_s - 1.0) < SAME_STEP
         step_s = self.step_s if even else trace.step_s
-        key = (*jck.tolist(), noise, sensing, step_s, *spans)
+        key = (linear, noise, sensing, step_s, *spans)
         kept, lock = self._gains.setdefault(group, ({}, Lock()))
         with lock:
             found = kept.get(key)
             if found is None:
-                found = gains_of(jck, noise, step_s, sensing, keep, spans, self.begun)
+                found = gains_of(linear, noise, step_s, sensing, keep, spans, self.begun)
                 for old in list(kept)[: max(0, len(kept) + 1 - GAIN_CACHE_SIZE)]:
                     kept.pop(old, None)
                 kept[key] = found

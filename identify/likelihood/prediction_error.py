@@ -34,6 +34,7 @@ from rig import effects
 from rig.arrays import Array
 from rig.dynamics.equations import Equations
 from rig.dynamics.gains import Gains, Noise, Sensing, StartVariance
+from rig.dynamics.linear_part import LinearPart, linear_part
 from rig.dynamics.predictor import predict_ahead
 
 # Of the motion, root mean square, by which a start state may be off: the smoothed motion is worst where a run begins.
@@ -84,7 +85,7 @@ class PredictionError:
             self.reading_variance, self.gyro, self.wanders,
         )  # fmt: skip
         self.workers = Workers(traces, threads=longest > LONG_RUN_SAMPLES * self.step_s)
-        self._slopes: dict[tuple[object, ...], Array] = {}
+        self._slopes: dict[tuple[object, ...], LinearPart] = {}
         self._slopes_lock = Lock()
         # A decay shows nothing but how it began and how it swings on, far beyond what is linear about its prediction:
         # where it began is fitted, and not corrected as the readings come in.
@@ -189,14 +190,14 @@ class PredictionError:
         linear = self._linear_part(equations)
         return self._gains.of(s.trace, linear, noise, self._sensing(s.trace, equations), spans)
 
-    def _linear_part(self, equations: Equations) -> Array:
-        """Inertia, damping and stiffness as the motion meets them, (3,): the effects' mean slopes along it included.
+    def _linear_part(self, equations: Equations) -> LinearPart:
+        """The platform as a Kalman filter takes it, with the effects' mean slopes along the motion.
 
         The spring of a pendulum is gravity, and dry friction damps. Gains of a platform without either would follow
         another motion (statistical linearisation: Gelb and Vander Velde 1968).
         """
         if not equations.body:
-            return equations.jck
+            return LinearPart(*equations.jck.tolist())
         key = (equations.jck.tobytes(), equations.p.tobytes(), equations.body)
         with self._slopes_lock:
             found = self._slopes.get(key)
@@ -204,8 +205,8 @@ class PredictionError:
                 inertia, damping, stiffness = equations.jck.tolist()
                 damps, pulls = mean_slopes(equations, self.traces)
                 # Gains of a linear part that runs away are none; an effect that drives it does so for a while only.
-                found = np.array(
-                    [inertia, damping + max(damps, 0.0), max(stiffness + pulls, min(stiffness, 0.0))]
+                found = linear_part(
+                    equations, [inertia, damping + max(damps, 0.0), max(stiffness + pulls, min(stiffness, 0.0))]
                 )  # fmt: skip
                 if len(self._slopes) > SLOPE_CACHE_SIZE:
                     self._slopes.clear()

@@ -17,7 +17,10 @@ EVERY = 8  # of the instants of the motion: enough for a mean
 
 
 def mean_slopes(equations: Equations, traces: Sequence[Trace]) -> tuple[float, float]:
-    """Least squares of all effects' torque over rate and angle: N m s/rad and N m/rad; zeros without effects."""
+    """Least squares of the effects' torque over rate and angle: N m s/rad and N m/rad; zeros without effects.
+
+    Effects that are linear with their states need no mean, and are left out.
+    """
     square, across = np.zeros((2, 2)), np.zeros(2)
     for trace in traces:
         angle, rate = trace.fine[0][::EVERY], trace.fine[1][::EVERY]
@@ -38,6 +41,8 @@ def _resisted(equations: Equations, trace: Trace) -> Array:
     out = np.zeros(len(angle[::EVERY]))
     for k, name in enumerate(equations.body):
         effect = effects.get(name)
+        if effect.has_linear_states:
+            continue
         every = 1 if effect.states else EVERY  # states follow the motion from instant to instant
         z = effect.rest_state(angle[0], rate[0]) if effect.rest_state else np.zeros(effect.states)
         along, soft = np.empty(len(angle[::every])), max(2.0 * left, 1e-12)

@@ -3,11 +3,12 @@
 The gains come from inertia, damping and stiffness and two noises, by the Riccati recursion (``rig.dynamics.riccati``).
 
 States of the linear part: angle, rate, coloured disturbance torque and where that is heading, the sensor's output and
-its slope (what its low-pass still holds back), and the gyro's bias, which walks.
+its slope (what its low-pass still holds back), the gyro's bias, which walks, and the states of linear effects.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -17,10 +18,11 @@ import numpy as np
 from scipy.linalg import expm
 
 from rig.arrays import Array
+from rig.dynamics.linear_part import LinearPart
 from rig.dynamics.native import jit
 from rig.dynamics.riccati import riccati
 
-STATES = 7  # angle, rate, disturbance torque and what it is heading for, sensor output, its slope, bias
+STATES = 7  # angle, rate, disturbance torque and what it is heading for, sensor output, its slope, bias; effects behind
 ANGLE, RATE, TORQUE, AIM, SENSED, SLOPE, BIAS = range(STATES)
 
 
@@ -118,12 +120,16 @@ class StartVariance(NamedTuple):
 
 @dataclass(frozen=True)
 class Gains:
-    """What an innovation of one adds to the states after every sample, (n, m, 7), and its variance, (n, m)."""
+    """What an innovation of one adds to the states after every sample, (n, m, 7 + s), and its variance, (n, m).
+
+    The last s are the states of linear effects.
+    """
 
     gain: Array
     variance: Array
-    onward: Array  # the linear part over a sample, (7, 7)
-    reads: Array  # what each reading is of the states, (m, 7)
+    onward: Array  # the linear part over a sample, (7 + s, 7 + s)
+    reads: Array  # what each reading is of the states, (m, 7 + s)
+    of_effects: Array  # which internal states of the platform the last ones are, (s,)
 
     @property
     def coloured(self) -> Array:
@@ -142,20 +148,22 @@ class Gains:
 
 
 @lru_cache(maxsize=64)
-def _discrete(
-    j: float, c: float, k: float, noise: Noise, lag: tuple[float, float], step_s: float
-) -> tuple[Array, Array]:  # fmt: skip
-    """Transition and disturbance covariance of the linear part over a sample (van Loan 1978), (7, 7) each.
+def _discrete(linear: LinearPart, noise: Noise, lag: tuple[float, float], step_s: float) -> tuple[Array, Array]:
+    """Transition and disturbance covariance of the linear part over a sample (van Loan 1978), (7 + s, 7 + s) each.
 
     States that are not there (a low-pass of first order has no slope) keep nothing and get nothing.
     """
-    f, density = np.zeros((STATES, STATES)), np.zeros((STATES, STATES))
+    j, every = linear.inertia, STATES + len(linear.states)
+    f, density = np.zeros((every, every)), np.zeros((every, every))
     f[ANGLE, RATE] = 1.0
-    f[RATE, :3] = -k / j, -c / j, 1.0 / j
+    f[RATE, :3] = -linear.stiffness / j, -linear.damping / j, 1.0 / j
+    if linear.states:
+        f[RATE, STATES:] = -np.array(linear.torque) / j
+        f[STATES:, :2], f[STATES:, STATES:] = linear.by_motion, linear.by_states
     time = noise.time_constant_s
     f[TORQUE, TORQUE], f[TORQUE, AIM], f[AIM, AIM] = -1.0 / time, 1.0 / time, -1.0 / time
     first, second = lag
-    there = [ANGLE, RATE, TORQUE, AIM, BIAS]
+    there = [ANGLE, RATE, TORQUE, AIM, BIAS, *range(STATES, every)]
     if second > 0.0:
         f[SENSED, SLOPE] = 1.0
         f[SLOPE, RATE], f[SLOPE, SENSED], f[SLOPE, SLOPE] = 1.0 / second, -1.0 / second, -first / second
@@ -170,26 +178,33 @@ def _discrete(
     f[BIAS, BIAS] = -1.0 / noise.walk_s
     density[BIAS, BIAS] = noise.walk
     at = np.ix_(sorted(there), sorted(there))
+    # A state far faster than a sample (the lag of a quick gyro) cancels badly: a part of a sample in which it is slow
+    # is doubled until it is the sample.
+    fastest = float(np.max(np.abs(np.linalg.eigvals(f[at])))) * step_s
+    doublings = max(0, math.ceil(math.log2(max(fastest, 1.0))))
     n = len(there)
     big = np.zeros((2 * n, 2 * n))
     big[:n, :n], big[:n, n:], big[n:, n:] = -f[at], density[at], f[at].T
-    van_loan = expm(big * step_s)
-    phi, q = np.zeros((STATES, STATES)), np.zeros((STATES, STATES))
-    phi[at] = van_loan[n:, n:].T
-    q[at] = phi[at] @ van_loan[:n, n:]
+    van_loan = expm(big * (step_s / 2**doublings))
+    onward = van_loan[n:, n:].T
+    driven = onward @ van_loan[:n, n:]
+    for _ in range(doublings):
+        driven, onward = driven + onward @ driven @ onward.T, onward @ onward
+    phi, q = np.zeros((every, every)), np.zeros((every, every))
+    phi[at], q[at] = onward, driven
     return np.ascontiguousarray(phi), 0.5 * (q + q.T)
 
 
 def gains_of(
-    jck: Array, noise: Noise, step_s: float, sensing: Sensing, keep: Any, spans: Sequence[tuple[int, int]],
+    linear: LinearPart, noise: Noise, step_s: float, sensing: Sensing, keep: Any, spans: Sequence[tuple[int, int]],
     begun: StartVariance = StartVariance(),  # noqa: B008  immutable
 ) -> Gains:  # fmt: skip
     """Kalman gains along a run.
 
     Parameters
     ----------
-    jck
-        Inertia, damping and stiffness of the linear part, (3,).
+    linear
+        The linear part of the platform.
     sensing
         What is read.
     keep
@@ -200,21 +215,22 @@ def gains_of(
         How well the start of a stretch is known. It is read off what a low-pass has let through. What that holds back
         is its first coefficient times the acceleration and its second times the jerk, and nobody knows those.
     """
-    phi, q = _discrete(*jck.tolist(), noise, sensing.lag, step_s)
+    phi, q = _discrete(linear, noise, sensing.lag, step_s)
+    every = len(phi)
     lagging = sensing.lag[0] > 0.0
     reads, noises = [], []
     if sensing.rate:
-        row = np.zeros(STATES)
+        row = np.zeros(every)
         row[SENSED if lagging else RATE] = row[BIAS] = 1.0
         reads.append(row)
         noises.append(1.0)
     if sensing.angle_variance > 0.0:
-        row = np.zeros(STATES)
+        row = np.zeros(every)
         row[ANGLE] = 1.0
         row[BIAS] = 0.0 if sensing.rate else 1.0
         reads.append(row)
         noises.append(sensing.angle_variance)
-    start = np.zeros((STATES, STATES))
+    start = np.zeros((every, every))
     start[ANGLE, ANGLE], start[RATE, RATE] = begun.angle, begun.rate
     start[TORQUE : AIM + 1, TORQUE : AIM + 1] = noise.coloured
     if sensing.rate:
@@ -228,17 +244,24 @@ def gains_of(
         if second > 0.0:
             start[SLOPE, SLOPE] = begun.acceleration
             start[RATE, SLOPE] = start[SLOPE, RATE] = first * begun.acceleration
+    if linear.states:
+        rest = np.array(linear.at_rest)  # they follow angle and rate, whatever is known of those
+        start[STATES:, :STATES] = rest @ start[:2, :STATES]
+        start[:STATES, STATES:] = start[STATES:, :STATES].T
+        start[STATES:, STATES:] = rest @ start[:2, :2] @ rest.T
     # A state that is neither read, nor driven, nor unknown at the start needs no arithmetic.
-    there = np.flatnonzero((np.arange(STATES) <= TORQUE) | (np.diag(q) > 0.0) | (np.diag(start) > 0.0))
+    there = np.flatnonzero(
+        (np.arange(every) <= TORQUE) | (np.arange(every) >= STATES) | (np.diag(q) > 0.0) | (np.diag(start) > 0.0)
+    )
     at = np.ix_(there, there)
     few, driven, seen = np.ascontiguousarray(phi[at]), np.ascontiguousarray(q[at]), np.array(reads)[:, there]
     m, n = len(reads), len(there)
     gain, variance = np.zeros((len(keep), m, n)), np.ones((len(keep), m))
     for begin, last in spans:
         riccati(few, driven, seen, np.array(noises), start[at].copy(), keep, begin, last, gain, variance)
-    whole = np.zeros((len(keep), m, STATES))
+    whole = np.zeros((len(keep), m, every))
     whole[:, :, there] = gain
-    return Gains(whole, variance, phi, np.array(reads))
+    return Gains(whole, variance, phi, np.array(reads), np.array(linear.states, dtype=np.int64))
 
 
 @jit
@@ -249,7 +272,7 @@ def _follow(spans, e, state, keep, gain, other, phi, reads, coloured, walk_decay
         d[:] = 0.0
         for i in range(spans[k, 0], spans[k, 1] + 1):
             for m in range(readings):
-                moved = e[i, m] - bias * reads[m, states - 1]  # what the last state, the bias, stands for
+                moved = e[i, m] - bias * reads[m, BIAS]
                 for a in range(states):
                     moved -= reads[m, a] * d[a]
                 out[i, m] = moved
@@ -264,7 +287,7 @@ def _follow(spans, e, state, keep, gain, other, phi, reads, coloured, walk_decay
             for a in range(2):
                 for b in range(2):
                     ahead[TORQUE + a] += (phi[TORQUE + a, TORQUE + b] - coloured[a, b]) * state[i, TORQUE + b]
-            ahead[states - 1] += (phi[states - 1, states - 1] - walk_decay) * state[i, AIM + 1]
+            ahead[BIAS] += (phi[BIAS, BIAS] - walk_decay) * state[i, AIM + 1]
             d[:] = ahead
 
 

@@ -2,7 +2,8 @@
 
 A torque that nobody recorded (current ripple, the floor, a cable) sets a simulated platform off for good. A Kalman
 filter in innovations form takes it up: the nonlinear simulator predicts each sample from the one before, the
-difference to the measurement corrects angle, rate and an estimate of the coloured part of that torque. The gains come
+difference to the measurement corrects angle, rate, the states of linear effects (a flexible mode rings with the shaft)
+and an estimate of the coloured part of that torque. The gains come
 from the linear part of the platform and its noises (``rig.dynamics.gains``). With no torque disturbance they are zero
 and the prediction is the simulation of the whole run (Ljung, System Identification, ch. 7; Astrom, Automatica 16,
 1980).
@@ -19,7 +20,7 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.dynamics.equations import Equations, Readings
-from rig.dynamics.gains import BIAS, Gains
+from rig.dynamics.gains import BIAS, STATES, Gains
 from rig.dynamics.integrator import acceleration, step_over_kinks
 from rig.dynamics.native import call_filter, jit, offset, pointer
 
@@ -40,7 +41,7 @@ def _between(w0, a0, w1, a1, h, x, same):  # type: ignore[no-untyped-def]
 @jit
 def _predict(  # type: ignore[no-untyped-def]
     starts, spans, offset_s, z, h, ratio, torque, jck, kernels, loads, z_at, p, p_at, kinks,
-    filters, fs, fs_at, fp, fp_at, measured, keep, gain, coloured, decay, walks, walk_decay, rate, bias, reads,
+    filters, fs, fs_at, fp, fp_at, measured, keep, gain, tracked, coloured, decay, walks, walk_decay, rate, bias, reads,
     out, state,
 ):  # fmt: skip
     n_states, readings = len(z), measured.shape[1]
@@ -80,7 +81,9 @@ def _predict(  # type: ignore[no-untyped-def]
                     aim += gain[i, m, 3] * e
                     held += gain[i, m, 4] * e
                     slope += gain[i, m, 5] * e
-                    walked += gain[i, m, 6] * e
+                    walked += gain[i, m, BIAS] * e
+                    for s in range(len(tracked)):
+                        z[tracked[s]] += gain[i, m, STATES + s] * e
                     if frictions and gain[i, m, 1] != 0.0:
                         motion[2] = np.sign(motion[1])
             state[i, 0], state[i, 1], state[i, 2], state[i, 3], state[i, 4] = motion[0], motion[1], slow, aim, walked
@@ -155,7 +158,7 @@ def predict_ahead(
         np.ascontiguousarray(starts), np.array(spans, dtype=np.int64).reshape(-1, 2), offset_s,
         equations.rest_states(*starts[0]), step_s, ratio, torque, equations.jck, equations.kernels, equations.loads,
         equations.z_at, p, equations.p_at, equations.kinks, filters, fs, fs_at, fp, fp_at, measured, keep, gains.gain,
-        gains.coloured, gains.held, np.ascontiguousarray(gains.reads[:, BIAS]), gains.walk_decay, rate, bias,
-        reads, out, state,
+        gains.of_effects, gains.coloured, gains.held, np.ascontiguousarray(gains.reads[:, BIAS]), gains.walk_decay,
+        rate, bias, reads, out, state,
     )  # fmt: skip
     return out, state

@@ -166,6 +166,7 @@ FREE_FORMS: Mapping[str, Effect] = {
             "N*m/rad",
             MEMORIES,
             states=MEMORIES,
+            has_linear_states=True,
             rest_state=lambda angle, rate: (angle,) * MEMORIES,
             fastest_rad_s=lambda values: 0.3 / values[3],
         ),

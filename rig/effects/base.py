@@ -134,6 +134,7 @@ class Effect:
     parameters: tuple[Parameter, ...]
     kernel: Any
     states: int = 0
+    has_linear_states: bool = False  # a LOAD whose torque and states are linear in angle, rate and states
     filter_states: Callable[[float, tuple[float, ...]], int] | None = None
     rest_state: Callable[[float, float], tuple[float, ...]] | None = None  # of angle and rate at the start
     lag: Callable[[tuple[float, ...]], tuple[float, float]] | None = None  # of a SENSOR: s and s^2 of its denominator

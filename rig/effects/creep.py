@@ -34,6 +34,7 @@ EFFECT = Effect(
     ),
     kernel=_torque,
     states=1,
+    has_linear_states=True,
     rest_state=lambda angle, rate: (angle,),
     fastest_rad_s=lambda values: 0.3 / values[4],
     is_flexible=True,

@@ -81,6 +81,7 @@ EFFECT = Effect(
     ),
     kernel=_torque,
     states=2,
+    has_linear_states=True,
     rest_state=lambda angle, rate: (angle, rate),
     fastest_rad_s=lambda values: 2.0 * math.pi * values[4] * (1.0 + values[3] / values[0]) ** 0.5,
     large_starts=_large,

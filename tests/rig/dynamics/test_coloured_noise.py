@@ -9,6 +9,7 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from rig.arrays import Array
 from rig.dynamics import Equations, Grid, TorqueSignal
 from rig.dynamics.gains import AIM, RATE, TORQUE, Noise, Sensing, gains_of, innovations_with
+from rig.dynamics.linear_part import LinearPart
 from rig.dynamics.predictor import predict_ahead
 from rig.platform import Platform
 from tests.rig.dynamics.test_predictor import JCK, SIGMA, STEP, TIME, innovations
@@ -41,7 +42,7 @@ def test_its_covariance_is_the_stationary_one_and_its_variance_the_sum_of_both(n
 def test_a_rough_torque_alone_heads_for_nothing() -> None:
     noise = Noise(slow=SLOW, time_constant_s=TIME_S)
     keep = np.ones(len(TIME), dtype=bool)
-    gains = gains_of(JCK, noise, STEP, Sensing(False, 1.0), keep, [(0, len(TIME) - 1)])
+    gains = gains_of(LinearPart(*JCK), noise, STEP, Sensing(False, 1.0), keep, [(0, len(TIME) - 1)])
     assert np.any(gains.gain[:, 0, TORQUE] != 0.0)
     assert gains.gain[:, 0, AIM] == pytest.approx(0.0, abs=1e-9)
     assert gains.coloured[0, 0] == pytest.approx(np.exp(-STEP / TIME_S))
@@ -94,7 +95,7 @@ def test_what_other_gains_do_is_followed_without_a_prediction() -> None:
     grid = Grid(TIME, TorqueSignal(TIME, torque, "zero_order"), 8)
 
     def predicted(noise: Noise):  # type: ignore[no-untyped-def]
-        gains = gains_of(JCK, noise, STEP, Sensing(False, 1.0), keep, spans)
+        gains = gains_of(LinearPart(*JCK), noise, STEP, Sensing(False, 1.0), keep, spans)
         out, state = predict_ahead(
             equations, grid.shaft_torque(equations), grid.step_s, 8, spans, np.zeros((1, 2)), angle[:, None], keep,
             gains, False, 0.0,

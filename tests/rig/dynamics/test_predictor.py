@@ -8,6 +8,7 @@ import pytest
 from rig.arrays import Array
 from rig.dynamics import Equations, Grid, TorqueSignal
 from rig.dynamics.gains import RATE, Noise, Sensing, gains_of
+from rig.dynamics.linear_part import LinearPart
 from rig.dynamics.predictor import predict_ahead
 from rig.platform import Platform
 
@@ -32,7 +33,7 @@ def innovations(torque: Array, angle: Array, noise: Noise, effects: dict[str, di
     grid = Grid(TIME, TorqueSignal(TIME, torque, "zero_order"), 8)
     keep = np.ones(len(TIME), dtype=bool)
     spans = [(0, len(TIME) - 1)]
-    gains = gains_of(JCK, noise, STEP, Sensing(False, 1.0), keep, spans)
+    gains = gains_of(LinearPart(*JCK), noise, STEP, Sensing(False, 1.0), keep, spans)
     read = angle[:, None]
     predicted, _ = predict_ahead(
         equations, grid.shaft_torque(equations), grid.step_s, 8, spans, np.zeros((1, 2)), read, keep, gains, False, 0.0
@@ -75,7 +76,7 @@ def test_dry_friction_stops_what_noise_would_move() -> None:
 def test_a_lost_sample_makes_the_next_ones_less_certain_for_a_while() -> None:
     keep = np.ones(len(TIME), dtype=bool)
     keep[1000:1010] = False
-    gains = gains_of(JCK, Noise(white=1e4), STEP, Sensing(True), keep, [(0, len(TIME) - 1)])
+    gains = gains_of(LinearPart(*JCK), Noise(white=1e4), STEP, Sensing(True), keep, [(0, len(TIME) - 1)])
     assert gains.variance[1010] > 1.5 * gains.variance[990]
     assert gains.variance[1600] == pytest.approx(gains.variance[990], rel=1e-3)
     assert not np.any(gains.gain[1000:1010])
@@ -94,7 +95,7 @@ def read_by_gyro(noise: Noise, sensing: Sensing, effects: dict[str, dict[str, fl
     true = Equations(Platform(*JCK, LATE))
     read = grid.simulate(true, (0.0, 0.0)).sensed_rate_rad_s + bias + SIGMA * rng.standard_normal(len(TIME))
     equations = Equations(Platform(*JCK, effects))
-    gains = gains_of(JCK, noise, STEP, sensing, KEEP, SPANS)
+    gains = gains_of(LinearPart(*JCK), noise, STEP, sensing, KEEP, SPANS)
     predicted, _ = predict_ahead(
         equations, grid.shaft_torque(equations), grid.step_s, 8, SPANS, np.zeros((1, 2)), read[:, None], KEEP, gains,
         True, 0.0,
@@ -121,8 +122,8 @@ def test_a_bias_that_walks_is_followed() -> None:
 
 def test_an_encoder_beside_a_gyro_makes_the_next_angle_more_certain_than_either_alone() -> None:
     noise = Noise(white=1e2)
-    alone = gains_of(JCK, noise, STEP, Sensing(False, 1.0), KEEP, SPANS)
-    both = gains_of(JCK, noise, STEP, Sensing(True, 1.0), KEEP, SPANS)
+    alone = gains_of(LinearPart(*JCK), noise, STEP, Sensing(False, 1.0), KEEP, SPANS)
+    both = gains_of(LinearPart(*JCK), noise, STEP, Sensing(True, 1.0), KEEP, SPANS)
     assert alone.variance.shape == (len(TIME), 1) and both.variance.shape == (len(TIME), 2)
     assert both.variance[-1, 1] < alone.variance[-1, 0]
     assert both.gain[-1, 0, RATE] > 0.0

@@ -10,6 +10,7 @@ from scipy.linalg import solve_discrete_are
 
 from rig.arrays import Array
 from rig.dynamics.gains import BIAS, RATE, STATES, Noise, Sensing, StartVariance, _discrete, gains_of
+from rig.dynamics.linear_part import LinearPart
 
 JCK = np.array([0.02, 0.045, 680.0])
 STEP_S, SAMPLES = 1e-3, 6000
@@ -21,7 +22,7 @@ ENCODER_BESIDE = Sensing(True, angle_variance=0.01, bias_variance=100.0)
 
 def sample_by_sample(noise: Noise, sensing: Sensing, keep: Any, begun: StartVariance) -> tuple[Array, Array]:
     """Gains and innovation variances as the textbook has them (Anderson and Moore, Optimal Filtering, ch. 3)."""
-    phi, q = _discrete(*JCK.tolist(), noise, sensing.lag, STEP_S)
+    phi, q = _discrete(LinearPart(*JCK.tolist()), noise, sensing.lag, STEP_S)
     start = np.zeros((STATES, STATES))
     start[0, 0], start[1, 1] = begun.angle, begun.rate
     start[2:4, 2:4] = noise.coloured
@@ -54,7 +55,7 @@ def sample_by_sample(noise: Noise, sensing: Sensing, keep: Any, begun: StartVari
 def test_gains_are_those_of_the_recursion_sample_by_sample(noise: Noise, sensing: Sensing, lost: Any) -> None:
     keep = np.ones(SAMPLES, dtype=bool)
     keep[list(lost)] = False
-    found = gains_of(JCK, noise, STEP_S, sensing, keep, [(0, SAMPLES - 1)], BEGUN)
+    found = gains_of(LinearPart(*JCK), noise, STEP_S, sensing, keep, [(0, SAMPLES - 1)], BEGUN)
     gain, variance = sample_by_sample(noise, sensing, keep, BEGUN)
     np.testing.assert_allclose(found.variance, variance, rtol=1e-6)
     size = np.max(np.abs(gain[100:]), axis=0)  # of each gain, once the start is over
@@ -64,8 +65,8 @@ def test_gains_are_those_of_the_recursion_sample_by_sample(noise: Noise, sensing
 def test_gains_settle_on_the_algebraic_equation() -> None:
     quick = Noise(white=1.0, slow=1e4, time_constant_s=0.02)
     keep = np.ones(SAMPLES, dtype=bool)
-    found = gains_of(JCK, quick, STEP_S, Sensing(True), keep, [(0, SAMPLES - 1)], BEGUN)
-    phi, q = _discrete(*JCK.tolist(), quick, (0.0, 0.0), STEP_S)
+    found = gains_of(LinearPart(*JCK), quick, STEP_S, Sensing(True), keep, [(0, SAMPLES - 1)], BEGUN)
+    phi, q = _discrete(LinearPart(*JCK.tolist()), quick, (0.0, 0.0), STEP_S)
     there = [0, 1, 2, 3]
     row = np.array([[0.0, 1.0, 0.0, 0.0]])
     p = solve_discrete_are(phi[np.ix_(there, there)].T, row.T, q[np.ix_(there, there)], np.eye(1))
@@ -76,5 +77,15 @@ def test_gains_settle_on_the_algebraic_equation() -> None:
 def test_a_platform_that_runs_away_is_followed_by_its_sensor() -> None:
     keep = np.ones(SAMPLES, dtype=bool)
     falling = np.array([0.02, -0.5, -680.0])
-    found = gains_of(falling, NOISE, STEP_S, GYRO, keep, [(0, SAMPLES - 1)], BEGUN)
+    found = gains_of(LinearPart(*falling), NOISE, STEP_S, GYRO, keep, [(0, SAMPLES - 1)], BEGUN)
     assert np.all(np.isfinite(found.gain)) and np.all(found.variance >= 1.0)
+
+
+@pytest.mark.parametrize("lag_s", [1e-5, 1e-4, 1e-3])
+def test_a_low_pass_far_faster_than_a_sample_hides_nothing(lag_s: float) -> None:
+    noise, step_s = Noise(white=50.0, slow=300.0, time_constant_s=0.2, ahead=1e-9), 0.02
+    keep, spans = np.ones(200, bool), [(0, 199)]
+    part = LinearPart(*JCK)
+    quick = gains_of(part, noise, step_s, Sensing(True, 0.0, (lag_s, 0.0)), keep, spans, BEGUN)
+    without = gains_of(part, noise, step_s, Sensing(True), keep, spans, BEGUN)
+    assert quick.variance[-1, 0] == pytest.approx(without.variance[-1, 0], rel=20.0 * lag_s / step_s)
