@@ -25,6 +25,8 @@ UNITS = {
     "linear": {"inertia": "kg", "damping": "N*s/m", "stiffness": "N/m", "torque": "N", "rate": "m/s"},
 }
 
+NORMAL_95 = 1.96  # half a 95 % interval in standard errors, where the error is normal
+
 
 @dataclass(frozen=True)
 class ParameterEstimate:
@@ -35,6 +37,12 @@ class ParameterEstimate:
     ci95: tuple[float, float]
     unit: str
     max_error_percent: float | None = None  # Eq. 15 against identify.reference
+
+    @classmethod
+    def normal(cls, value: float, std_error: float, unit: str) -> ParameterEstimate:
+        """With the interval of a normal error."""
+        half = NORMAL_95 * std_error
+        return cls(value, std_error, (value - half, value + half), unit)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from identify.residual import Disturbance
-from identify.results import Errors, Identification, NotReported, ParameterEstimate
+from identify.results import NORMAL_95, Errors, Identification, NotReported, ParameterEstimate
 
 SYMBOLS = {
     "inertia": "J",
@@ -17,7 +17,6 @@ SYMBOLS = {
     "stiffness_over_inertia": "K/J",
 }
 MAX_DIGITS = 7  # significant digits: torque and gyro scales are never calibrated better than 1e-6
-NORMAL_95 = 1.96  # half a 95 % interval in standard errors
 TWO_DIGITS_UP_TO = 3.55  # leading digits of an uncertainty, rule of the Particle Data Group: 1.0 to 3.5 get two digits
 MANY_TIMES = 3.0  # from here on a factor reads better than a percentage
 _TITLES = {"rotary": "rotary inertia", "linear": "mass"}

@@ -60,6 +60,7 @@ def fit_of(complete: Sequence[PlayedSet], terms: Sequence[str]) -> Mapping[str, 
     from identify.estimate.final_fit import by_regression
     from identify.estimate.initial_guess import first_guess
     from identify.model.structure import Structure
+    from identify.results import NORMAL_95
     from identify.signals.prepare import prepare
     from identify.wording import number
 
@@ -71,7 +72,7 @@ def fit_of(complete: Sequence[PlayedSet], terms: Sequence[str]) -> Mapping[str, 
         found = by_regression(traces, structure, {}, first_guess(traces, structure), use, use, {})
     rows = {}
     for term in terms:
-        half = 1.96 * found.std_error((term,))
+        half = NORMAL_95 * found.std_error((term,))
         rows[term] = {
             "symbol": SYMBOLS[term], "unit": UNITS[term], "value": number(found.values[term,], 4),
             "half": number(half, 2) if np.isfinite(half) else "-",

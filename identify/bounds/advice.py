@@ -8,6 +8,7 @@ import numpy as np
 
 from identify.bounds.cramer_rao import DELAY, Information, together
 from identify.model.parameters import Name
+from identify.results import NORMAL_95
 from identify.wording import SYMBOLS, joined, number, plain
 from rig import effects
 from rig.platform import TERMS
@@ -15,7 +16,6 @@ from rig.platform import TERMS
 DETERMINED_RELATIVE_ERROR = 0.05  # relative standard error up to which a parameter counts as determined
 AIM = 0.01  # relative standard error that advice on the torque aims at
 SEPARATE = 200.0  # amplification of the model's errors beyond which inertia and stiffness cannot be separated
-DETECTABLE = 1.96  # standard errors: a smaller value cannot be distinguished from 0
 DELAY_NAME: Name = (DELAY, "delay")
 _RATIOS = {("damping",): "C/J", ("stiffness",): "K/J"}
 
@@ -127,7 +127,7 @@ def _detection_limits(information: Information) -> str:
     bounds = ""
     for k, name in enumerate(information.names):
         if information.values[k] == 0.0 and name in {("damping",), ("stiffness",)}:
-            least = DETECTABLE * information.std_error(name)
+            least = NORMAL_95 * information.std_error(name)
             if np.isfinite(least):
                 bound = f"{number(least, 2)} {_unit(name)}"
                 bounds += f"; {name[0]} is declared as 0; a value below {bound} cannot be distinguished from 0"

@@ -118,4 +118,4 @@ class FinalModels:
         value, error = fitted.values[name], fitted.std_error(name)
         if not np.isfinite(error) or not fitted.determined[fitted.names.index(name)]:
             return None
-        return ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), "1")
+        return ParameterEstimate.normal(value, error, "1")

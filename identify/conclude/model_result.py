@@ -32,7 +32,7 @@ def model_of(case: Case, fitted: FinalFit, measured: Measured, dropped: tuple[No
         if name in lost or of_another_run(name, runs_fitted(case)):
             continue
         value, error = fitted.values[name], open_.get(name, fitted.std_error(name))
-        estimate = ParameterEstimate(value, error, (value - 1.96 * error, value + 1.96 * error), _unit(case, name))
+        estimate = ParameterEstimate.normal(value, error, _unit(case, name))
         if len(name) == 1:
             parameters[_label(case, name)] = estimate
         else:

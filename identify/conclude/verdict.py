@@ -5,7 +5,7 @@ from __future__ import annotations
 from identify.bounds.advice import DETERMINED_RELATIVE_ERROR
 from identify.conclude.acceptance import of_reported, opposite_signs
 from identify.conclude.next_steps import to_determine, torque_free
-from identify.results import Identification
+from identify.results import NORMAL_95, Identification
 from identify.runs.measured_channels import REFUSED
 from identify.runs.sign_convention import SENTENCE
 from identify.select.evidence import WEIGHT
@@ -48,10 +48,10 @@ def sentences_of(found: Identification, damping_said: bool = False) -> tuple[str
     out += _parameter_bias(found)
     if found.torque_scale is not None and "torque_scale" not in found.verdict.effects:
         scale = found.torque_scale
-        off = abs(scale.value - 1.0) > 1.96 * scale.std_error
+        off = abs(scale.value - 1.0) > NORMAL_95 * scale.std_error
         out.append(
             f"The known added inertia shows that the torque on the shaft is {number(scale.value, 5)} +- "
-            f"{number(1.96 * scale.std_error, 2)} times the recorded one"
+            f"{number(NORMAL_95 * scale.std_error, 2)} times the recorded one"
             + ("; J, C and K are larger or smaller by the same factor." if off else ": the torque scale is right.")
         )
     out += _poorly_determined(found, damping_said)

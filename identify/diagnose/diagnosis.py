@@ -14,7 +14,7 @@ import numpy as np
 
 from identify.diagnose.free_lines import free_lines, without_lines
 from identify.diagnose.harmonics import Repeated, harmonics
-from identify.diagnose.memory import Moved, direction_power, memory_power
+from identify.diagnose.memory import RunResiduals, direction_power, memory_power
 from identify.diagnose.moments import moments
 from identify.results import UNITS, Harmonics, Identification, ResidualDiagnosis, RunTraces, Share
 from identify.signals.low_pass import EDGE_PERIODS, low_pass
@@ -100,7 +100,7 @@ def _over(value: float | None, floor: float) -> float | None:
     return None if value is None or not floor > 0.0 else value / floor
 
 
-def _run(trace: RunTraces, sensor: Sensor, torque: bool, number: int) -> Moved:
+def _run(trace: RunTraces, sensor: Sensor, torque: bool, number: int) -> RunResiduals:
     """One run with both models' residuals and the draws of noise as columns."""
     time = trace.time_s - trace.time_s[0]
     step = float(time[-1]) / (len(time) - 1)
@@ -120,7 +120,7 @@ def _run(trace: RunTraces, sensor: Sensor, torque: bool, number: int) -> Moved:
     known = trace.torque_nm if trace.torque_nm is not None else np.zeros(len(time))
     thin = max(1, int(1.0 / (OVERSAMPLED * sensor.lowpass_hz * step))) if torque and sensor.lowpass_hz else 1
     angle, rate = _by_model(trace, step)
-    return Moved(
+    return RunResiduals(
         thin * step, trace.angle_rad[::thin], trace.rate_rad_s[::thin], known[::thin], angle[::thin], rate[::thin],
         use[::thin], left[::thin],
     )  # fmt: skip

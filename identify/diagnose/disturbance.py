@@ -56,7 +56,7 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
         # What is explained is a torque: with the parameters free, a function of it would explain it by itself.
         explain = regression.following if term.on == "torque" else regression.beside
         richer, gains = explain(fit, term.columns)
-        by_size, by_ratio = regression.sureness(fit, richer)
+        by_size, by_ratio = regression.fall_in_sigmas(fit, richer)
         sure = max(by_size, by_ratio)
         share = 1.0 - richer.held_nm**2 / max(fit.held_nm**2, 1e-300)
         if share < MIN_POWER_SHARE or sure < DEPENDENCE_SIGMAS:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from identify.diagnose.harmonics import RINGING_SHARE
-from identify.diagnose.memory import Moved
+from identify.diagnose.memory import RunResiduals
 from identify.results import FreeLine
 from identify.signals.spectral_lines import RESONANCE_BAND_SHARE
 from rig.recording.run import Array
@@ -34,7 +34,7 @@ class _Line:
 
 
 def free_lines(
-    runs: Sequence[Moved], periods: Sequence[float | None], natural_hz: float, cutoff_hz: float | None
+    runs: Sequence[RunResiduals], periods: Sequence[float | None], natural_hz: float, cutoff_hz: float | None
 ) -> tuple[tuple[FreeLine, ...], ...]:
     """Of the first two residuals of the runs, the strongest first; the others are draws of noise.
 
@@ -48,7 +48,7 @@ def free_lines(
     return tuple(_grouped(several, runs) for several in lines)
 
 
-def without_lines(run: Moved, lines: Sequence[Sequence[FreeLine]]) -> Moved:
+def without_lines(run: RunResiduals, lines: Sequence[Sequence[FreeLine]]) -> RunResiduals:
     """The run with the free lines of each model taken out of its residual."""
     left = run.left.copy()
     time = run.step_s * np.arange(len(left))
@@ -61,7 +61,7 @@ def without_lines(run: Moved, lines: Sequence[Sequence[FreeLine]]) -> Moved:
 
 
 def _lines(
-    run: Moved, period_s: float | None, number: int, natural_hz: float, cutoff_hz: float | None
+    run: RunResiduals, period_s: float | None, number: int, natural_hz: float, cutoff_hz: float | None
 ) -> tuple[list[_Line], list[_Line]]:
     """The steady lines of one run in the residual of either model."""
     left, step = run.left[int(RINGING_SHARE * len(run.use)) :], run.step_s
@@ -88,7 +88,7 @@ def _lines(
     return out
 
 
-def _of_swing(hertz: Array, run: Moved, width: float) -> NDArray[np.bool_]:
+def _of_swing(hertz: Array, run: RunResiduals, width: float) -> NDArray[np.bool_]:
     """Whether a frequency is that of a free swing or a multiple, whatever the amplitude has made of it, (m,)."""
     angle = (run.angle - np.mean(run.angle)) * np.hanning(len(run.angle))
     power = np.abs(fft.rfft(angle, fft.next_fast_len(len(angle), real=True)))
@@ -129,14 +129,14 @@ def _amplitude(y: Array, hertz: float, step_s: float) -> float:
     return float(2.0 * abs(np.sum(window * y * turn)) / np.sum(window))
 
 
-def _locked(hertz: float, run: Moved, period_s: float | None, width: float) -> bool | None:
+def _locked(hertz: float, run: RunResiduals, period_s: float | None, width: float) -> bool | None:
     if period_s:
         multiple = max(round(hertz * period_s), 1)
         return bool(abs(hertz - multiple / period_s) < width)  # NumPy's False is not False
     return None if np.any(run.torque) else False
 
 
-def _grouped(lines: Sequence[_Line], runs: Sequence[Moved]) -> tuple[FreeLine, ...]:
+def _grouped(lines: Sequence[_Line], runs: Sequence[RunResiduals]) -> tuple[FreeLine, ...]:
     found, left = [], sorted(lines, key=lambda line: -line.size)
     width = max((1.0 / ((1.0 - RINGING_SHARE) * len(r.use) * r.step_s) for r in runs), default=0.0)
     while left:

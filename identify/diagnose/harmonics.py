@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft
 
-from identify.diagnose.memory import Moved
+from identify.diagnose.memory import RunResiduals
 from rig.recording.run import Array
 
 RINGING_SHARE = 0.3  # of a run, left out where enough is left without it: there it still rings
@@ -31,7 +31,7 @@ class Repeated:
     orders: dict[int, Array]
 
 
-def harmonics(runs: Sequence[Moved], periods: Sequence[float | None]) -> Repeated | None:
+def harmonics(runs: Sequence[RunResiduals], periods: Sequence[float | None]) -> Repeated | None:
     """Sums over the runs; None where no torque repeats at least twice."""
     found = [one for run, period in zip(runs, periods, strict=True) if period for one in _of_run(run, period)]
     if not found:
@@ -44,7 +44,7 @@ def harmonics(runs: Sequence[Moved], periods: Sequence[float | None]) -> Repeate
     return Repeated(total, own, odd, even, all(f.parted for f in found), orders)
 
 
-def _of_run(run: Moved, period_s: float) -> list[Repeated]:
+def _of_run(run: RunResiduals, period_s: float) -> list[Repeated]:
     """One run's powers, weighed by its length; nothing where it holds less than two periods."""
     window = _whole_periods(run, period_s)
     if window is None:
@@ -70,7 +70,7 @@ def _of_run(run: Moved, period_s: float) -> list[Repeated]:
     ]  # fmt: skip
 
 
-def _whole_periods(run: Moved, period_s: float) -> tuple[Array, int] | None:
+def _whole_periods(run: RunResiduals, period_s: float) -> tuple[Array, int] | None:
     """Places in samples, evenly spread over the last whole periods, and how many periods these are."""
     known = np.flatnonzero(run.use)
     length = period_s / run.step_s

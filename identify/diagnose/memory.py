@@ -30,7 +30,7 @@ MIN_DIRECTION_BIN_SAMPLES = 8  # samples of either direction in a bin
 
 
 @dataclass(frozen=True)
-class Moved:
+class RunResiduals:
     """One run: its motion, and residuals (n, m) of several models or of noise, side by side.
 
     ``angle_by_model`` and ``rate_by_model`` are zero where no model runs near the data.
@@ -46,7 +46,7 @@ class Moved:
     left: Array
 
 
-def memory_power(runs: Sequence[Moved]) -> Array:
+def memory_power(runs: Sequence[RunResiduals]) -> Array:
     """Mean square of each residual, (m,), that the past explains beyond what the present does; negative by chance.
 
     The present is asked twice, as measured and as the model has it, and the lesser gain counts. Beside the model's
@@ -91,7 +91,7 @@ def _left_square(columns: Array, left: Array, fold: NDArray[np.intp]) -> Array:
     return np.asarray(square / len(left))
 
 
-def _past(run: Moved, travel: float) -> Array:
+def _past(run: RunResiduals, travel: float) -> Array:
     """What was a while ago, (n, k), less what is now."""
     moved = (run.angle_by_model, run.rate_by_model, run.torque)
     columns = [delayed(x, tau, run.step_s) - x for x in moved for tau in MEMORY_TIMES_S]
@@ -131,7 +131,7 @@ def came_from(angle: Array, length: float) -> Array:
     return np.asarray(np.interp(path, even, lagged))
 
 
-def direction_power(runs: Sequence[Moved]) -> Array:
+def direction_power(runs: Sequence[RunResiduals]) -> Array:
     """Mean square of each residual, (m,), that changes sign with the direction of motion at the same angle.
 
     Half the difference of the two directions' means in bins of the angle, the product of two estimates from

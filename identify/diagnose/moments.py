@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.diagnose.memory import Moved
+from identify.diagnose.memory import RunResiduals
 from identify.results import Moment
 from rig.recording.run import Array
 
@@ -19,7 +19,9 @@ MIN_EVENT_SHARE = 0.05  # of the power: a moment with less is not told
 MANY = 3  # moments: more are no accident
 
 
-def moments(runs: Sequence[Moved], begins_s: Sequence[float], names: Sequence[str]) -> tuple[tuple[Moment, ...], ...]:
+def moments(
+    runs: Sequence[RunResiduals], begins_s: Sequence[float], names: Sequence[str]
+) -> tuple[tuple[Moment, ...], ...]:
     """The moments of each model's residual (``left``), none where it is spread over the runs.
 
     ``begins_s`` are the times of the runs' first samples, ``names`` what the runs are called.
@@ -27,7 +29,7 @@ def moments(runs: Sequence[Moved], begins_s: Sequence[float], names: Sequence[st
     return tuple(_of_one([_windows(r, i) for r in runs], begins_s, names) for i in range(2))
 
 
-def _windows(run: Moved, model: int) -> tuple[float, Array]:
+def _windows(run: RunResiduals, model: int) -> tuple[float, Array]:
     """Length of a window in s, and the squares in each, (windows,)."""
     length = max(1, round(WINDOW_S / run.step_s))
     squares = np.where(run.use, run.left[:, model], 0.0) ** 2

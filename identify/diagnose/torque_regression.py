@@ -246,7 +246,7 @@ class TorqueRegression(TorqueBand):
                 ]
         return strongest(hz), strongest(orders)
 
-    def sureness(self, base: TorqueFit, richer: TorqueFit) -> tuple[float, float]:
+    def fall_in_sigmas(self, base: TorqueFit, richer: TorqueFit) -> tuple[float, float]:
         """Standard errors by which the squared residual on held-out samples is lower, block by block.
 
         Of the falls, and of the falls of their logarithms: a few blocks with all of the torque must not hide that all

@@ -12,7 +12,7 @@ import numpy as np
 
 from identify.follow_up.excitations import Candidate
 from identify.follow_up.pairs import Pair
-from identify.follow_up.separation import Sensor, Share, Way, measured, settled, share_of, shots_of
+from identify.follow_up.separation import Imitation, Sensor, Share, measured, settled, share_of, shots_of
 from rig.excitation import PlannedSet
 from rig.platform import Platform
 
@@ -26,7 +26,7 @@ PARALLEL_PROOFS = 2  # of them: the compiled simulations run side by side
 LOOKED_AT = 14  # candidates of a pair whose sensitivities are taken
 
 
-class Looks:
+class PairSeparations:
     """Chi square between the models of each pair under each candidate, computed where it is asked for."""
 
     def __init__(
@@ -52,11 +52,11 @@ class Looks:
             out += sorted(mine, key=lambda i: -size[i])[:per]
         return out
 
-    def _share(self, i: int, k: int, w: int, way: Way) -> Share:
+    def _share(self, i: int, k: int, w: int, imitation: Imitation) -> Share:
         key = (i, k, w)
         if key not in self._shares:
-            trace = measured(way.truth, self.choice[i].planned, self._sensor)
-            found = share_of(way.model, shots_of(way.model, trace))
+            trace = measured(imitation.truth, self.choice[i].planned, self._sensor)
+            found = share_of(imitation.model, shots_of(imitation.model, trace))
             g = self._weight
             self._shares[key] = Share(g * found.squares, g * found.gradient, g * found.information)
         return self._shares[key]
@@ -64,12 +64,12 @@ class Looks:
     def separation(self, chosen: Sequence[int], k: int) -> float:
         """Chi square between the models of pair ``k`` after all chosen sets, in the worse direction."""
         left = []
-        for w, way in enumerate(self.pairs[k].ways):
-            several = [self._share(i, k, w, way) for i in chosen]
+        for w, imitation in enumerate(self.pairs[k].imitations):
+            several = [self._share(i, k, w, imitation) for i in chosen]
             total = several[0]
             for one in several[1:]:
                 total = total + one
-            left.append(total.left(way.prior))
+            left.append(total.left(imitation.prior))
         return min(left)
 
     def score(self, chosen: Sequence[int]) -> float:
@@ -87,8 +87,8 @@ class Looks:
     def _settled(self, plans: Sequence[PlannedSet], pair: Pair) -> float:
         """In the worse of both directions; too little in one is too little."""
         least = np.inf
-        for way in pair.ways:
-            least = min(least, settled(way, plans, self._sensor, self._weight, MIN_CHI_SQUARE))
+        for imitation in pair.imitations:
+            least = min(least, settled(imitation, plans, self._sensor, self._weight, MIN_CHI_SQUARE))
             if least < MIN_CHI_SQUARE:
                 break
         return float(least)
@@ -108,23 +108,23 @@ def _worth(separations: Iterable[float]) -> float:
     return float(sum(np.log1p(np.clip(x, 0.0, BEST)) for x in separations))
 
 
-def choose(looks: Looks) -> list[int]:
+def choose(separations: PairSeparations) -> list[int]:
     """Set by set, each the one that parts most; the shortest of those that do nearly as well.
 
     What looks best to first order is put to the proof, one after the other, until one stands.
     """
     chosen: list[int] = []
-    reached, stands = 0.0, [0.0] * len(looks.pairs)
-    while looks.shortlist and len(chosen) < MAX_SETS:
-        gains = {i: looks.score([*chosen, i]) for i in looks.shortlist}
+    reached, stands = 0.0, [0.0] * len(separations.pairs)
+    while separations.shortlist and len(chosen) < MAX_SETS:
+        gains = {i: separations.score([*chosen, i]) for i in separations.shortlist}
         best = max(gains.values())
         alike = sorted(
             (i for i, g in gains.items() if g > best - EQUIVALENT_SCORE_RATIO),
-            key=lambda i: (looks.duration(i), -looks.choice[i].share),
+            key=lambda i: (separations.duration(i), -separations.choice[i].share),
         )
         others = sorted((i for i in gains if i not in alike), key=lambda i: -gains[i])
-        order = _varied(looks, [*alike, *others])
-        proofs = _proofs(looks, chosen, order[:PROOFS], stands)
+        order = _varied(separations, [*alike, *others])
+        proofs = _proofs(separations, chosen, order[:PROOFS], stands)
         winner = max(proofs, key=lambda i: _worth(proofs[i]))
         if chosen and _worth(proofs[winner]) < reached + 0.1:  # of the logarithm: nothing that would be seen
             break
@@ -137,13 +137,13 @@ def choose(looks: Looks) -> list[int]:
 
 
 def _proofs(
-    looks: Looks, chosen: Sequence[int], several: Sequence[int], stands: Sequence[float]
+    separations: PairSeparations, chosen: Sequence[int], several: Sequence[int], stands: Sequence[float]
 ) -> dict[int, list[float]]:
     """Chi square of every pair with each of several sets added, two at a time until one parts all of them well."""
 
     def proof(i: int) -> list[float]:
         with np.errstate(all="ignore"):  # which a thread does not inherit
-            return looks.proved([*chosen, i], stands)
+            return separations.proved([*chosen, i], stands)
 
     found: dict[int, list[float]] = {}
     with ThreadPoolExecutor(PARALLEL_PROOFS) as workers:
@@ -155,10 +155,10 @@ def _proofs(
     return found
 
 
-def _varied(looks: Looks, order: Sequence[int]) -> list[int]:
+def _varied(separations: PairSeparations, order: Sequence[int]) -> list[int]:
     """The same order, but the best of every amplitude first: where one amplitude misleads, the next is another."""
     first: list[int] = []
     for i in order:
-        if looks.choice[i].share not in {looks.choice[k].share for k in first}:
+        if separations.choice[i].share not in {separations.choice[k].share for k in first}:
             first.append(i)
     return [*first, *(i for i in order if i not in first)]

@@ -10,7 +10,7 @@ import numpy as np
 from identify.bounds.cramer_rao import vector_of
 from identify.estimate.evaluation import evaluate
 from identify.estimate.output_error import OutputErrorFit, refine
-from identify.follow_up.separation import Way, prior_of
+from identify.follow_up.separation import Imitation, prior_of
 from identify.results import Identification, Unparted
 from identify.signals.trace import Trace
 from rig import effects
@@ -28,7 +28,7 @@ class Pair:
     effect: str
     rival: str
     models: tuple[Platform, Platform]
-    ways: tuple[Way, ...]
+    imitations: tuple[Imitation, ...]
 
 
 def never_reason(effect: str, rival: str, travel_deg: float) -> str:
@@ -65,14 +65,14 @@ def pairs_of(
                     without.append(Unparted(effect, rival, why))
                 else:
                     pairs.append(
-                        Pair(effect, rival, (final, placed), _ways(final, placed, effect, rival, traces, noise))
+                        Pair(effect, rival, (final, placed), _imitations(final, placed, effect, rival, traces, noise))
                     )
     return pairs, without
 
 
-def _ways(
+def _imitations(
     named: Platform, other: Platform, effect: str, rival: str, traces: Sequence[Trace], noise: float
-) -> tuple[Way, ...]:
+) -> tuple[Imitation, ...]:
     """Where both have as many parameters either may be the truth, and the other has to fail.
 
     One with more parameters may pass for the simpler without being true: that is for their penalty to decide. So
@@ -81,9 +81,9 @@ def _ways(
     sizes = len(effects.get(effect).parameters), len(effects.get(rival).parameters)
     out = []
     if sizes[0] <= sizes[1]:
-        out.append(Way(other, named, prior_of(named, traces, noise)))
+        out.append(Imitation(other, named, prior_of(named, traces, noise)))
     if sizes[1] <= sizes[0]:
-        out.append(Way(named, other, prior_of(other, traces, noise)))
+        out.append(Imitation(named, other, prior_of(other, traces, noise)))
     return tuple(out)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from identify.bounds.bound_and_estimate import usable_traces
-from identify.follow_up.choice import MIN_CHI_SQUARE, Looks, choose
+from identify.follow_up.choice import MIN_CHI_SQUARE, PairSeparations, choose
 from identify.follow_up.excitations import Candidate, candidates, fitting, shapes
 from identify.follow_up.pairs import Pair, pairs_of
 from identify.follow_up.separation import Sensor, coarser
@@ -38,7 +38,7 @@ CAP = 1.3  # times the predicted travel: what a set may reach on a rig whose dec
 
 
 @dataclass(frozen=True)
-class Table:
+class PlanningLimits:
     """What the rig allows, and how a set is read."""
 
     allowed: Peaks
@@ -82,8 +82,8 @@ def plan_follow_up(
             return FollowUp(None, tuple(without))
         sensor = Sensor(sample_rate_hz, noise, traces[0].channel)
         played = max(float(np.max(np.abs(r.torque_nm))) for r in recording.runs if r.torque_nm is not None)
-        table = Table(allowed, sensor, rest_s, prefix, found.axis == "linear", FAINTEST_TORQUE_SHARE * played)
-        return _planned(pairs, without, table, _least_damping(found))
+        limits = PlanningLimits(allowed, sensor, rest_s, prefix, found.axis == "linear", FAINTEST_TORQUE_SHARE * played)
+        return _planned(pairs, without, limits, _least_damping(found))
 
 
 def _all(found: Identification) -> list[tuple[str, tuple[str, ...]]]:
@@ -103,23 +103,23 @@ def _least_damping(found: Identification) -> float:
     return float(np.clip(1.0 - below, MIN_DAMPING_SHARE, 1.0))
 
 
-def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table, least_damping: float) -> FollowUp:
+def _planned(pairs: Sequence[Pair], without: list[Unparted], limits: PlanningLimits, least_damping: float) -> FollowUp:
     models: list[Platform] = []
     models += [m for p in pairs for m in p.models if m not in models]
     lighter = [replace(m, damping_nm_s_rad=least_damping * m.damping_nm_s_rad) for m in models]
     bearing = [*models, *(lighter if least_damping < WELL_KNOWN_DAMPING_SHARE else [])]
     own_hz = natural_hz(models[0])
-    look, weight = coarser(table.sensor, FIRST_LOOK_SAMPLES_A_PERIOD * own_hz)
-    several = shapes(own_hz, table.sensor.sample_rate_hz)
-    choice = candidates(several, bearing, table.allowed, look, table.least_torque_nm)
+    look, weight = coarser(limits.sensor, FIRST_LOOK_SAMPLES_A_PERIOD * own_hz)
+    several = shapes(own_hz, limits.sensor.sample_rate_hz)
+    choice = candidates(several, bearing, limits.allowed, look, limits.least_torque_nm)
     if not choice:
-        why = f"no kind of excitation stays within the limits at {number(table.least_torque_nm, 2)} N m or more"
+        why = f"no kind of excitation stays within the limits at {number(limits.least_torque_nm, 2)} N m or more"
         return FollowUp(None, (*without, *(Unparted(p.effect, p.rival, why) for p in pairs)))
-    looks = Looks(pairs, choice, models, look, weight)
-    sets = [s for i in choose(looks) if (s := fitting(choice[i], bearing, table.allowed)) is not None]
+    separations = PairSeparations(pairs, choice, models, look, weight)
+    sets = [s for i in choose(separations) if (s := fitting(choice[i], bearing, limits.allowed)) is not None]
     partings, failed = [], list(without)
     for pair in pairs:
-        best = looks.checked(sets, pair) if sets else 0.0
+        best = separations.checked(sets, pair) if sets else 0.0
         if best >= MIN_CHI_SQUARE:
             partings.append(Parting(pair.effect, pair.rival, best))
         else:
@@ -127,7 +127,7 @@ def _planned(pairs: Sequence[Pair], without: list[Unparted], table: Table, least
     if not partings:
         return FollowUp(None, tuple(failed))
     plan = FollowUpPlan(
-        _section(sets, table), tuple(partings), sum(c.planned.duration_s for c in sets), why_of(partings, sets)
+        _section(sets, limits), tuple(partings), sum(c.planned.duration_s for c in sets), why_of(partings, sets)
     )
     return FollowUp(plan, tuple(failed))
 
@@ -148,18 +148,19 @@ def natural_hz(platform: Platform) -> float:
     return float(np.sqrt(k / j) / (2.0 * np.pi)) if k > 0.0 and j > 0.0 else USUAL_HZ
 
 
-def _section(sets: Sequence[Candidate], table: Table) -> dict[str, Any]:
+def _section(sets: Sequence[Candidate], limits: PlanningLimits) -> dict[str, Any]:
     """The plan as an `excitation` section of a rig.yaml, checked as such."""
     entries = []
     for candidate in sets:
         entry = candidate.planned.excitation.model_dump(mode="json", exclude_defaults=True)
         entry = {"kind": candidate.planned.excitation.model_dump()["kind"]} | entry
-        entry["name"] = f"{table.prefix}: {candidate.planned.excitation.describe()}"
-        if not table.linear:
-            entry["travel_cap_deg"] = float(f"{min(CAP * candidate.travel_deg, table.allowed.travel_deg):.3g}")
+        entry["name"] = f"{limits.prefix}: {candidate.planned.excitation.describe()}"
+        if not limits.linear:
+            entry["travel_cap_deg"] = float(f"{min(CAP * candidate.travel_deg, limits.allowed.travel_deg):.3g}")
         entries.append(entry)
     section = {
-        "sample_rate_hz": table.sensor.sample_rate_hz, "rest_s": table.rest_s, "scale_to_limits": True, "sets": entries
+        "sample_rate_hz": limits.sensor.sample_rate_hz, "rest_s": limits.rest_s, "scale_to_limits": True,
+        "sets": entries,
     }  # fmt: skip
     ExcitationConfig.model_validate_json(json.dumps(section), strict=True)
     return section

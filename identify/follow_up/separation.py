@@ -40,7 +40,7 @@ class Sensor:
 
 
 @dataclass(frozen=True)
-class Way:
+class Imitation:
     """One of two directions: ``truth`` makes the data, ``model`` tries to pass for it.
 
     ``prior`` is what the data so far tell about the model's parameters, (p, p), per noise variance; parameters with a
@@ -135,7 +135,7 @@ def share_of(model: Platform, shots: Shots) -> Share:
 
 
 def settled(
-    way: Way, several: Sequence[PlannedSet], sensor: Sensor, weight: float = 1.0, least: float = 0.0
+    imitation: Imitation, several: Sequence[PlannedSet], sensor: Sensor, weight: float = 1.0, least: float = 0.0
 ) -> float:  # fmt: skip
     """Chi square that several sets leave when the model is fitted to what the truth would have shown.
 
@@ -144,27 +144,27 @@ def settled(
     be far off, and the way back from there leads over hills. Below ``least`` it does not look any further.
     """
     sensor = replace(sensor, noise=sensor.noise / np.sqrt(weight))
-    shots = [shots_of(way.model, measured(way.truth, s, sensor)) for s in several]
-    _, names, origin = vector_of(way.model, 1)
-    own = np.array([len(n) > 1 and n[0] not in way.truth.effects and is_gain(n) for n in names])
+    shots = [shots_of(imitation.model, measured(imitation.truth, s, sensor)) for s in several]
+    _, names, origin = vector_of(imitation.model, 1)
+    own = np.array([len(n) > 1 and n[0] not in imitation.truth.effects and is_gain(n) for n in names])
     found = np.inf
     for share in STARTS[: 1 + 2 * bool(own.any())]:
-        found = min(found, _descend(way, shots, np.where(own, share * origin, origin)))
+        found = min(found, _descend(imitation, shots, np.where(own, share * origin, origin)))
         if found < least:
             break
     return found
 
 
-def _descend(way: Way, several: Sequence[Shots], start: Array) -> float:
+def _descend(imitation: Imitation, several: Sequence[Shots], start: Array) -> float:
     """The least chi square, price of moving included, that is found from a start."""
-    structure, names, origin = vector_of(way.model, 1)
+    structure, names, origin = vector_of(imitation.model, 1)
     kept = [i for i, n in enumerate(names) if len(n) < 3]
     low, high = np.array([bounds_of(n) for n in names]).T
 
     def at(values: Array) -> tuple[Share, float]:
         share = _total(platform_of(structure, names, values), several)
         moved = (values - origin)[kept]
-        return share, share.squares + float(moved @ way.prior @ moved)
+        return share, share.squares + float(moved @ imitation.prior @ moved)
 
     values = start
     total, cost = at(values)
@@ -173,7 +173,7 @@ def _descend(way: Way, several: Sequence[Shots], start: Array) -> float:
         before = cost
         for _try in range(TRIES):
             trial = values.copy()
-            trial[kept] += total.step(way.prior, (values - origin)[kept], damping)
+            trial[kept] += total.step(imitation.prior, (values - origin)[kept], damping)
             trial = ordered(names, np.clip(trial, low, high))
             share, new = at(trial)
             if 0.0 < new < cost:

@@ -235,9 +235,7 @@ def _result(
         if not (determined[i] and _is_known(value, error)):
             continue
         identifiable.append(term)
-        parameters[term] = ParameterEstimate(
-            value, error, (value - 1.96 * error, value + 1.96 * error), UNITS[axis][term]
-        )  # fmt: skip
+        parameters[term] = ParameterEstimate.normal(value, error, UNITS[axis][term])
     missing = [t for t in terms if t not in identifiable]
     advice = (
         f"{trace.run.name} alone does not determine {' and '.join(missing)}: keep the start transient "

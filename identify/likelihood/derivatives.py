@@ -26,7 +26,7 @@ BIAS_STEP, START_STEP = 1e-4, 1e-6  # of the motion, of a bias and of a start st
 
 
 @dataclass(frozen=True)
-class Standpoint:
+class OperatingPoint:
     """A model with all its numbers, and every run predicted with them."""
 
     problem: PredictionError
@@ -76,7 +76,10 @@ class Derivatives:
 
 
 def derivatives(
-    at: Standpoint, steps: Mapping[int, float], kinds: Sequence[str], through_gains: Mapping[int, float] | None = None
+    at: OperatingPoint,
+    steps: Mapping[int, float],
+    kinds: Sequence[str],
+    through_gains: Mapping[int, float] | None = None,
 ) -> list[Derivatives]:
     """Every run's derivatives; the predictions they need side by side, of all runs and parameters.
 
@@ -101,7 +104,7 @@ def derivatives(
 
 
 @RUNAWAY
-def _by_parameter(at: Standpoint, i: int, k: int, step: float) -> Array:
+def _by_parameter(at: OperatingPoint, i: int, k: int, step: float) -> Array:
     """What a parameter does to one run's scaled innovations, (n,)."""
     s, base, there = at.shots[i], at.looks[i], at.x.copy()
     w = s.weight
@@ -112,7 +115,7 @@ def _by_parameter(at: Standpoint, i: int, k: int, step: float) -> Array:
 
 @RUNAWAY
 def _of_run(
-    at: Standpoint, i: int, done: Mapping[tuple[int, int], Array], kinds: Sequence[str],
+    at: OperatingPoint, i: int, done: Mapping[tuple[int, int], Array], kinds: Sequence[str],
     through_gains: Mapping[int, float],
 ) -> Derivatives:  # fmt: skip
     """Derivatives of one run; ``done`` are those by parameters with gains that stay.
@@ -124,7 +127,7 @@ def _of_run(
     p, s, base = at.problem, at.shots[i], at.looks[i]
     w, spans = s.weight, [(a, b - 1) for a, b in s.edges]
     root = np.sqrt(base.variance[w])
-    bends = at.structure.bends
+    bends = at.structure.acts_on_motion
 
     def followed(gains: Gains, h: float, bias: float = 0.0, predict: bool = bends) -> Array:
         if predict:
@@ -170,7 +173,7 @@ def _of_run(
     return Derivatives(Columns(columns, own, scaled, base.variance[w].ravel()), pulled, spread)
 
 
-def _by_start(at: Standpoint, s: Shots, base: Look, root: Array) -> Array:
+def _by_start(at: OperatingPoint, s: Shots, base: Look, root: Array) -> Array:
     """What angle and rate at the start of every stretch do to one run's scaled innovations, (n, 2 stretches)."""
     p, out = at.problem, []
     stretch = np.searchsorted(s.first, np.arange(len(s.weight)), side="right")[s.weight] - 1

@@ -15,7 +15,7 @@ import numpy as np
 
 from identify.estimate.output_error import held_still
 from identify.likelihood.damped_step import LEVENBERG_DAMPING, step_down
-from identify.likelihood.derivatives import GAIN_STEP, Derivatives, Standpoint, derivatives
+from identify.likelihood.derivatives import GAIN_STEP, Derivatives, OperatingPoint, derivatives
 from identify.likelihood.fit import Columns, Fit, Look, Prediction
 from identify.likelihood.gyro_biases import settle_biases
 from identify.likelihood.noise_grid import kinds_of_noise, noise_on_grid
@@ -93,7 +93,7 @@ class Descent:
         if self.alone:
             self._begins(noise_on_grid(p.bounds, lambda q: self.cost_of(self.looks_at(self.x, q, self.shots)), smooth))
         settle_biases(self)
-        if self.alone and not structure.bends:  # else every look is a prediction
+        if self.alone and not structure.acts_on_motion:  # else every look is a prediction
             noise_alone(self)
         self.information: Array = np.zeros((len(self.x), len(self.x)))
         self._informed: tuple[Noise, bytes] | None = None
@@ -189,11 +189,14 @@ class Descent:
 
         shaping = [k for k in free if of_gains and self._shapes_gains(self.names[k])]
         return derivatives(
-            self._standpoint(), steps(DIFFERENCE_STEP, free), self.kinds if of_noise else [], steps(GAIN_STEP, shaping)
+            self._operating_point(),
+            steps(DIFFERENCE_STEP, free),
+            self.kinds if of_noise else [],
+            steps(GAIN_STEP, shaping),
         )
 
-    def _standpoint(self) -> Standpoint:
-        return Standpoint(self.problem, self.structure, self.names, self.x, self.noise, self.shots, self.looks)
+    def _operating_point(self) -> OperatingPoint:
+        return OperatingPoint(self.problem, self.structure, self.names, self.x, self.noise, self.shots, self.looks)
 
     @staticmethod
     def _shapes_gains(name: Name) -> bool:
@@ -210,7 +213,7 @@ class Descent:
 
     def of_noise(self) -> Step:
         """The normal equations of the noise and the runs' own unknowns, where the descent stands."""
-        parts = derivatives(self._standpoint(), {}, self.kinds)
+        parts = derivatives(self._operating_point(), {}, self.kinds)
         return normal_equations(parts, len(self.x), len(self.kinds), self.count, self.problem.variance_of)
 
     def try_step(self, of_noise: bool, enough: float = 0.0) -> bool:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identify.likelihood.derivatives import Standpoint, derivatives
+from identify.likelihood.derivatives import OperatingPoint, derivatives
 from identify.likelihood.normal_equations import COST_TOLERANCE, changed, normal_equations
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def settle_biases(descent: Descent) -> None:
     if not any(s.trace.biased for s in d.shots):
         return
     for _ in range(BIAS_STEPS):
-        there = Standpoint(d.problem, d.structure, d.names, d.x, d.noise, d.shots, d.looks)
+        there = OperatingPoint(d.problem, d.structure, d.names, d.x, d.noise, d.shots, d.looks)
         found = normal_equations(derivatives(there, {}, []), len(d.x), 0, d.count, d.problem.variance_of)
         if not all(np.all(np.isfinite(taken)) for _, taken in found.own):
             return

@@ -22,7 +22,7 @@ class Structure:
     effects: tuple[str, ...] = ()
 
     @property
-    def bends(self) -> bool:
+    def acts_on_motion(self) -> bool:
         """Whether an effect acts on the motion itself: what a disturbance does then depends on where the motion is."""
         return any(effects.get(e).place in (Place.LOAD, Place.FRICTION) for e in self.effects)
 

@@ -13,6 +13,7 @@ from identify.follow_up.pairs import free_run
 from identify.proof.compensation import linear_part
 from identify.proof.drive import Drive
 from identify.proven import Share
+from identify.results import NORMAL_95
 from identify.signals.prepare import prepare
 from rig.arrays import Array, Mask
 from rig.dynamics import Equations, TorqueSignal, simulate
@@ -21,7 +22,6 @@ from rig.platform import Platform
 from rig.recording.run import Run
 
 JACKKNIFE_BLOCKS = 20  # of a set, each left out once (Quenouille 1956): far longer than what the noise remembers
-Z95 = 1.96  # standard errors to either end of a 95 % interval
 NO_MORE_THAN_NOISE = 1.1  # root mean square over noise: below it an error is too small for a share of it
 
 
@@ -139,7 +139,7 @@ def share_left(pairs: list[tuple[Deviation, Deviation, float]]) -> Share | None:
     rest = (np.sum(after) - after) / (np.sum(before) - before)
     count = len(rest)
     spread = float(np.sqrt((count - 1) / count * np.sum((rest - np.mean(rest)) ** 2)))
-    low, high = total - Z95 * spread, total + Z95 * spread
+    low, high = total - NORMAL_95 * spread, total + NORMAL_95 * spread
     return Share(_root(total), (_root(low), _root(high)))
 
 

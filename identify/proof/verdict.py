@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from identify.proof.deviation import Deviation, deviation, explained_left, share_left
 from identify.proof.plan import ALL, PLAIN, ProofPlan, not_cancelled, pair_of
 from identify.proven import EffectProof, Proof, ProofLines, ProofSet, ProofStatus, Share
+from identify.results import NORMAL_95
 from identify.wording import plain as plain_words
 from rig import effects
 from rig.arrays import Array
@@ -255,7 +256,8 @@ def _ratio(plan: ProofPlan, pair: str, sets: list[str], found: Found) -> tuple[f
     total = float(np.log(np.sum(b) / np.sum(a)))
     rest = np.log((np.sum(b) - b) / (np.sum(a) - a))
     spread = float(np.sqrt((len(rest) - 1) / len(rest) * np.sum((rest - np.mean(rest)) ** 2)))
-    low, middle, high = (float(np.exp(0.5 * x)) for x in (total - 1.96 * spread, total, total + 1.96 * spread))
+    half = NORMAL_95 * spread
+    low, middle, high = (float(np.exp(0.5 * x)) for x in (total - half, total, total + half))
     return middle, low, high
 
 

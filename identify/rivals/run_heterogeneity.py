@@ -27,7 +27,7 @@ from rig.platform import TERMS
 from rig.recording.run import Array
 
 # Of the excess over the noise: less is foretold of what is no such run, and of a delay that is no small one.
-GONE = 0.95
+EXPLAINED_SHARE = 0.95
 RUNS_AT_NOISE = 1.05  # reduced chi-square: the noise is known to a percent or two
 AT_FLOOR = 1.1  # the same: what is there has found what there is
 RUN_CHANGE_ROUNDS = 3  # the change is small, but not infinitely so
@@ -177,7 +177,7 @@ def _predicted_changes(fits: FreeRunFitter, base: OutputErrorFit) -> list[Change
         return x / size[several], total - float(right[several] @ x)
 
     aim = base.count * fits.noise**2
-    enough = aim + (1.0 - GONE) * max(total - aim, 0.0)
+    enough = aim + (1.0 - EXPLAINED_SHARE) * max(total - aim, 0.0)
     while len({items[k][0] for k in chosen}) < len(base.shots) - 1 or len(chosen) < 1:
         left = {k: fitted([*chosen, k])[1] for k in range(len(items)) if k not in chosen}
         best = min(left, key=lambda k: left[k])

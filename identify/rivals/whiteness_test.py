@@ -15,7 +15,7 @@ import numpy as np
 from identify.estimate.final_fit import FinalFit
 from rig import effects
 
-SO_MANY = 3  # effects beside those declared
+MIN_EFFECTS_TESTED = 3  # effects beside those declared
 BANDS = (0.05, 0.1, 0.2, 0.4)  # of Nyquist: where a platform may move
 MOTIONLESS_BAND = (0.5, 0.98)  # of Nyquist: where it does not
 COLOURED_SIGMAS = 5.0  # standard errors by which a band may stand out
@@ -24,7 +24,7 @@ COLOURED_SIGMAS = 5.0  # standard errors by which a band may stand out
 def fails_whiteness_test(fitted: FinalFit, declared: Sequence[str]) -> bool:
     """Whether what was found beside the declared effects is more than a residual like this one supports."""
     found = [e for e in fitted.structure.effects if e not in declared]
-    if len(found) < SO_MANY or not any(effects.get(e).is_flexible for e in found):
+    if len(found) < MIN_EFFECTS_TESTED or not any(effects.get(e).is_flexible for e in found):
         return False
     return leaves_more_than_noise(fitted)
 

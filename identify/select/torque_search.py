@@ -25,6 +25,7 @@ RICHER = 0.6  # share of what its special case leaves that a richer effect has t
 EQUAL_WEIGHT_MARGIN = 0.05  # of what is left: candidates that differ by less carry the same torque
 RIVAL = 0.02  # of what is left: rivals carry as much as what was taken, to that
 INERTIA_MATTERS = 0.2  # of the torque: below, the motion hardly shows the inertia
+WORTH_EVIDENCE = 0.2  # of the weight that names: less is not worth working out how sure it is
 POLISHED = 8  # candidates whose shapes are searched for beside those of a grid
 
 
@@ -38,10 +39,10 @@ class TorqueCandidate:
         Share of the held-out residual's power, the sensor's part taken off, that it takes away.
     evidence
         Fall of the penalised cost with a coloured residual.
-    sureness
+    fall_sigmas
         Standard errors by which the squared residual falls, over blocks of the held-out samples: of the falls, or of
         their logarithms, whichever is more.
-    sureness_by_size
+    absolute_fall_sigmas
         Of the falls alone: what a few moments decide has little of it.
     """
 
@@ -49,14 +50,14 @@ class TorqueCandidate:
     fit: TorqueFit
     weight: float
     evidence: float
-    sureness: float
-    sureness_by_size: float
+    fall_sigmas: float
+    absolute_fall_sigmas: float
 
     @property
     def is_significant(self) -> bool:
         """Whether it is proven and carries enough to be named."""
         flexible = effects.get(self.effect).is_flexible  # its shape was looked for on the held-out samples, too
-        return self.weight >= WEIGHT and (self.sureness_by_size if flexible else self.sureness) >= FALL_SIGMAS
+        return self.weight >= WEIGHT and (self.absolute_fall_sigmas if flexible else self.fall_sigmas) >= FALL_SIGMAS
 
 
 @dataclass
@@ -103,9 +104,9 @@ class TorqueSearch:
     def candidate(self, name: str, now: TorqueFit, fit: TorqueFit) -> TorqueCandidate:
         """A candidate's weight and evidence on top of a model."""
         share = 1.0 - self._smaller_inertia(now, fit) * self.left(fit) / self.left(now)
-        worth = share > 0.2 * WEIGHT
+        worth = share > WORTH_EVIDENCE * WEIGHT
         evidence = self.regression.evidence(now, fit) if worth else 0.0
-        by_size, by_ratio = self.regression.sureness(now, fit) if worth else (0.0, 0.0)
+        by_size, by_ratio = self.regression.fall_in_sigmas(now, fit) if worth else (0.0, 0.0)
         return TorqueCandidate(name, fit, share, evidence, max(by_size, by_ratio), by_size)
 
     def _smaller_inertia(self, now: TorqueFit, fit: TorqueFit) -> float:
@@ -158,7 +159,7 @@ class TorqueSearch:
             return now
         without = self.regression.solve(now.structure.minus("stiffness"), now.shapes)
         share = 1.0 - self.left(now) / self.left(without)
-        by_size, by_ratio = self.regression.sureness(without, now)
+        by_size, by_ratio = self.regression.fall_in_sigmas(without, now)
         pulls = now.values[("stiffness",)] > 0.0
         return now if pulls and share >= WEIGHT and max(by_size, by_ratio) >= FALL_SIGMAS else without
 
@@ -213,6 +214,6 @@ def _status(look: TorqueCandidate, chosen: TorqueCandidate | None, named: Sequen
         return "added" if look.effect in named else "added, then no longer needed"
     if look.is_significant:
         return "carries less than what was added"
-    if look.sureness >= FALL_SIGMAS and look.weight > 0.0:
+    if look.fall_sigmas >= FALL_SIGMAS and look.weight > 0.0:
         return f"proven but small: {100.0 * look.weight:.0f} % of what is left"
     return "no better"

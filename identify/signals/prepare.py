@@ -13,7 +13,7 @@ from identify.signals.channel_readings import lost
 from identify.signals.glitches import glitches
 from identify.signals.noise import bandwidth_of, least_of, noise_of, rounding_of
 from identify.signals.resampling import HOLE, beat_of, sampled, torque_instants
-from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace, _gaps, clear_of_seam
+from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace, _gaps, drop_samples_at_seam
 from rig.dynamics import TorqueSignal
 from rig.recording.run import Array, Run
 
@@ -179,7 +179,7 @@ def prepare(
         inside[a : b + 1] = True
     trace.keep &= inside
     for seam in (0, *(a for a, _ in trace.stretches), n):
-        clear_of_seam(trace, seam, trace.keep)
+        drop_samples_at_seam(trace, seam, trace.keep)
     return trace
 
 

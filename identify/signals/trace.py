@@ -272,7 +272,7 @@ def loads_differ(traces: Sequence[Trace]) -> bool:
     return len({t.run.added_inertia_kg_m2 for t in traces}) > 1
 
 
-def clear_of_seam(trace: Trace, seam: int, keep: Any) -> None:
+def drop_samples_at_seam(trace: Trace, seam: int, keep: Any) -> None:
     """Take the samples in which the gyro's own average mixes both sides of a seam out of ``keep``, in place."""
     run = trace.run
     if trace.channel == "rate" and run.rate_corner_hz and run.rate_delay_s:

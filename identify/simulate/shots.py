@@ -11,7 +11,7 @@ import numpy as np
 
 from identify.model.parameters import Name, equations_of
 from identify.model.structure import Structure
-from identify.signals.trace import LEAD_S, UPSAMPLING, Trace, clear_of_seam
+from identify.signals.trace import LEAD_S, UPSAMPLING, Trace, drop_samples_at_seam
 from rig.dynamics import Equations, Grid
 from rig.dynamics.low_pass import low_pass_kernel, mean_rate, smoothed
 from rig.recording.run import Array
@@ -93,7 +93,7 @@ def make_shots(
     starts = np.stack([angle[first * ratio], rate[first * ratio]], axis=1)
     weight = trace.keep.copy() if use is None else trace.keep & use
     for seam in (*first.tolist(), n):
-        clear_of_seam(trace, seam, weight)
+        drop_samples_at_seam(trace, seam, weight)
     rests = rests and bool(first[0] == 0 and np.any(weight[: [*first[1:], n][0]]))
     if rests:
         starts[0] = 0.0

@@ -45,7 +45,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "select/free_form_residual.py": "MIN_CURVE_SCORE CURVE_STEPS CURVES_TRIED",
     "select/likelihood_search.py": "RIVAL_SAMPLES MIN_MORE_SAMPLES_RATIO SAMPLES",
     "select/stepwise.py": "MIN_RIVAL_SHARE PROMISING",
-    "select/torque_search.py": "POLISHED RIVAL",
+    "select/torque_search.py": "POLISHED RIVAL WORTH_EVIDENCE",
     "select/trial_fits.py": "BEHIND COMPARABLE FAINT_SCORE FOLLOWED_LINES FOLLOWS FOLLOWS_LESS FULL_FIT_RATIO "
     "FULL_ITERATIONS HEAVIEST MIN_TRIAL_SCORE OTHER_START PAIRS TRIAL_ITERATIONS TRIED",
 }

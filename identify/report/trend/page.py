@@ -72,10 +72,7 @@ def change_sentences(one: Series, campaigns: Sequence[Campaign]) -> list[str]:
 
 
 def _of(level: Level, of_unit: str) -> str:
-    half = 1.96 * level.std_error
-    return with_interval(
-        ParameterEstimate(level.mean, level.std_error, (level.mean - half, level.mean + half), of_unit)
-    )
+    return with_interval(ParameterEstimate.normal(level.mean, level.std_error, of_unit))
 
 
 def _figure(name: str, campaigns: Sequence[Campaign], found: Sequence[Series]) -> Figure | None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.diagnose.memory import Moved
+from identify.diagnose.memory import RunResiduals
 from identify.diagnose.moments import moments
 from identify.diagnose.wording import diagnosis_sentences
 from identify.pipeline import identify
@@ -19,9 +19,11 @@ from tests.identify.simulated import DECLARED, campaign
 STEP_S = 2e-3
 
 
-def run(left: Array) -> Moved:
+def run(left: Array) -> RunResiduals:
     still = np.zeros(len(left))
-    return Moved(STEP_S, still, still, still, still, still, np.ones(len(left), bool), np.column_stack([left, left]))
+    return RunResiduals(
+        STEP_S, still, still, still, still, still, np.ones(len(left), bool), np.column_stack([left, left])
+    )
 
 
 def white(seed: int, seconds: float = 10.0) -> Array:

@@ -9,7 +9,7 @@ import pytest
 
 from identify.conclude.next_steps import next_steps
 from identify.follow_up.rounds import after_playing, errors_on, is_distinguished, limits_of, promises_more
-from identify.follow_up.separation import Sensor, Share, Way, prior_of, settled
+from identify.follow_up.separation import Imitation, Sensor, Share, prior_of, settled
 from identify.follow_up.wording import lines, verdict_sentences
 from identify.report.files import result_json
 from identify.report.summary import summary
@@ -119,8 +119,8 @@ def test_what_the_data_so_far_know_keeps_a_model_from_giving_way() -> None:
     prior = prior_of(heavier, traces, SIGMA)
     new = [PlannedSet("new", Sine(torque_nm=20.0, frequency_hz=5.0, duration_s=1.0))]
     sensor = Sensor(1000.0, SIGMA)
-    free = settled(Way(true, heavier, 0.0 * prior), new, sensor)
-    held = settled(Way(true, heavier, prior), new, sensor)
+    free = settled(Imitation(true, heavier, 0.0 * prior), new, sensor)
+    held = settled(Imitation(true, heavier, prior), new, sensor)
     assert free < 1.0
     assert held > 25.0
 
