@@ -103,8 +103,9 @@ class Disturbance:
     moves_percent
         How far J, C and K move with the free-form terms of what it depends on beside the model.
     moves_without_percent
-        How far they move without a named effect that is flexible enough to have taken up part of what is left, for
-        each such effect; empty where nothing is left that depends on something.
+        How far they differ with and without an effect that is flexible enough to have taken up part of what is left,
+        for each that is named and for all together that were taken back ("creep and cogging"); empty where nothing is
+        left that depends on something.
     """
 
     torque_rms: float

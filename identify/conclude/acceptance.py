@@ -75,8 +75,8 @@ def reasons_against_disturbance(left: Disturbance, accept: AcceptConfig, axis: s
             changes = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in beyond.items()])
             keys = joined([f"identify.accept.{k}_percent" for k in beyond])
             out.append(
-                f"{plain(effect)} changes {changes}, more than is allowed ({keys}), and it can follow almost any "
-                f"{torque}: it may have taken up part of what depends on the {on} and has no name yet"
+                f"{plain(effect)} would change {changes}, more than is allowed ({keys}), and can follow almost any "
+                f"{torque}: how much of what depends on the {on} belongs to that is not known"
             )
     return out
 

@@ -46,11 +46,15 @@ def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callab
         return found
     say(f"something is left over: checking how far the parameters depend on {_listed(flexible)}")
     hangs_on = {effects.first_of(name): moved(found.after, found.without(name).after) for name in flexible}
+    hangs_on = {**found.disturbance.moves_without_percent, **hangs_on}
     return replace(found, disturbance=replace(found.disturbance, moves_without_percent=hangs_on))
 
 
 def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
-    """The same without effects that may only stand in; what was left beside them is left without them, too."""
+    """The same without effects that may only stand in; what was left beside them is left without them, too.
+
+    One of them may be real all the same: J, C and K are no surer than they differ with and without.
+    """
     depends = found.disturbance.depends_on
     less = found.without(*names)
     left = less.disturbance
@@ -65,7 +69,8 @@ def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
     search.left_open = f"{search.left_open} {words}".strip()
     if not less.named:  # the declared model has all of its terms
         search.dropped = []
-    return replace(less, disturbance=left)
+    apart = {" and ".join(dict.fromkeys(effects.first_of(n) for n in names)): moved(less.after, found.after)}
+    return replace(less, disturbance=replace(left, moves_without_percent=apart))
 
 
 def _listed(names: Sequence[str]) -> str:

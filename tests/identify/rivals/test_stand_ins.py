@@ -57,6 +57,8 @@ def test_a_flexible_effect_beside_which_something_else_is_left_is_not_named() ->
     assert "Not named: flexible mode." in less.search.left_open
     assert "frequency" in less.search.left_open
     assert {c.effect: c.status for c in less.search.candidates}["flexible_mode"] == "left open"
+    # It may be real all the same: what is reported is no surer than that.
+    assert less.disturbance.moves_without_percent == {"flexible_mode": {"inertia": pytest.approx(100.0 * 0.06 / 1.06)}}
 
 
 def test_more_of_its_own_kind_does_not_speak_against_a_name_but_how_far_j_hangs_on_it_is_noted() -> None:
@@ -77,6 +79,7 @@ def test_what_was_taken_back_is_not_in_the_model_that_the_others_are_judged_besi
     kept = looked_at(begun)
     assert kept.named == ["creep"]
     assert asked == [("cogging",), ("cogging", "creep")]
+    assert set(kept.disturbance.moves_without_percent) == {"cogging", "creep"}
 
 
 @pytest.mark.parametrize(("effects", "depends"), [(("flexible_mode",), ()), (("coulomb_friction",), (LINES,))])
