@@ -25,6 +25,7 @@ from rig.recording.run import Array
 
 DEPENDENCE_BINS = 30  # of a quantity, in which the residual is averaged
 MIN_BIN_SAMPLES = 20  # samples in a bin
+WANDER_DEGREE = 5  # of the polynomial in time that the integral of a gyro's bias is taken for
 
 
 def motion(trace: Trace, cutoff_hz: float) -> tuple[Array, Array, Array]:
@@ -32,16 +33,29 @@ def motion(trace: Trace, cutoff_hz: float) -> tuple[Array, Array, Array]:
 
     Quintic splines differentiate and integrate: at 29 Hz and 1 kHz even the second derivative of an encoder's
     angle is right to 1e-4, where a cubic one is off by 0.3 %. An angle that is integrated from the rate begins at zero;
-    where an encoder reads it, too, that is the angle.
+    where an encoder reads it, too, that is the angle, as late as the gyro shows the rate.
     """
     t = trace.step_s * np.arange(len(trace.measured))
     spline = make_interp_spline(t, low_pass(trace.measured, cutoff_hz, trace.step_s), k=5)
     if trace.channel == "rate":
         rate, acceleration = np.asarray(spline(t)), np.asarray(spline.derivative()(t))
+        integrated = np.asarray(spline.antiderivative()(t))
         if trace.beside is not None:
-            return low_pass(trace.beside, cutoff_hz, trace.step_s), rate, acceleration
-        return trace.on_the_encoder(np.asarray(spline.antiderivative()(t)), t), rate, acceleration
+            angle = low_pass(trace.beside, cutoff_hz, trace.step_s)
+            return angle - _gyro_delay_s(angle - integrated, rate, trace.keep) * rate, rate, acceleration
+        return trace.on_the_encoder(integrated, t), rate, acceleration
     return np.asarray(spline(t)), np.asarray(spline.derivative()(t)), np.asarray(spline.derivative(2)(t))
+
+
+def _gyro_delay_s(ahead_rad: Array, rate: Array, keep: Any) -> float:
+    """By how much a gyro's low-pass makes it late, from how far the encoder is ahead of the integrated rate.
+
+    The integral of the gyro's bias, which wanders slowly, is taken for a polynomial of the time.
+    """
+    wander = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, len(rate)), WANDER_DEGREE)
+    keep = np.asarray(keep, dtype=bool)
+    columns = np.column_stack([rate / (np.max(np.abs(rate)) + 1e-300), wander])[keep]
+    return float(np.linalg.lstsq(columns, ahead_rad[keep], rcond=None)[0][0] / (np.max(np.abs(rate)) + 1e-300))
 
 
 @dataclass(frozen=True)
@@ -107,8 +121,13 @@ def at_samples(pieces: Array | None, n: int, upsampling: int = UPSAMPLING) -> Ar
     if pieces is None:
         return np.zeros(n)
     values = pieces[:, 0]
-    if pieces.shape[1] == 1:  # held: at the instant of a jump its middle, or the torque would seem half a step early
-        values = np.concatenate([values[:1], 0.5 * (values[1:] + values[:-1])])
+    if (
+        pieces.shape[1] == 1
+    ):  # held: the mean over a sample around each instant, or a jump seems early, and a delay wrong
+        whole = np.concatenate([[0.0], np.cumsum(values)])
+        edges = np.clip(upsampling * (np.arange(n + 1) - 0.5), 0.0, len(values))
+        mean = np.diff(np.interp(edges, np.arange(len(whole)), whole)) / np.maximum(np.diff(edges), 1e-9)
+        return np.where(np.diff(edges) > 0.0, mean, values[-1])
     at = values[::upsampling]
     return np.append(at, np.full(n - len(at), at[-1]))[:n]
 

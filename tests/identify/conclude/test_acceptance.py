@@ -37,7 +37,9 @@ def test_a_flexible_effect_that_j_hangs_on_is_a_reason_while_something_is_left()
     moves = {"flexible_mode": {"inertia": 5.8, "damping": 7.9}, "cogging": {"inertia": 0.4}}
     left = Disturbance(0.1, "N*m", 0.1, (RATE,), {}, moves)
     (reason,) = reasons_against_disturbance(left, AcceptConfig(), "rotary")
-    assert reason.startswith("flexible mode would change J by 5.8 %, more than is allowed (identify.accept.inertia_percent)")
+    assert reason.startswith(
+        "flexible mode would change J by 5.8 %, more than is allowed (identify.accept.inertia_percent)"
+    )
     assert "identify.accept.inertia_percent" in reason
     unreported = of_reported(left, cast(Any, SimpleNamespace(parameters={"damping": None})))
     assert reasons_against_disturbance(unreported, AcceptConfig(), "rotary") == []
