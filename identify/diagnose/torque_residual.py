@@ -121,9 +121,7 @@ def at_samples(pieces: Array | None, n: int, upsampling: int = UPSAMPLING) -> Ar
     if pieces is None:
         return np.zeros(n)
     values = pieces[:, 0]
-    if (
-        pieces.shape[1] == 1
-    ):  # held: the mean over a sample around each instant, or a jump seems early, and a delay wrong
+    if pieces.shape[1] == 1:  # held: the mean over a sample around each instant, or a delay seems up to twice as long
         whole = np.concatenate([[0.0], np.cumsum(values)])
         edges = np.clip(upsampling * (np.arange(n + 1) - 0.5), 0.0, len(values))
         mean = np.diff(np.interp(edges, np.arange(len(whole)), whole)) / np.maximum(np.diff(edges), 1e-9)

@@ -45,9 +45,9 @@ def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callab
     if not flexible:
         return found
     say(f"something is left over: checking how far the parameters depend on {_listed(flexible)}")
-    hangs_on = {effects.first_of(name): moved(found.after, found.without(name).after) for name in flexible}
-    hangs_on = {**found.disturbance.moves_without_percent, **hangs_on}
-    return replace(found, disturbance=replace(found.disturbance, moves_without_percent=hangs_on))
+    apart = dict(found.disturbance.moves_without_percent)
+    apart |= {effects.first_of(name): moved(found.after, found.without(name).after) for name in flexible}
+    return replace(found, disturbance=replace(found.disturbance, moves_without_percent=apart))
 
 
 def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
