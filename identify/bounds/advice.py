@@ -20,10 +20,10 @@ DELAY_NAME: Name = (DELAY, "delay")
 _RATIOS = {("damping",): "C/J", ("stiffness",): "K/J"}
 
 
-def undetermined(name: str, missing: Sequence[str], partner: str | None = None) -> str:
+def undetermined_sentence(name: str, missing: Sequence[str], partner: str | None = None) -> str:
     """Advice on a run that alone does not determine some terms; ``partner`` is a run that it should be fitted with.
 
-    >>> undetermined("0.5 Hz", ["inertia", "stiffness"], "6 Hz")
+    >>> undetermined_sentence("0.5 Hz", ["inertia", "stiffness"], "6 Hz")
     '0.5 Hz alone cannot separate inertia from stiffness: keep the start transient or fit it with 6 Hz'
     """
     beside = f"fit it with {partner}" if partner else "fit it together with a set at another frequency"
@@ -118,7 +118,7 @@ def of_weak_set(information: Information, others: Sequence[Information] = ()) ->
     terms = [n[0] for n in missing if n[0] in TERMS]
     if not terms:
         return f"{information.name} alone does not determine every effect"
-    sentence = undetermined(information.name, terms, _partner(information, missing, others))
+    sentence = undetermined_sentence(information.name, terms, _partner(information, missing, others))
     rest = [label(n) for n in missing if n[0] not in TERMS]
     return sentence + (f"; add a set for {joined(rest)}" if rest else "")
 

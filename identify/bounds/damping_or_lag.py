@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.bounds.cramer_rao import information_of, together, with_delay
-from identify.signals.torque_band import highest_torque_hz
+from identify.signals.torque_bandwidth import highest_torque_hz
 from identify.signals.trace import Trace
 from identify.wording import number
 from rig.platform import Platform

@@ -8,7 +8,7 @@ import numpy as np
 
 from identify.bounds.jumps import JUMP
 from identify.conclude.acceptance import INTERRUPTED, USUAL_CUTOFF_HZ, opposite_signs
-from identify.diagnose import torque_noise
+from identify.diagnose import torque_sensor_noise
 from identify.diagnose.torque_residual import dependence
 from identify.diagnose.wording import is_significant
 from identify.model.parameter_fit import reduced_chi_square
@@ -164,7 +164,7 @@ def _to_explain(found: Identification) -> list[str]:
     if left is not None and left.moments:
         places = joined([f"in {m.run} from {m.from_s:.2f} to {m.to_s:.2f} s" for m in left.moments])
         return [f"Most of the residual lies {places}. Exclude it with from_s or to_s, or record the run again."]
-    noisy = torque_noise.describe(found)
+    noisy = torque_sensor_noise.describe(found)
     return [noisy] if noisy else [*_by_dependence(found), *_coloured(found)]
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from identify.diagnose.coloured_residual import bounded, coloured_cost, lines, rms, standard_errors, strongest
-from identify.diagnose.torque_band import TorqueBand
+from identify.diagnose.low_passed_torque import LowPassedTorque
 from identify.diagnose.torque_fit import TorqueFit
 from identify.model.effect_torque import feeds_on_torque
 from identify.model.parameters import Name
@@ -42,7 +42,7 @@ class _Stacked(NamedTuple):
     extra: int
 
 
-class TorqueRegression(TorqueBand):
+class TorqueRegression(LowPassedTorque):
     """Fits structures in torque over a set of runs."""
 
     def following(self, fit: TorqueFit, columns: Array) -> tuple[TorqueFit, Array]:

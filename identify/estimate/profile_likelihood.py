@@ -24,7 +24,7 @@ from identify.estimate.started_at_rest import (
     with_fixed_initial_state,
 )
 from identify.model.parameters import Name, bounds_of, ordered
-from identify.signals.torque_band import highest_torque_hz
+from identify.signals.torque_bandwidth import highest_torque_hz
 from identify.simulate.sensitivities import jacobian
 from identify.simulate.shots import RUNAWAY, residual_at
 from rig.platform import TERMS

@@ -16,7 +16,7 @@ import numpy as np
 
 from identify.estimate.output_error import OutputErrorFit
 from identify.model.parameters import Name
-from identify.signals.torque_band import highest_torque_hz
+from identify.signals.torque_bandwidth import highest_torque_hz
 from identify.simulate.shots import Shots, may_rest
 from rig.dynamics import Equations
 

@@ -18,7 +18,7 @@ import numpy as np
 from identify.results import Identification, RunTraces
 from identify.signals.noise import LOWER, LOWER_MEAN
 from identify.signals.period import torque_period_s
-from identify.signals.torque_band import highest_hz
+from identify.signals.torque_bandwidth import highest_hz
 from identify.wording import frequency, number
 from rig.errors import Aborted, RecordingError
 from rig.recording.run import Array

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from identify.model.parameter_fit import ParameterFit, reduced_chi_square
@@ -56,28 +57,24 @@ class Search:
 
     def drop(self, without: ParameterFit, status: str = "added, then no longer needed") -> None:
         """Take back the effects that the final model does without; the report gives them this status."""
-        gone = [e for e in self.best.structure.effects if e not in without.structure.effects]
-        self.candidates = [
-            replace(c, status=status) if c.status == "added" and c.effect in gone else c for c in self.candidates
-        ]  # fmt: skip
-        for effect in gone:
-            self.rivals.pop(effect, None)
-            self.rival_models.pop(effect, None)
-        self.best = without
+        self._take_back(without, lambda effect: status)
 
     def mark_undetermined(self, name: str, sentences: tuple[str, str], without: ParameterFit) -> None:
         """Take an effect back that may as well be something no library has, and what was found beside it.
 
         ``without`` is the model of what was found before it.
         """
+        self._take_back(without, lambda effect: "left open" if effect == name else "found together with an open effect")
+        self.dropped = []
+        self.left_open, self.tells_apart = sentences
+
+    def _take_back(self, without: ParameterFit, status_of: Callable[[str], str]) -> None:
         gone = [e for e in self.best.structure.effects if e not in without.structure.effects]
-        status = {e: "left open" if e == name else "found together with an open effect" for e in gone}
         self.candidates = [
-            replace(c, status=status[c.effect]) if c.status == "added" and c.effect in status else c
+            replace(c, status=status_of(c.effect)) if c.status == "added" and c.effect in gone else c
             for c in self.candidates
         ]  # fmt: skip
         for effect in gone:
             self.rivals.pop(effect, None)
             self.rival_models.pop(effect, None)
-        self.best, self.dropped = without, []
-        self.left_open, self.tells_apart = sentences
+        self.best = without

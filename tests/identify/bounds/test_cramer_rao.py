@@ -162,7 +162,7 @@ def test_a_planned_set_is_played_from_rest_without_noise() -> None:
 
 def test_advice_reads_like_a_bench_engineer() -> None:
     assert (
-        advice.undetermined("set 0.5 Hz", ["inertia", "stiffness"], "6 Hz")
+        advice.undetermined_sentence("set 0.5 Hz", ["inertia", "stiffness"], "6 Hz")
         == "set 0.5 Hz alone cannot separate inertia from stiffness: keep the start transient or fit it with 6 Hz"
     )
-    assert advice.undetermined("a", ["damping"]).startswith("a alone does not determine damping")
+    assert advice.undetermined_sentence("a", ["damping"]).startswith("a alone does not determine damping")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from identify.diagnose import torque_noise
+from identify.diagnose import torque_sensor_noise
 from identify.pipeline import identify
 from identify.results import Identification
 from identify.rivals import coloured_noise
@@ -131,7 +131,7 @@ def test_noise_in_the_recorded_torque_swells_at_the_resonance_and_is_not_the_sen
 def test_what_a_clean_torque_leaves_is_not_blamed_on_its_noise(filtered: bool) -> None:
     found, _ = found_without_its_effect() if filtered else found_in(recorded(None, CUBIC), [])
     assert found.verdict.unexplained
-    assert torque_noise.describe(found) == ""
+    assert torque_sensor_noise.describe(found) == ""
 
 
 def test_two_runs_of_different_noise_have_no_colour_in_common() -> None:

@@ -32,7 +32,7 @@ AROUND_REVERSAL, MAX_REVERSAL_SHARE = 0.6, 0.35  # periods of the cut-off left o
 _QUANTITIES = {"angle": 0, "rate": 1, "torque": 3}  # of a trace's fine motion
 
 
-class TorqueBand:
+class LowPassedTorque:
     """The columns of structures in torque over a set of runs, at the samples where the platform moves.
 
     Parameters
