@@ -266,7 +266,8 @@ class Descent:
         ]  # fmt: skip
         first, spread = [q.innovations[:, 0] for q in self.looks], [q.variance[:, 0] for q in self.looks]
         variance, _ = self.problem.variance_of(self._squares(self.looks), self.count)
+        costs = [np.sum(q.innovations**2 / (v := q.variance * variance) + np.log(v), axis=1) for q in self.looks]
         return Fit(
             self.structure, self.names, self.x, self.count, variance, self.cost, self.information, self.noise,
-            tuple(self.shots), Prediction(first, spread, disturbance), self.reduced_chi_square(),
+            tuple(self.shots), Prediction(first, spread, costs, disturbance), self.reduced_chi_square(),
         )  # fmt: skip

@@ -65,9 +65,11 @@ class Prediction:
     Attributes
     ----------
     innovations
-        Measured minus predicted, in units of the reading, (n,) each.
+        Measured minus predicted, in units of the reading, (n,) each; where two are read, of the first.
     variance
         Of the innovations, over the variance of one reading's noise, (n,) each.
+    costs
+        What each sample adds to minus twice the log-likelihood, all its readings together, (n,) each.
     disturbance_nm
         The torque nobody recorded, as the innovations show it: its slow part and, sample by sample, the torque that
         the correction of the rate stands for, (n,) each.
@@ -75,6 +77,7 @@ class Prediction:
 
     innovations: list[Array]
     variance: list[Array]
+    costs: list[Array]
     disturbance_nm: list[Array]
 
 

@@ -8,6 +8,7 @@ for. Where it is, the torque does depend on the angle, but not as any effect of 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from identify.likelihood.fit import Fit
 from identify.propose.free_forms import fitted, ranges
 from identify.propose.innovation_score import InnovationScores
-from identify.select.evidence import STRONG_SUPPORT, support_difference
+from identify.select.evidence import STRONG_SUPPORT, inflation
 from identify.select.free_form_residual import CURVE_STEPS, ON
 from identify.select.trial_fits import COMPARABLE, TRIAL_ITERATIONS
 from rig import effects
@@ -40,6 +41,7 @@ def against_curves(search: Stepwise, now: Fit) -> Fit:
     names, curve, rest, with_curve = found
     search.in_place = with_curve
     search.stood_for_curves |= set(names)
+    search.dropped = [d for d in search.dropped if d[0] not in rest.structure.terms]
     search.dropped += [(n, f"a curve over the {ON[curve]} explains clearly more in its place") for n in names]
     search.say(f"took {' and '.join(names)} back: a curve over the {ON[curve]} explains clearly more")
     return rest
@@ -53,21 +55,43 @@ def is_beaten(search: Stepwise, now: Fit) -> bool:
 def _beaten(search: Stepwise, now: Fit) -> tuple[list[str], str, Fit, Fit] | None:
     """Names that a curve in their place beats, the curve, and the model without them and with it; None where none does.
 
-    Several effects of one kind (two waves over the angle) are judged together.
+    Several effects of one kind (two waves over the angle) are judged together, and then all that are a torque over one
+    quantity: two of them, of different kinds, may bend to what neither of them is.
     """
-    groups: dict[str, list[str]] = {}
+    kinds: dict[str, list[str]] = {}
+    over: dict[str, list[str]] = {}
     for name in search.trials.added(now):
-        groups.setdefault(effects.first_of(name), []).append(name)
-    for first, names in groups.items():
-        effect = effects.get(first)
-        curves = [*CURVES.get(effect.family, ()), *(("free_memory",) if effect.states else ())]
+        kinds.setdefault(effects.first_of(name), []).append(name)
+        for curve in CURVES.get(effects.get(name).family, ()):
+            over.setdefault(curve, []).append(name)
+    groups = [(_curves_of(first), names) for first, names in kinds.items()]
+    groups += [([curve], names) for curve, names in over.items() if names not in kinds.values()]
+    for curves, names in groups:
         if not curves:
             continue
         rest = _without(search, now, names)
         curve = _in_place(search, now, rest, names, curves)
-        if curve is not None and support_difference(now, curve[1]) > STRONG_SUPPORT:
+        if curve is not None and _support(search, now, *curve) > STRONG_SUPPORT:
             return names, curve[0], rest, curve[1]
     return None
+
+
+def _support(search: Stepwise, now: Fit, curve: str, with_curve: Fit) -> float:
+    """By how much a model with a curve in the place of names is likelier, as far as that can be believed.
+
+    A curve nearly contains what it stands for, so its fall is believed as that of an effect that is added. A bump acts
+    in few blocks of a record, and most of them cannot agree on it.
+    """
+    own = [n for n in with_curve.names if n[0] == curve]
+    inflated = inflation(search.problem.columns_at(with_curve, with_variance=True), with_curve, own)
+    price = (with_curve.penalised - with_curve.cost) - (now.penalised - now.cost)
+    return (now.cost - with_curve.cost) / inflated - price
+
+
+def _curves_of(name: str) -> list[str]:
+    """Curves that may stand in the place of an effect."""
+    effect = effects.get(name)
+    return [*CURVES.get(effect.family, ()), *(("free_memory",) if effect.states else ())]
 
 
 def _in_place(
@@ -91,12 +115,13 @@ def _in_place(
 
 
 def _without(search: Stepwise, now: Fit, names: Sequence[str]) -> Fit:
-    """A model without some effects: as it was in the search, or fitted."""
-    structure = now.structure
+    """A model without some effects, and with the terms that they have replaced: as it was in the search, or fitted."""
+    structure = replace(now.structure, terms=search.base.structure.terms)
     for name in names:
         structure = structure.minus(name)
     known = search.known(structure)
     if known is not None:
         return known
-    values = {k: v for k, v in now.values.items() if k[0] not in names}
+    lost = {(t,): search.base.values[(t,)] for t in structure.terms if t not in now.structure.terms}
+    values = lost | {k: v for k, v in now.values.items() if k[0] not in names}
     return search.problem.fit(structure, values, now.noise, TRIAL_ITERATIONS, carry=now.shots, thorough=False)

@@ -172,13 +172,10 @@ def agreement(falls: Array, price: float = 0.0) -> float:
 
 def block_costs(fit: Fit) -> Array:
     """What blocks of the record add to the cost of a fit, (b,)."""
-    p = fit.prediction
-    each = max(1, round(EVIDENCE_BLOCKS / len(p.innovations)))
-    out = []
-    for e, v, s in zip(p.innovations, p.variance, fit.shots, strict=True):
-        cost = (e**2 / (v * fit.variance) + np.log(v * fit.variance))[s.weight]
-        out += [float(np.sum(part)) for part in np.array_split(cost, each)]
-    return np.array(out)
+    costs = fit.prediction.costs
+    each = max(1, round(EVIDENCE_BLOCKS / len(costs)))
+    parts = [np.array_split(cost[s.weight], each) for cost, s in zip(costs, fit.shots, strict=True)]
+    return np.array([float(np.sum(part)) for run in parts for part in run])
 
 
 def in_band(noise: Noise, cutoff_hz: float) -> float:
