@@ -70,9 +70,9 @@ def _beaten(search: Stepwise, now: Fit) -> tuple[list[str], str, Fit, Fit] | Non
         if not curves:
             continue
         rest = _without(search, now, names)
-        curve = _in_place(search, now, rest, names, curves)
-        if curve is not None and _support(search, now, *curve) > STRONG_SUPPORT:
-            return names, curve[0], rest, curve[1]
+        found = _in_place(search, now, rest, names, curves)
+        if found is not None and _support(search, now, *found) > STRONG_SUPPORT:
+            return names, found[0], rest, found[1]
     return None
 
 
