@@ -17,6 +17,7 @@ from identify.conclude.declared_values import declared_shapes, declared_values
 from identify.conclude.error_figures import floor_of, in_torque, measure
 from identify.conclude.final_models import FinalModels
 from identify.diagnose.decay_disturbance import left_of_a_decay
+from identify.diagnose.torque_fit import TorqueFit
 from identify.estimate.final_fit import FinalFit
 from identify.estimate.initial_guess import Start, first_guess
 from identify.genetic.per_set import each_set
@@ -36,7 +37,7 @@ from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_without_motion
 from identify.runs.usable import runs_used
-from identify.select.field_search import Found, search_in_torque, with_free_form
+from identify.select.field_search import Found, Judged, search_in_torque, with_free_form
 from identify.select.free_form_residual import dependence_on, most_moving
 from identify.select.likelihood_search import LikelihoodSearch
 from identify.select.search_state import Search
@@ -220,19 +221,23 @@ class _Identifier:
         self.say("the residual holds a torque that was not recorded, in addition to the sensor's noise")
         self.more_than_noise = True
         allowed = [n for n in self._allowed() if n not in search.stepwise.stood_for_curves]
+        step = search.stepwise
+
+        def judge(proposed: TorqueFit) -> Judged | None:
+            fit = search.adopt(proposed)
+            return None if fit is None else Judged(fit, found_there, self._curves(step) if fit is step.best else ())
+
         found = search_in_torque(
             self.traces, self.split, self.structure, shapes, self.start, allowed,
-            UNITS[self.recording.axis]["torque"], self.say,
-            (search.stepwise.best, found_there), search.stepwise.trusted, search.stepwise.weigher.regression,
-            self._curves(search.stepwise), search.refutes,
+            UNITS[self.recording.axis]["torque"], self.say, Judged(step.best, found_there, self._curves(step)),
+            step.trusted, step.weigher.regression, judge,
         )  # fmt: skip
-        found = found.with_lines(search.stepwise.best, search.stepwise.problem.torque_nm)
+        found = found.with_lines(step.best, step.problem.torque_nm)
         gyro = all(t.channel == "rate" and t.beside is None for t in self.traces)  # an encoder has no line of its own
         line = standing_line(found.after, self.traces) if gyro and TONE in found.named else None
         if line is not None:
             words = describe(line, self.recording.axis, self.traces[0].channel)
             self.say(f"not named: {TONE}; the line may come from the sensor itself")
-            step = search.stepwise
             bare = step.without(step.best, TONE) if TONE in step.best.structure.effects else step.best
             found = found.without(TONE).with_lines(bare, step.problem.torque_nm)
             found.search.mark_undetermined(TONE, words, found.kept)
@@ -280,12 +285,8 @@ class _Identifier:
         if in_full:
             self.say("fitting each set separately")
             d = self.declared
-            centre = {
-                "inertia": d.inertia_kg_m2, "damping": d.damping_nm_s_rad, "stiffness": d.stiffness_nm_rad
-            }  # fmt: skip
-            per_set, joint = each_set(
-                self.traces, after, self.start, centre, self.settings, self.recording.axis
-            )  # fmt: skip
+            centre = dict(zip(TERMS, (d.inertia_kg_m2, d.damping_nm_s_rad, d.stiffness_nm_rad), strict=True))
+            per_set, joint = each_set(self.traces, after, self.start, centre, self.settings, self.recording.axis)
         left = measured.disturbance if measured else None
         if self.torque_free:
             left = left_of_a_decay(self.traces, self.split, after, self.start, self.recording.axis)

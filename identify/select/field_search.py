@@ -23,6 +23,7 @@ from identify.runs.observability import can_show
 from identify.select.disturbance_lines import lines_left
 from identify.select.evidence import MAX_TRUSTED_INFLATION, STRONG_SUPPORT, in_band, inflation, torque_fit_of
 from identify.select.likelihood_search import MAX_CUTOFF_SHARE
+from identify.select.preference import is_more_flexible, leaves_less
 from identify.select.search_state import Search
 from identify.select.torque_search import TorqueSearch
 from identify.signals.trace import Trace
@@ -32,10 +33,26 @@ from rig.effects.base import Place
 MUCH_LEFT = 0.05  # of the torque: where nothing explains that, a wider band is looked at
 # Times the cut-off at which the sensor's noise is ten times as much torque: an angle is differentiated twice.
 WIDER = {"angle": 10.0**0.4, "rate": 10.0 ** (2.0 / 3.0)}
-CLEARLY_LESS, ABOUT_AS_MUCH = 0.75, 1.25  # times the power that prediction error's model leaves on held-out samples
 UNFOLLOWED = 0.5  # of the residual in torque, that the likelihood takes the disturbance for
 NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
 ANOTHER = 0.5  # of the inertia, by which the likeliest platform is another than the one that is reported
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A model as the likelihood judges it.
+
+    Attributes
+    ----------
+    fit, search
+        The model, and the search as the report tells it.
+    curves
+        What curves over what it leaves show, and how far J, C and K move with each, percent.
+    """
+
+    fit: Fit
+    search: Search
+    curves: Sequence[tuple[Dependence, Mapping[str, float]]] = ()
 
 
 @dataclass(frozen=True)
@@ -100,9 +117,8 @@ class TorqueErrors:
 
 def search_in_torque(
     traces: Sequence[Trace], split: Split, structure: Structure, shapes: dict[str, tuple[float, ...]], start: Start,
-    allowed: Sequence[str], unit: str, say: Callable[[str], None], known: tuple[Fit, Search],
-    trusted: bool, along_few: TorqueRegression, curves: Sequence[tuple[Dependence, Mapping[str, float]]] = (),
-    refutes: Callable[[TorqueFit], bool] = lambda fit: False,
+    allowed: Sequence[str], unit: str, say: Callable[[str], None], known: Judged, trusted: bool,
+    along_few: TorqueRegression, judge: Callable[[TorqueFit], Judged | None],
 ) -> Found:  # fmt: skip
     """Find what the declared model lacks, and fit both models with their disturbance.
 
@@ -117,17 +133,15 @@ def search_in_torque(
     unit
         Of the torque.
     known
-        The model that the search by prediction error has found, and that search as the report tells it. It stands
-        where what it leaves depends on nothing, or where the search in torque leaves as much on held-out samples.
+        The model that the search by prediction error has found. It stands where what it leaves depends on nothing, or
+        where the search in torque leaves as much on held-out samples.
     trusted
         Whether its likelihood is right about the disturbance: then a model that it leaves little of stands, though its
         effects cannot be followed along the measured motion (a play, a hysteresis).
     along_few
         The samples that search looked at, in torque.
-    curves
-        What curves over what that model leaves show, and how far J, C and K move with each, percent.
-    refutes
-        Whether that model is likelier than one found in torque: the search in torque proposes, the likelihood judges.
+    judge
+        A model found in torque as the likelihood judges it, maybe with fewer effects; None where the other is likelier.
     """
     few, parts = along_few.traces, along_few.split
     scale = scale_of(few, start.platform, ())
@@ -143,29 +157,29 @@ def search_in_torque(
 
     highest = MAX_CUTOFF_SHARE / few[0].step_s
     search = at(min(start.cutoff_hz, highest))
-    trial = torque_fit_of(search.regression, known[0])
-    by_likelihood: tuple[Fit, Search] | None = known
-    best = trial
-    size_nm = float(np.sqrt(in_band(known[0].noise, search.regression.cutoff_hz) * known[0].variance))
+    trial = torque_fit_of(search.regression, known.fit)
+    by_likelihood: Judged | None = known
+    best = proposed = trial
+    size_nm = float(np.sqrt(in_band(known.fit.noise, search.regression.cutoff_hz) * known.fit.variance))
     unfollowed = trusted and size_nm < UNFOLLOWED * trial.held_nm
-    filtered = any(effects.get(e).place is Place.SENSOR for e in known[0].structure.effects)  # which no torque shows
+    filtered = any(effects.get(e).place is Place.SENSOR for e in known.fit.structure.effects)  # which no torque shows
     if not unfollowed and not filtered:
         say("looking at what is left as a torque")
-        depends = bool(curves or disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on)
-        best = search.run()
-        better = _better(search, best, trial, depends) and not (trusted and _more_flexible(best, trial))
-        if better and not refutes(best):
-            by_likelihood = None
-        else:
-            best = trial
+        depends = bool(known.curves or disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on)
+        proposed = search.run()
+        better = leaves_less(search, proposed, trial, depends) and not (trusted and is_more_flexible(proposed, trial))
+        if better and (judged := judge(proposed)) is not None:
+            by_likelihood, known = None, judged
+            same = judged.fit.structure == proposed.structure
+            best = proposed if same else torque_fit_of(search.regression, judged.fit)
     left = best.held_nm / search.regression.torque_nm
     if by_likelihood is None and best.structure.effects == structure.effects and left > MUCH_LEFT:
         wider = min(WIDER[few[0].channel] * start.cutoff_hz, highest)
         say(f"nothing found up to {start.cutoff_hz:.3g} Hz: looking up to {wider:.3g} Hz")
         search = at(wider)
-        best = search.run()
+        best = proposed = search.run()
     regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
-    final = by_likelihood[0].structure if by_likelihood else best.structure
+    final = by_likelihood.fit.structure if by_likelihood else best.structure
     say(f"final fit with {', '.join(final.effects) or 'fewer terms'}")
     before = _final(regression, base, traces, split)
 
@@ -174,11 +188,11 @@ def search_in_torque(
             return before
         if by_likelihood:
             return by_prediction_error(
-                traces, final, by_likelihood[0].values, split.final, split.everything, like=by_likelihood[0]
+                traces, final, by_likelihood.fit.values, split.final, split.everything, like=by_likelihood.fit
             )  # fmt: skip
         return _final(regression, best, traces, split)
 
-    after, found_so_far = fitted(final), final
+    after = fitted(final)
     while name := _unsupported(after, structure, bool(by_likelihood)):
         say(f"dropped {name}: in the final fit it does not differ significantly from zero")
         final, best = final.minus(name), search.without(best, name)
@@ -187,8 +201,8 @@ def search_in_torque(
     lost = [e for e in final.effects if e not in best.structure.effects and effects.get(e).place is not Place.SENSOR]
     if by_likelihood and (unfollowed or lost):
         disturbance = Disturbance(size_nm, unit, size_nm / regression.torque_nm, (), {})
-    if _describes(known[0], after):
-        for curve in curves:
+    if _describes(known.fit, after):
+        for curve in known.curves:
             disturbance = with_free_form(disturbance, *curve)
 
     def errors(fit: TorqueFit) -> TorqueErrors:
@@ -205,11 +219,11 @@ def search_in_torque(
             fitted = by_prediction_error(traces, less, values, split.final, split.everything, like)
         return fitted, errors(there), disturbance_of(regression, there, floor, unit)
 
-    reported = search.as_search(best)
+    reported = search.as_search(proposed if by_likelihood is None else best)
     if by_likelihood:
-        reported = replace(by_likelihood[1], contribution=reported.contribution)
-        if final != found_so_far:
-            reported.drop(after.fit)
+        reported = replace(by_likelihood.search, contribution=reported.contribution)
+    if final != (by_likelihood.fit if by_likelihood else proposed).structure:
+        reported.drop(after.fit)
     return Found(reported, before, after, disturbance, (errors(base), errors(best)), lacking)
 
 
@@ -246,27 +260,6 @@ def with_free_form(left: Disturbance, curve: Dependence, moves: Mapping[str, flo
         depends_on=tuple(sorted(depends, key=lambda d: -d.torque_rms)),
         moves_percent=most,
     )  # fmt: skip
-
-
-def _better(search: TorqueSearch, best: TorqueFit, trial: TorqueFit, depends: bool) -> bool:
-    """Whether the model that the search in torque found stands in place of prediction error's.
-
-    On samples not fitted it has to leave clearly less. Where what is left ``depends`` on something, prediction error
-    lacks an effect or has a wrong one, and about as much with fewer parameters is enough, or less with as many.
-    """
-    ratio, more = search.left(best) / search.left(trial), len(best.values) - len(trial.values)
-    enough = (ratio < ABOUT_AS_MUCH and more < 0) or (ratio < 1.0 / ABOUT_AS_MUCH and more == 0)
-    return ratio < CLEARLY_LESS or (depends and enough)
-
-
-def _more_flexible(best: TorqueFit, trial: TorqueFit) -> bool:
-    """Whether a model has a lag of the drive besides, or beside what was found an effect that fits almost anything.
-
-    Where the likelihood can be trusted it knows of both: it has seen how the platform answers, sample by sample.
-    """
-    found = trial.structure.effects
-    added = [effects.get(e) for e in best.structure.effects if e not in found]
-    return any(e.place is Place.DRIVE or (bool(found) and e.is_flexible) for e in added)
 
 
 def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> FinalFit:

@@ -1,16 +1,19 @@
-"""Which of several effects is named that the data part hardly or not at all."""
+"""Which of several effects, and of two searches' models, is preferred that the data part hardly or not at all."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from identify.diagnose.torque_fit import TorqueFit
 from identify.likelihood.fit import Fit
 from identify.runs.measured_channels import simplicity
 from identify.select.evidence import MAX_TRUSTED_INFLATION, Evidence, EvidenceModel
+from identify.select.torque_search import TorqueSearch
 from rig import effects
 from rig.effects.base import Place
 
 MIN_RICHER_WEIGHT_GAIN = 0.05  # of the disturbance: what a richer effect carries besides, where nothing else is sure
+CLEARLY_LESS, ABOUT_AS_MUCH = 0.75, 1.25  # times the power that prediction error's model leaves on held-out samples
 SPECIAL = 0.8  # of the fall of the cost with a richer effect, parameters paid for: its special case is preferred
 
 
@@ -49,3 +52,24 @@ def prefers_special_case(special: Evidence, rich: Evidence) -> bool:
 def explains_most(special: Evidence, rich: Evidence) -> bool:
     """Whether most of the fall of the cost with an effect is that of its special case."""
     return special.gain - special.price > SPECIAL * (rich.gain - rich.price)
+
+
+def leaves_less(search: TorqueSearch, best: TorqueFit, trial: TorqueFit, depends: bool) -> bool:
+    """Whether the model that the search in torque found stands in place of prediction error's.
+
+    On samples not fitted it has to leave clearly less. Where what is left ``depends`` on something, prediction error
+    lacks an effect or has a wrong one, and about as much with fewer parameters is enough, or less with as many.
+    """
+    ratio, more = search.left(best) / search.left(trial), len(best.values) - len(trial.values)
+    enough = (ratio < ABOUT_AS_MUCH and more < 0) or (ratio < 1.0 / ABOUT_AS_MUCH and more == 0)
+    return ratio < CLEARLY_LESS or (depends and enough)
+
+
+def is_more_flexible(best: TorqueFit, trial: TorqueFit) -> bool:
+    """Whether a model has a lag of the drive besides, or beside what was found an effect that fits almost anything.
+
+    Where the likelihood can be trusted it knows of both: it has seen how the platform answers, sample by sample.
+    """
+    found = trial.structure.effects
+    added = [effects.get(e) for e in best.structure.effects if e not in found]
+    return any(e.place is Place.DRIVE or (bool(found) and e.is_flexible) for e in added)
