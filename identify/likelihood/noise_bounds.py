@@ -18,8 +18,8 @@ MIN_DISTURBANCE, MAX_DISTURBANCE = 1e-7, 10.0  # of the torque: how large a dist
 MAX_SMOOTH = 0.1
 MIN_BIAS_WALK, MAX_BIAS_WALK = 1e-7, 0.01  # of the rate, that a gyro's bias walks over a run
 MAX_ENCODER_ERROR = 1.0  # of the angle, that an encoder's slow error takes over a run
-# Times the variance of one reading, of a gyro's noise ahead of its low-pass.
-MIN_PREFILTER_NOISE, MAX_PREFILTER_NOISE = 1e-3, 1e8
+# Times the variance of one reading, of what a gyro's low-pass lets through of the noise ahead of it.
+MIN_PREFILTER_NOISE, MAX_PREFILTER_NOISE = 1e-4, 1e8
 FAR = 1e30  # times a number of the noise: a bound holds it
 
 
@@ -63,13 +63,12 @@ class NoiseBounds:
     def within(self, noise: Noise) -> Noise:
         """The nearest noise that is neither absurdly large nor without effect."""
         walks = MAX_BIAS_WALK if self.gyro else MAX_ENCODER_ERROR
-        ahead = float(np.clip(noise.ahead, MIN_PREFILTER_NOISE * self.step_s, MAX_PREFILTER_NOISE * self.step_s))
         return Noise(
             float(np.clip(noise.white, self.white(MIN_DISTURBANCE), self.white(MAX_DISTURBANCE))),
             float(np.clip(noise.slow, self.slow(MIN_DISTURBANCE), self.slow(MAX_DISTURBANCE))),
             float(np.clip(noise.time_constant_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
             float(np.clip(noise.walk, self.walk(MIN_BIAS_WALK), self.walk(walks))) if self.wanders else 0.0,
-            ahead if self.gyro else 0.0,
+            float(np.clip(noise.ahead, MIN_PREFILTER_NOISE, MAX_PREFILTER_NOISE)) if self.gyro else 0.0,
             np.inf if self.gyro else float(np.clip(noise.walk_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
             float(np.clip(noise.smooth, self.slow(MIN_DISTURBANCE), self.slow(MAX_SMOOTH))),
         )

@@ -12,6 +12,7 @@ from rig import effects
 from rig.dynamics.gains import Noise
 
 INITIAL_BIAS_WALK = 1e-5  # of the rate, over a run
+INITIAL_PREFILTER_NOISE = 0.1  # times the variance of one reading
 WHITE_SHARES = (1.0, 0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)  # of the torque, on the grid
 COLOURED_SHARES, WHITE_BESIDE = (0.3, 0.03, 0.003), (1.0, 0.05)  # of the torque, and times the best white beside them
 LITTLE_DISTURBANCE = 1e-6  # of the torque
@@ -33,7 +34,7 @@ def noise_on_grid(bounds: NoiseBounds, cost: Callable[[Noise], float], smooth: S
     """The best of a coarse grid of noises: white alone first, then a coloured part beside it, rough or smooth."""
     p = bounds
     times_s = np.geomspace(20.0 * p.step_s, 0.3 * p.slowest_s, 3).tolist()
-    gyro = (p.walk(INITIAL_BIAS_WALK), p.step_s, np.inf if p.gyro else 30.0 * p.step_s)
+    gyro = (p.walk(INITIAL_BIAS_WALK), INITIAL_PREFILTER_NOISE, np.inf if p.gyro else 30.0 * p.step_s)
     little = p.slow(LITTLE_DISTURBANCE)
 
     def of(white: float, coloured: float, time_s: float, is_smooth: bool = True) -> Noise:

@@ -98,8 +98,8 @@ class EvidenceModel:
         added = [n for n in new.names if n not in now.names]
         inflated = inflation(self.problem.columns_at(new, with_variance=True), new, added)
         torqueless = effect not in TERMS and effects.get(effect).place is Place.SENSOR
-        if torqueless and not self.regression.by_gyro:
-            weight = 1.0
+        if torqueless and (self.problem.both or not self.regression.by_gyro):
+            weight = 1.0  # two sensors of one motion show by themselves which is late
         else:
             weight = self.explained_share(now, new, inflated < MAX_TRUSTED_INFLATION, torqueless)
         price = (new.penalised - new.cost) - (now.penalised - now.cost)

@@ -44,7 +44,8 @@ class Noise:
     walk_s
         Time constant with which that returns to nothing; infinite: never.
     ahead
-        Density of the gyro's white noise ahead of its low-pass, (rad/s)^2 s over the variance of one reading.
+        Variance of what a gyro's low-pass lets through of the white noise ahead of it, over the variance of one
+        reading. Behind a quick low-pass that is white as well.
     smooth
         Variance of a smooth torque (second-order coloured: it has a slope) over the variance of one reading, (N m)^2.
     """
@@ -167,11 +168,11 @@ def _discrete(linear: LinearPart, noise: Noise, lag: tuple[float, float], step_s
     if second > 0.0:
         f[SENSED, SLOPE] = 1.0
         f[SLOPE, RATE], f[SLOPE, SENSED], f[SLOPE, SLOPE] = 1.0 / second, -1.0 / second, -first / second
-        density[SLOPE, SLOPE] = noise.ahead / second**2
+        density[SLOPE, SLOPE] = 2.0 * first * noise.ahead / second**2
         there += [SENSED, SLOPE]
     elif first > 0.0:
         f[SENSED, RATE], f[SENSED, SENSED] = 1.0 / first, -1.0 / first
-        density[SENSED, SENSED] = noise.ahead / first**2
+        density[SENSED, SENSED] = 2.0 * noise.ahead / first
         there.append(SENSED)
     density[RATE, RATE] = noise.white / j**2
     density[TORQUE : AIM + 1, TORQUE : AIM + 1] = np.outer(noise.kicks, noise.kicks)

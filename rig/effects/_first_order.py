@@ -15,7 +15,7 @@ def lag(x, step, state, p):  # type: ignore[no-untyped-def]
     which a low-noise sensor shows in J and K.
     """
     tau = p[0]
-    if tau <= 1e-9:
+    if tau <= 0.0:  # however small it is, a fit has to see what a little more does
         return x
     a = math.exp(-step / tau)
     ramp = 1.0 - tau / step * (1.0 - a)

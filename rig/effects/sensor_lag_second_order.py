@@ -7,8 +7,6 @@ import math
 from rig.effects._first_order import times
 from rig.effects.base import Effect, Parameter, Place, filter_kernel
 
-SHORTEST = 1e-3  # of a step: a faster filter passes what a straight line between two samples shows
-
 
 @filter_kernel
 def _low_pass(x, step, state, p):  # type: ignore[no-untyped-def]
@@ -17,10 +15,10 @@ def _low_pass(x, step, state, p):  # type: ignore[no-untyped-def]
     State: output, its slope over the corner frequency, the last input.
     """
     root = math.sqrt(2.0)
-    corner = root / max(p[0], 1e-300)
-    if corner * step > 1.0 / SHORTEST:
+    if p[0] <= 0.0:
         state[0], state[1], state[2] = x, 0.0, x
         return x
+    corner = root / p[0]
     u = corner * step / root
     decay, c, s = math.exp(-u), math.cos(u), math.sin(u)
     # Behind a straight line the output runs along it, late by the time p[0].

@@ -89,3 +89,11 @@ def test_a_low_pass_far_faster_than_a_sample_hides_nothing(lag_s: float) -> None
     quick = gains_of(part, noise, step_s, Sensing(True, 0.0, (lag_s, 0.0)), keep, spans, BEGUN)
     without = gains_of(part, noise, step_s, Sensing(True), keep, spans, BEGUN)
     assert quick.variance[-1, 0] == pytest.approx(without.variance[-1, 0], rel=20.0 * lag_s / step_s)
+
+
+def test_noise_ahead_of_a_quick_low_pass_is_white_noise_as_large_as_it_comes_through() -> None:
+    noise, keep, spans = Noise(white=1e-12, ahead=3.0), np.ones(50, bool), [(0, 49)]
+    still = gains_of(LinearPart(*JCK), noise, 0.02, Sensing(True, 0.0, (1e-7, 0.0)), keep, spans)
+    second = gains_of(LinearPart(*JCK), noise, 0.02, Sensing(True, 0.0, (1e-7, 0.5e-14)), keep, spans)
+    assert still.variance[-1, 0] == pytest.approx(1.0 + 3.0, rel=1e-3)
+    assert second.variance[-1, 0] == pytest.approx(1.0 + 3.0, rel=1e-3)
