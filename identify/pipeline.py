@@ -25,8 +25,8 @@ from identify.model.structure import Structure
 from identify.results import UNITS, Dependence, Identification, SetResult
 from identify.rivals.alternative_causes import AlternativeCauses
 from identify.rivals.coloured_noise import Colour, with_noise_known
+from identify.rivals.open_line import with_line_left_open
 from identify.rivals.stand_ins import with_stand_ins
-from identify.rivals.tone_origin import TONE, describe, standing_line
 from identify.rivals.whiteness_test import fails_whiteness_test, leaves_more_than_noise
 from identify.rivals.whole_runs import FreeRunFitter
 from identify.runs.clipping import full_scale_of
@@ -233,14 +233,7 @@ class _Identifier:
             step.trusted, step.weigher.regression, judge,
         )  # fmt: skip
         found = found.with_lines(step.best, step.problem.torque_nm)
-        gyro = all(t.channel == "rate" and t.beside is None for t in self.traces)  # an encoder has no line of its own
-        line = standing_line(found.after, self.traces) if gyro and TONE in found.named else None
-        if line is not None:
-            words = describe(line, self.recording.axis, self.traces[0].channel)
-            self.say(f"not named: {TONE}; the line may come from the sensor itself")
-            bare = step.without(step.best, TONE) if TONE in step.best.structure.effects else step.best
-            found = found.without(TONE).with_lines(bare, step.problem.torque_nm)
-            found.search.mark_undetermined(TONE, words, found.kept)
+        found = with_line_left_open(found, step, self.traces, self.split.everything, self.recording.axis, self.say)
         found = with_stand_ins(found, self.traces, self.recording.axis, self.say)
         return self._report(found.search, found.before, found.after, measured=found)
 

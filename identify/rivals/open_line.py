@@ -1,0 +1,49 @@
+"""A steady line of which nobody can say whether a torque or the sensor makes it: not named, but not forgotten either.
+
+The numbers of the others, and what is left, stay as they are beside it. At its own frequency a torque does to the
+reading of a platform in steady motion what a line of the sensor does; without either, the line would be taken for
+inertia and damping.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from identify.estimate.final_fit import FinalFit, free_run_of
+from identify.rivals.tone_origin import TONE, describe, standing_line
+from identify.select.field_search import Found
+from identify.select.stepwise import Stepwise
+from identify.signals.trace import Trace
+
+
+def with_line_left_open(
+    found: Found, search: Stepwise, traces: Sequence[Trace], everything: Sequence[Any], axis: str,
+    say: Callable[[str], None],
+) -> Found:  # fmt: skip
+    """The same without a periodic disturbance that may be a line of the gyro's own; unchanged where it is none."""
+    gyro = all(t.channel == "rate" and t.beside is None for t in traces)  # an encoder has no line of its own
+    line = standing_line(found.after, traces) if gyro and TONE in found.named else None
+    if line is None:
+        return found
+    say(f"not named: {TONE}; the line may come from the sensor itself")
+    bare = search.without(search.best, TONE) if TONE in search.best.structure.effects else search.best
+    less = replace(found.without(TONE), disturbance=found.disturbance).with_lines(bare, search.problem.torque_nm)
+    if less.named:
+        less = replace(less, after=_with_numbers_of(found.after, less.after, traces, everything))
+    less.search.mark_undetermined(TONE, describe(line, axis, traces[0].channel), less.kept)
+    return less
+
+
+def _with_numbers_of(richer: FinalFit, less: FinalFit, traces: Sequence[Trace], use: Sequence[Any]) -> FinalFit:
+    """A model with the numbers, and their uncertainty, that it has as a part of another."""
+    at = [richer.names.index(n) for n in less.names if n in richer.names]
+    values = {n: richer.values.get(n, value) for n, value in less.values.items()}
+    return replace(
+        less, values=values, names=tuple(richer.names[i] for i in at), covariance=richer.covariance[np.ix_(at, at)],
+        determined=tuple(richer.determined[i] for i in at),
+        free_run=free_run_of(traces, less.structure, values, use),
+    )  # fmt: skip
