@@ -105,6 +105,7 @@ def test_an_effect_that_is_not_offered_is_no_noise() -> None:
     assert not any("marks of noise" in line for line in said)
 
 
+@pytest.mark.slow
 def test_white_noise_needs_no_second_look() -> None:
     found, said = found_in(recorded(None), [])
     assert found.accepted
