@@ -71,8 +71,8 @@ def linear_part(equations: Equations, jck: Sequence[float]) -> LinearPart:
         motion.append(columns[1:, :2])
         own.append(columns[1:, 2:])
         pull += columns[0, 2:].tolist()
-        assert effect.rest_state is not None
-        rest.append(np.array([effect.rest_state(1.0, 0.0), effect.rest_state(0.0, 1.0)]).T)
+        stands = effect.rest_state
+        rest.append(np.array([stands(1.0, 0.0), stands(0.0, 1.0)]).T if stands else np.zeros((n, 2)))
     if not places:
         return LinearPart(inertia, damping, stiffness)
     together = np.zeros((len(places), len(places)))
