@@ -17,7 +17,6 @@ from identify.conclude.declared_values import declared_shapes, declared_values
 from identify.conclude.error_figures import floor_of, in_torque, measure
 from identify.conclude.final_models import FinalModels
 from identify.diagnose.decay_disturbance import left_of_a_decay
-from identify.diagnose.torque_fit import TorqueFit
 from identify.estimate.final_fit import FinalFit
 from identify.estimate.initial_guess import Start, first_guess
 from identify.genetic.per_set import each_set
@@ -222,15 +221,10 @@ class _Identifier:
         self.more_than_noise = True
         allowed = [n for n in self._allowed() if n not in search.stepwise.stood_for_curves]
         step = search.stepwise
-
-        def judge(proposed: TorqueFit) -> Judged | None:
-            fit = search.adopt(proposed)
-            return None if fit is None else Judged(fit, found_there, self._curves(step) if fit is step.best else ())
-
         found = search_in_torque(
             self.traces, self.split, self.structure, shapes, self.start, allowed,
             UNITS[self.recording.axis]["torque"], self.say, Judged(step.best, found_there, self._curves(step)),
-            step.trusted, step.weigher.regression, judge,
+            step.trusted, step.weigher.regression, search.refutes,
         )  # fmt: skip
         found = found.with_lines(step.best, step.problem.torque_nm)
         found = with_line_left_open(found, step, self.traces, self.split.everything, self.recording.axis, self.say)

@@ -16,7 +16,7 @@ import numpy as np
 from identify.likelihood.fit import Fit
 from identify.propose.free_forms import fitted, ranges
 from identify.propose.innovation_score import InnovationScores
-from identify.select.evidence import STRONG_SUPPORT, inflation
+from identify.select.evidence import STRONG_SUPPORT, support_difference
 from identify.select.free_form_residual import CURVE_STEPS, ON
 from identify.select.trial_fits import COMPARABLE, TRIAL_ITERATIONS
 from rig import effects
@@ -71,21 +71,9 @@ def _beaten(search: Stepwise, now: Fit) -> tuple[list[str], str, Fit, Fit] | Non
             continue
         rest = _without(search, now, names)
         found = _in_place(search, now, rest, names, curves)
-        if found is not None and _support(search, now, *found) > STRONG_SUPPORT:
+        if found is not None and support_difference(now, found[1]) > STRONG_SUPPORT:
             return names, found[0], rest, found[1]
     return None
-
-
-def _support(search: Stepwise, now: Fit, curve: str, with_curve: Fit) -> float:
-    """By how much a model with a curve in the place of names is likelier, as far as that can be believed.
-
-    A curve nearly contains what it stands for, so its fall is believed as that of an effect that is added. A bump acts
-    in few blocks of a record, and most of them cannot agree on it.
-    """
-    own = [n for n in with_curve.names if n[0] == curve]
-    inflated = inflation(search.problem.columns_at(with_curve, with_variance=True), with_curve, own)
-    price = (with_curve.penalised - with_curve.cost) - (now.penalised - now.cost)
-    return (now.cost - with_curve.cost) / inflated - price
 
 
 def _curves_of(name: str) -> list[str]:

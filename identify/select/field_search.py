@@ -118,7 +118,7 @@ class TorqueErrors:
 def search_in_torque(
     traces: Sequence[Trace], split: Split, structure: Structure, shapes: dict[str, tuple[float, ...]], start: Start,
     allowed: Sequence[str], unit: str, say: Callable[[str], None], known: Judged, trusted: bool,
-    along_few: TorqueRegression, judge: Callable[[TorqueFit], Judged | None],
+    along_few: TorqueRegression, refutes: Callable[[TorqueFit], bool],
 ) -> Found:  # fmt: skip
     """Find what the declared model lacks, and fit both models with their disturbance.
 
@@ -140,8 +140,8 @@ def search_in_torque(
         effects cannot be followed along the measured motion (a play, a hysteresis).
     along_few
         The samples that search looked at, in torque.
-    judge
-        A model found in torque as the likelihood judges it, maybe with fewer effects; None where the other is likelier.
+    refutes
+        Whether that model is likelier than one found in torque: the search in torque proposes, the likelihood judges.
     """
     few, parts = along_few.traces, along_few.split
     scale = scale_of(few, start.platform, ())
@@ -159,7 +159,7 @@ def search_in_torque(
     search = at(min(start.cutoff_hz, highest))
     trial = torque_fit_of(search.regression, known.fit)
     by_likelihood: Judged | None = known
-    best = proposed = trial
+    best = trial
     size_nm = float(np.sqrt(in_band(known.fit.noise, search.regression.cutoff_hz) * known.fit.variance))
     unfollowed = trusted and size_nm < UNFOLLOWED * trial.held_nm
     filtered = any(effects.get(e).place is Place.SENSOR for e in known.fit.structure.effects)  # which no torque shows
@@ -168,16 +168,14 @@ def search_in_torque(
         depends = bool(known.curves or disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on)
         proposed = search.run()
         better = leaves_less(search, proposed, trial, depends) and not (trusted and is_more_flexible(proposed, trial))
-        if better and (judged := judge(proposed)) is not None:
-            by_likelihood, known = None, judged
-            same = judged.fit.structure == proposed.structure
-            best = proposed if same else torque_fit_of(search.regression, judged.fit)
+        if better and not refutes(proposed):
+            by_likelihood, best = None, proposed
     left = best.held_nm / search.regression.torque_nm
     if by_likelihood is None and best.structure.effects == structure.effects and left > MUCH_LEFT:
         wider = min(WIDER[few[0].channel] * start.cutoff_hz, highest)
         say(f"nothing found up to {start.cutoff_hz:.3g} Hz: looking up to {wider:.3g} Hz")
         search = at(wider)
-        best = proposed = search.run()
+        best = search.run()
     regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
     final = by_likelihood.fit.structure if by_likelihood else best.structure
     say(f"final fit with {', '.join(final.effects) or 'fewer terms'}")
@@ -192,7 +190,7 @@ def search_in_torque(
             )  # fmt: skip
         return _final(regression, best, traces, split)
 
-    after = fitted(final)
+    after, found_so_far = fitted(final), final
     while name := _unsupported(after, structure, bool(by_likelihood)):
         say(f"dropped {name}: in the final fit it does not differ significantly from zero")
         final, best = final.minus(name), search.without(best, name)
@@ -219,11 +217,11 @@ def search_in_torque(
             fitted = by_prediction_error(traces, less, values, split.final, split.everything, like)
         return fitted, errors(there), disturbance_of(regression, there, floor, unit)
 
-    reported = search.as_search(proposed if by_likelihood is None else best)
+    reported = search.as_search(best)
     if by_likelihood:
         reported = replace(by_likelihood.search, contribution=reported.contribution)
-    if final != (by_likelihood.fit if by_likelihood else proposed).structure:
-        reported.drop(after.fit)
+        if final != found_so_far:
+            reported.drop(after.fit)
     return Found(reported, before, after, disturbance, (errors(base), errors(best)), lacking)
 
 

@@ -20,7 +20,7 @@ from identify.results import Candidate
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
 from identify.runs.reduced import reduced
-from identify.select.curve_rivals import CURVES, against_curves
+from identify.select.curve_rivals import CURVES
 from identify.select.evidence import STRONG_SUPPORT, EvidenceModel, support_difference
 from identify.select.search_state import Search
 from identify.select.stepwise import PREDICTS_TO_NOISE, Stepwise
@@ -88,26 +88,20 @@ class LikelihoodSearch:
         """Search; whether the last model predicts down to the sensor's noise."""
         return self.stepwise.run().reduced_chi_square < PREDICTS_TO_NOISE
 
-    def adopt(self, fit: TorqueFit) -> Fit | None:
-        """Go on with a model found in torque, judged like the search's own; None where the best model is likelier.
+    def refutes(self, fit: TorqueFit) -> bool:
+        """Whether the best model is likelier than one found in torque, also where that has its own best numbers.
 
-        The search in torque proposes, the likelihood judges, each with its own best numbers. A curve that is believed
-        beside the best model belongs to it where all that was found is of the kind that the curve stands for: what it
-        shows is not another effect of that kind. What is adopted is compared with curves in its turn.
+        A curve that is believed beside the best model belongs to it where all that was found is of the kind that the
+        curve stands for: what it shows is not another effect of that kind.
         """
         search = self.stepwise
         if fit.structure == search.best.structure:
-            return search.best
+            return False
         left, added = search.left, [e for e in fit.structure.effects if e not in search.base.structure.effects]
         beside = left is not None and all(left.form in CURVES.get(effects.get(e).family, ()) for e in added)
         best = left.evidence.fit if left is not None and beside else search.best
         there = search.problem.fit(fit.structure, fit.values)
-        if not np.isfinite(there.cost):
-            return there
-        if support_difference(there, best) > STRONG_SUPPORT:
-            return None
-        search.best = search.compare_with_free_form(against_curves(search, there))
-        return search.best
+        return bool(np.isfinite(there.cost)) and support_difference(there, best) > STRONG_SUPPORT
 
     @property
     def found(self) -> Search:

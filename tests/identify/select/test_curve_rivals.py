@@ -53,7 +53,7 @@ def asked(monkeypatch: pytest.MonkeyPatch, search: Searched, beaten: tuple[str, 
         return curves[0], SimpleNamespace(structure=rest.structure, names=tuple(names))
 
     monkeypatch.setattr(curve_rivals, "_in_place", in_place)
-    monkeypatch.setattr(curve_rivals, "_support", lambda _, now, curve, fit: 99.0 if fit.names == beaten else 0.0)
+    monkeypatch.setattr(curve_rivals, "support_difference", lambda now, fit: 99.0 if fit.names == beaten else 0.0)
     is_beaten(cast(Any, search), search.best)
     return groups
 

@@ -1,4 +1,4 @@
-"""A model found in torque is adopted unless the search's own is likelier, and then judged like that."""
+"""A curve that is believed stands against effects of its own kind that were found in torque, and against no others."""
 
 from __future__ import annotations
 
@@ -28,16 +28,14 @@ def fit(effects: tuple[str, ...], cost: float) -> Any:
         (("unbalance",), None, False),
     ],
 )
-def test_a_curve_stands_only_against_effects_of_its_kind(
+def test_a_curve_refutes_only_effects_of_its_kind(
     monkeypatch: pytest.MonkeyPatch, found: tuple[str, ...], curve: str | None, refuted: bool
 ) -> None:
     monkeypatch.setattr(likelihood_search, "support_difference", lambda one, other: one.cost - other.cost)
     bare = fit((), COST_WITHOUT)
     left = curve and SimpleNamespace(form=curve, evidence=SimpleNamespace(fit=fit((), COST_WITH_CURVE)))
     problem = SimpleNamespace(fit=lambda structure, values: fit(structure.effects, COST_IN_TORQUE))
-    compared: list[Any] = []
-    monkeypatch.setattr(likelihood_search, "against_curves", lambda _, there: compared.append(there) or there)
-    stepwise = SimpleNamespace(best=bare, base=bare, left=left, problem=problem, compare_with_free_form=lambda now: now)
-    adopted = LikelihoodSearch(cast(Any, stepwise), [], Structure()).adopt(fit(found, 0.0))
-    assert (adopted is None) is refuted
-    assert compared == ([] if refuted else [stepwise.best])  # it has to stand against curves like the search's own
+    search = LikelihoodSearch(
+        cast(Any, SimpleNamespace(best=bare, base=bare, left=left, problem=problem)), [], Structure()
+    )
+    assert search.refutes(fit(found, 0.0)) is refuted
