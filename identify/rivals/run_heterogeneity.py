@@ -26,7 +26,7 @@ from rig.dynamics import TorqueSignal
 from rig.platform import TERMS
 from rig.recording.run import Array
 
-# Of the excess over the noise: less is foretold of what is no such run, and of a delay that is no small one.
+# Of the excess over the noise, that changes of single runs have to be foretold to explain.
 EXPLAINED_SHARE = 0.95
 RUNS_AT_NOISE = 1.05  # reduced chi-square: the noise is known to a percent or two
 AT_FLOOR = 1.1  # the same: what is there has found what there is
