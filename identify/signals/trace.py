@@ -26,7 +26,6 @@ from rig.recording.run import Array, Run
 UPSAMPLING = 4  # nonlinear torques have corners between samples
 SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than it tells
 LEAD_S = 0.1  # of torque ahead of a piece of a run, for a drive with memory
-STRAIGHT = 0.1  # of the sensor's noise
 RUNAWAY_TORQUE = 1e100  # torque of an effect along a noisy motion, in any unit: it was integrated beyond all bounds
 MOST_BIAS_RAD_S = 0.05  # of a gyro: what its integral runs away faster with is the motion itself
 STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
@@ -173,14 +172,10 @@ class Trace:
         return float(np.median(encoder - angle_rad))
 
     @cached_property
-    def straight_s(self) -> float:
-        """Longest step over which the rate runs straight, within a tenth of the sensor's noise.
-
-        A gyro's filter takes it for straight between two instants of the simulation; a sine is not.
-        """
-        rate = self.fine[1]
-        bend = np.diff(rate, 2) / (self.step_s / UPSAMPLING) ** 2
-        return float(np.sqrt(8.0 * STRAIGHT * self.noise / max(float(np.sqrt(np.mean(bend**2))), 1e-300)))
+    def bend_rad_s3(self) -> float:
+        """Second derivative of the rate, root mean square."""
+        bend = np.diff(self.fine[1], 2) / (self.step_s / UPSAMPLING) ** 2
+        return float(np.sqrt(np.mean(bend**2)))
 
     def torque_pieces(self, drive: tuple[tuple[str, tuple[float, ...]], ...]) -> tuple[Array, int] | None:
         """Torque behind the given drive effects as polynomials, and how many of them a sample holds."""

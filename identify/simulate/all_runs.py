@@ -16,14 +16,23 @@ from rig.dynamics import Equations
 from rig.dynamics.equations import MAX_SUBSTEPS
 from rig.recording.run import Array
 
-LAGGING = 4  # fine steps a sample, behind a lag of the sensor, while models are compared
 COARSEST = 16  # fine steps a sample while models are compared
+READ_BIAS = 0.3  # standard errors of a parameter, by which what a lag is fed may move it
+PARTS_OF_A_LAG = 8  # read so often within its time, a lag has its own effect of second order to a quarter percent
 
 
-def _behind_a_lag(step_s: float, equations: Equations) -> int:
-    """Fine steps a sample that a lag of the sensor needs at most; it is exact along a parabola."""
-    times = [t for values in equations.sensor.values for t in values if t > 0.0]
-    return int(np.clip(np.ceil(2.0 * step_s / min(times)), LAGGING, COARSEST)) if times else LAGGING
+def reads_a_sample(trace: Trace, lag_s: float, samples: int) -> float:
+    """How often a sample a lag of the sensor has to be fed, which takes the rate for straight in between.
+
+    Of a rate whose second derivative is b its output is off by b d^2 / 12, d being the interval, or by b d T / 2 behind
+    a lag T that is shorter. What is off repeats with the motion and does not average out as noise does, so it may be no
+    more than the noise of a mean over all ``samples``.
+    """
+    least = READ_BIAS * trace.noise / (np.sqrt(samples) * max(trace.bend_rad_s3, 1e-300))
+    straight_s = np.sqrt(12.0 * least)
+    if lag_s > 0.0:
+        straight_s = max(straight_s, 2.0 * least / lag_s, lag_s / PARTS_OF_A_LAG)
+    return float(trace.step_s / max(straight_s, 1e-300))
 
 
 def shots_for(
@@ -33,18 +42,20 @@ def shots_for(
 ) -> list[Shots]:  # fmt: skip
     """Every run cut into shots (see ``refine``), its steps as fine as the model needs, or ``finer`` times that.
 
-    ``ahead``: for a prediction from sample to sample, which feeds a sensor's filter within a step, too; a simulation
-    takes finer steps behind a lag.
+    ``ahead``: for a prediction from sample to sample, which follows a low-pass of the sensor exactly and feeds another
+    filter within a step, too; a simulation takes finer steps behind a lag.
     """
     out = []
+    samples = sum(len(trace.measured) for trace in traces)
     for i, trace in enumerate(traces):
         equations = Equations(platform_of(structure, names, x, trace.number, trace.run.added_inertia_kg_m2))
         substeps = min(MAX_SUBSTEPS, equations.substeps(trace.step_s))
         substeps = int(np.clip((substeps + 1) // 2, 1 if ahead else 2, COARSEST)) if coarse else substeps
         reads = substeps
-        if equations.sensor.names:  # a lag is exact along a parabola
-            most = _behind_a_lag(trace.step_s, equations) if coarse else COARSEST
-            reads = int(np.clip(np.ceil(trace.step_s / trace.straight_s), substeps, max(substeps, most)))
+        if equations.sensor.names:
+            lag_s = sum(t for values in equations.sensor.values for t in values)
+            most = max(substeps, COARSEST)
+            reads = int(np.clip(np.ceil(reads_a_sample(trace, lag_s, samples)), substeps, most))
             substeps = substeps if ahead else reads
         if trace.torque is not None and trace.torque.hold == "zero_order":
             # A step that spans several held values sees only their mean: that alone is a sigma or two.

@@ -115,6 +115,14 @@ class Equations:
         found = [at(values[name]) for name, at in zip(body, bends, strict=True) if at]
         self.kinks = np.unique(np.array([x for each in found for x in each], dtype=float))
 
+    @property
+    def low_passes(self) -> tuple[tuple[float, float], ...] | None:
+        """Of the sensor, each as s and s^2 of its denominator; None where one of its filters is no low-pass."""
+        known = [effects.get(name).lag for name in self.sensor.names]
+        if any(lag is None for lag in known):
+            return None
+        return tuple(lag(v) for lag, v in zip(known, self.sensor.values, strict=True) if lag is not None)
+
     def _way_rad(self, name: str, values: tuple[float, ...]) -> float:
         """Angle over which the states of an effect follow the motion; infinite where they follow something else."""
         way = effects.get(name).follows_within_rad

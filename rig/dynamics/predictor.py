@@ -20,6 +20,7 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.dynamics.equations import Equations, Readings
+from rig.dynamics.exact_lags import CHORDS, lag_table
 from rig.dynamics.gains import BIAS, STATES, Gains
 from rig.dynamics.integrator import acceleration, step_over_kinks
 from rig.dynamics.native import call_filter, jit, offset, pointer
@@ -39,10 +40,28 @@ def _between(w0, a0, w1, a1, h, x, same):  # type: ignore[no-untyped-def]
 
 
 @jit
+def _behind(lag, at, h, w0, a0, w1, a1, y, v):  # type: ignore[no-untyped-def]
+    """Output of a low-pass and its slope after a step, along the cubic through rate and acceleration at both ends.
+
+    ``at`` is where the row of ``lag_table`` holds what such a step leaves of both.
+    """
+    a, b = lag[0], lag[1]
+    c2, c3 = (3.0 * (w1 - w0) / h - 2.0 * a0 - a1) / h, (2.0 * (w0 - w1) / h + a0 + a1) / (h * h)
+    q2 = c2 - 3.0 * a * c3  # of the cubic that the output runs along once it has settled
+    q1 = a0 - 2.0 * a * q2 - 6.0 * b * c3
+    q0 = w0 - a * q1 - 2.0 * b * q2
+    y, v = y - q0, v - q1
+    out = q0 + h * (q1 + h * (q2 + h * c3)) + lag[at] * y + lag[at + 1] * v
+    if b > 0.0:
+        return out, q1 + h * (2.0 * q2 + 3.0 * h * c3) + lag[at + 2] * y + lag[at + 3] * v
+    return out, (w1 - out) / a if a > 0.0 else a1
+
+
+@jit
 def _predict(  # type: ignore[no-untyped-def]
     starts, spans, offset_s, z, h, ratio, torque, jck, kernels, loads, z_at, p, p_at, kinks,
-    filters, fs, fs_at, fp, fp_at, measured, keep, gain, tracked, coloured, decay, walks, walk_decay, rate, bias, reads,
-    out, state,
+    filters, fs, fs_at, fp, fp_at, lags, behind, measured, keep, gain, tracked, coloured, decay, walks, walk_decay,
+    rate, bias, reads, out, state,
 ):  # fmt: skip
     n_states, readings = len(z), measured.shape[1]
     room = np.zeros((10, max(4, n_states)))
@@ -55,7 +74,7 @@ def _predict(  # type: ignore[no-untyped-def]
     mo, zp = pointer(motion), pointer(z)
     jck3 = (jck[0], jck[1], jck[2])
     body = (loads, len(kernels), pointer(kernels), pointer(z_at), pointer(p), pointer(p_at))
-    frictions, filtered = len(kernels) > loads, len(filters) > 0
+    frictions, filtered = len(kernels) > loads, len(filters) > 0 or len(lags) > 0
     for k in range(len(spans)):
         first, last = spans[k, 0], spans[k, 1]
         motion[0], motion[1], motion[2] = starts[k, 0], starts[k, 1], np.sign(starts[k, 1])
@@ -65,6 +84,7 @@ def _predict(  # type: ignore[no-untyped-def]
         # the linear low-pass with what the low-pass holds back.
         jumps = 0.0
         fs[:] = 0.0
+        behind[:] = 0.0
         still = motion[1]
         sensed = motion[1]
         for i in range(first, last + 1):
@@ -108,10 +128,22 @@ def _predict(  # type: ignore[no-untyped-def]
                 a1 = 0.0
                 if motion[2] != 0.0 or not frictions:
                     a1 = acceleration(mo[0], mo[1], mo[3], torque[s, 2] + acting, mo[2], zp, spare, jck3, body)
-                for r in range(1, reads + 1):
-                    same = slip == motion[2]
-                    sensed = motion[1] if r == reads else _between(w0, a0, motion[1], a1, h, r / reads, same)
+                same = slip == motion[2]
+                parts = reads if len(lags) == 0 else 1 if same else CHORDS
+                before_part = w0 - jumps - still
+                for r in range(1, parts + 1):
+                    sensed = motion[1] if r == parts else _between(w0, a0, motion[1], a1, h, r / parts, same)
                     sensed -= jumps + still
+                    began, begins, ends = before_part, a0, a1
+                    if not same:
+                        begins = ends = (sensed - began) * parts / h
+                    before_part = sensed
+                    for f in range(len(lags)):
+                        y, v = behind[f, 0], behind[f, 1]
+                        sensed, ends = _behind(
+                            lags[f], 2 if same else 6, h / parts, began, begins, sensed, ends, y, v
+                        )  # fmt: skip
+                        began, begins, behind[f, 0], behind[f, 1] = y, v, sensed, ends
                     for f in range(len(filters)):
                         sensed = call_filter(
                             filters[f], sensed, h / reads, offset(pointer(fs), fs_at[f]), offset(pointer(fp), fp_at[f])
@@ -149,16 +181,21 @@ def predict_ahead(
     measured, keep
         The readings, (n, m), and which samples were measured, (n,). A gyro's reading stands before an encoder's.
     reads
-        How often in a fine step the sensor's filters are fed.
+        How often in a fine step the sensor's filters are fed, where they are not all low-passes that are followed as
+        such.
     """
     p, _kept = equations.parameters_with(readings)
     filters, fs, fs_at, fp, fp_at = equations.sensor.arrays(step_s)
+    low_passes = equations.low_passes
+    lags = lag_table(low_passes or (), step_s)
+    filters = filters if low_passes is None else filters[:0]
     out, state = np.zeros(measured.shape), np.zeros((len(measured), 5))
     _predict(
         np.ascontiguousarray(starts), np.array(spans, dtype=np.int64).reshape(-1, 2), offset_s,
         equations.rest_states(*starts[0]), step_s, ratio, torque, equations.jck, equations.kernels, equations.loads,
-        equations.z_at, p, equations.p_at, equations.kinks, filters, fs, fs_at, fp, fp_at, measured, keep, gains.gain,
-        gains.of_effects, gains.coloured, gains.held, np.ascontiguousarray(gains.reads[:, BIAS]), gains.walk_decay,
-        rate, bias, reads, out, state,
+        equations.z_at, p, equations.p_at, equations.kinks, filters, fs, fs_at, fp, fp_at,
+        lags, np.zeros((len(lags), 2)),
+        measured, keep, gains.gain, gains.of_effects, gains.coloured, gains.held,
+        np.ascontiguousarray(gains.reads[:, BIAS]), gains.walk_decay, rate, bias, reads, out, state,
     )  # fmt: skip
     return out, state

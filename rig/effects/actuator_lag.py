@@ -42,5 +42,6 @@ EFFECT = Effect(
         )
     },
     inverse=_led,
+    delay_s=lambda values: values[0],
     separated_by="from a delay: excite at higher frequencies",
 )

@@ -138,6 +138,7 @@ class Effect:
     filter_states: Callable[[float, tuple[float, ...]], int] | None = None
     rest_state: Callable[[float, float], tuple[float, ...]] | None = None  # of angle and rate at the start
     lag: Callable[[tuple[float, ...]], tuple[float, float]] | None = None  # of a SENSOR: s and s^2 of its denominator
+    delay_s: Callable[[tuple[float, ...]], float] | None = None  # of a DRIVE: by how much it delays a slow torque
     fastest_rad_s: Callable[[tuple[float, ...]], float] | None = None  # of (J, C, K, *values): sets the step
     # Of the same: the angle over which its states follow the motion, if they follow the angle and not time.
     follows_within_rad: Callable[[tuple[float, ...]], float] | None = None
@@ -177,6 +178,12 @@ class Effect:
         """Whether a torque that is computed before a run can take its part in the motion away, if not all of it."""
         in_motion = self.place in (Place.LOAD, Place.FRICTION) or self.inverse is not None
         return in_motion and self.foreseen and self.reads is None
+
+    def late_s(self, values: tuple[float, ...]) -> float:
+        """By how much later slow motion is read because of it, wherever between torque and reading it acts."""
+        if self.lag is not None:  # a low-pass delays by the first coefficient of its denominator
+            return self.lag(values)[0]
+        return self.delay_s(values) if self.delay_s is not None else 0.0
 
     def per_inertia(self, parameter: Parameter) -> bool:
         """Whether a free decay determines only the ratio of a parameter to the inertia, as of every torque."""

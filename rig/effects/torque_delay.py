@@ -59,6 +59,7 @@ EFFECT = Effect(
     kernel=_delay,
     filter_states=lambda step_s, values: int(values[0] / step_s) + 6,
     inverse=_earlier,
+    delay_s=lambda values: values[0],
     ahead_s=lambda values: values[0],
     separated_by="from damping: excite at several frequencies; from a lag: excite at higher frequencies",
 )
