@@ -255,7 +255,7 @@ class _Identifier:
         measured: Found | None = None,
     ) -> Identification:  # fmt: skip
         changed = after.structure != self.structure
-        after = after if changed else before
+        after = after.as_uncertain_as_rivals(list(search.between_rivals.values())) if changed else before
         cutoff = self.start.cutoff_hz
         measured_before = measure(self.traces, self.split, before, cutoff)
         measured_after = measure(self.traces, self.split, after, cutoff) if changed else measured_before

@@ -24,6 +24,7 @@ from identify.model.structure import Structure
 from identify.signals.trace import Trace
 from identify.simulate.sensitivities import INFORMATION_RCOND, jacobian
 from identify.simulate.shots import Shots
+from rig.platform import TERMS
 from rig.recording.run import Array
 
 NEAR_FLOOR = 1.3**2  # reduced chi-square: close enough for a free run over the whole set
@@ -102,6 +103,11 @@ class FinalFit:
         values, vectors = np.linalg.eigh((theirs - self.covariance) / np.outer(size, size))
         more = (vectors * np.maximum(values, 0.0)) @ vectors.T
         return replace(self, covariance=self.covariance + more * np.outer(size, size), determined=both)
+
+    def as_uncertain_as_rivals(self, between: Sequence[Array]) -> FinalFit:
+        """The same with J, C and K as uncertain as which of several models is true: covariances to add, (3, 3) each."""
+        which = np.array([[n == (t,) for t in TERMS] for n in self.names], dtype=float)  # (names, 3)
+        return replace(self, covariance=self.covariance + sum(which @ spread @ which.T for spread in between))
 
 
 def by_regression(

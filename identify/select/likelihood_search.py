@@ -127,6 +127,7 @@ class LikelihoodSearch:
         rivals = {k: s.rivals.get(k, {}) for k in named}
         found.rivals = {k: tuple(v) for k, v in rivals.items()}
         found.rival_models = {k: {n: f.platform() for n, f in v.items()} for k, v in rivals.items()}
+        found.between_rivals = {k: s.between_rivals[k] for k in named if k in s.between_rivals}
         found.dropped = [(n, why) for n, why in s.dropped if n not in (*best.structure.terms, *best.structure.effects)]
         return found
 

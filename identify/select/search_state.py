@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from identify.model.parameter_fit import ParameterFit, reduced_chi_square
 from identify.results import Candidate
+from rig.arrays import Array
 from rig.platform import Platform
 
 
@@ -22,6 +23,8 @@ class Search:
         Effect -> other effects that did as well in its round.
     rival_models
         Effect -> rival -> the platform fitted with the rival in its place.
+    between_rivals
+        Effect -> covariance of J, C and K over it and the rivals in its place, (3, 3).
     dropped
         Terms of the declared model and effects that the data do not support, with the reason.
     contribution
@@ -37,6 +40,7 @@ class Search:
     candidates: list[Candidate] = field(default_factory=list)
     rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
     rival_models: dict[str, dict[str, Platform]] = field(default_factory=dict)
+    between_rivals: dict[str, Array] = field(default_factory=dict)
     dropped: list[tuple[str, str]] = field(default_factory=list)
     contribution: dict[str, float] = field(default_factory=dict)
     left_open: str = ""
@@ -54,6 +58,7 @@ class Search:
             for c in self.candidates
         ]  # fmt: skip
         self.best, self.rivals, self.rival_models, self.dropped = self.base, {}, {}, []
+        self.between_rivals = {}
 
     def drop(self, without: ParameterFit, status: str = "added, then no longer needed") -> None:
         """Take back the effects that the final model does without; the report gives them this status."""
@@ -77,4 +82,5 @@ class Search:
         for effect in gone:
             self.rivals.pop(effect, None)
             self.rival_models.pop(effect, None)
+            self.between_rivals.pop(effect, None)
         self.best = without

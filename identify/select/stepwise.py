@@ -14,6 +14,7 @@ from functools import partial
 
 import numpy as np
 
+from identify.bounds.between_models import model_spread
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
@@ -34,9 +35,9 @@ from identify.select.preference import no_possible_gain, prefers_special_case, s
 from identify.select.replaced_terms import NEEDED_TERM_SIGMAS, replace_linear_terms
 from identify.select.trial_fits import FULL_ITERATIONS, TRIAL_ITERATIONS, TrialFits
 from rig import effects
+from rig.arrays import Array
 from rig.platform import TERMS
 
-# What decides a name. All in units of the cost (minus twice the log-likelihood) or as shares.
 PREDICTS_TO_NOISE = 1.1  # reduced chi-square: a model that predicts as closely leaves no disturbance
 # What only costs time.
 PROMISING = 0.1  # of the score of what was added: another with less was no rival then and is not asked again
@@ -73,6 +74,7 @@ class Stepwise:
     samples: int = 0
     rounds: list[Round] = field(default_factory=list)
     rivals: dict[str, dict[str, Fit]] = field(default_factory=dict)
+    between_rivals: dict[str, Array] = field(default_factory=dict)  # of J, C, K, by effect (``model_spread``)
     dropped: list[tuple[str, str]] = field(default_factory=list)
     stood_for_curves: set[str] = field(default_factory=set)  # wrong names: a curve explains what they seemed to
     best: Fit = None  # type: ignore[assignment]
@@ -163,8 +165,10 @@ class Stepwise:
             if chosen != name:
                 self.say(f"replaced {name} by {chosen}: it fits better beside the other effects")
                 now = fits[chosen]
-            self.rivals.pop(name, None)
+            for known in (self.rivals, self.between_rivals):
+                known.pop(name, None)
             self.rivals[chosen] = {n: fits[n] for n in alike if n != chosen}
+            self.between_rivals[chosen] = self._between(fits[chosen], *self.rivals[chosen].values())
         return now
 
     def without(self, now: Fit, name: str, steps: int = TRIAL_ITERATIONS) -> Fit:
@@ -187,9 +191,7 @@ class Stepwise:
                     if special not in tried or fit.cost < tried[special].cost:
                         tried[special] = fit
                 return r.now, tried
-        rest = self._lacking.get(_key(without))
-        if rest is None:
-            rest = self.without(now, name, FULL_ITERATIONS)
+        rest = self._lacking.get(_key(without)) or self.without(now, name, FULL_ITERATIONS)
         return rest, self.trials.alternatives_to(now, rest, name, self._promising())
 
     def _promising(self) -> set[str]:
@@ -201,7 +203,7 @@ class Stepwise:
         return out
 
     def _best_of(self, name: str, seen: Mapping[str, Evidence]) -> tuple[str, list[str]]:
-        """Of an effect and others in its place, the one that is named, and all that are as likely."""
+        """The one that is named of an effect and others in its place, and all that are as likely."""
         best = seen[name]
         for other in seen.values():
             special = best.effect in effects.get(other.effect).nests and not self._has_more(other, best)
@@ -226,6 +228,12 @@ class Stepwise:
                 alike = [n for n, f in fits.items() if support_difference(f, likeliest) < STRONG_SUPPORT]
         return simplest(self.weigher, {n: seen[n].fit for n in alike}), alike
 
+    def _between(self, *models: Fit) -> Array:
+        """By how much J, C and K differ between a model and its rivals, on as many samples as all were fitted to."""
+        on_all = [f for m in models if (f := self._on_all.get(_key(m.structure))) is not None]
+        first, *others = on_all if len(on_all) == len(models) else models
+        return model_spread(first, others, support_difference)
+
     def _has_more(self, rich: Evidence, special: Evidence) -> bool:
         """Whether an effect is worth it after its special case, judged as it was when it was added."""
         more = self.weigher.evidence(rich.effect, special.fit, rich.fit)
@@ -247,8 +255,6 @@ class Stepwise:
         for name in names:
             if len(now.structure.terms) + len(now.structure.effects) <= 1 or not self._is_in_doubt(now, name):
                 continue
-            own = [n for n in now.names if n[0] == name]
-            term = len(own) == 1 and own[0][0] in TERMS
             without = lacking[name] if now is begun and name in lacking else self.without(now, name)
             if not np.isfinite(without.cost):  # it runs away without
                 continue
@@ -259,8 +265,7 @@ class Stepwise:
             if evidence.support > STRONG_SUPPORT and not light:
                 continue
             why = f"the log-likelihood changes by {-0.5 * evidence.gain:+.2g} without it"
-            if term and light:
-                why = "the other terms already explain its torque"
+            why = "the other terms already explain its torque" if light and name in TERMS else why
             self.dropped.append((name, why))
             self.say(f"dropped {name}")
             now = without
