@@ -24,12 +24,16 @@ def with_line_left_open(
     found: Found, search: Stepwise, traces: Sequence[Trace], everything: Sequence[Any], axis: str,
     say: Callable[[str], None],
 ) -> Found:  # fmt: skip
-    """The same without a periodic disturbance that may be a line of the gyro's own; unchanged where it is none."""
-    gyro = all(t.channel == "rate" and t.beside is None for t in traces)  # an encoder has no line of its own
-    line = standing_line(found.after, traces) if gyro and TONE in found.named else None
-    if line is None:
+    """The same without a periodic disturbance that may be a line of the gyro's own; unchanged where it is none.
+
+    An encoder has no line of its own, but the torque of a run may differ from the recorded one under any sensor.
+    """
+    line = standing_line(found.after, traces) if TONE in found.named else None
+    gyro = all(t.channel == "rate" and t.beside is None for t in traces)
+    if line is None or not (gyro or line.of_torque):
         return found
-    say(f"not named: {TONE}; the line may come from the sensor itself")
+    where = "the recorded torque of one run" if line.of_torque else "the sensor itself"
+    say(f"not named: {TONE}; the line may come from {where}")
     bare = search.without(search.best, TONE) if TONE in search.best.structure.effects else search.best
     less = replace(found.without(TONE), disturbance=found.disturbance).with_lines(bare, search.problem.torque_nm)
     if less.named:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -14,7 +15,7 @@ from identify.residual import Disturbance
 from identify.results import Candidate
 from identify.rivals import open_line
 from identify.rivals.open_line import with_line_left_open
-from identify.rivals.tone_origin import TONE
+from identify.rivals.tone_origin import TONE, SpectralLine
 from identify.select.field_search import Found
 from identify.select.search_state import Search
 
@@ -29,7 +30,12 @@ def final(effects: tuple[str, ...], inertia: float, error: float) -> FinalFit:
     )  # fmt: skip
 
 
-def left_open(monkeypatch: pytest.MonkeyPatch, line: object, beside: str | None) -> tuple[Found, Found]:
+LINE = SpectralLine(5.0, 0.1, 0.01)
+
+
+def left_open(
+    monkeypatch: pytest.MonkeyPatch, line: SpectralLine | None, beside: str | None, channel: str = "rate"
+) -> tuple[Found, Found]:
     """What the search found with a tone, maybe beside something else, and the same with the line left open."""
     effects = (TONE,) if beside is None else (beside, TONE)
     monkeypatch.setattr(open_line, "standing_line", lambda final, traces: line)
@@ -48,12 +54,12 @@ def left_open(monkeypatch: pytest.MonkeyPatch, line: object, beside: str | None)
     monkeypatch.setattr(Found, "with_lines", lambda self, likeliest, torque_nm: self)
     best: Any = SimpleNamespace(structure=Structure())
     stepwise: Any = SimpleNamespace(best=best, problem=SimpleNamespace(torque_nm=1.0))
-    traces: Any = [SimpleNamespace(channel="rate", beside=None)]
+    traces: Any = [SimpleNamespace(channel=channel, beside=None)]
     return found, with_line_left_open(found, stepwise, traces, [], "rotary", lambda text: None)
 
 
 def test_the_numbers_of_the_others_are_those_beside_the_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    _, less = left_open(monkeypatch, object(), "coulomb_friction")
+    _, less = left_open(monkeypatch, LINE, "coulomb_friction")
     assert less.named == ["coulomb_friction"]
     assert less.after.values["inertia",] == 1.0
     assert less.after.std_error(("inertia",)) == pytest.approx(0.01)
@@ -64,10 +70,23 @@ def test_the_numbers_of_the_others_are_those_beside_the_line(monkeypatch: pytest
 
 
 def test_a_line_alone_leaves_the_declared_model(monkeypatch: pytest.MonkeyPatch) -> None:
-    _, less = left_open(monkeypatch, object(), None)
+    _, less = left_open(monkeypatch, LINE, None)
     assert less.named == []
 
 
 def test_a_line_that_is_a_torque_stays_named(monkeypatch: pytest.MonkeyPatch) -> None:
     found, less = left_open(monkeypatch, None, "coulomb_friction")
     assert less is found
+
+
+def test_an_encoder_has_no_line_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, less = left_open(monkeypatch, LINE, "coulomb_friction", "angle")
+    assert less is found
+
+
+def test_runs_whose_own_torque_has_that_frequency_had_another_torque_under_any_sensor(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    _, less = left_open(monkeypatch, replace(LINE, of_torque=True), "coulomb_friction", "angle")
+    assert less.named == ["coulomb_friction"]
+    assert less.after.values["inertia",] == 1.0
