@@ -25,6 +25,7 @@ from identify.results import UNITS, Dependence, Identification, SetResult
 from identify.rivals.alternative_causes import AlternativeCauses
 from identify.rivals.coloured_noise import Colour, with_noise_known
 from identify.rivals.open_line import with_line_left_open
+from identify.rivals.own_low_pass import with_own_low_pass
 from identify.rivals.stand_ins import with_stand_ins
 from identify.rivals.whiteness_test import fails_whiteness_test, leaves_more_than_noise
 from identify.rivals.whole_runs import FreeRunFitter
@@ -229,6 +230,8 @@ class _Identifier:
         found = found.with_lines(step.best, step.problem.torque_nm)
         found = with_line_left_open(found, step, self.traces, self.split.everything, self.recording.axis, self.say)
         found = with_stand_ins(found, self.traces, self.recording.axis, self.say)
+        found, note = with_own_low_pass(found, step, self.traces, self.split, self.say)
+        self.left_out = (*self.left_out, note) if note else self.left_out
         return self._report(found.search, found.before, found.after, measured=found)
 
     def _curves(self, search: Stepwise) -> list[tuple[Dependence, dict[str, float]]]:

@@ -37,12 +37,12 @@ def with_line_left_open(
     bare = search.without(search.best, TONE) if TONE in search.best.structure.effects else search.best
     less = replace(found.without(TONE), disturbance=found.disturbance).with_lines(bare, search.problem.torque_nm)
     if less.named:
-        less = replace(less, after=_with_numbers_of(found.after, less.after, traces, everything))
+        less = replace(less, after=with_numbers_of(found.after, less.after, traces, everything))
     less.search.mark_undetermined(TONE, describe(line, axis, traces[0].channel), less.kept)
     return less
 
 
-def _with_numbers_of(richer: FinalFit, less: FinalFit, traces: Sequence[Trace], use: Sequence[Any]) -> FinalFit:
+def with_numbers_of(richer: FinalFit, less: FinalFit, traces: Sequence[Trace], use: Sequence[Any]) -> FinalFit:
     """A model with the numbers, and their uncertainty, that it has as a part of another."""
     at = [richer.names.index(n) for n in less.names if n in richer.names]
     values = {n: richer.values.get(n, value) for n, value in less.values.items()}

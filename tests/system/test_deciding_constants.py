@@ -37,6 +37,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "likelihood/workers.py": "PATIENCE SHORTEST_WAIT_S",
     "propose/innovation_score.py": "LITTLE SCALED SHAPES",
     "propose/torque_looks.py": "EVALUATIONS",
+    "rivals/own_low_pass.py": "BEGUN_SAMPLES",
     "rivals/run_heterogeneity.py": "RUN_CHANGE_ROUNDS",
     "rivals/whole_runs.py": "WHOLE_RUN_STEPS TOLERANCE",
     "select/curve_rivals.py": "NEAR",

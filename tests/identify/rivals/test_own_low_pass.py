@@ -1,0 +1,112 @@
+"""The gyro's own low-pass is no name: where it is likelier than not, the numbers are those beside it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from identify.estimate.final_fit import FinalFit
+from identify.likelihood.fit import Fit, Prediction
+from identify.model.structure import Structure
+from identify.residual import Dependence, Disturbance
+from identify.rivals import open_line, own_low_pass
+from identify.rivals.own_low_pass import with_own_low_pass
+from identify.select.evidence import Evidence
+from identify.select.field_search import Found
+from rig.dynamics.gains import Noise
+
+SECOND, FIRST = "sensor_lag_second_order", "sensor_lag"
+GYRO = [SimpleNamespace(channel="rate", beside=None, torque=object())]
+ENCODER = [SimpleNamespace(channel="angle", beside=None, torque=object())]
+
+
+def fit_with(effects: tuple[str, ...], cost: float, inertia: float) -> Fit:
+    names = (("inertia",), ("damping",), *((e, "time") for e in effects))
+    x = np.array([inertia, 0.1, *[1e-3 for _ in effects]])
+    left = Prediction([], [], [], [])
+    return Fit(Structure(effects=effects), names, x, 10_000, 1.0, cost, np.eye(len(x)), Noise(), (), left, 1.5)  # type: ignore[arg-type]
+
+
+def final(fit: Fit) -> FinalFit:
+    covariance = 1e-6 * np.eye(len(fit.names))
+    return FinalFit(fit, fit.values, fit.names, covariance, None, False, (True,) * len(fit.names), "prediction error")
+
+
+def found_with(effects: tuple[str, ...] = ()) -> Found:
+    after = final(fit_with(effects, -1000.0, 1.0))
+    nothing = cast(Any, None)
+    return Found(nothing, final(fit_with((), 0.0, 1.1)), after, Disturbance(0.1, "N*m", 0.01), nothing, nothing)
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What fits with a low-pass gain, on the samples searched and on all; and which one was fitted."""
+    seen: dict[str, Any] = {"few": 60.0, "all": 80.0, "form": None}
+
+    def evidence(search: Any, form: str) -> Evidence:
+        best = search.best
+        richer = fit_with((*best.structure.effects, form), best.cost - seen["few"], 1.0)
+        return Evidence(form, richer, seen["few"], 2.0, 0.0, 0.01)
+
+    def on_all(traces: Any, structure: Structure, start: Any, use: Any, like: Fit) -> Any:
+        seen["form"] = structure.effects[-1]
+        return SimpleNamespace(columns_at=lambda *_, **__: []), fit_with(
+            structure.effects, like.cost - seen["all"], 0.9
+        )
+
+    monkeypatch.setattr(own_low_pass, "_evidence", evidence)
+    monkeypatch.setattr(own_low_pass, "fitted_on_all", on_all)
+    monkeypatch.setattr(own_low_pass, "inflation", lambda *_: 2.0)
+    monkeypatch.setattr(own_low_pass, "as_final", lambda problem, fit, traces, use: final(fit))
+    monkeypatch.setattr(open_line, "free_run_of", lambda *_: None)
+    return seen
+
+
+def asked_of(found: Found, traces: Any = GYRO, samples: int = 10_000) -> tuple[Found, str]:
+    search: Any = SimpleNamespace(best=found.after.fit, samples=samples, problem=SimpleNamespace(step_s=1e-3))
+    split: Any = SimpleNamespace(final=[], everything=[])
+    return with_own_low_pass(found, search, traces, split, lambda text: None)
+
+
+def test_what_was_found_stays_and_has_the_numbers_beside_the_low_pass(asked: dict[str, Any]) -> None:
+    less, note = asked_of(found_with(("torque_delay",)))
+    assert asked["form"] == SECOND
+    assert less.after.structure.effects == ("torque_delay",)
+    assert less.after.values["inertia",] == 0.9
+    assert "1.00 ms" in note and "too little to be named" in note
+
+
+def test_beside_a_low_pass_that_is_named_the_other_form_is_asked(asked: dict[str, Any]) -> None:
+    asked_of(found_with((SECOND,)))
+    assert asked["form"] == FIRST
+
+
+def test_both_forms_named_leave_nothing_to_ask(asked: dict[str, Any]) -> None:
+    found = found_with((SECOND, FIRST))
+    assert asked_of(found) == (found, "")
+
+
+@pytest.mark.parametrize(("few", "everything"), [(10.0, 80.0), (60.0, 10.0)])
+def test_where_it_is_not_likelier_nothing_changes(asked: dict[str, Any], few: float, everything: float) -> None:
+    asked |= {"few": few, "all": everything}
+    found = found_with()
+    assert asked_of(found) == (found, "")
+
+
+def test_few_samples_that_hint_at_it_ask_all_of_a_long_recording(asked: dict[str, Any]) -> None:
+    asked["few"] = 10.0
+    less, note = asked_of(found_with(), samples=100_000)
+    assert note and less.after.values["inertia",] == 0.9
+
+
+def test_beside_an_encoder_and_where_something_is_left_over_it_is_not_asked(asked: dict[str, Any]) -> None:
+    found = found_with()
+    left = replace(found.disturbance, depends_on=(Dependence("angle", 0.1, 0.01, 1e-9, (), ()),))
+    over = replace(found, disturbance=left)
+    assert asked_of(found, ENCODER) == (found, "")
+    assert asked_of(over) == (over, "")
+    assert asked["form"] is None
