@@ -79,7 +79,9 @@ def _goes_down(d: Descent, reach: _Reach, with_noise: bool) -> bool:
     change = np.concatenate([x - d.x, logs_of(step[len(d.x) :], reach.step.level, reach.ratios)])
     noise = d.with_logs(change[len(d.x) :])
     own = zip(d.shots, reach.step.own, strict=True)
-    shots = [changed(s, (taken - across @ change) / (1.0 + d.damping)) for s, (across, taken) in own]
+    # What a run has of its own follows the parameters all the way, however short their step is; else no step along a
+    # valley of both goes down (a gyro's bias that has turned a wave over the angle).
+    shots = [changed(s, taken / (1.0 + d.damping) - across @ change) for s, (across, taken) in own]
     looks = d.looks_at(x, noise, shots)
     cost = d.cost_of(looks)
     if not cost < d.cost:

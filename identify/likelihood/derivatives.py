@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 NOISE_STEP = 0.02  # of a logarithm of the noise, in its differences
 GAIN_STEP = 0.02  # of a parameter's scale, in differences of gains: those are cut off where they have settled
 RUNAWAY_SIGMAS = 1e6  # standard deviations that innovations move by with a step: gains that follow no motion
-BIAS_STEP, START_STEP = 1e-4, 1e-6  # of the motion, of a bias and of a start state
+MOTION_STEP = 1e-6  # of the motion, for a bias and for a start state: a bias turns the angle far in a long run
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def _of_run(
             columns[:, k] = done[(i, k)]
     own = np.zeros((scaled.size, 0))
     if s.trace.biased:
-        h = BIAS_STEP * p.rate_rad_s
+        h = MOTION_STEP * p.rate_rad_s
         # Where a stretch begins within a run, its start angle goes with the bias.
         own = followed(base.gains, h, h, predict=bends or bool(np.any(s.since_s > 0.0)))[:, None]
     if p.fits_starts:
@@ -180,7 +180,7 @@ def _by_start(at: OperatingPoint, s: Shots, base: Look, root: Array) -> Array:
     of_reading = np.repeat(stretch, p.readings)
     for which, size in enumerate((p.angle_rad, p.rate_rad_s)):
         h = np.array([0.0, 0.0])
-        h[which] = START_STEP * size
+        h[which] = MOTION_STEP * size
         other = p.look(moved(s, (h, 0.0)), at.structure, at.names, at.x, at.noise, base.gains)
         change = ((base.innovations - other.innovations)[s.weight] / (h[which] * root)).ravel()
         out.append([np.where(of_reading == k, change, 0.0) for k in range(len(s.first))])

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from identify.likelihood.fit import Fit
+from identify.likelihood.normal_equations import COST_TOLERANCE
 from identify.propose.innovation_score import Score
 from identify.select.curve_rivals import is_beaten
 from identify.select.evidence import ADDED_SUPPORT, MAX_EFFECTS, STRONG_SUPPORT, WEIGHT, Evidence
@@ -47,6 +48,9 @@ def add_effects(search: Stepwise) -> None:
         now = search.best
         scores, tried = search.score_candidates(now)
         chosen = search.best_candidate(tried)
+        if chosen is None:
+            tried = _arrived(search, now, tried)
+            chosen = search.best_candidate(tried)
         if chosen and _is_series(search, now, chosen) and is_beaten(search, now):
             break
         new = tried[chosen] if chosen else _pair(search, now, scores)
@@ -67,6 +71,17 @@ def add_effects(search: Stepwise) -> None:
     if trial:
         search.say(f"took {trial[0]} back")
         search.best = _without_trial(search, *trial)
+
+
+def _arrived(search: Stepwise, now: Fit, tried: dict[str, Evidence]) -> dict[str, Evidence]:
+    """The same with candidates that are likelier but not believed followed to their minimum.
+
+    Short of it their scores scatter because they have not arrived, and that passes for a likelihood that is wrong.
+    """
+    doubted = [n for n, e in tried.items() if e.gain - e.price > ADDED_SUPPORT > e.support and e.weight > WEIGHT]
+    ends = dict(zip(doubted, search.trials.all_further([tried[n].fit for n in doubted]), strict=True))
+    moved = {n: fit for n, fit in ends.items() if fit.cost < tried[n].fit.cost - COST_TOLERANCE}
+    return {**tried, **search.weigher.all(now, moved)} if moved else tried
 
 
 def _is_series(search: Stepwise, now: Fit, name: str) -> bool:

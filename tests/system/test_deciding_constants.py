@@ -18,7 +18,7 @@ ORIGINS = ("derivation: ", "reference: ", "calibration run: ", "set by hand")
 # Judged by hand: these cost time, guard the arithmetic, or shape what is shown. None of them gives another name.
 DECIDE_NOTHING: Mapping[str, str] = {
     "likelihood/by_prediction_error.py": "FINAL_FIT_ITERATIONS MAX_SAMPLES",
-    "likelihood/derivatives.py": "BIAS_STEP GAIN_STEP NOISE_STEP RUNAWAY_SIGMAS START_STEP",
+    "likelihood/derivatives.py": "GAIN_STEP MOTION_STEP NOISE_STEP RUNAWAY_SIGMAS",
     "likelihood/damped_step.py": "LEAST_DAMPING LEVENBERG_DAMPING MAX_STEP_TRIALS",
     "likelihood/descent.py": "COARSE_TOLERANCE DIFFERENCE_STEP EARLY_STEPS STALLED_STEPS",
     "likelihood/fit.py": "MAX_LINEAR_INERTIA_CHANGE",
