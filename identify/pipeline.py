@@ -39,10 +39,9 @@ from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_
 from identify.runs.usable import runs_used
 from identify.select.field_search import Found, Judged, search_in_torque, with_free_form
 from identify.select.free_form_residual import dependence_on, most_moving
-from identify.select.likelihood_search import LikelihoodSearch
+from identify.select.likelihood_search import LikelihoodSearch, filtered_above, start_search
 from identify.select.search_state import Search
 from identify.select.stepwise import Stepwise
-from identify.select.torque_choice import filtered_above, start_search
 from identify.signals.prepare import channels_of, prepare
 from identify.signals.trace import Trace, release
 from rig import effects

@@ -25,6 +25,7 @@ from identify.diagnose.torque_regression import TorqueRegression
 from identify.likelihood.fit import Columns, Fit, orthogonal_part
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
+from identify.select.lags import KnownDelays, takes_damping
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.gains import Noise
@@ -41,7 +42,6 @@ WEIGHT = 0.20  # share of the disturbance that an effect takes away to be named:
 MAX_EFFECTS = 6  # that one recording is believed to show
 MAX_UNFOLLOWED_SHARE = 0.5  # of what a prediction errs by beyond the sensor's noise
 MAX_TRUSTED_INFLATION = 1.5  # inflation up to which what the likelihood takes the disturbance for is believed
-SAME_DELAY = 0.1  # relative difference of a lag of the gyro and a delay of the drive that are one in torque
 SHOWS = 0.1  # of the disturbance in the band, that its white part is: what becomes of less is chance
 
 
@@ -93,7 +93,7 @@ class EvidenceModel:
 
     def __init__(self, problem: PredictionError, regression: TorqueRegression, floor_nm: float) -> None:
         self.problem, self.regression, self.floor_nm = problem, regression, floor_nm
-        self._delays: dict[frozenset[str], list[tuple[float, float]]] = {}  # beside what: how long, with which weight
+        self._delays = KnownDelays()
 
     def evidence(self, effect: str, now: Fit, new: Fit) -> Evidence:
         """A model with more against the one without it; ``effect`` is the effect or term that is judged."""
@@ -104,7 +104,9 @@ class EvidenceModel:
             weight = 1.0  # two sensors of one motion show by themselves which is late
         else:
             weight = self.explained_share(now, new, inflated < MAX_TRUSTED_INFLATION, torqueless)
-            weight = max(weight, self._as_delay(effect, new)) if torqueless else weight
+            weight = max(weight, self._delays.weight_of(effect, new)) if torqueless else weight
+        if effect not in TERMS and takes_damping(effect, now, new):
+            weight = 0.0
         price = (new.penalised - new.cost) - (now.penalised - now.cost)
         return Evidence(effect, new, now.cost - new.cost, inflated, price, weight, unfollowed_share(now, new))
 
@@ -114,21 +116,13 @@ class EvidenceModel:
         out = {e.effect: replace(e, fit=fits[e.effect]) for e in found}
         for name, e in out.items():
             if name not in TERMS and effects.get(name).delay_s is not None:
-                self._delays.setdefault(_beside(name, e.fit), []).append((_late_by(name, e.fit), e.weight))
+                self._delays.add(name, e.fit, e.weight)
         if self.problem.both or not self.regression.by_gyro:
             return out
         lags = [n for n in out if n not in TERMS and effects.get(n).lag is not None]
-        return out | {n: replace(out[n], weight=max(out[n].weight, self._as_delay(n, out[n].fit))) for n in lags}
-
-    def _as_delay(self, effect: str, fit: Fit) -> float:
-        """Weight of a delay of the drive that is as long as a lag of the gyro, beside the same; zero if none was tried.
-
-        What the residual in torque shows of the two is the same, and the weight is to say whether something is late.
-        Which of the two it is, the likelihood says.
-        """
-        late_s = _late_by(effect, fit)
-        known = self._delays.get(_beside(effect, fit), [])
-        return max((weight for long, weight in known if abs(long - late_s) <= SAME_DELAY * late_s), default=0.0)
+        return out | {
+            n: replace(out[n], weight=max(out[n].weight, self._delays.weight_of(n, out[n].fit))) for n in lags
+        }
 
     def explained_share(self, now: Fit, new: Fit, trusted: bool, torqueless: bool = False) -> float:
         """Share of the disturbance that goes: of its power in the band of the motion, or of its white part.
@@ -235,16 +229,6 @@ def _late_s(fit: Fit) -> float:
     """By how much a gyro's low-passes delay the motion that they show."""
     shapes = fit.structure.shapes_of(fit.values)
     return sum(lag(shapes[e])[0] for e in fit.structure.effects if (lag := effects.get(e).lag) is not None)
-
-
-def _late_by(effect: str, fit: Fit) -> float:
-    """By how much later slow motion is read because of an effect."""
-    return effects.get(effect).late_s(fit.structure.shapes_of(fit.values)[effect])
-
-
-def _beside(effect: str, fit: Fit) -> frozenset[str]:
-    """The effects of a model but for one."""
-    return frozenset(fit.structure.effects) - {effect}
 
 
 def unfollowed_share(now: Fit, new: Fit) -> float:

@@ -79,6 +79,8 @@ def _arrived(search: Stepwise, now: Fit, tried: dict[str, Evidence]) -> dict[str
     Short of it their scores scatter because they have not arrived, and that passes for a likelihood that is wrong.
     """
     doubted = [n for n, e in tried.items() if e.gain - e.price > ADDED_SUPPORT > e.support and e.weight > WEIGHT]
+    if not doubted:
+        return tried
     ends = dict(zip(doubted, search.trials.all_further([tried[n].fit for n in doubted]), strict=True))
     moved = {n: fit for n, fit in ends.items() if fit.cost < tried[n].fit.cost - COST_TOLERANCE}
     return {**tried, **search.weigher.all(now, moved)} if moved else tried

@@ -24,6 +24,7 @@ from identify.select.curve_rivals import CURVES
 from identify.select.evidence import STRONG_SUPPORT, EvidenceModel, support_difference
 from identify.select.search_state import Search
 from identify.select.stepwise import PREDICTS_TO_NOISE, Stepwise
+from identify.signals.torque_noise import quieter
 from identify.signals.trace import Trace, pooled_noise
 from rig import effects
 from rig.platform import TERMS
@@ -130,6 +131,30 @@ class LikelihoodSearch:
         found.between_rivals = {k: s.between_rivals[k] for k in named if k in s.between_rivals}
         found.dropped = [(n, why) for n, why in s.dropped if n not in (*best.structure.terms, *best.structure.effects)]
         return found
+
+
+def start_search(
+    traces: Sequence[Trace], begin: Callable[[Sequence[Trace]], LikelihoodSearch]
+) -> tuple[LikelihoodSearch, float | None]:
+    """The search on the runs whose declared model is likelier, and above which frequency their torque was filtered.
+
+    None where it was not.
+    """
+    search = begin(traces)
+    less = None if all(t.torque is None for t in traces) else quieter(traces)
+    if less is None:
+        return search, None
+    filtered, cutoff_hz = less
+    other = begin(filtered)
+    if other.stepwise.base.cost > search.stepwise.base.cost - STRONG_SUPPORT:
+        return search, None
+    return other, cutoff_hz
+
+
+def filtered_above(cutoff_hz: float, axis: str) -> str:
+    """That the recorded torque was filtered, as the report says it."""
+    torque = "force" if axis == "linear" else "torque"
+    return f"the recorded {torque} is filtered: above {cutoff_hz:.3g} Hz it is noise that the platform does not follow"
 
 
 def _status(name: str, added: Sequence[str], named: Sequence[str], fit: Fit | None) -> str:

@@ -1,0 +1,52 @@
+"""Lags and delays, wherever between torque and reading: what is the same in torque, and what no platform does."""
+
+from __future__ import annotations
+
+from identify.likelihood.fit import Fit
+from identify.model.parameters import Name
+from rig import effects
+
+SAME_DELAY = 0.1  # relative difference of a lag of the gyro and a delay of the drive that are one in torque
+PASSIVE_SIGMAS = 3.0  # standard errors below zero, from which a damping is no chance
+DAMPING: Name = ("damping",)
+
+
+class KnownDelays:
+    """Delays of the drive that were weighed: how long beside which effects, and their weight."""
+
+    def __init__(self) -> None:
+        self._known: dict[frozenset[str], list[tuple[float, float]]] = {}
+
+    def add(self, effect: str, fit: Fit, weight: float) -> None:
+        """Remember a delay of the drive."""
+        self._known.setdefault(_beside(effect, fit), []).append((_late_by(effect, fit), weight))
+
+    def weight_of(self, effect: str, fit: Fit) -> float:
+        """Weight of a delay of the drive that is as long as a lag of the gyro, beside the same; zero if none was tried.
+
+        What the residual in torque shows of the two is the same, and the weight is to say whether something is late.
+        Which of the two it is, the likelihood says.
+        """
+        late_s, known = _late_by(effect, fit), self._known.get(_beside(effect, fit), [])
+        return max((weight for long, weight in known if abs(long - late_s) <= SAME_DELAY * late_s), default=0.0)
+
+
+def takes_damping(effect: str, now: Fit, new: Fit) -> bool:
+    """Whether a lag leaves the platform with a damping below zero, which no platform has.
+
+    Below resonance a lag turns the phase as damping does, and what a model leaves may ask for any of the two.
+    """
+    if not (_late_by(effect, new) > 0.0 and DAMPING in now.names and DAMPING in new.names):
+        return False
+    sigmas = [f.values[DAMPING] / max(f.std_error(DAMPING), 1e-300) for f in (now, new)]
+    return sigmas[1] < -PASSIVE_SIGMAS < sigmas[0]
+
+
+def _late_by(effect: str, fit: Fit) -> float:
+    """By how much later slow motion is read because of an effect."""
+    return effects.get(effect).late_s(fit.structure.shapes_of(fit.values)[effect])
+
+
+def _beside(effect: str, fit: Fit) -> frozenset[str]:
+    """The effects of a model but for one."""
+    return frozenset(fit.structure.effects) - {effect}
