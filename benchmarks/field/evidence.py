@@ -81,7 +81,8 @@ def weigh(
     white, lacking = white[:, : white.shape[1] - len(names)], white[:, white.shape[1] - len(names) :]
     bound, oracle, whiteness = _bound(rig, motions, seen, filt, white, wrong)
     late = _lateness(rig, motions, seen, filt, np.delete(white, terms, axis=1))
-    allowed = sorted(LATE) if late > LATE_ENERGY else []
+    # Beside an encoder the gyro's own low-pass shows without any torque, also where the torque itself comes late.
+    allowed = sorted(LATE) if late > LATE_ENERGY else ["sensor_lag"] if rig.sensors == "both" else []
     energy: dict[str, float] = {}
     beside: dict[str, Any] = {}
     for i, n in enumerate(names):

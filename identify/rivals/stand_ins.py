@@ -3,7 +3,7 @@
 A few effects follow almost anything: a second mass on a spring answers an amplifier's coarse steps, a torque that
 repeats over the angle a cable that pulls at one place. As long as nothing is left over, the evidence speaks for them.
 Where something is left that no effect describes, nobody knows how much of it they have taken up, nor what they did to
-J, C and K in its place.
+J, C and K in its place. Where that is little beside what an effect takes, the effect is no stand-in for it.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from identify.estimate.final_fit import FinalFit
 from identify.runs.observability import is_seen_to_repeat
+from identify.select.evidence import WEIGHT
 from identify.select.field_search import Found, with_free_form
 from identify.select.free_form_residual import MOVED_SIGMAS
 from identify.signals.trace import Trace
@@ -31,32 +32,42 @@ def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callab
     the effect is noted.
     """
     depends = found.disturbance.depends_on  # the largest first
-    flexible = [name for name in found.named if effects.get(name).is_flexible]
-    if not flexible or not depends:
+    flexible = [name for name in found.named if effects.get(name).is_flexible] if depends else []
+    apart = {name: found.without(name) for name in flexible}
+    flexible = [name for name in flexible if _is_in_doubt(found, apart[name])]
+    if not flexible:
         return found
     waves = {
         name: is_seen_to_repeat(effects.first_of(name), found.named, found.after.values, traces) for name in flexible
     }
     stand_ins = [name for name in flexible if depends[0].on not in effects.get(name).goes_with or not waves[name]]
     if stand_ins:
-        found = _taken_back(found, stand_ins, axis)
+        found = _taken_back(found, stand_ins, axis, apart[stand_ins[0]] if len(stand_ins) == 1 else None)
         say(f"not named: {_listed(stand_ins)}; what is left then still depends on the {depends[0].on}")
         flexible = [name for name in flexible if name not in stand_ins]
     if not flexible:
         return found
     say(f"something is left over: checking how far the parameters depend on {_listed(flexible)}")
-    apart = dict(found.disturbance.moves_without_percent)
-    apart |= {effects.first_of(name): moved(found.after, found.without(name).after) for name in flexible}
-    return replace(found, disturbance=replace(found.disturbance, moves_without_percent=apart))
+    moves = dict(found.disturbance.moves_without_percent)
+    for name in flexible:
+        less = found.without(name) if stand_ins else apart[name]
+        moves[effects.first_of(name)] = moved(found.after, less.after)
+    return replace(found, disturbance=replace(found.disturbance, moves_without_percent=moves))
 
 
-def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
+def _is_in_doubt(found: Found, less: Found) -> bool:
+    """Whether what is left over is a share of what an effect takes that would be a name of its own."""
+    with_it, without = found.in_torque[1].held_relative, less.in_torque[1].held_relative
+    return bool(found.disturbance.depends_on[0].relative ** 2 > WEIGHT * (without**2 - with_it**2))
+
+
+def _taken_back(found: Found, names: Sequence[str], axis: str, less: Found | None) -> Found:
     """The same without effects that may only stand in; what was left beside them is left without them, too.
 
     One of them may be real all the same: J, C and K are no surer than they differ with and without.
     """
     depends = found.disturbance.depends_on
-    less = found.without(*names)
+    less = less or found.without(*names)
     left = less.disturbance
     for dependence in depends:
         left = with_free_form(left, dependence, {})
