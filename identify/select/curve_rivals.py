@@ -31,6 +31,12 @@ CURVES: Mapping[str, Sequence[str]] = {
 }  # fmt: skip
 
 
+def is_part_of(name: str, curve: str) -> bool:
+    """Whether an effect is of the kind that a curve stands for; a constant torque is a part of any curve."""
+    effect = effects.get(name)
+    return effect.is_constant or curve in CURVES.get(effect.family, ())
+
+
 def against_curves(search: Stepwise, now: Fit) -> Fit:
     """A model without names that a curve in their place beats; what else is there is judged beside that curve next."""
     if search.trials.added(now):

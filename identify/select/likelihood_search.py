@@ -20,13 +20,12 @@ from identify.results import Candidate
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
 from identify.runs.reduced import reduced
-from identify.select.curve_rivals import CURVES
+from identify.select.curve_rivals import is_part_of
 from identify.select.evidence import STRONG_SUPPORT, EvidenceModel, support_difference
 from identify.select.search_state import Search
 from identify.select.stepwise import PREDICTS_TO_NOISE, Stepwise
 from identify.signals.torque_noise import quieter
 from identify.signals.trace import Trace, pooled_noise
-from rig import effects
 from rig.platform import TERMS
 
 SAMPLES = 10_000  # that the search looks at
@@ -99,7 +98,7 @@ class LikelihoodSearch:
         if fit.structure == search.best.structure:
             return False
         left, added = search.left, [e for e in fit.structure.effects if e not in search.base.structure.effects]
-        beside = left is not None and all(left.form in CURVES.get(effects.get(e).family, ()) for e in added)
+        beside = left is not None and all(is_part_of(e, left.form) for e in added)
         best = left.evidence.fit if left is not None and beside else search.best
         there = search.problem.fit(fit.structure, fit.values)
         return bool(np.isfinite(there.cost)) and support_difference(there, best) > STRONG_SUPPORT

@@ -179,6 +179,12 @@ class Effect:
         in_motion = self.place in (Place.LOAD, Place.FRICTION) or self.inverse is not None
         return in_motion and self.foreseen and self.reads is None
 
+    @property
+    def is_constant(self) -> bool:
+        """Whether it is a torque that depends on nothing."""
+        varies = any(x in self.formula for x in ("angle_rad", "rate_rad_s", "torque_nm"))
+        return self.place is Place.LOAD and bool(self.formula) and not varies
+
     def late_s(self, values: tuple[float, ...]) -> float:
         """By how much later slow motion is read because of it, wherever between torque and reading it acts."""
         if self.lag is not None:  # a low-pass delays by the first coefficient of its denominator

@@ -24,7 +24,9 @@ def fit(effects: tuple[str, ...], cost: float) -> Any:
         (("unbalance",), "free_angle", True),
         (("cogging", "cogging_2"), "free_angle", True),
         (("cogging", "cogging_2"), "free_time", False),
-        (("cogging", "torque_offset"), "free_angle", False),
+        (("cogging", "torque_offset"), "free_angle", True),  # a constant is a part of any curve
+        (("torque_offset",), "free_time", True),
+        (("coulomb_friction", "torque_offset"), "free_angle", False),
         (("unbalance",), None, False),
     ],
 )

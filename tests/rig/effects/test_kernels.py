@@ -190,3 +190,14 @@ def test_saturation_clips_and_a_dead_zone_swallows() -> None:
 
 def test_a_rate_bias_is_added() -> None:
     np.testing.assert_allclose(filtered("rate_bias", np.array([1.0, -1.0]), (0.25,)), [1.25, -0.75])
+
+
+def test_only_an_offset_is_a_torque_that_depends_on_nothing() -> None:
+    assert [name for name in effects.known() if effects.get(name).is_constant] == ["torque_offset"]
+
+
+def test_what_makes_readings_late_says_by_how_much() -> None:
+    late = {name for name in effects.known() if effects.get(name).late_s((1e-3,)) == 1e-3}
+    assert late >= {"torque_delay", "actuator_lag", "sensor_lag"}
+    assert effects.get("sensor_lag_second_order").late_s((1e-3,)) == 1e-3
+    assert effects.get("coulomb_friction").late_s((1e-3,)) == 0.0
