@@ -77,6 +77,6 @@ def _price(richer: Fit, less: Fit) -> float:
 def _note(beside: FinalFit, name: Name) -> str:
     late = f"{number(1e3 * beside.values[name], 3)} ms"
     return (
-        f"The gyro's own low-pass makes its readings late by {late}. That is too little to be named as an effect; "
-        "the parameters are those beside it."
+        f"The gyro's own low-pass delays its readings by {late}. That is too little to be named as an effect, but the "
+        "final fit includes it."
     )
