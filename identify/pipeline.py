@@ -257,7 +257,7 @@ class _Identifier:
         measured: Found | None = None,
     ) -> Identification:  # fmt: skip
         changed = after.structure != self.structure
-        after = after.as_uncertain_as_rivals(list(search.between_rivals.values())) if changed else before
+        after = replace(after, between_rivals=search.spread_between_rivals) if changed else before
         cutoff = self.start.cutoff_hz
         measured_before = measure(self.traces, self.split, before, cutoff)
         measured_after = measure(self.traces, self.split, after, cutoff) if changed else measured_before

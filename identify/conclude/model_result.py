@@ -31,7 +31,7 @@ def model_of(case: Case, fitted: FinalFit, measured: Measured, dropped: tuple[No
     for name in fitted.names:
         if name in lost or of_another_run(name, runs_fitted(case)):
             continue
-        value, error = fitted.values[name], open_.get(name, fitted.std_error(name))
+        value, error = fitted.values[name], open_.get(name, fitted.reported_error(name))
         estimate = ParameterEstimate.normal(value, error, _unit(case, name))
         if len(name) == 1:
             parameters[_label(case, name)] = estimate

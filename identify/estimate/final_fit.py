@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,6 @@ from identify.model.structure import Structure
 from identify.signals.trace import Trace
 from identify.simulate.sensitivities import INFORMATION_RCOND, jacobian
 from identify.simulate.shots import Shots
-from rig.platform import TERMS
 from rig.recording.run import Array
 
 NEAR_FLOOR = 1.3**2  # reduced chi-square: close enough for a free run over the whole set
@@ -53,6 +52,8 @@ class FinalFit:
         The free run leaves no more than the sensor's noise.
     determined
         Parameters that the data determine (False along directions of the information that are empty).
+    between_rivals
+        Standard deviation of J, C and K over models that the data do not part from this one.
     """
 
     fit: ParameterFit
@@ -63,6 +64,7 @@ class FinalFit:
     sensor_limited: bool
     determined: tuple[bool, ...]
     method: str
+    between_rivals: Mapping[Name, float] = field(default_factory=dict)
 
     @property
     def structure(self) -> Structure:
@@ -104,10 +106,9 @@ class FinalFit:
         more = (vectors * np.maximum(values, 0.0)) @ vectors.T
         return replace(self, covariance=self.covariance + more * np.outer(size, size), determined=both)
 
-    def as_uncertain_as_rivals(self, between: Sequence[Array]) -> FinalFit:
-        """The same with J, C and K as uncertain as which of several models is true: covariances to add, (3, 3) each."""
-        which = np.array([[n == (t,) for t in TERMS] for n in self.names], dtype=float)  # (names, 3)
-        return replace(self, covariance=self.covariance + sum(which @ spread @ which.T for spread in between))
+    def reported_error(self, name: Name) -> float:
+        """One standard error of a parameter, with what is uncertain because rivals of the model may be true."""
+        return float(np.hypot(self.std_error(name), self.between_rivals.get(name, 0.0)))
 
 
 def by_regression(

@@ -127,7 +127,9 @@ class LikelihoodSearch:
         rivals = {k: s.rivals.get(k, {}) for k in named}
         found.rivals = {k: tuple(v) for k, v in rivals.items()}
         found.rival_models = {k: {n: f.platform() for n, f in v.items()} for k, v in rivals.items()}
-        found.between_rivals = {k: s.between_rivals[k] for k in named if k in s.between_rivals}
+        apart = {k: s.between_rivals[k] for k in named if k in s.between_rivals}
+        same = set(best.structure.effects)  # what was found of a model that has changed since tells nothing
+        found.between_rivals = {k: v for k, (structure, v) in apart.items() if set(structure.effects) == same}
         found.dropped = [(n, why) for n, why in s.dropped if n not in (*best.structure.terms, *best.structure.effects)]
         return found
 

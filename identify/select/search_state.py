@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from identify.model.parameter_fit import ParameterFit, reduced_chi_square
+from identify.model.parameters import Name
 from identify.results import Candidate
 from rig.arrays import Array
-from rig.platform import Platform
+from rig.platform import TERMS, Platform
 
 
 @dataclass
@@ -24,7 +27,7 @@ class Search:
     rival_models
         Effect -> rival -> the platform fitted with the rival in its place.
     between_rivals
-        Effect -> covariance of J, C and K over it and the rivals in its place, (3, 3).
+        Effect -> variance of J, C and K over it and the rivals in its place, (3,).
     dropped
         Terms of the declared model and effects that the data do not support, with the reason.
     contribution
@@ -49,6 +52,12 @@ class Search:
     def reduced_chi_square(self, fit: ParameterFit) -> float:
         """Of what one of its models leaves on samples held out."""
         return reduced_chi_square(fit.held_out_error, self.floor)
+
+    @property
+    def spread_between_rivals(self) -> dict[Name, float]:
+        """Standard deviation of J, C and K over models that the data do not part."""
+        variance = np.sum(list(self.between_rivals.values()), axis=0) if self.between_rivals else np.zeros(len(TERMS))
+        return {(term,): float(np.sqrt(v)) for term, v in zip(TERMS, variance, strict=True)}
 
     def reject_all(self) -> None:
         """Name nothing: the declared model is what there is."""

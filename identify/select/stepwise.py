@@ -74,7 +74,7 @@ class Stepwise:
     samples: int = 0
     rounds: list[Round] = field(default_factory=list)
     rivals: dict[str, dict[str, Fit]] = field(default_factory=dict)
-    between_rivals: dict[str, Array] = field(default_factory=dict)  # of J, C, K, by effect (``model_spread``)
+    between_rivals: dict[str, tuple[Structure, Array]] = field(default_factory=dict)  # ``model_spread``, and of what
     dropped: list[tuple[str, str]] = field(default_factory=list)
     stood_for_curves: set[str] = field(default_factory=set)  # wrong names: a curve explains what they seemed to
     best: Fit = None  # type: ignore[assignment]
@@ -165,10 +165,9 @@ class Stepwise:
             if chosen != name:
                 self.say(f"replaced {name} by {chosen}: it fits better beside the other effects")
                 now = fits[chosen]
-            for known in (self.rivals, self.between_rivals):
-                known.pop(name, None)
+            self.rivals.pop(name, None)
             self.rivals[chosen] = {n: fits[n] for n in alike if n != chosen}
-            self.between_rivals[chosen] = self._between(fits[chosen], *self.rivals[chosen].values())
+            self.between_rivals[chosen] = (now.structure, self._between(chosen, fits))
         return now
 
     def without(self, now: Fit, name: str, steps: int = TRIAL_ITERATIONS) -> Fit:
@@ -228,11 +227,12 @@ class Stepwise:
                 alike = [n for n, f in fits.items() if support_difference(f, likeliest) < STRONG_SUPPORT]
         return simplest(self.weigher, {n: seen[n].fit for n in alike}), alike
 
-    def _between(self, *models: Fit) -> Array:
-        """By how much J, C and K differ between a model and its rivals, on as many samples as all were fitted to."""
+    def _between(self, chosen: str, fits: Mapping[str, Fit]) -> Array:
+        """By how much J, C and K differ with rivals; a richer effect and its special case are none of each other."""
+        nested = {chosen, *effects.get(chosen).nests} | {n for n in fits if chosen in effects.get(n).nests}
+        models = [fits[chosen], *(f for n, f in self.rivals[chosen].items() if n not in nested)]
         on_all = [f for m in models if (f := self._on_all.get(_key(m.structure))) is not None]
-        first, *others = on_all if len(on_all) == len(models) else models
-        return model_spread(first, others, support_difference)
+        return model_spread(*(on_all if len(on_all) == len(models) else models), ahead=support_difference)
 
     def _has_more(self, rich: Evidence, special: Evidence) -> bool:
         """Whether an effect is worth it after its special case, judged as it was when it was added."""
