@@ -20,6 +20,7 @@ REJECTED_TOGETHER = (
 INTERRUPTED_NOTE = (
     "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
 )
+ACTIVE_SIGMAS = 3.0  # standard errors below zero, from which a damping is no chance
 USUAL_CUTOFF_HZ = 50.0  # where the residual passed no low-pass
 
 
@@ -45,7 +46,18 @@ def reasons_against_fit(searched: Sequence[GeneticRun], final: ModelResult) -> l
         f"{g.name}: the objective {g.objective:.4g} is still above J_dec {g.j_dec:.4g} after {g.restarts} repeats"
         for g in searched if not g.accepted
     ]  # fmt: skip
-    return above + [f"{x.name} is not determined: {x.reason}" for x in final.not_determined]
+    return [*above, *(f"{x.name} is not determined: {x.reason}" for x in final.not_determined), *_active(final)]
+
+
+def _active(final: ModelResult) -> list[str]:
+    """That a damping is negative, which no platform's is."""
+    damping = next((p for n, p in final.parameters.items() if n.startswith("damping")), None)
+    if damping is None or not damping.value < -ACTIVE_SIGMAS * damping.std_error:
+        return []
+    return [
+        f"damping C is negative ({number(damping.value, 3)} {damping.unit}), which no platform's is: the model takes "
+        "something else for damping, often a delay"
+    ]
 
 
 def reasons_against_disturbance(left: Disturbance, accept: AcceptConfig, axis: str) -> list[str]:

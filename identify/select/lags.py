@@ -36,10 +36,14 @@ def takes_damping(effect: str, now: Fit, new: Fit) -> bool:
 
     Below resonance a lag turns the phase as damping does, and what a model leaves may ask for any of the two.
     """
-    if not (_late_by(effect, new) > 0.0 and DAMPING in now.names and DAMPING in new.names):
+    return _late_by(effect, new) > 0.0 and drives(new) and not drives(now)
+
+
+def drives(fit: Fit) -> bool:
+    """Whether a model's damping is below zero by more than chance: it would feed the motion."""
+    if DAMPING not in fit.names:
         return False
-    sigmas = [f.values[DAMPING] / max(f.std_error(DAMPING), 1e-300) for f in (now, new)]
-    return sigmas[1] < -PASSIVE_SIGMAS < sigmas[0]
+    return bool(fit.values[DAMPING] < -PASSIVE_SIGMAS * fit.std_error(DAMPING))
 
 
 def _late_by(effect: str, fit: Fit) -> float:

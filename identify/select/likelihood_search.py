@@ -22,6 +22,7 @@ from identify.runs.observability import can_show
 from identify.runs.reduced import reduced
 from identify.select.curve_rivals import is_part_of
 from identify.select.evidence import STRONG_SUPPORT, EvidenceModel, support_difference
+from identify.select.lags import drives
 from identify.select.search_state import Search
 from identify.select.stepwise import PREDICTS_TO_NOISE, Stepwise
 from identify.signals.torque_noise import quieter
@@ -101,6 +102,8 @@ class LikelihoodSearch:
         beside = left is not None and all(is_part_of(e, left.form) for e in added)
         best = left.evidence.fit if left is not None and beside else search.best
         there = search.problem.fit(fit.structure, fit.values)
+        if drives(there) and not drives(best):  # it has taken for damping what is none
+            return True
         return bool(np.isfinite(there.cost)) and support_difference(there, best) > STRONG_SUPPORT
 
     @property

@@ -7,8 +7,9 @@ from typing import Any, cast
 
 import pytest
 
-from identify.conclude.acceptance import of_reported, reasons_against_disturbance
+from identify.conclude.acceptance import of_reported, reasons_against_disturbance, reasons_against_fit
 from identify.residual import Dependence, Disturbance
+from identify.results import ParameterEstimate
 from identify.wording import residual_torque_sentence
 from rig.config.identify import AcceptConfig
 
@@ -51,3 +52,14 @@ def test_within_all_limits_it_is_accepted_and_told_in_a_sentence() -> None:
     assert "3.0 % depends on the rate" in residual_torque_sentence(left, "rotary")
     assert "3.0 % depends on the speed" in residual_torque_sentence(left, "linear")
     assert "changes J by 1.0 % and C by 5.0 %" in residual_torque_sentence(left, "rotary")
+
+
+def test_a_negative_damping_is_a_reason_of_its_own() -> None:
+    def of(damping: float) -> list[str]:
+        parameters = {"damping": ParameterEstimate.normal(damping, 0.03, "N*m*s/rad")}
+        final = cast(Any, SimpleNamespace(parameters=parameters, not_determined=()))
+        return reasons_against_fit((), final)
+
+    assert of(0.05) == of(-0.05) == []
+    assert len(of(-2.4)) == 1
+    assert "damping C is negative (-2.40 N*m*s/rad)" in of(-2.4)[0]

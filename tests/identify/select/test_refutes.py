@@ -15,7 +15,7 @@ COST_WITH_CURVE, COST_IN_TORQUE, COST_WITHOUT = 0.0, 100.0, 1000.0
 
 
 def fit(effects: tuple[str, ...], cost: float) -> Any:
-    return SimpleNamespace(structure=Structure(effects=effects), values={}, cost=cost)
+    return SimpleNamespace(structure=Structure(effects=effects), values={}, names=(), cost=cost)
 
 
 @pytest.mark.parametrize(
@@ -41,3 +41,16 @@ def test_a_curve_refutes_only_effects_of_its_kind(
         cast(Any, SimpleNamespace(best=bare, base=bare, left=left, problem=problem)), [], Structure()
     )
     assert search.refutes(fit(found, 0.0)) is refuted
+
+
+def test_a_model_that_takes_a_delay_for_a_negative_damping_is_refuted_however_likely(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(likelihood_search, "support_difference", lambda one, other: 0.0)
+    bare, there = fit((), COST_WITHOUT), fit(("creep",), 0.0)
+    there.names, there.values, there.std_error = (("damping",),), {("damping",): -2.4}, lambda name: 0.03
+    problem = SimpleNamespace(fit=lambda structure, values: there)
+    search = LikelihoodSearch(
+        cast(Any, SimpleNamespace(best=bare, base=bare, left=None, problem=problem)), [], Structure()
+    )
+    assert search.refutes(fit(("creep",), 0.0))
