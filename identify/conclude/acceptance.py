@@ -9,6 +9,7 @@ from dataclasses import replace
 from identify.residual import Disturbance
 from identify.results import GeneticRun, Identification, ModelResult
 from identify.runs.sign_convention import signs
+from identify.select.lags import PASSIVE_SIGMAS
 from identify.wording import SYMBOLS, depends_on, joined, number, percent, plain
 from rig.config.identify import AcceptConfig
 from rig.platform import TERMS
@@ -20,7 +21,6 @@ REJECTED_TOGETHER = (
 INTERRUPTED_NOTE = (
     "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
 )
-ACTIVE_SIGMAS = 3.0  # standard errors below zero, from which a damping is no chance
 USUAL_CUTOFF_HZ = 50.0  # where the residual passed no low-pass
 
 
@@ -46,13 +46,17 @@ def reasons_against_fit(searched: Sequence[GeneticRun], final: ModelResult) -> l
         f"{g.name}: the objective {g.objective:.4g} is still above J_dec {g.j_dec:.4g} after {g.restarts} repeats"
         for g in searched if not g.accepted
     ]  # fmt: skip
-    return [*above, *(f"{x.name} is not determined: {x.reason}" for x in final.not_determined), *_active(final)]
+    return [
+        *above,
+        *(f"{x.name} is not determined: {x.reason}" for x in final.not_determined),
+        *_against_negative_damping(final),
+    ]
 
 
-def _active(final: ModelResult) -> list[str]:
+def _against_negative_damping(final: ModelResult) -> list[str]:
     """That a damping is negative, which no platform's is."""
     damping = next((p for n, p in final.parameters.items() if n.startswith("damping")), None)
-    if damping is None or not damping.value < -ACTIVE_SIGMAS * damping.std_error:
+    if damping is None or not damping.value < -PASSIVE_SIGMAS * damping.std_error:
         return []
     return [
         f"damping C is negative ({number(damping.value, 3)} {damping.unit}), which no platform's is: the model takes "

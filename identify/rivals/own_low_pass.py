@@ -1,4 +1,4 @@
-"""The gyro's own low-pass where it is proven but carries too little to be named: the numbers are those beside it.
+"""The gyro's own low-pass where it shows but carries too little to be named: the numbers are those beside it.
 
 Every gyro has one. It is no effect that the platform lacks, but what it does would be taken for inertia and damping,
 however little of the torque that is; also beside another lag, which delays all of the motion alike. So it takes no
@@ -30,7 +30,7 @@ BEGUN_SAMPLES = 0.2  # length of the low-pass that a fit begins from
 def with_own_low_pass(
     found: Found, search: Stepwise, traces: Sequence[Trace], split: Split, say: Callable[[str], None]
 ) -> tuple[Found, str]:
-    """The same with its numbers as they are beside the gyro's low-pass, and a note; unchanged where none is proven.
+    """The same with its numbers as they are beside the gyro's low-pass, and a note; unchanged where none shows.
 
     Where something is left over, a low-pass smooths that away and proves nothing.
     """
@@ -41,7 +41,7 @@ def with_own_low_pass(
         return found, ""
     if not isinstance(found.after.fit, Fit) or not _shows(search, form):
         return found, ""
-    say("the gyro's own low-pass shows: fitting it beside what was found")
+    say("the rate sensor's own low-pass shows: fitting it beside what was found")
     start = {**found.after.values, (form, "time"): BEGUN_SAMPLES * search.problem.step_s}
     problem, richer = fitted_on_all(traces, structure.plus(form), start, split.final, found.after.fit)
     inflated = inflation(problem.columns_at(richer, with_variance=True), richer, [(form, "time")])
@@ -77,6 +77,6 @@ def _price(richer: Fit, less: Fit) -> float:
 def _note(beside: FinalFit, name: Name) -> str:
     late = f"{number(1e3 * beside.values[name], 3)} ms"
     return (
-        f"The gyro's own low-pass delays its readings by {late}. That is too little to be named as an effect, but the "
-        "final fit includes it."
+        f"The rate sensor's own low-pass delays its readings by {late}. That is too little to be named as an effect, "
+        "but the final fit includes it."
     )

@@ -12,14 +12,12 @@ def lag(x, step, state, p):  # type: ignore[no-untyped-def]
     """First-order lag, exact for an input that follows a parabola through the last three samples.
 
     With straight lines between the samples the gain would be too low by (w h)^2 / 12 (w: frequency in rad/s, h: step),
-    which a low-noise sensor shows in J and K. State: output, the last two inputs; then a step and its decay.
+    which a low-noise sensor shows in J and K.
     """
     tau = p[0]
     if tau <= 0.0:  # however small it is, a fit has to see what a little more does
         return x
-    if state[3] != step:
-        state[3], state[4] = step, math.exp(-step / tau)
-    a = state[4]
+    a = math.exp(-step / tau)
     ramp = 1.0 - tau / step * (1.0 - a)
     y = a * state[0] + (1.0 - a - ramp) * state[1] + ramp * x
     bend = (x - 2.0 * state[1] + state[2]) / (2.0 * step * step)
@@ -31,8 +29,8 @@ def lag(x, step, state, p):  # type: ignore[no-untyped-def]
 
 
 def remembers(step_s: float, values: tuple[float, ...]) -> int:
-    """Number of states of the lag."""
-    return 5
+    """Number of states of the lag: its output and two input samples."""
+    return 3
 
 
 def times(scale: Scale) -> tuple[float, ...]:

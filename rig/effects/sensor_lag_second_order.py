@@ -12,17 +12,15 @@ from rig.effects.base import Effect, Parameter, Place, filter_kernel
 def _low_pass(x, step, state, p):  # type: ignore[no-untyped-def]
     """Butterworth low-pass of second order, exact for an input that runs straight between two samples.
 
-    State: output, its slope over the corner frequency, the last input; then a step and what it decays and turns by.
+    State: output, its slope over the corner frequency, the last input.
     """
     root = math.sqrt(2.0)
     if p[0] <= 0.0:
         state[0], state[1], state[2] = x, 0.0, x
         return x
     corner = root / p[0]
-    if state[3] != step:
-        u = corner * step / root
-        state[3], state[4], state[5], state[6] = step, math.exp(-u), math.cos(u), math.sin(u)
-    decay, c, s = state[4], state[5], state[6]
+    u = corner * step / root
+    decay, c, s = math.exp(-u), math.cos(u), math.sin(u)
     # Behind a straight line the output runs along it, late by the time p[0].
     slope = (x - state[2]) / step
     late = state[2] - slope * p[0]
@@ -45,7 +43,7 @@ EFFECT = Effect(
         Parameter("time", "s", "by how much later slow motion is read", low=0.0, high=0.5, suffix="s", start=times),
     ),
     kernel=_low_pass,
-    filter_states=lambda step_s, values: 7,
+    filter_states=lambda step_s, values: 3,
     lag=lambda values: (values[0], 0.5 * values[0] ** 2),
     stays="it changes the measurement, not the motion: the linear model is measured through the same lag",
     separated_by="from a delay: excite at higher frequencies",
