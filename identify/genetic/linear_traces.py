@@ -33,15 +33,14 @@ def linear_traces(traces: Sequence[Trace], fitted: FinalFit) -> list[Trace]:
 
 def _as_the_gyro_sees(trace: Trace, sensor: Any) -> Trace:
     """The torque behind the same filters as the rate: for a linear platform that changes nothing else."""
-    run = trace.run
-    smooth = bool(run.rate_corner_hz and run.rate_delay_s)
-    if trace.channel != "rate" or trace.torque is None or not (smooth or sensor.names):
+    low_pass = trace.low_pass
+    if trace.channel != "rate" or trace.torque is None or not (low_pass or sensor.names):
         return trace
     fine = trace.step_s / UPSAMPLING
     n = (len(trace.measured) - 1) * UPSAMPLING + 1
     mean = np.asarray(sensor.apply(trace.torque.on_half_steps(trace.start_s, fine, n), fine))
-    if smooth:
-        mean = smoothed(mean, low_pass_kernel(float(run.rate_corner_hz or 0.0), float(run.rate_delay_s or 0.0), fine))
+    if low_pass is not None:
+        mean = smoothed(mean, low_pass_kernel(*low_pass, fine))
     time = trace.start_s + fine * np.arange(n)
     return replace(trace, torque=TorqueSignal(time, mean, "zero_order"), _series={})
 

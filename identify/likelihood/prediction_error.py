@@ -176,10 +176,12 @@ class PredictionError:
         spans = [(a, b - 1) for a, b in s.edges]
         sensing = self._sensing(trace, equations)
         gains = kept or self._gains.of(s.trace, self._linear_part(equations), noise, sensing, spans)
-        measured = self._readings(trace)
+        measured, low_pass = self._readings(trace), trace.low_pass
+        smoothing = None if low_pass is None else s.grid.smoothing(equations, low_pass)
         predicted, state = predict_ahead(
             equations, s.grid.shaft_torque(equations), s.grid.step_s, round(trace.step_s / s.grid.step_s), spans,
-            s.starts, measured, trace.keep, gains, sensing.rate, s.bias, trace.offset_s, trace, s.reads,
+            s.starts, measured, trace.keep, gains, sensing.rate, s.bias, trace.offset_s, trace, s.reads, low_pass,
+            smoothing,
         )  # fmt: skip
         return Look(measured - predicted, gains.variance, state, gains)
 

@@ -105,6 +105,13 @@ class Trace:
         return self._tables[channel]
 
     @property
+    def low_pass(self) -> tuple[float, float] | None:
+        """Corner in Hz and delay in s of the gyro's own low-pass, where one is read and its data sheet says them."""
+        corner_hz, delay_s = self.run.rate_corner_hz, self.run.rate_delay_s
+        by_gyro = self.channel == "rate" or self.beside is not None
+        return (corner_hz, delay_s) if by_gyro and corner_hz and delay_s else None
+
+    @property
     def biased(self) -> bool:
         """Whether the channel may carry an unknown constant: a gyro alone; an encoder beside it would show it."""
         return self.channel == "rate" and self.run.angle_rad is None
@@ -269,9 +276,8 @@ def loads_differ(traces: Sequence[Trace]) -> bool:
 
 def drop_samples_at_seam(trace: Trace, seam: int, keep: Any) -> None:
     """Take the samples in which the gyro's own average mixes both sides of a seam out of ``keep``, in place."""
-    run = trace.run
-    if trace.channel == "rate" and run.rate_corner_hz and run.rate_delay_s:
-        reach = int(np.ceil(run.rate_delay_s / trace.step_s + 0.5))  # a model averages over two fine steps besides
+    if trace.low_pass is not None:
+        reach = int(np.ceil(trace.low_pass[1] / trace.step_s + 0.5))  # a model averages over two fine steps besides
         keep[max(0, seam - reach) : seam + reach] = False
 
 

@@ -146,20 +146,19 @@ def predict(shots: Shots, equations: Equations, starts: Array, bias: float, push
 
 def read_off(shots: Shots, equations: Equations, fine: Array, first: int, bias: float) -> Array:
     """The measured channel of a motion, (m, 2) or (m, 3), that is simulated from one instant on, shape (n,)."""
-    grid, run = shots.grid, shots.trace.run
+    grid = shots.grid
     ratio = round(shots.trace.step_s / grid.step_s)
     n = len(shots.trace.measured)
     if shots.trace.channel == "angle":
         return np.asarray(fine[: n * ratio : ratio, 0])
     turned, step_s = fine[:, 1], grid.step_s
-    filtered = bool(run.rate_corner_hz and run.rate_delay_s)
-    if filtered:
+    low_pass = shots.trace.low_pass
+    if low_pass is not None:
         turned = mean_rate(fine[:, 0], turned, step_s)
     if equations.sensor.names:
         turned = _sensed(equations, turned, first, step_s)
-    if filtered:
-        corner_hz, delay_s = float(run.rate_corner_hz or 0.0), float(run.rate_delay_s or 0.0)
-        turned = smoothed(turned, low_pass_kernel(corner_hz, delay_s, step_s, 2.0 * step_s))
+    if low_pass is not None:
+        turned = smoothed(turned, low_pass_kernel(*low_pass, step_s, 2.0 * step_s))
     return np.asarray(turned[: n * ratio : ratio] + bias)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -12,6 +12,7 @@ from scipy.interpolate import CubicHermiteSpline
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.equations import Equations
+from rig.dynamics.low_pass import low_pass_kernel, smoothed
 from rig.dynamics.torque import NO_TORQUE, TorqueSignal
 from rig.platform import Platform
 
@@ -67,6 +68,30 @@ class Motion:
     sensed_rate_rad_s: Array
 
 
+class Smoothing(NamedTuple):
+    """What a gyro's own low-pass adds to the torque, and by that to the motion of a linear platform.
+
+    Attributes
+    ----------
+    torque_nm
+        At start, middle and end of each fine step, (n, 3). On a linear platform this torque alone moves the rate as the
+        filter changes it.
+    begins
+        What it has added by the start of each fine step to the integrals of the torque, the second in N m s^2 and the
+        first in N m s, (n + 1, 2): times inertia, angle and rate by which a platform is beside itself there.
+    """
+
+    torque_nm: Array
+    begins: Array
+
+
+def _kept(store: dict[Any, Any], key: Any, found: Any) -> Any:
+    while len(store) >= KEPT:  # simulations in other threads may be doing the same
+        store.pop(next(iter(store), None), None)
+    store[key] = found
+    return found
+
+
 class Grid:
     """The fine time grid of one run, with its torque: made once, simulated many times.
 
@@ -94,6 +119,7 @@ class Grid:
         torque = torque or NO_TORQUE
         self._held = torque.hold == "zero_order"
         self._shaft: dict[Any, Array] = {}
+        self._smoothing: dict[Any, Smoothing] = {}
         self._finer: Array | None
         self._lead = max(0, int(lead_s / self.step_s))  # jittered stamps may begin a little before the beat
         self._torque, self._factor, self._finer = torque, 1.0, None
@@ -104,6 +130,7 @@ class Grid:
         """The same grid with its torque multiplied: reading a smooth torque off its samples costs more than that."""
         other = copy(self)
         other._given, other._shaft, other._factor = factor * self._given, {}, factor * self._factor
+        other._smoothing = {}
         other._finer = None
         return other
 
@@ -119,10 +146,32 @@ class Grid:
         key = (drive.names, drive.values)
         found = self._shaft.get(key)
         if found is None:
-            found = self._behind(equations)
-            while len(self._shaft) >= KEPT:  # simulations in other threads may be doing the same
-                self._shaft.pop(next(iter(self._shaft), None), None)
-            self._shaft[key] = found
+            found = _kept(self._shaft, key, self._behind(equations))
+        return found
+
+    def smoothing(self, equations: Equations, low_pass: tuple[float, float]) -> Smoothing:
+        """What a gyro's low-pass (corner in Hz, delay in s) does to that torque."""
+        drive, part_s = equations.drive, self.step_s / self._pieces
+        key = (drive.names, drive.values, low_pass)
+        found = self._smoothing.get(key)
+        if found is None:
+            ahead = int(np.ceil(low_pass[1] / self.step_s)) + 1  # steps by which the filter sees a torque coming
+            given = drive.apply(self._given, part_s)[max(0, self._lead - ahead) * self._pieces :]
+            missing = max(0, ahead - self._lead) * self._pieces
+            if missing:
+                first_s = float(self.time_s[0]) - ahead * self.step_s
+                before = self._factor * self._torque.on_half_steps(first_s, part_s, missing)
+                given = np.concatenate([drive.apply(before, part_s), given])
+            kernel = low_pass_kernel(*low_pass, part_s)
+            skipped = ahead * self._pieces
+
+            def added(values: Array) -> Array:
+                return np.asarray((smoothed(values, kernel) - values)[skipped:])
+
+            impulse = part_s * np.concatenate([[0.0], np.cumsum(given)])
+            twist = part_s * np.concatenate([[0.0], np.cumsum(0.5 * (impulse[1:] + impulse[:-1]))])
+            begins = np.stack([added(twist), added(impulse)], axis=1)[:: self._pieces]
+            found = _kept(self._smoothing, key, Smoothing(self._by_step(added(given)), np.ascontiguousarray(begins)))
         return found
 
     def _behind(self, equations: Equations) -> Array:

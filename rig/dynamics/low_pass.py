@@ -15,6 +15,7 @@ import numpy as np
 
 from rig.arrays import Array
 
+CORNER_ENTRIES = 32  # of a table over the delay
 _BISECTIONS = 60
 _STEEPEST = 400.0
 
@@ -53,6 +54,21 @@ def low_pass_kernel(corner_hz: float, delay_s: float, step_s: float, averaged_s:
         power = 0.5 * (wide + narrow)
         wide, narrow = (wide, power) if passes(shape(power)) else (power, narrow)
     return shape(0.5 * (wide + narrow))
+
+
+@lru_cache(maxsize=8)
+def corner_table(corner_hz: float, delay_s: float) -> Array:
+    """What such a filter adds to a rate beside a corner in it, shape (n + 1,), s: per jump of the acceleration.
+
+    Entries stand for distances from the corner from none to ``delay_s``, evenly spaced. Half the jump times the
+    distance is the corner's part of the rate, and the filter averages it.
+    """
+    step_s = delay_s / CORNER_ENTRIES
+    kernel = low_pass_kernel(corner_hz, delay_s, step_s)
+    beside = step_s * np.arange(-2 * CORNER_ENTRIES, 2 * CORNER_ENTRIES + 1)
+    added = smoothed(np.abs(beside), kernel) - np.abs(beside)
+    middle = len(beside) // 2
+    return np.ascontiguousarray(0.5 * added[middle : middle + CORNER_ENTRIES + 1])
 
 
 def mean_rate(angle: Array, rate: Array, step_s: float) -> Array:

@@ -22,7 +22,9 @@ from rig.arrays import Array
 from rig.dynamics.equations import Equations, Readings
 from rig.dynamics.exact_lags import CHORDS, lag_table
 from rig.dynamics.gains import BIAS, STATES, Gains
-from rig.dynamics.integrator import acceleration, step_over_kinks
+from rig.dynamics.grid import Smoothing
+from rig.dynamics.integrator import acceleration, resisting, step_over_kinks
+from rig.dynamics.low_pass import corner_table
 from rig.dynamics.native import call_filter, jit, offset, pointer
 
 
@@ -58,10 +60,53 @@ def _behind(lag, at, h, w0, a0, w1, a1, y, v):  # type: ignore[no-untyped-def]
 
 
 @jit
+def _rounded(motion, smooth, torque, rise, corner, table, reach_s, jck, z, spare, body):  # type: ignore[no-untyped-def]
+    """What a gyro's low-pass adds to the rate where dry friction is about to turn the platform, or has just done so.
+
+    There the acceleration jumps by twice the friction, or to none where the platform stops. ``corner`` holds when and
+    by how much: foreseen while the platform comes to a standstill, remembered afterwards. ``smooth`` and ``torque`` are
+    angle, rate and torque as the filter makes them of a linear platform's: ripple moves no corner that is foreseen.
+    ``rise`` is how fast that torque changes, in N m/s.
+    """
+    slip, now = motion[2], motion[3]
+    if slip != 0.0:
+        w = motion[1] + smooth[1]
+        a = acceleration(motion[0] + smooth[0], w, now, torque, slip, z, spare, jck, body)
+        slows, speed = -slip * a, slip * w
+        square = slows * slows - 2.0 * slip * (rise - jck[1] * a - jck[2] * w) / jck[0] * speed
+        if slows > 0.0 and speed < 2.0 * reach_s * slows:
+            # Where the parabola through rate, acceleration and jerk stays above zero, the platform turns by itself.
+            ahead_s = 2.0 * speed / (slows + np.sqrt(square)) if square > 0.0 else np.inf
+            friction = resisting(body[0], body[1], motion[0], 0.0, now, torque, z, spare, *body[2:])
+            corner[0], corner[1] = now + ahead_s, slip * min(2.0 * friction / jck[0], np.sqrt(max(square, 0.0)))
+    at = abs(now - corner[0]) / reach_s * (len(table) - 1)
+    if not at < len(table) - 1:
+        return 0.0
+    k = int(at)
+    return corner[1] * (table[k] + (at - k) * (table[k + 1] - table[k]))
+
+
+@jit
+def _linear_step(x, h, m0, m1, m2, jck):  # type: ignore[no-untyped-def]
+    """Angle and rate of a linear platform under a torque, over one step (fourth-order Runge-Kutta)."""
+    j, c, k = jck
+    th, w = x[0], x[1]
+    a1 = (m0 - c * w - k * th) / j
+    w2 = w + 0.5 * h * a1
+    a2 = (m1 - c * w2 - k * (th + 0.5 * h * w)) / j
+    w3 = w + 0.5 * h * a2
+    a3 = (m1 - c * w3 - k * (th + 0.5 * h * w2)) / j
+    w4 = w + h * a3
+    a4 = (m2 - c * w4 - k * (th + h * w3)) / j
+    x[0] = th + h * (w + 2.0 * w2 + 2.0 * w3 + w4) / 6.0
+    x[1] = w + h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
+
+
+@jit
 def _predict(  # type: ignore[no-untyped-def]
     starts, spans, offset_s, z, h, ratio, torque, jck, kernels, loads, z_at, p, p_at, kinks,
     filters, fs, fs_at, fp, fp_at, lags, behind, measured, keep, gain, tracked, coloured, decay, walks, walk_decay,
-    rate, bias, reads, out, state,
+    rate, bias, reads, smoothing, settled, corners, reach_s, out, state,
 ):  # fmt: skip
     n_states, readings = len(z), measured.shape[1]
     room = np.zeros((10, max(4, n_states)))
@@ -70,7 +115,8 @@ def _predict(  # type: ignore[no-untyped-def]
         pointer(room[3]), pointer(room[4]), pointer(room[5]),
     )  # fmt: skip
     saved, spare, before, bends = pointer(room[6]), pointer(room[7]), pointer(room[8:]), pointer(kinks)
-    motion = np.empty(4)
+    motion, corner, smooth = np.empty(4), np.empty(2), np.empty(2)
+    smooths = len(smoothing) > 0
     mo, zp = pointer(motion), pointer(z)
     jck3 = (jck[0], jck[1], jck[2])
     body = (loads, len(kernels), pointer(kernels), pointer(z_at), pointer(p), pointer(p_at))
@@ -80,6 +126,11 @@ def _predict(  # type: ignore[no-untyped-def]
         motion[0], motion[1], motion[2] = starts[k, 0], starts[k, 1], np.sign(starts[k, 1])
         motion[3] = offset_s + first * ratio * h
         slow, aim, held, slope, walked = 0.0, 0.0, 0.0, 0.0, 0.0
+        corner[0], corner[1] = -np.inf, 0.0
+        smooth[:] = 0.0
+        if smooths:
+            smooth[0], smooth[1] = settled[first * ratio, 0] / jck[0], settled[first * ratio, 1] / jck[0]
+        before_nm = 0.0
         # A correction of the rate is a jump. The filters see the rate without its jumps, and the sum of these passes
         # the linear low-pass with what the low-pass holds back.
         jumps = 0.0
@@ -88,8 +139,15 @@ def _predict(  # type: ignore[no-untyped-def]
         still = motion[1]
         sensed = motion[1]
         for i in range(first, last + 1):
+            rounded = 0.0
+            if frictions and smooths:
+                s, at = (i * ratio, 0) if i < last else (i * ratio - 1, 2)
+                now = torque[s, at] + smoothing[s, at] + slow
+                rise = (now - before_nm) / (ratio * h) if i > first else 0.0
+                before_nm = now
+                rounded = _rounded(motion, smooth, now, rise, corner, corners, reach_s, jck3, zp, spare, body)
             for m in range(readings):
-                y = sensed + held + bias if rate and m == 0 else motion[0]
+                y = sensed + held + bias + rounded if rate and m == 0 else motion[0]
                 y += walks[m] * walked
                 out[i, m] = y
                 if keep[i]:
@@ -112,27 +170,34 @@ def _predict(  # type: ignore[no-untyped-def]
             onward = coloured[0, 0] * slow + coloured[0, 1] * aim
             acting = 0.5 * (slow + onward)  # held over the sample: its mean there
             for s in range(i * ratio, (i + 1) * ratio):
-                w0, slip, a0 = motion[1], motion[2], 0.0
+                w0, slip, a0 = motion[1] + smooth[1], motion[2], 0.0
                 if filtered and (slip != 0.0 or not frictions):
                     a0 = acceleration(
                         mo[0], mo[1], mo[3], torque[s, 0] + acting, slip, zp, spare, jck3, body
                     )  # fmt: skip
+                if smooths:
+                    m0, m1, m2 = smoothing[s, 0], smoothing[s, 1], smoothing[s, 2]
+                    a0 += (m0 - jck[1] * smooth[1] - jck[2] * smooth[0]) / jck[0]
+                    _linear_step(smooth, h, m0, m1, m2, jck3)
                 step_over_kinks(
                     mo, n_states, zp, work, saved, h, torque[s, 0] + acting, torque[s, 1] + acting,
                     torque[s, 2] + acting, jck3, body, bends, len(kinks), before,
                 )  # fmt: skip
                 motion[3] = offset_s + (s + 1) * h
+                w1 = motion[1] + smooth[1]
                 if not filtered:
-                    sensed = motion[1] - jumps
+                    sensed = w1 - jumps
                     continue
                 a1 = 0.0
                 if motion[2] != 0.0 or not frictions:
                     a1 = acceleration(mo[0], mo[1], mo[3], torque[s, 2] + acting, mo[2], zp, spare, jck3, body)
+                if smooths:
+                    a1 += (smoothing[s, 2] - jck[1] * smooth[1] - jck[2] * smooth[0]) / jck[0]
                 same = slip == motion[2]
                 parts = reads if len(lags) == 0 else 1 if same else CHORDS
                 before_part = w0 - jumps - still
                 for r in range(1, parts + 1):
-                    sensed = motion[1] if r == parts else _between(w0, a0, motion[1], a1, h, r / parts, same)
+                    sensed = w1 if r == parts else _between(w0, a0, w1, a1, h, r / parts, same)
                     sensed -= jumps + still
                     began, begins, ends = before_part, a0, a1
                     if not same:
@@ -163,7 +228,8 @@ def _predict(  # type: ignore[no-untyped-def]
 def predict_ahead(
     equations: Equations, torque: Array, step_s: float, ratio: int, spans: Sequence[tuple[int, int]], starts: Array,
     measured: Array, keep: Any, gains: Gains, rate: bool, bias: float, offset_s: float = 0.0,
-    readings: Readings | None = None, reads: int = 1,
+    readings: Readings | None = None, reads: int = 1, low_pass: tuple[float, float] | None = None,
+    smoothing: Smoothing | None = None,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Every reading predicted from those before it, (n, m), and the states after it, (n, 5).
 
@@ -183,12 +249,19 @@ def predict_ahead(
     reads
         How often in a fine step the sensor's filters are fed, where they are not all low-passes that are followed as
         such.
+    low_pass
+        Corner in Hz and delay in s of the gyro's own symmetric low-pass, None where it has none.
+    smoothing
+        What that low-pass adds to the torque. A linear platform answers to it as the filter changes its rate, in steps
+        of the torque above all; what is left for the filter to round are the corners that dry friction makes.
     """
     p, _kept = equations.parameters_with(readings)
     filters, fs, fs_at, fp, fp_at = equations.sensor.arrays(step_s)
     low_passes = equations.low_passes
     lags = lag_table(low_passes or (), step_s)
     filters = filters if low_passes is None else filters[:0]
+    corners, reach_s = (np.zeros(2), 1.0) if low_pass is None else (corner_table(*low_pass), low_pass[1])
+    smoothing = Smoothing(np.zeros((0, 3)), np.zeros((0, 2))) if smoothing is None else smoothing
     out, state = np.zeros(measured.shape), np.zeros((len(measured), 5))
     _predict(
         np.ascontiguousarray(starts), np.array(spans, dtype=np.int64).reshape(-1, 2), offset_s,
@@ -196,6 +269,8 @@ def predict_ahead(
         equations.z_at, p, equations.p_at, equations.kinks, filters, fs, fs_at, fp, fp_at,
         lags, np.zeros((len(lags), 2)),
         measured, keep, gains.gain, gains.of_effects, gains.coloured, gains.held,
-        np.ascontiguousarray(gains.reads[:, BIAS]), gains.walk_decay, rate, bias, reads, out, state,
+        np.ascontiguousarray(gains.reads[:, BIAS]), gains.walk_decay, rate, bias, reads,
+        smoothing.torque_nm, smoothing.begins, corners, reach_s,
+        out, state,
     )  # fmt: skip
     return out, state

@@ -12,6 +12,7 @@ from rig.arrays import Array
 from rig.dynamics.polynomials import Polynomials
 from rig.signals import TorqueHold
 
+ON_A_STEP = 1e-3  # of a step, by which an instant may be off and still be on the grid
 KEPT = 6  # readings between the samples: every fit to a run asks for one of a few
 KEPT_BYTES = 64 << 20  # of them; a long run that needs fine steps is read again
 AT_ONCE = 1 << 18  # instants: the times of millions would take as much memory as what is read at them
@@ -45,6 +46,11 @@ class TorqueSignal:
     def shortest_s(self) -> float:
         """Usual time between samples in s: the median, which gaps do not move."""
         return float(np.median(np.diff(self.time_s)))
+
+    def steps_on(self, start_s: float, step_s: float) -> bool:
+        """Whether a held torque changes only at instants that are so many steps from the start."""
+        at = (self.time_s - start_s) / step_s
+        return bool(np.max(np.abs(at - np.rint(at))) < ON_A_STEP)
 
     @cached_property
     def _impulse_nm_s(self) -> Array:
