@@ -26,6 +26,7 @@ from identify.rivals.alternative_causes import AlternativeCauses
 from identify.rivals.coloured_noise import Colour, with_noise_known
 from identify.rivals.open_line import with_line_left_open
 from identify.rivals.own_low_pass import with_own_low_pass
+from identify.rivals.run_delays import aligned
 from identify.rivals.stand_ins import with_stand_ins
 from identify.rivals.whiteness_test import fails_whiteness_test, leaves_more_than_noise
 from identify.rivals.whole_runs import FreeRunFitter
@@ -136,6 +137,8 @@ class _Identifier:
             self.say("fitting the declared model")
             search = self._begun()
             at_noise = search.run() or self.colour is not None
+            self.traces, note = aligned(self.traces, self.split.final, search.stepwise.best)
+            self.left_out = (*self.left_out, note) if note else self.left_out
             found = search.found
             in_torque = partial(self._in_torque, shapes, search, found)
             fits = FreeRunFitter(*(reduced(self.traces, self.split) if self.torque_free else (self.traces, self.split)))

@@ -7,18 +7,19 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy import signal
 from scipy.linalg import block_diag
 
+from identify.estimate.covariance import rms_of, sandwich
 from identify.estimate.evaluation import evaluate
 from identify.estimate.grid_refinement import sharpened
 from identify.estimate.initial_guess import Start, best_rho
 from identify.estimate.initial_state_sensitivity import least_std_errors
 from identify.estimate.output_error import OutputErrorFit, refine
+from identify.estimate.own_delays import beside_own_delay, freed, have_own_delays
 from identify.estimate.profile_likelihood import settled, widened
 from identify.estimate.regression import Regression, RegressionFit, residuals
 from identify.estimate.starting_point import start_values
-from identify.model.parameter_fit import ZERO_INFORMATION, ParameterFit, std_error_of
+from identify.model.parameter_fit import ParameterFit, std_error_of
 from identify.model.parameters import Name, is_gain
 from identify.model.structure import Structure
 from identify.signals.trace import Trace
@@ -30,8 +31,6 @@ NEAR_FLOOR = 1.3**2  # reduced chi-square: close enough for a free run over the 
 FEW_NOISES = 5.0**2  # reduced chi-square of a free run: disturbed moments, not a wrong model
 OUTPUT_ERROR_STEPS = 12  # steps of a fit
 FREER = 0.95**2  # of the mean square of the free run
-BLOCKS_PER_RUN = 20  # blocks at most, over which scores scatter
-RESIDUAL_SEGMENT_SAMPLES = 256  # samples of a stretch whose spectrum is averaged
 
 
 @dataclass(frozen=True)
@@ -194,71 +193,6 @@ def by_output_error(
     return FinalFit(best, values, free_names, covariance, free, limited, determined, method)
 
 
-def _inverse(information: Array) -> tuple[Array, tuple[bool, ...]]:
-    """Inverse of an information matrix and which parameters it determines."""
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    power, axes = np.linalg.eigh(information / np.outer(scale, scale))
-    empty = power < INFORMATION_RCOND * max(power[-1], 1e-300)
-    inverse = axes[:, ~empty] @ np.diag(1.0 / power[~empty]) @ axes[:, ~empty].T
-    touched = np.any(np.abs(axes[:, empty]) > 0.05, axis=1) if np.any(empty) else np.zeros(len(scale), dtype=bool)
-    dead = np.diag(information) <= ZERO_INFORMATION
-    return inverse / np.outer(scale, scale), tuple(bool(x) for x in ~(touched | dead))
-
-
-def _sandwich(parts: Sequence[tuple[Array, Array]], sigma: float) -> tuple[Array, Any]:
-    """Covariance from every run's columns (m, p) and residual (m,): plain where the residual is white.
-
-    Where it is coloured, scores of blocks carry what changes along a run, but are few; the residual's spectrum
-    uses every sample, but takes the colour for the same all along. Each parameter gets the larger of the two.
-    """
-    information = np.sum([x.T @ x for x, _ in parts], axis=0)
-    inverse, determined = _inverse(information)
-    plain = inverse * sigma**2
-    blocks = [
-        x[part].T @ r[part]
-        for x, r in parts for part in np.array_split(np.arange(len(r)), min(BLOCKS_PER_RUN, max(len(r) // 50, 1)))
-    ]  # fmt: skip
-    scores = np.array(blocks)
-    m = len(scores)
-    if is_white([r for _, r in parts]) or m < 3 * len(information):
-        return plain, determined
-    by_blocks = inverse @ (scores.T @ scores * m / (m - 1.0)) @ inverse
-    by_spectrum = inverse @ np.sum([_coloured(x, r) for x, r in parts], axis=0) @ inverse
-    ratio = np.diag(by_spectrum) / np.maximum(np.diag(by_blocks), 1e-300)
-    wider = np.sqrt(np.maximum(1.0, ratio))
-    return by_blocks * np.outer(wider, wider), determined
-
-
-def covariance_of(parts: Sequence[tuple[Array, Array]], fitted: int) -> tuple[Array, tuple[bool, ...]]:
-    """Covariance of least squares from every run's columns (m, p) and residual (m,), coloured or not."""
-    covariance, determined = _sandwich(parts, _rms(parts, fitted))
-    return covariance, tuple(determined)
-
-
-def _coloured(columns: Array, residual: Array) -> Array:
-    """Variance of the scores of one run where its residual is stationary, (p, p): columns weighed by its spectrum."""
-    n = len(residual)
-    f, power = signal.welch(residual, nperseg=min(n, RESIDUAL_SEGMENT_SAMPLES), detrend=False)
-    transformed = np.fft.rfft(columns, 2 * n, axis=0)
-    level = np.interp(np.fft.rfftfreq(2 * n), f[1:-1], 0.5 * power[1:-1])  # two-sided
-    weight = level * np.where(np.arange(n + 1) % n == 0, 1.0, 2.0) / (2 * n)
-    return np.asarray(np.real(np.conj(transformed).T @ (transformed * weight[:, None])))
-
-
-def is_white(series: Sequence[Array]) -> bool:
-    """Whether the first autocorrelations of a residual are no larger than chance makes them."""
-    num, den, count = np.zeros(8), 0.0, 0
-    for values in series:
-        if len(values) < 9:
-            continue
-        r = values - np.mean(values)
-        num += np.array([float(r[k:] @ r[:-k]) for k in range(1, 9)])
-        den += float(r @ r)
-        count += len(r)
-    rho = num / max(den, 1e-300)
-    return bool(np.all(np.abs(rho) < 4.0 / np.sqrt(max(count, 1)) + 0.01))
-
-
 def _output_covariance(fit: OutputErrorFit, names: tuple[Name, ...]) -> tuple[Array, tuple[bool, ...]]:
     keep = [fit.names.index(n) for n in names]
     parts = []
@@ -267,8 +201,11 @@ def _output_covariance(fit: OutputErrorFit, names: tuple[Name, ...]) -> tuple[Ar
             continue
         columns, residual = jacobian(shots, fit.structure, fit.names, fit.vector)
         parts.append((columns[:, keep], residual))
-    sigma = _rms(parts, len(names) + 2 * sum(len(s.first) for s in fit.shots))
-    covariance, determined = _sandwich(parts, sigma)
+    sigma = rms_of(parts, len(names) + 2 * sum(len(s.first) for s in fit.shots))
+    covariance, determined = sandwich(parts, sigma)
+    if have_own_delays([s.trace for s in fit.shots], names):
+        apart, _ = sandwich([(beside_own_delay(x, names), r) for x, r in parts], sigma)
+        covariance = freed(apart, covariance, names)
     if len(fit.shots) > 1:
         return covariance, determined
     # A single run has nothing beside it that tells what its ring may only seem to tell.
@@ -289,10 +226,4 @@ def _regression_covariance(
         if not np.any(mask):
             continue
         parts.append((block.projected[mask][:, :p], whole[mask]))
-    return _sandwich(parts, _rms(parts, p))
-
-
-def _rms(parts: Sequence[tuple[Array, Array]], fitted: int) -> float:
-    """Root mean square residual, ``fitted`` degrees of freedom taken off."""
-    count = sum(len(r) for _, r in parts)
-    return float(np.sqrt(sum(float(r @ r) for _, r in parts) / max(count - fitted, 1)))
+    return sandwich(parts, rms_of(parts, p))

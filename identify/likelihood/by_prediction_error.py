@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from identify.estimate.final_fit import FinalFit, free_run_of
-from identify.likelihood.fit import Fit
+from identify.estimate.own_delays import beside_own_delay, freed, have_own_delays
+from identify.likelihood.fit import Fit, orthogonal_part
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameter_fit import ZERO_INFORMATION
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.runs.reduced import thinned
 from identify.signals.trace import Trace
+from rig.arrays import Array
 
 MAX_SAMPLES = 60_000  # of the final fit: longer recordings are filtered and decimated, all of them
 FINAL_FIT_ITERATIONS = 25  # steps of that fit
@@ -53,5 +56,15 @@ def as_final(problem: PredictionError, fit: Fit, traces: Sequence[Trace], everyt
     held = free_run_of(traces, structure, fit.values, everything)
     reported = [i for i, n in enumerate(fit.names) if n != ("inertia",) or not problem.torque_free]
     determined = tuple(bool(x > ZERO_INFORMATION) for x in np.diag(fit.information)[reported])
-    names, covariance = tuple(fit.names[i] for i in reported), fit.covariance[np.ix_(reported, reported)]
+    names, covariance = tuple(fit.names[i] for i in reported), _covariance(problem, fit)[np.ix_(reported, reported)]
     return FinalFit(fit, fit.values, names, covariance, held, False, determined, "prediction error")
+
+
+def _covariance(problem: PredictionError, fit: Fit) -> Array:
+    """Of all parameters, (p, p), where clocks differ beside a delay of each run's own."""
+    if not have_own_delays(problem.traces, fit.names):
+        return fit.covariance
+    parts = [orthogonal_part(c.own, c.columns) for c in problem.columns_at(fit)]
+    seen = [beside_own_delay(x, fit.names) for x in parts]
+    information = np.sum([x.T @ x for x in seen], axis=0)
+    return freed(replace(fit, information=information).covariance, fit.covariance, fit.names)

@@ -11,7 +11,8 @@ from scipy.linalg import block_diag
 from identify.diagnose.disturbance import disturbance_of
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
-from identify.estimate.final_fit import FinalFit, covariance_of, free_run_of
+from identify.estimate.covariance import covariance_of
+from identify.estimate.final_fit import FinalFit, free_run_of
 from identify.estimate.initial_guess import Start, scale_of
 from identify.likelihood.by_prediction_error import as_final, by_prediction_error, fitted_on_all
 from identify.likelihood.fit import Fit

@@ -28,7 +28,7 @@ from sim_backend.emulators.pty_port import PtyPort
 from sim_backend.emulators.socket_port import SocketListener
 from sim_backend.emulators.world import World
 
-WORLD_STEPS_PER_SAMPLE = 10  # of what the gyro filters; with half as many a 29 Hz ring reads 2.5e-5 too weak
+WORLD_STEPS_PER_SAMPLE = 20  # with half as many friction turns late under a torque's steps: K is 4e-6 too large
 LONGEST_SLEEP_S = 0.002  # the promise of ``run``: ``stop`` is asked so often
 DEFAULT_BAUD, DEFAULT_RATE_HZ = 921_600, 2000.0
 

@@ -8,7 +8,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from identify.estimate.final_fit import FinalFit, by_output_error, by_regression, is_white
+from identify.estimate.covariance import is_white
+from identify.estimate.final_fit import FinalFit, by_output_error, by_regression
 from identify.estimate.initial_guess import first_guess
 from identify.model.structure import Structure
 from identify.runs.holdout import split

@@ -1,0 +1,90 @@
+"""Torque and rate that disagree by a little more or less in every run, made to agree.
+
+Where a drive and a gyro have clocks of their own, every run has a delay of its own (``identify.estimate.own_delays``).
+What differs between runs looks like damping, or like a memory of the platform. So beside the model that was found
+every run gets the delay that it shows, and its torque is moved by how much that differs from the others'.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from identify.estimate.own_delays import DELAY, have_own_delays
+from identify.likelihood.fit import Fit, orthogonal_part
+from identify.likelihood.prediction_error import PredictionError
+from identify.runs.reduced import thinned
+from identify.signals.trace import Trace
+from identify.wording import number
+from rig.arrays import Array
+from rig.dynamics.torque import TorqueSignal
+
+MAX_SAMPLES = 120_000  # that are looked at
+MAX_SHIFT_S = 50e-6  # of a run: two clocks that disagree by more show something else
+RCOND = 1e-12
+
+
+def aligned(traces: Sequence[Trace], use: Sequence[Any], best: Fit) -> tuple[list[Trace], str]:
+    """The runs with their torque moved to the delay that all have in the mean, and a note; unmoved where none shows.
+
+    Parameters
+    ----------
+    use
+        Samples that fit, one boolean array a run.
+    best
+        The model that was found, fitted to some of the samples.
+    """
+    if not have_own_delays(traces, best.names):
+        return list(traces), ""
+    few, masks = thinned(traces, use, MAX_SAMPLES)
+    problem = PredictionError(few, masks)
+    fit = problem.fit(best.structure, best.values, problem.noise_of(best), 1, thorough=False)
+    if not np.isfinite(fit.cost):
+        return list(traces), ""
+    own_s, brought = _own_delays(problem, fit)
+    likelier = brought > (len(traces) - 1) * np.log(max(fit.count, 2))
+    if not likelier or np.max(np.abs(own_s)) > MAX_SHIFT_S:
+        return list(traces), ""
+    moved = [_later(t, late_s) for t, late_s in zip(traces, own_s.tolist(), strict=True)]
+    most = number(1e6 * float(np.max(np.abs(own_s))), 2)
+    return moved, (
+        f"The clocks of torque and rate agree to {most} us between runs: every run is fitted with the delay that it "
+        "shows, and the intervals include that."
+    )
+
+
+def _own_delays(problem: PredictionError, fit: Fit) -> tuple[Array, float]:
+    """By how much every run's delay is longer than all have in the mean, (runs,), and what that brings.
+
+    The latter is by how much minus twice the log-likelihood falls, all other parameters free.
+    """
+    parts, at, shared = problem.columns_at(fit), fit.names.index(DELAY), len(fit.names) - 1
+    size = shared + len(parts)
+    matrix, right = np.zeros((size, size)), np.zeros(size)
+    order = [*(k for k in range(shared + 1) if k != at), at]
+    for r, part in enumerate(parts):
+        seen = orthogonal_part(part.own, np.column_stack([part.columns, part.scaled])) / np.sqrt(fit.variance)
+        here, wide = [*range(shared), shared + r], seen[:, order]
+        matrix[np.ix_(here, here)] += wide.T @ wide
+        right[here] += wide.T @ seen[:, -1]
+    one = np.zeros((size, shared + 1))  # one delay for all
+    one[:shared, :shared] = np.eye(shared)
+    one[shared:, -1] = 1.0
+    apart, together = _solved(matrix, right), one @ _solved(one.T @ matrix @ one, one.T @ right)
+    own_s, known = apart[shared:], np.diag(matrix)[shared:]
+    return own_s - float(known @ own_s) / max(float(np.sum(known)), 1e-300), float(right @ (apart - together))
+
+
+def _solved(matrix: Array, right: Array) -> Array:
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    inverse = np.linalg.pinv(matrix / np.outer(size, size), rcond=RCOND, hermitian=True)
+    return np.asarray(inverse @ (right / size) / size)
+
+
+def _later(trace: Trace, late_s: float) -> Trace:
+    given = trace.torque
+    assert given is not None
+    return replace(trace, torque=TorqueSignal(given.time_s + late_s, given.torque_nm, given.hold), _series={})

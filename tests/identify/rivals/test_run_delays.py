@@ -1,0 +1,96 @@
+"""Runs whose torque and rate were stamped by clocks that agree a little worse in every run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identify.estimate.final_fit import by_output_error
+from identify.estimate.own_delays import DELAY, beside_own_delay
+from identify.likelihood.prediction_error import PredictionError
+from identify.model.structure import Structure
+from identify.rivals.run_delays import aligned
+from identify.signals.prepare import prepare
+from identify.signals.trace import Trace
+from rig.arrays import Array
+from rig.dynamics import TorqueSignal, simulate
+from rig.platform import Platform
+from rig.recording.run import Run
+
+PLATFORM = Platform(0.02, 0.045, 680.0)
+STEP_S, COUNT, SIGMA = 1e-3, 4000, 9e-4
+FREQUENCIES_HZ = (3.0, 6.0, 9.0, 14.0)
+LATE_S = np.array([-4e-6, 1e-6, 5e-6, -2e-6])
+STRUCTURE = Structure(effects=("torque_delay",))
+START = {("inertia",): 0.02, ("damping",): 0.045, ("stiffness",): 680.0, DELAY: 1e-4}
+
+
+def recorded(late_s: Array, other_clock: bool = True) -> list[Trace]:
+    """Runs whose torque acts so much later than it was stamped, each shaken at one frequency."""
+    rng = np.random.default_rng(3)
+    time = STEP_S * np.arange(COUNT)
+    stamps = time - 0.4 * STEP_S if other_clock else time
+    out = []
+    for i, (hz, late) in enumerate(zip(FREQUENCIES_HZ, late_s.tolist(), strict=True)):
+        torque = 60.0 * np.sin(2.0 * np.pi * hz * stamps)
+        acting = TorqueSignal(stamps + 1e-4 + late, torque, "zero_order")
+        rate = simulate(PLATFORM, time, acting).rate_rad_s + SIGMA * rng.standard_normal(COUNT)
+        run = Run(
+            str(hz), time, np.ones(COUNT, dtype=bool), rate_rad_s=rate, torque_time_s=stamps, torque_nm=torque,
+            torque_hold="zero_order", frequency_hz=hz,
+        )  # fmt: skip
+        out.append(prepare(run, i, SIGMA))
+    return out
+
+
+def offsets_of(traces: list[Trace]) -> Array:
+    """By how much every torque was moved from its stamps, in s."""
+    both = [(t.torque, t.run.torque_time_s) for t in traces]
+    return np.array([float(np.mean(t.time_s - given)) for t, given in both if t is not None and given is not None])
+
+
+def test_every_run_is_moved_to_the_delay_that_it_shows() -> None:
+    traces = recorded(LATE_S)
+    best = PredictionError(traces).fit(STRUCTURE, START)
+    moved, note = aligned(traces, [t.keep for t in traces], best)
+    assert "agree to 6.5 us" in note
+    found = offsets_of(moved)
+    assert found - found[-1] == pytest.approx(LATE_S - LATE_S[-1], abs=1e-6)
+
+
+def test_runs_that_were_moved_tell_far_more_and_nothing_false() -> None:
+    traces = recorded(LATE_S)
+    use = [t.keep for t in traces]
+    moved, _ = aligned(traces, use, PredictionError(traces).fit(STRUCTURE, START))
+    after, before = (by_output_error(ts, STRUCTURE, START, 1.0, use, use) for ts in (moved, traces))
+    for name, truth in ((("inertia",), 0.02), (("damping",), 0.045), (("stiffness",), 680.0)):
+        assert abs(after.values[name] - truth) < 3.0 * after.std_error(name)
+    assert after.std_error(("inertia",)) < 0.3 * before.std_error(("inertia",))
+
+
+@pytest.mark.parametrize("other_clock", [True, False])
+def test_runs_that_agree_or_have_one_clock_stay_as_they_are(other_clock: bool) -> None:
+    traces = recorded(LATE_S if not other_clock else 0.0 * LATE_S, other_clock)
+    moved, note = aligned(traces, [t.keep for t in traces], PredictionError(traces).fit(STRUCTURE, START))
+    assert note == ""
+    assert offsets_of(moved) == pytest.approx(offsets_of(traces), abs=1e-12)
+
+
+def test_without_a_delay_in_the_model_nothing_is_moved() -> None:
+    traces = recorded(LATE_S)
+    values = {n: v for n, v in START.items() if n != DELAY}
+    best = PredictionError(traces).fit(Structure(), values)
+    assert aligned(traces, [t.keep for t in traces], best)[1] == ""
+    single = [replace(traces[0], number=0)]
+    alone = PredictionError(single).fit(STRUCTURE, START)
+    assert aligned(single, [single[0].keep], alone)[1] == ""
+
+
+def test_what_a_run_tells_of_the_rest_is_what_its_own_delay_cannot_follow() -> None:
+    columns = np.random.default_rng(0).standard_normal((50, 3))
+    names = (("inertia",), DELAY, ("damping",))
+    left = beside_own_delay(columns, names)
+    assert left[:, 1] == pytest.approx(columns[:, 1])
+    assert left[:, [0, 2]].T @ columns[:, 1] == pytest.approx([0.0, 0.0], abs=1e-12)
