@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import cast
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -26,7 +27,7 @@ from identify.rivals.alternative_causes import AlternativeCauses
 from identify.rivals.coloured_noise import Colour, with_noise_known
 from identify.rivals.open_line import with_line_left_open
 from identify.rivals.own_low_pass import with_own_low_pass
-from identify.rivals.run_delays import aligned
+from identify.rivals.run_delays import aligned, told
 from identify.rivals.stand_ins import with_stand_ins
 from identify.rivals.whiteness_test import fails_whiteness_test, leaves_more_than_noise
 from identify.rivals.whole_runs import FreeRunFitter
@@ -39,10 +40,9 @@ from identify.runs.reduced import reduced
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_without_motion
 from identify.runs.usable import runs_used
 from identify.select.field_search import Found, Judged, search_in_torque, with_free_form
-from identify.select.free_form_residual import dependence_on, most_moving
+from identify.select.free_form_residual import curves_left, dependence_on
 from identify.select.likelihood_search import LikelihoodSearch, filtered_above, start_search
 from identify.select.search_state import Search
-from identify.select.stepwise import Stepwise
 from identify.signals.prepare import channels_of, prepare
 from identify.signals.trace import Trace, release
 from rig import effects
@@ -81,16 +81,15 @@ def identify(
     with threadpool_limits(1):  # small matrices: a second BLAS thread only waits
         first = _Identifier(recording, declared, settings, say)
         found = first.run()
-        if (
-            found.aborted
-            or first.torque_free
-            or recording.noise is not None
-            or not (found.verdict.unexplained or first.more_than_noise)
-        ):
+        no_other_noise = found.aborted or first.torque_free or recording.noise is not None
+        if no_other_noise or not (found.verdict.unexplained or first.more_than_noise):
             return found
         return with_noise_known(
             found, lambda colour: _Identifier(recording, declared, settings, say, colour).run(), say
         )
+
+
+MOST_SEARCHES = 3  # each on runs whose clocks the one before has made to agree
 
 
 class _Identifier:
@@ -110,7 +109,7 @@ class _Identifier:
         traces = [prepare(r, i, noise, full_scale=beyond, channels=channels) for i, r in enumerate(runs)]
         self.traces, self.left_out = runs_used(traces, recording.noise is not None, recording.axis, say)
         self.left_out += describe_excerpts(recording.runs, say)
-        self.torque_free = free
+        self.torque_free, self.search = free, cast(LikelihoodSearch | None, None)  # that runs, or has run
         self.torque_noise_above_hz: float | None = None
         self.curve: tuple[Dependence, dict[str, float]] | None = None  # over what is left of a decay
         self.more_than_noise = False  # is left by all that was found, though nothing else seemed to limit the runs
@@ -132,20 +131,16 @@ class _Identifier:
     def run(self) -> Identification:
         """The whole way; where somebody stops it in the middle, what there is so far."""
         shapes = declared_shapes(self.declared, self.structure)
-        search: LikelihoodSearch | None = None
         try:
             self.say("fitting the declared model")
-            search = self._begun()
-            at_noise = search.run() or self.colour is not None
-            self.traces, note = aligned(self.traces, self.split.final, search.stepwise.best)
-            self.left_out = (*self.left_out, note) if note else self.left_out
+            search, at_noise = self._searched()
             found = search.found
             in_torque = partial(self._in_torque, shapes, search, found)
             fits = FreeRunFitter(*(reduced(self.traces, self.split) if self.torque_free else (self.traces, self.split)))
             causes = AlternativeCauses(self.traces, fits, self.structure, self.recording.axis, self.say)
             both = all(t.beside is not None for t in self.traces)
             behind_a_lag = any(effects.get(e).lag is not None for e in found.best.structure.effects)
-            noisy = self.torque_noise_above_hz is not None  # some of which is left in the band of the motion
+            noisy = self.torque_noise_above_hz is not None  # some of it in the band of the motion
             white = at_noise and not (both or behind_a_lag or noisy)  # as output error takes the noise of one channel
             nothing_left = search.stepwise.left is None or self.colour is not None
             if self.torque_free:
@@ -159,9 +154,25 @@ class _Identifier:
                 return self._concluded(found, causes, in_torque)
             return in_torque()
         except (Aborted, KeyboardInterrupt):
-            if search is None:
+            if self.search is None:
                 raise
-            return self._stopped(search.found)
+            return self._stopped(self.search.found)
+
+    def _searched(self) -> tuple[LikelihoodSearch, bool]:
+        """The search, and whether its model predicts to the noise; anew where several names may hang on clocks."""
+        given = self.traces
+        for _ in range(MOST_SEARCHES):
+            self.search = search = self._begun()
+            at_noise = search.run() or self.colour is not None
+            filtered = self.torque_noise_above_hz is not None
+            moved = None if filtered else aligned(self.traces, self.split.final, search.stepwise.best)
+            self.traces = moved or self.traces
+            if moved is None or len(search.stepwise.trials.added(search.stepwise.best)) < 2:  # one hangs on no clock
+                break
+            self.say("the clocks of torque and rate differ between runs: searching again with that corrected")
+        if self.traces is not given and not filtered:
+            self.left_out = (*self.left_out, told(given, self.traces))
+        return search, at_noise
 
     def _begun(self) -> LikelihoodSearch:
         """The search with the torque as it was recorded, or low-passed where the readings follow that better."""
@@ -223,10 +234,10 @@ class _Identifier:
         self.say("the residual holds a torque that was not recorded, in addition to the sensor's noise")
         self.more_than_noise = True
         allowed = [n for n in self._allowed() if n not in search.stepwise.stood_for_curves]
-        step = search.stepwise
+        step, most = search.stepwise, {t: getattr(self.settings.accept, f"{t}_percent") for t in TERMS}
         found = search_in_torque(
             self.traces, self.split, self.structure, shapes, self.start, allowed,
-            UNITS[self.recording.axis]["torque"], self.say, Judged(step.best, found_there, self._curves(step)),
+            UNITS[self.recording.axis]["torque"], self.say, Judged(step.best, found_there, curves_left(step, most)),
             step.trusted, step.weigher.regression, search.refutes,
         )  # fmt: skip
         found = found.with_lines(step.best, step.problem.torque_nm)
@@ -235,13 +246,6 @@ class _Identifier:
         found, note = with_own_low_pass(found, step, self.traces, self.split, self.say)
         self.left_out = (*self.left_out, note) if note else self.left_out
         return self._report(found.search, found.before, found.after, measured=found)
-
-    def _curves(self, search: Stepwise) -> list[tuple[Dependence, dict[str, float]]]:
-        """What curves over the torque that is left show; of those hardly believed, the one J, C or K hang on."""
-        most = {term: getattr(self.settings.accept, f"{term}_percent") for term in TERMS}
-        moving = most_moving(search, search.doubtful, most)
-        believed = [] if search.left is None else [dependence_on(search, search.left)]
-        return believed if moving is None else [*believed, moving]
 
     def _models(self) -> FinalModels:
         return FinalModels(self.traces, self.split, self.declared, self.structure, self.start, self.say)

@@ -23,12 +23,13 @@ from rig.arrays import Array
 from rig.dynamics.torque import TorqueSignal
 
 MAX_SAMPLES = 120_000  # that are looked at
+ROUNDS, FIT_STEPS = 4, 3  # of moving them, and of the model in each
 MAX_SHIFT_S = 50e-6  # of a run: two clocks that disagree by more show something else
 RCOND = 1e-12
 
 
-def aligned(traces: Sequence[Trace], use: Sequence[Any], best: Fit) -> tuple[list[Trace], str]:
-    """The runs with their torque moved to the delay that all have in the mean, and a note; unmoved where none shows.
+def aligned(traces: Sequence[Trace], use: Sequence[Any], best: Fit) -> list[Trace] | None:
+    """The runs with their torque moved to the delay that all have in the mean; None where none shows another.
 
     Parameters
     ----------
@@ -38,21 +39,29 @@ def aligned(traces: Sequence[Trace], use: Sequence[Any], best: Fit) -> tuple[lis
         The model that was found, fitted to some of the samples.
     """
     if not have_own_delays(traces, best.names):
-        return list(traces), ""
-    few, masks = thinned(traces, use, MAX_SAMPLES)
-    problem = PredictionError(few, masks)
-    fit = problem.fit(best.structure, best.values, problem.noise_of(best), 1, thorough=False)
-    if not np.isfinite(fit.cost):
-        return list(traces), ""
-    own_s, brought = _own_delays(problem, fit)
-    likelier = brought > (len(traces) - 1) * np.log(max(fit.count, 2))
-    if not likelier or np.max(np.abs(own_s)) > MAX_SHIFT_S:
-        return list(traces), ""
-    moved = [_later(t, late_s) for t, late_s in zip(traces, own_s.tolist(), strict=True)]
-    most = number(1e6 * float(np.max(np.abs(own_s))), 2)
-    return moved, (
-        f"The clocks of torque and rate agree to {most} us between runs: every run is fitted with the delay that it "
-        "shows, and the intervals include that."
+        return None
+    moved: list[Trace] | None = None
+    for _ in range(ROUNDS):
+        few, masks = thinned(moved or traces, use, MAX_SAMPLES)
+        problem = PredictionError(few, masks)
+        best = problem.fit(best.structure, best.values, problem.noise_of(best), FIT_STEPS, thorough=False)
+        if not np.isfinite(best.cost):
+            break
+        own_s, brought = _own_delays(problem, best)
+        likelier = brought > (len(traces) - 1) * np.log(max(best.count, 2))
+        if not likelier or np.max(np.abs(own_s)) > MAX_SHIFT_S:
+            break
+        moved = [_later(t, late_s) for t, late_s in zip(moved or traces, own_s.tolist(), strict=True)]
+    return moved
+
+
+def told(given: Sequence[Trace], moved: Sequence[Trace]) -> str:
+    """A note that runs were moved, and by how much at most."""
+    both = [(a.torque, b.torque) for a, b in zip(given, moved, strict=True)]
+    late_s = [abs(float(np.mean(b.time_s - a.time_s))) for a, b in both if a is not None and b is not None]
+    return (
+        f"The clocks of torque and rate agree to {number(1e6 * max(late_s), 2)} us between runs: every run is fitted "
+        "with the delay that it shows, and the intervals include that."
     )
 
 

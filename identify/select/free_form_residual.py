@@ -193,6 +193,15 @@ def _shape(form: str, fit: Fit) -> tuple[list[float], list[float]]:
     return at.tolist(), np.interp(at, places, values).tolist()
 
 
+def curves_left(
+    search: Stepwise, most_percent: Mapping[str, float]
+) -> list[tuple[Dependence, dict[str, float]]]:  # fmt: skip
+    """What curves over the torque that is left show; of those hardly believed, the one J, C or K hang on."""
+    moving = most_moving(search, search.doubtful, most_percent)
+    believed = [] if search.left is None else [dependence_on(search, search.left)]
+    return believed if moving is None else [*believed, moving]
+
+
 def most_moving(
     search: Stepwise, curves: Sequence[FreeFormFit], most_percent: Mapping[str, float]
 ) -> tuple[Dependence, dict[str, float]] | None:
