@@ -159,15 +159,17 @@ class _Identifier:
             return self._stopped(self.search.found)
 
     def _searched(self) -> tuple[LikelihoodSearch, bool]:
-        """The search, and whether its model predicts to the noise; anew where several names may hang on clocks."""
+        """The search, and whether its model predicts to the noise; anew where clocks may pass for effects."""
         given = self.traces
         for _ in range(MOST_SEARCHES):
             self.search = search = self._begun()
             at_noise = search.run() or self.colour is not None
             filtered = self.torque_noise_above_hz is not None
             moved = None if filtered else aligned(self.traces, self.split.final, search.stepwise.best)
-            self.traces = moved or self.traces
-            if moved is None or len(search.stepwise.trials.added(search.stepwise.best)) < 2:  # one hangs on no clock
+            if moved is None:
+                break
+            self.traces = moved.traces
+            if not moved.may_explain(search.stepwise):
                 break
             self.say("the clocks of torque and rate differ between runs: searching again with that corrected")
         if self.traces is not given and not filtered:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -22,13 +23,36 @@ from identify.wording import number
 from rig.arrays import Array
 from rig.dynamics.torque import TorqueSignal
 
+if TYPE_CHECKING:
+    from identify.select.stepwise import Stepwise
+
 MAX_SAMPLES = 120_000  # that are looked at
 ROUNDS, FIT_STEPS = 4, 3  # of moving them, and of the model in each
+SURE_RATIO = 10.0  # times what clocks bring: no name that brings more is theirs
 MAX_SHIFT_S = 50e-6  # of a run: two clocks that disagree by more show something else
 RCOND = 1e-12
 
 
-def aligned(traces: Sequence[Trace], use: Sequence[Any], best: Fit) -> list[Trace] | None:
+class Aligned(NamedTuple):
+    """Runs whose torque was moved.
+
+    Attributes
+    ----------
+    brought
+        By how much that lowers minus twice the log-likelihood, a sample.
+    """
+
+    traces: list[Trace]
+    brought: float
+
+    def may_explain(self, search: Stepwise) -> bool:
+        """Whether clocks that disagreed may have been taken for an effect: one that brought about as little."""
+        costs = [*(r.now.cost for r in search.rounds if r.added), search.best.cost]
+        least = min((a - b for a, b in pairwise(costs)), default=np.inf)
+        return least < SURE_RATIO * self.brought * search.best.count
+
+
+def aligned(traces: Sequence[Trace], use: Sequence[Any], best: Fit) -> Aligned | None:
     """The runs with their torque moved to the delay that all have in the mean; None where none shows another.
 
     Parameters
@@ -40,9 +64,10 @@ def aligned(traces: Sequence[Trace], use: Sequence[Any], best: Fit) -> list[Trac
     """
     if not have_own_delays(traces, best.names):
         return None
-    moved: list[Trace] | None = None
+    moved: Aligned | None = None
     for _ in range(ROUNDS):
-        few, masks = thinned(moved or traces, use, MAX_SAMPLES)
+        runs = moved.traces if moved else traces
+        few, masks = thinned(runs, use, MAX_SAMPLES)
         problem = PredictionError(few, masks)
         best = problem.fit(best.structure, best.values, problem.noise_of(best), FIT_STEPS, thorough=False)
         if not np.isfinite(best.cost):
@@ -51,7 +76,8 @@ def aligned(traces: Sequence[Trace], use: Sequence[Any], best: Fit) -> list[Trac
         likelier = brought > (len(traces) - 1) * np.log(max(best.count, 2))
         if not likelier or np.max(np.abs(own_s)) > MAX_SHIFT_S:
             break
-        moved = [_later(t, late_s) for t, late_s in zip(moved or traces, own_s.tolist(), strict=True)]
+        later = [_later(t, late_s) for t, late_s in zip(runs, own_s.tolist(), strict=True)]
+        moved = Aligned(later, brought / best.count + (moved.brought if moved else 0.0))
     return moved
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from identify.estimate.final_fit import by_output_error
 from identify.estimate.own_delays import DELAY, beside_own_delay
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
-from identify.rivals.run_delays import aligned, told
+from identify.rivals.run_delays import Aligned, aligned, told
 from identify.signals.prepare import prepare
 from identify.signals.trace import Trace
 from rig.arrays import Array
@@ -56,16 +58,17 @@ def test_every_run_is_moved_to_the_delay_that_it_shows() -> None:
     best = PredictionError(traces).fit(STRUCTURE, START)
     moved = aligned(traces, [t.keep for t in traces], best)
     assert moved is not None
-    assert "agree to 6.5 us" in told(traces, moved)
-    found = offsets_of(moved)
+    assert "agree to 6.5 us" in told(traces, moved.traces)
+    found = offsets_of(moved.traces)
     assert found - found[-1] == pytest.approx(LATE_S - LATE_S[-1], abs=1e-6)
 
 
 def test_runs_that_were_moved_tell_far_more_and_nothing_false() -> None:
     traces = recorded(LATE_S)
     use = [t.keep for t in traces]
-    moved = aligned(traces, use, PredictionError(traces).fit(STRUCTURE, START)) or []
-    after, before = (by_output_error(ts, STRUCTURE, START, 1.0, use, use) for ts in (moved, traces))
+    found = aligned(traces, use, PredictionError(traces).fit(STRUCTURE, START))
+    assert found is not None
+    after, before = (by_output_error(ts, STRUCTURE, START, 1.0, use, use) for ts in (found.traces, traces))
     for name, truth in ((("inertia",), 0.02), (("damping",), 0.045), (("stiffness",), 680.0)):
         assert abs(after.values[name] - truth) < 3.0 * after.std_error(name)
     assert after.std_error(("inertia",)) < 0.3 * before.std_error(("inertia",))
@@ -93,3 +96,14 @@ def test_what_a_run_tells_of_the_rest_is_what_its_own_delay_cannot_follow() -> N
     left = beside_own_delay(columns, names)
     assert left[:, 1] == pytest.approx(columns[:, 1])
     assert left[:, [0, 2]].T @ columns[:, 1] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+def test_only_a_name_that_brings_about_as_little_as_the_clocks_may_be_theirs() -> None:
+    def search(*costs: float) -> Any:
+        before = [SimpleNamespace(now=SimpleNamespace(cost=c), added=("an effect",)) for c in costs[:-1]]
+        return SimpleNamespace(rounds=before, best=SimpleNamespace(cost=costs[-1], count=1000))
+
+    clocks = Aligned([], 0.05)  # 50 on the samples that were searched
+    assert not clocks.may_explain(search(0.0, -1000.0))
+    assert clocks.may_explain(search(0.0, -1000.0, -1100.0))
+    assert not clocks.may_explain(search(0.0))
