@@ -161,7 +161,7 @@ class _Identifier:
     def _searched(self) -> tuple[LikelihoodSearch, bool]:
         """The search, and whether its model predicts to the noise; anew where clocks may pass for effects."""
         given = self.traces
-        for _ in range(MOST_SEARCHES):
+        for number in range(1, MOST_SEARCHES + 1):
             self.search = search = self._begun()
             at_noise = search.run() or self.colour is not None
             filtered = self.torque_noise_above_hz is not None
@@ -169,7 +169,7 @@ class _Identifier:
             if moved is None:
                 break
             self.traces = moved.traces
-            if not moved.may_explain(search.stepwise):
+            if number == MOST_SEARCHES or not moved.may_explain(search.stepwise):
                 break
             self.say("the clocks of torque and rate differ between runs: searching again with that corrected")
         if self.traces is not given and not filtered:
