@@ -9,6 +9,7 @@ from rig.clock import Clock
 from rig.errors import Aborted, DeviceFault, RigError, SafetyTrip
 from rig.guard import Guard, Tick, Trip
 from rig.interface import Rig
+from rig.sequencer.held_torque import HeldTorque, Pulse
 from rig.sequencer.recorder import SetRecorder
 
 
@@ -34,6 +35,11 @@ class GuardedTick:
         self._rig, self._clock, self._guard, self._stop = rig, clock, guard, stop
         self.verdict_s: float | None = None
         self.trip: Trip | None = None
+        self._held = HeldTorque()
+
+    def pulses(self) -> list[Pulse]:
+        """What late ticks did to the platform, seen from the verdict; none where there is no verdict."""
+        return [] if self.verdict_s is None else self._held.pulses(self.verdict_s)
 
     def note_verdict(self) -> None:
         """The instant at which the first error was known; it ends up in the journal and in ``Campaign``."""
@@ -52,6 +58,7 @@ class GuardedTick:
         trip = self._guard.permit(torque_nm, now_s, late_s)
         if trip is not None:
             raise self._tripped(trip)
+        self._held.take(now_s, late_s, period_s, torque_nm)
         try:
             reply = self._rig.exchange(now_s, torque_nm)
         except BaseException as error:

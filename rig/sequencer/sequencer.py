@@ -139,10 +139,10 @@ class Sequencer:
         except KeyboardInterrupt:
             cause = Aborted("Stopped by Ctrl-C: torque is off; what was recorded until then is kept.")
         except RigError as error:
-            trip = self._guarded.trip  # torque is off and all is closed: there is time to look at the model
+            trip, pulses = self._guarded.trip, self._guarded.pulses()  # all is closed: there is time to look at why
             from rig.sequencer.declared_motion import explained  # noqa: PLC0415  # slow to load
 
-            cause = explained(_with_context(error), trip, self._declared, sets[:begun], self._rest_s)
+            cause = explained(_with_context(error), trip, pulses, self._declared, sets[:begun], self._rest_s)
         if cause is not None and self._journal is not None:
             with contextlib.suppress(RigError):
                 self._journal.event(self._now_s(), str(cause), {"aborted": True, "verdict_s": self._guarded.verdict_s})
