@@ -17,7 +17,10 @@ DEFAULT_REDUCED_SAMPLES = 20_000  # samples, where nothing else is asked for
 HARMONICS = 5.0  # of a decay's swing: it moves no faster, whatever its noise does
 TURNS = 0.02  # of the largest rate, below which a turn may be noise
 SHORTEST_SPAN = 1_500  # samples: slow effects need a span to show in
-COLUMNS = 5  # acceleration, rate, angle, direction, constant
+COLUMNS = 8  # acceleration, rate, angle, direction, constant; and where torque, rate and angle reach farthest
+OUTERMOST = (
+    5  # power that leaves of a quantity little but its peaks: what sets in there (a limit, a stop) shows nowhere else
+)
 PLACES = 12  # where a span may begin
 LEAD = 0.25  # of a span, that is measured ahead of it: ``identify.likelihood.settling`` leaves it out again
 
@@ -26,7 +29,8 @@ def reduced(traces: Sequence[Trace], split: Split, enough: int = DEFAULT_REDUCED
     """The same runs with about ``enough`` samples, and the split of these.
 
     Every run is first filtered and decimated, all of it; what is still too long is cut to the span in which inertia,
-    damping, stiffness and dry friction are best told apart, and where there are many runs, to some of them.
+    damping, stiffness and dry friction are best told apart, and where there are many runs, to some of them: those that
+    reach farthest, as what limits a drive or a travel shows nowhere else, and others evenly spread between them.
     """
     factor = min(_decimation(t) for t in traces)
     total = sum(t.count for t in traces)
@@ -40,7 +44,7 @@ def reduced(traces: Sequence[Trace], split: Split, enough: int = DEFAULT_REDUCED
         count = max(2, enough // wanted)
         fitting = [i for i in chosen if np.any(fit[i])]
         judging = [i for i in chosen if np.any(judge[i]) and i not in fitting]
-        picked = {*_spread(fitting, count), *_spread(judging, max(1, count // 3))}
+        picked = {*_chosen(few, fitting, count), *_chosen(few, judging, max(1, count // 3))}
         chosen = sorted(picked)  # type: ignore[assignment]
     out, fits, judges = [], [], []
     information: Array = 1e-6 * np.eye(COLUMNS)
@@ -67,10 +71,21 @@ def thinned(traces: Sequence[Trace], masks: Sequence[Any], most: int) -> tuple[l
     return few, [_every(m, factor, len(t.measured)) & t.keep for m, t in zip(masks, few, strict=True)]
 
 
-def _spread(items: Sequence[int], count: int) -> list[int]:
-    if not items:
-        return []
-    return [items[i] for i in np.unique(np.linspace(0, len(items) - 1, min(count, len(items))).astype(int))]
+def _chosen(traces: Sequence[Trace], items: Sequence[int], count: int) -> set[int]:
+    """So many of some runs: with the largest torque, rate and angle, and evenly spread ones."""
+    if len(items) <= count:
+        return set(items)
+    reach = [[float(np.max(np.abs(x), initial=0.0)) for x in _torque_rate_angle(traces[i])] for i in items]
+    farthest = [items[k] for k in dict.fromkeys(np.argmax(reach, axis=0).tolist())][:count]
+    others = [i for i in items if i not in farthest]
+    even = np.linspace(0, len(others) - 1, count - len(farthest)).astype(int).tolist() if others else []
+    return {*farthest, *(others[i] for i in even)}
+
+
+def _torque_rate_angle(trace: Trace) -> tuple[Array, Array, Array]:
+    """Torque, rate and angle from its middle, of a run; no torque in a decay."""
+    angle, rate, _, torque, _ = trace.fine
+    return np.zeros(1) if trace.torque is None else np.asarray(torque), rate, angle - float(np.median(angle))
 
 
 def _decimation(trace: Trace) -> int:
@@ -129,10 +144,11 @@ def _every(mask: Any, factor: int, count: int) -> Any:
 def _span(trace: Trace, wanted: int, information: Array) -> tuple[int, int, Array]:
     """First and last sample of the span of a length that adds most to what other runs tell, and that with it."""
     n = len(trace.measured)
-    angle, rate, time, _torque, _ = (x[::UPSAMPLING] if isinstance(x, np.ndarray) else x for x in trace.fine)
-    acceleration = np.gradient(rate, time)
+    angle, rate, time, torque = (np.asarray(x)[::UPSAMPLING] for x in trace.fine[:4])
+    acceleration, angle = np.gradient(rate, time), angle - np.mean(angle)
     slow = 0.02 * float(np.max(np.abs(rate))) + 1e-300
-    columns = np.stack([acceleration, rate, angle - np.mean(angle), np.tanh(rate / slow), np.ones(n)], axis=1)
+    outermost = [(x / (np.max(np.abs(x)) + 1e-300)) ** OUTERMOST for x in (torque, rate, angle)]
+    columns = np.stack([acceleration, rate, angle, np.tanh(rate / slow), np.ones(n), *outermost], axis=1)
     columns = columns / (np.sqrt(np.mean(columns**2, axis=0)) + 1e-300)
     columns[~trace.keep] = 0.0
 

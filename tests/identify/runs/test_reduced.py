@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from identify.likelihood.prediction_error import PredictionError
@@ -37,3 +39,26 @@ def test_a_lag_of_the_drive_is_not_taken_for_one_of_the_gyro_because_of_the_filt
     scaled = np.concatenate([e / np.sqrt(v * right.variance) for e, v in told])
     next_to = float(np.mean(scaled[1:] * scaled[:-1])) / float(np.mean(scaled**2))
     assert abs(next_to) < 4.0 / np.sqrt(len(scaled))
+
+
+def test_of_many_runs_the_one_that_reaches_farthest_is_looked_at() -> None:
+    """What limits the drive shows in no other: with only evenly spread runs the search could not see it."""
+    for strongest in range(12):
+        runs = [sine_run(9.0 if i == strongest else 5.0, 1.0, jck=SOFT, seed=i, duration_s=3.0) for i in range(12)]
+        traces = one_noise([prepare(run, i) for i, run in enumerate(runs)], False)
+        few, _ = reduced(traces, split(traces), enough=6000)
+        assert len(few) < 12
+        assert strongest in [t.number for t in few]
+
+
+def test_of_a_long_run_the_span_with_the_largest_torque_is_looked_at() -> None:
+    for at_s in (5.0, 11.0, 22.0, 35.0):
+        run = sine_run(5.0, 1.0, jck=SOFT, duration_s=40.0, soft_s=3.0)
+        assert run.torque_nm is not None
+        there = np.abs(run.time_s - at_s) < 1.0
+        run = replace(run, torque_nm=np.where(there, 1.5, 1.0) * run.torque_nm)
+        traces = one_noise([prepare(run, 0)], False)
+        few, _ = reduced(traces, split(traces), enough=2000)
+        (piece,) = few
+        assert len(piece.measured) * piece.step_s < 25.0
+        assert piece.start_s < at_s < piece.start_s + len(piece.measured) * piece.step_s
