@@ -78,6 +78,8 @@ class Dependence:
         two directions. Empty for what depends on the past, which no single number describes, and for lines.
     shape_nm
         The torque there, N m, without the constant and the linear part that J, C and K take up.
+    wave_on, wave_hz
+        Of what is "angle", "rate" or "torque" times a wave over the time: which, and the wave's frequency.
     """
 
     on: str
@@ -86,6 +88,8 @@ class Dependence:
     false_alarm: float
     at: tuple[float, ...] = ()
     shape_nm: tuple[float, ...] = ()
+    wave_on: str = ""
+    wave_hz: float | None = None
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from identify.residual import Disturbance
+from identify.residual import Dependence, Disturbance
 from identify.results import NORMAL_95, Errors, Identification, NotReported, ParameterEstimate
 
 SYMBOLS = {
@@ -222,11 +222,24 @@ def residual_torque_sentence(left: Disturbance, axis: str) -> str:
             "counts as noise and is included in the intervals."
         )
     each = joined(
-        [f"{number(100.0 * d.relative, 2)} % depends on the {depends_on(d.on, axis)}" for d in left.depends_on]
+        [
+            f"{number(100.0 * d.relative, 2)} % depends on the {depends_on(d.on, axis)}{_wave(d)}"
+            for d in left.depends_on
+        ]
     )
     moved = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in left.moves_percent.items()])
     change = f" Fitting this part too changes {moved}." if moved else ""
     return f"The final model leaves a residual {torque} of {size}. Of the {torque}, {each}.{change}"
+
+
+def _wave(part: Dependence) -> str:
+    """Of what changes as a wave: what, and how fast."""
+    if part.wave_hz is None:
+        return ""
+    return f", as if something changed the {PULSATING[part.wave_on]} at {number(part.wave_hz, 3)} Hz"
+
+
+PULSATING = {"angle": "stiffness", "rate": "damping", "torque": "torque of the drive"}
 
 
 def depends_on(quantity: str, axis: str) -> str:

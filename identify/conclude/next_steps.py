@@ -14,7 +14,7 @@ from identify.diagnose.wording import is_significant
 from identify.model.parameter_fit import reduced_chi_square
 from identify.results import GeneticRun, Identification, ResidualDiagnosis, RunTraces, follow_up_file_name
 from identify.runs.sign_convention import SENTENCE
-from identify.wording import capital, joined, number, plain
+from identify.wording import PULSATING, capital, joined, number, plain
 
 MIN_SHARE = 0.1  # share of the residual's power from which it is said to depend on a quantity
 RUN = {
@@ -186,6 +186,9 @@ def _by_dependence(found: Identification) -> list[str]:
             "before the torque."
         ]
     free = torque_free(found)
+    pulsating = _pulsating(found)
+    if pulsating:
+        return [*late, pulsating]
     name, sentence = _dependence(found)
     runs = DECAY_RUN if free else RUN
     if name not in runs:
@@ -197,6 +200,18 @@ def _by_dependence(found: Identification) -> list[str]:
         for rotary, linear in LINEAR.items():
             advice = advice.replace(f" {rotary}", f" {linear}")
     return [*late, advice]
+
+
+def _pulsating(found: Identification) -> str:
+    """Where to look for what changes a parameter as a wave over the time; empty where most of what is left does not."""
+    parts = () if found.disturbance is None else found.disturbance.depends_on
+    most = max(parts, key=lambda d: d.relative, default=None)
+    if most is None or most.wave_hz is None:
+        return ""
+    return (
+        f"Something changes the {PULSATING[most.wave_on]} at {number(most.wave_hz, 3)} Hz: look for a machine, a fan "
+        "or a controller that runs at this frequency, switch it off and record the runs again."
+    )
 
 
 def _dependence(found: Identification) -> tuple[str, str]:

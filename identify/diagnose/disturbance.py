@@ -26,6 +26,7 @@ DEPENDENCE_SIGMAS = 4.0  # standard errors over blocks of held-out samples; by c
 MIN_POWER_SHARE = 0.02  # of the power that is left: less is not worth a word
 SHAPE_POINTS = 25  # places at which a curve's shape is given
 OUTER = (0.8, 0.95)  # shares of the samples inside of which nothing is touched
+MIN_PERIODS = 3.0  # in the longest run, of what changes as a wave: a slower change is one over the time itself
 PAST_RUN_SHARES = (0.05, 0.5)  # of the run: time constants with which a rate is remembered
 
 
@@ -37,6 +38,9 @@ class FreeForm:
     columns: Array  # (n, k)
     at: Array
     shape: Array  # (SHAPE_POINTS, k)
+    of_each_run: bool = False  # columns that belong to one run each
+    wave_on: str = ""
+    wave_hz: float | None = None
 
 
 def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float, unit: str) -> Disturbance:
@@ -51,27 +55,34 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
     """
     left = float(np.sqrt(max(fit.held_nm**2 - floor_nm**2, 0.0)))
     relative = left / max(regression.torque_nm, 1e-300)
-    found: list[tuple[Dependence, Mapping[Name, float]]] = []
-    for term in free_forms(regression):
-        # What is explained is a torque: with the parameters free, a function of it would explain it by itself.
-        explain = regression.following if term.on == "torque" else regression.beside
-        richer, gains = explain(fit, term.columns)
-        by_size, by_ratio = regression.fall_in_sigmas(fit, richer)
-        sure = max(by_size, by_ratio)
-        share = 1.0 - richer.held_nm**2 / max(fit.held_nm**2, 1e-300)
-        if share < MIN_POWER_SHARE or sure < DEPENDENCE_SIGMAS:
-            continue
-        size = float(np.sqrt(share)) * fit.held_nm
-        found.append((
-            Dependence(
-                term.on, size, size / regression.torque_nm, float(norm.sf(sure)), tuple(term.at.tolist()),
-                tuple((term.shape @ gains).tolist()),
-            ), _moved(regression, fit, richer, term, gains),
-        ))  # fmt: skip
+    found = [f for term in free_forms(regression) if (f := _dependence(regression, fit, term)) is not None]
+    if not found:  # asked last: it may follow, as a change over time, what an angle or a rate explains by itself
+        found = [f for term in _pulsating(regression, fit) if (f := _dependence(regression, fit, term)) is not None]
     found.sort(key=lambda f: -f[0].torque_rms)
     found = [f for i, f in enumerate(found) if f[0].on not in [g[0].on for g in found[:i]]]
     moves = _moves(fit, [moved for _, moved in found])
     return Disturbance(left, unit, relative, tuple(d for d, _ in found), moves)
+
+
+def _dependence(
+    regression: TorqueRegression, fit: TorqueFit, term: FreeForm
+) -> tuple[Dependence, Mapping[Name, float]] | None:  # fmt: skip
+    """What of the residual goes with a term, and how far the parameters move; None where held-out samples show none."""
+    if term.on == "torque":  # what is explained is a torque: with the parameters free, it would explain itself
+        richer, gains = regression.following(fit, term.columns)
+    else:
+        richer, gains = regression.beside(fit, term.columns, term.of_each_run)
+    by_size, by_ratio = regression.fall_in_sigmas(fit, richer)
+    sure = max(by_size, by_ratio)
+    share = 1.0 - richer.held_nm**2 / max(fit.held_nm**2, 1e-300)
+    if share < MIN_POWER_SHARE or sure < DEPENDENCE_SIGMAS:
+        return None
+    size = float(np.sqrt(share)) * fit.held_nm
+    at, shape_nm = tuple(term.at.tolist()), tuple((term.shape @ gains).tolist())
+    found = Dependence(
+        term.on, size, size / regression.torque_nm, float(norm.sf(sure)), at, shape_nm, term.wave_on, term.wave_hz
+    )
+    return found, _moved(regression, fit, richer, term, gains)
 
 
 def _moved(
@@ -177,6 +188,44 @@ def _changing(time: Array, series: Sequence[Array]) -> FreeForm:
     return FreeForm(
         "time", np.column_stack([shape * x[:, None] for x in series]), np.zeros(0), np.zeros((0, 2 * len(series)))
     )  # fmt: skip
+
+
+def _pulsating(regression: TorqueRegression, fit: TorqueFit) -> list[FreeForm]:
+    """Angle, rate and torque times a wave over the time: a spring, a damping or a gain that something outside changes.
+
+    The frequency is where the residual times the quantity has its highest line; the phase is another in every run.
+    """
+    angle, rate, _, torque, time, run = regression.series()
+    residual = np.concatenate(fit.residuals)
+    out = []
+    driven = [] if regression.torque_free else [("torque", torque)]
+    for on, series in (("angle", angle), ("rate", rate), *driven):
+        frequency_hz = _strongest_line_hz(residual * series, time, run, regression.cutoff_hz)
+        if frequency_hz is None:
+            continue
+        wave = np.exp(2j * np.pi * frequency_hz * time) * series
+        columns = [part * (run == k) for k in np.unique(run) for part in (wave.real, wave.imag)]
+        none = np.zeros((0, len(columns)))
+        out.append(FreeForm("time", np.stack(columns, axis=1), np.zeros(0), none, True, on, frequency_hz))
+    return out
+
+
+def _strongest_line_hz(values: Array, time: Array, run: Array, highest_hz: float) -> float | None:
+    """The frequency at which the power of all runs' lines is highest; None where no run is long enough for one."""
+    step_s = float(np.min(np.diff(time)[np.diff(time) > 0.0], initial=np.inf))
+    longest_s = float(np.max(time))
+    lowest_hz = MIN_PERIODS / max(longest_s, 1e-300)
+    if not np.isfinite(step_s) or lowest_hz >= min(highest_hz, 0.5 / step_s):
+        return None
+    size = 2 ** int(np.ceil(np.log2(2.0 * longest_s / step_s + 2.0)))  # half a line's width between two frequencies
+    power = np.zeros(size // 2 + 1)
+    for k in np.unique(run):
+        here = run == k
+        on_grid = np.bincount(np.rint(time[here] / step_s).astype(int), values[here] - np.mean(values[here]), size)
+        power += np.abs(np.fft.rfft(on_grid)) ** 2
+    hz = np.fft.rfftfreq(size, step_s)
+    power[(hz < lowest_hz) | (hz > highest_hz)] = 0.0
+    return float(hz[np.argmax(power)])
 
 
 def _history(rate: Array, run: Array, regression: TorqueRegression) -> FreeForm:

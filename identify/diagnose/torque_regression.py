@@ -75,8 +75,11 @@ class TorqueRegression(LowPassedTorque):
         x = bounded(wide.T @ wide, wide.T @ torque[self._used], np.full(len(names), -np.inf))
         return dict(zip(names, x.tolist(), strict=True))
 
-    def beside(self, fit: TorqueFit, columns: Array) -> tuple[TorqueFit, Array]:
-        """A model fitted together with further columns, and the gains of these; what it leaves on samples held out."""
+    def beside(self, fit: TorqueFit, columns: Array, of_each_run: bool = False) -> tuple[TorqueFit, Array]:
+        """A model fitted together with further columns, and the gains of these; what it leaves on samples held out.
+
+        Columns ``of_each_run`` are zero in all other runs: blocks of every run are held out instead of whole ones.
+        """
         a, y, names, extra = self._over_all_runs(fit.structure, fit.shapes)
         wide = np.column_stack([a, columns])
         low = np.array([self._low(n) for n in names] + [-np.inf] * (extra + columns.shape[1]))
@@ -84,7 +87,8 @@ class TorqueRegression(LowPassedTorque):
         ridge[a.shape[1] :] = CURVE_RIDGE * float(np.mean(np.sum(columns * columns, axis=0)))
         own = np.arange(wide.shape[1])
         free = (own >= len(names)) & (own < a.shape[1])
-        x, held, _ = self._with_folds(wide, y, low, self._folds(names, extra), free, ridge)
+        folds = self._by_block if of_each_run else self._folds(names, extra)
+        x, held, _ = self._with_folds(wide, y, low, folds, free, ridge)
         scale = self._passed_on(y - self._taken(names, x[: a.shape[1]], a))
         r, held = scale * (y - wide @ x), scale * held
         ends = np.cumsum([len(rows) for rows in self._rows])[:-1]

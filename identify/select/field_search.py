@@ -162,7 +162,7 @@ def search_in_torque(
     by_likelihood: Judged | None = known
     best = trial
     size_nm = float(np.sqrt(in_band(known.fit.noise, search.regression.cutoff_hz) * known.fit.variance))
-    unfollowed = trusted and size_nm < UNFOLLOWED * trial.held_nm
+    unfollowed = trusted and bool(known.fit.structure.effects) and size_nm < UNFOLLOWED * trial.held_nm
     filtered = any(effects.get(e).place is Place.SENSOR for e in known.fit.structure.effects)  # which no torque shows
     if not unfollowed and not filtered:
         say("looking at what is left as a torque")
