@@ -293,6 +293,7 @@ class _Identifier:
         case = Case(
             self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
             self.declared, self.left_out, self.colour, left,
+            None if self.torque_free or self.search is None else self.search.stepwise.weigher.regression,
         )  # fmt: skip
         scale = self._models().torque_scale(after) if in_full else None
         return conclude(case, search, before, after, measured_before, measured_after, floor, per_set, joint, scale)

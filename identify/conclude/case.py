@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identify.diagnose.torque_regression import TorqueRegression
 from identify.model.structure import Structure
 from identify.residual import Disturbance
 from identify.rivals.coloured_noise import Colour
@@ -33,6 +34,7 @@ class Case:
     left_out: tuple[str, ...] = ()  # which runs, and why, in words
     colour: Colour | None = None  # of the sensor's noise, where it is not white
     disturbance: Disturbance | None = None  # what is left, where that is a torque and not the sensor's noise
+    regression: TorqueRegression | None = None  # the runs in torque; None without one
 
 
 def runs_fitted(case: Case) -> set[int]:

@@ -20,6 +20,7 @@ from identify.conclude.max_error import with_max_error
 from identify.conclude.model_result import model_of, to_build_on
 from identify.conclude.verdict import sentences_of
 from identify.diagnose.diagnosis import with_diagnosis
+from identify.diagnose.disturbance import disturbance_of
 from identify.estimate.final_fit import FinalFit
 from identify.model.parameter_fit import reduced_chi_square
 from identify.model.structure import Structure
@@ -92,15 +93,18 @@ def conclude(
     searched = [g for g in (*(s.genetic for s in per_set), joint) if g is not None]
     reasons = reasons_against_fit(searched if after.sensor_limited else (), final)
     reference, per_set = with_max_error(per_set, case.settings.reference)
-    material = measured is None and unexplained
-    if measured is not None:
-        reasons += reasons_against_disturbance(of_reported(measured, final), case.settings.accept, case.recording.axis)
+    unsettled = measured is None and unexplained and not search.left_open
+    seen = _seen_in_torque(case, after) if unsettled else measured
+    if seen is not None:
+        reasons += reasons_against_disturbance(of_reported(seen, final), case.settings.accept, case.recording.axis)
+    unknown = seen is None or not (measured or seen.depends_on or seen.relative <= _allowed_share(case))
+    material = unexplained and unknown  # what is left, and nothing shows what it would do to J, C and K
     found = Identification(
         accepted=not reasons and not material, reasons=(), axis=case.recording.axis, before=result_before,
         verdict=verdict, after=result_after, noise_floor=floor, per_set=per_set, joint=joint,
         traces=_series(case, measured_before, measured_after), holdout_note=_note(case, after),
         max_error_percent=reference, torque_free=case.torque_free, torque_scale=torque_scale,
-        scale_shows=loads_differ(case.traces), disturbance=measured or _at_the_sensor(case, measured_after, floor),
+        scale_shows=loads_differ(case.traces), disturbance=seen or _at_the_sensor(case, measured_after, floor),
         note=grown(result_before, result_after),
     )  # fmt: skip
     if material:
@@ -111,6 +115,19 @@ def conclude(
     of_damping = _about_damping(case, after, final)
     said = (*sentences_of(found, damping_said=bool(of_damping)), *of_damping)
     return with_diagnosis(replace(found, verdict=replace(verdict, sentences=said)))
+
+
+def _allowed_share(case: Case) -> float:
+    return case.settings.accept.torque_percent / 100.0
+
+
+def _seen_in_torque(case: Case, after: FinalFit) -> Disturbance | None:
+    """What a free run leaves above the sensor's noise, as a torque: whether it matters is no question of the sensor."""
+    if case.regression is None or case.colour is not None:
+        return None
+    fit = case.regression.solve(after.structure, after.structure.shapes_of(after.values))
+    floor_nm = case.regression.noise_floor_nm(after.values)
+    return disturbance_of(case.regression, fit, floor_nm, UNITS[case.recording.axis]["torque"])
 
 
 def _at_the_sensor(case: Case, measured: Measured, floor: NoiseFloor) -> Disturbance | None:
