@@ -42,7 +42,8 @@ def _found(found: Identification) -> str:
     if found.verdict.left_open:
         return "Something is missing from the declared model, and these data do not determine what."
     if found.verdict.unexplained:
-        return "The declared model lacks something that no effect here describes."
+        little = ", and too little of it to matter" if found.accepted else ""
+        return f"The declared model lacks something that no effect here describes{little}."
     return "The declared model describes these runs: no effect is missing."
 
 

@@ -11,6 +11,7 @@ from identify.runs.sign_convention import SENTENCE
 from identify.select.evidence import WEIGHT
 from identify.wording import (
     capital,
+    depends_on,
     half_interval,
     how_to_separate,
     joined,
@@ -60,7 +61,7 @@ def sentences_of(found: Identification, damping_said: bool = False) -> tuple[str
     elif found.verdict.unexplained:
         out.append(
             f"{number(100.0 * found.verdict.unexplained_fraction, 2)} % of the residual above the noise floor is "
-            "unexplained; the plots show what it depends on."
+            f"unexplained; {_what_it_depends_on(found)}."
         )
     if found.after is not None:
         out += [f"{capital(plain(d.name))} was dropped: {d.reason}." for d in found.after.dropped]
@@ -80,6 +81,15 @@ def sentences_of(found: Identification, damping_said: bool = False) -> tuple[str
         for pair, why in found.verdict.never_separable.items()
     ]
     return tuple(out)
+
+
+def _what_it_depends_on(found: Identification) -> str:
+    """As the acceptance has it, which looked at the torque that is left; the plots where it did not."""
+    left = found.disturbance
+    if not found.accepted or left is None:
+        return "the plots show what it depends on"
+    on = joined(list(dict.fromkeys(depends_on(d.on, found.axis) for d in left.depends_on)))
+    return f"it depends on the {on}" if on else "it depends on no quantity that was tested"
 
 
 def _decided_in_torque(found: Identification) -> bool:

@@ -26,6 +26,7 @@ DEPENDENCE_SIGMAS = 4.0  # standard errors over blocks of held-out samples; by c
 MIN_POWER_SHARE = 0.02  # of the power that is left: less is not worth a word
 SHAPE_POINTS = 25  # places at which a curve's shape is given
 OUTER = (0.8, 0.95)  # shares of the samples inside of which nothing is touched
+MISSING_IN_RUNS, MISSING_SHARE = 0.25, 0.25  # runs in which a wave may be missing: with less of its share in all
 MIN_PERIODS = 3.0  # in the longest run, of what changes as a wave: a slower change is one over the time itself
 PAST_RUN_SHARES = (0.05, 0.5)  # of the run: time constants with which a rate is remembered
 
@@ -92,7 +93,7 @@ def _in_most_runs(fit: TorqueFit, richer: TorqueFit, share: float) -> bool:
     not. ``share`` is that of all runs together."""
     pairs = zip(fit.held, richer.held, strict=True)
     falls = [1.0 - float(np.sum(new**2)) / max(float(np.sum(old**2)), 1e-300) for old, new in pairs]
-    return float(np.quantile(falls, 0.25)) > 0.25 * share
+    return float(np.quantile(falls, MISSING_IN_RUNS)) > MISSING_SHARE * share
 
 
 def _moved(

@@ -9,6 +9,7 @@ import pytest
 from identify.conclude.conclusion import inseparable
 from identify.conclude.verdict import sentences_of
 from identify.model.structure import Structure
+from identify.residual import Dependence, Disturbance
 from identify.results import NotReported
 from tests.identify.sample import estimate, sample
 
@@ -66,6 +67,15 @@ def test_nothing_found_is_said_as_plainly_whether_the_floor_is_reached_or_not() 
     said = sentences_of(replace(FOUND, verdict=lost, after=None))
     assert "no candidate explains" in said[0]
     assert any("42 %" in s for s in said)
+    left = Disturbance(0.1, "N*m", 0.001)
+    for disturbance, on in (
+        (left, "no quantity that was tested"),
+        (replace(left, depends_on=(Dependence("angle", 0.1, 0.001, 1e-6),)), "the angle"),
+    ):
+        accepted = replace(FOUND, verdict=lost, after=None, accepted=True, disturbance=disturbance)
+        assert any(f"unexplained; it depends on {on}." in s for s in sentences_of(accepted))
+    refused = replace(FOUND, verdict=lost, after=None, accepted=False)
+    assert any("the plots show what it depends on" in s for s in sentences_of(refused))
 
 
 def test_a_scale_that_was_found_is_said_with_what_it_means() -> None:
