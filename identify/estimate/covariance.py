@@ -27,6 +27,16 @@ def _inverse(information: Array) -> tuple[Array, tuple[bool, ...]]:
     return inverse / np.outer(scale, scale), tuple(bool(x) for x in ~(touched | dead))
 
 
+def orthogonal_part(own: Array, values: Array) -> Array:
+    """Columns (n, m) without what a run's own unknowns, (n, k), can follow."""
+    size: Array = np.linalg.norm(own, axis=0)
+    nonzero = size > 0.0
+    if not np.any(nonzero):
+        return values
+    basis = np.linalg.qr(own[:, nonzero] / size[nonzero])[0]
+    return np.asarray(values - basis @ (basis.T @ values))
+
+
 def sandwich(parts: Sequence[tuple[Array, Array]], sigma: float) -> tuple[Array, Any]:
     """Covariance from every run's columns (m, p) and residual (m,): plain where the residual is white.
 

@@ -15,7 +15,7 @@ from identify.estimate.grid_refinement import sharpened
 from identify.estimate.initial_guess import Start, best_rho
 from identify.estimate.initial_state_sensitivity import least_std_errors
 from identify.estimate.output_error import OutputErrorFit, refine
-from identify.estimate.own_delays import beside_own_delay, freed, have_own_delays
+from identify.estimate.own_delays import beside_own_delay, freed, have_own_delays, position
 from identify.estimate.profile_likelihood import settled, widened
 from identify.estimate.regression import Regression, RegressionFit, residuals
 from identify.estimate.starting_point import start_values
@@ -195,16 +195,17 @@ def by_output_error(
 
 def _output_covariance(fit: OutputErrorFit, names: tuple[Name, ...]) -> tuple[Array, tuple[bool, ...]]:
     keep = [fit.names.index(n) for n in names]
-    parts = []
+    parts, along = [], []
     for shots in fit.shots:
         if not np.any(shots.weight):
             continue
         columns, residual = jacobian(shots, fit.structure, fit.names, fit.vector)
         parts.append((columns[:, keep], residual))
+        along.append(position(shots.trace, shots.weight))
     sigma = rms_of(parts, len(names) + 2 * sum(len(s.first) for s in fit.shots))
     covariance, determined = sandwich(parts, sigma)
     if have_own_delays([s.trace for s in fit.shots], names):
-        apart, _ = sandwich([(beside_own_delay(x, names), r) for x, r in parts], sigma)
+        apart, _ = sandwich([(beside_own_delay(x, names, u), r) for (x, r), u in zip(parts, along, strict=True)], sigma)
         covariance = freed(apart, covariance, names)
     if len(fit.shots) > 1:
         return covariance, determined

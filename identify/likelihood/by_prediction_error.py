@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from identify.estimate.covariance import orthogonal_part
 from identify.estimate.final_fit import FinalFit, free_run_of
-from identify.estimate.own_delays import beside_own_delay, freed, have_own_delays
-from identify.likelihood.fit import Fit, orthogonal_part
+from identify.estimate.own_delays import beside_own_delay, freed, have_own_delays, position
+from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameter_fit import ZERO_INFORMATION
 from identify.model.parameters import Name
@@ -65,6 +66,7 @@ def _covariance(problem: PredictionError, fit: Fit) -> Array:
     if not have_own_delays(problem.traces, fit.names):
         return fit.covariance
     parts = [orthogonal_part(c.own, c.columns) for c in problem.columns_at(fit)]
-    seen = [beside_own_delay(x, fit.names) for x in parts]
+    along = [position(s.trace, s.weight, problem.readings) for s in fit.shots]
+    seen = [beside_own_delay(x, fit.names, u) for x, u in zip(parts, along, strict=True)]
     information = np.sum([x.T @ x for x in seen], axis=0)
     return freed(replace(fit, information=information).covariance, fit.covariance, fit.names)

@@ -48,16 +48,6 @@ class Columns:
     variance: Array
 
 
-def orthogonal_part(own: Array, values: Array) -> Array:
-    """Columns (n, m) without what a run's own unknowns, (n, k), can follow."""
-    size: Array = np.linalg.norm(own, axis=0)
-    nonzero = size > 0.0
-    if not np.any(nonzero):
-        return values
-    basis = np.linalg.qr(own[:, nonzero] / size[nonzero])[0]
-    return np.asarray(values - basis @ (basis.T @ values))
-
-
 @dataclass(frozen=True)
 class Prediction:
     """Every reading predicted one sample ahead, one array a run.

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.likelihood.fit import MAX_LINEAR_INERTIA_CHANGE, Fit, orthogonal_part
+from identify.estimate.covariance import orthogonal_part
+from identify.likelihood.fit import MAX_LINEAR_INERTIA_CHANGE, Fit
 from identify.likelihood.normal_equations import NORMAL_RCOND
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name, bounds_of, names_of

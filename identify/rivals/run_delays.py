@@ -1,8 +1,9 @@
 """Torque and rate that disagree by a little more or less in every run, made to agree.
 
-Where a drive and a gyro have clocks of their own, every run has a delay of its own (``identify.estimate.own_delays``).
-What differs between runs looks like damping, or like a memory of the platform. So beside the model that was found
-every run gets the delay that it shows, and its torque is moved by how much that differs from the others'.
+Where a drive and a gyro have clocks of their own, every run has a delay of its own that changes evenly along it
+(``identify.estimate.own_delays``). What differs looks like damping, or like a memory of the platform. So beside the
+model that was found every run gets the delay that it shows, and its torque is moved by how much that differs from what
+all have in the mean.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from identify.estimate.own_delays import DELAY, have_own_delays
-from identify.likelihood.fit import Fit, orthogonal_part
+from identify.estimate.covariance import orthogonal_part
+from identify.estimate.own_delays import DELAY, have_own_delays, of_own_clock, position
+from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.runs.reduced import thinned
 from identify.signals.trace import Trace
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
 
 MAX_SAMPLES = 120_000  # that are looked at
+AKAIKE = 2.0  # for each of the delays' numbers: no name hangs on them, and the intervals pay for them anyhow
 ROUNDS, FIT_STEPS = 4, 3  # of moving them, and of the model in each
 SURE_RATIO = 10.0  # times what clocks bring: no name that brings more is theirs
 MAX_SHIFT_S = 50e-6  # of a run: two clocks that disagree by more show something else
@@ -73,10 +76,10 @@ def aligned(traces: Sequence[Trace], use: Sequence[Any], best: Fit) -> Aligned |
         if not np.isfinite(best.cost):
             break
         own_s, brought = _own_delays(problem, best)
-        likelier = brought > (len(traces) - 1) * np.log(max(best.count, 2))
-        if not likelier or np.max(np.abs(own_s)) > MAX_SHIFT_S:
+        likelier = brought > AKAIKE * (own_s.size - 1)
+        if not likelier or np.max(np.sum(np.abs(own_s), axis=1)) > MAX_SHIFT_S:
             break
-        later = [_later(t, late_s) for t, late_s in zip(runs, own_s.tolist(), strict=True)]
+        later = [_later(t, *line_s) for t, line_s in zip(runs, own_s.tolist(), strict=True)]
         moved = Aligned(later, brought / best.count + (moved.brought if moved else 0.0))
     return moved
 
@@ -84,33 +87,37 @@ def aligned(traces: Sequence[Trace], use: Sequence[Any], best: Fit) -> Aligned |
 def told(given: Sequence[Trace], moved: Sequence[Trace]) -> str:
     """A note that runs were moved, and by how much at most."""
     both = [(a.torque, b.torque) for a, b in zip(given, moved, strict=True)]
-    late_s = [abs(float(np.mean(b.time_s - a.time_s))) for a, b in both if a is not None and b is not None]
+    late_s = [float(np.max(np.abs(b.time_s - a.time_s))) for a, b in both if a is not None and b is not None]
     return (
-        f"The clocks of torque and rate agree to {number(1e6 * max(late_s), 2)} us between runs: every run is fitted "
+        f"The clocks of torque and rate agree to {number(1e6 * max(late_s), 2)} us: every run is fitted "
         "with the delay that it shows, and the intervals include that."
     )
 
 
 def _own_delays(problem: PredictionError, fit: Fit) -> tuple[Array, float]:
-    """By how much every run's delay is longer than all have in the mean, (runs,), and what that brings.
+    """By how much every run's delay is longer than all have in the mean, (runs, 2), and what that brings.
 
-    The latter is by how much minus twice the log-likelihood falls, all other parameters free.
+    A run's delay is a line: in the middle of the run, and half its change along it. What it brings is by how much minus
+    twice the log-likelihood falls, all other parameters free.
     """
     parts, at, shared = problem.columns_at(fit), fit.names.index(DELAY), len(fit.names) - 1
-    size = shared + len(parts)
+    size = shared + 2 * len(parts)
     matrix, right = np.zeros((size, size)), np.zeros(size)
-    order = [*(k for k in range(shared + 1) if k != at), at]
-    for r, part in enumerate(parts):
-        seen = orthogonal_part(part.own, np.column_stack([part.columns, part.scaled])) / np.sqrt(fit.variance)
-        here, wide = [*range(shared), shared + r], seen[:, order]
-        matrix[np.ix_(here, here)] += wide.T @ wide
-        right[here] += wide.T @ seen[:, -1]
-    one = np.zeros((size, shared + 1))  # one delay for all
+    rest = [k for k in range(shared + 1) if k != at]
+    for r, (part, shots) in enumerate(zip(parts, fit.shots, strict=True)):
+        clock = of_own_clock(part.columns, fit.names, position(shots.trace, shots.weight, problem.readings))
+        wide = np.column_stack([part.columns[:, rest], clock, part.scaled])
+        seen = orthogonal_part(part.own, wide) / np.sqrt(fit.variance)
+        here = [*range(shared), shared + 2 * r, shared + 2 * r + 1]
+        matrix[np.ix_(here, here)] += seen[:, :-1].T @ seen[:, :-1]
+        right[here] += seen[:, :-1].T @ seen[:, -1]
+    one = np.zeros((size, shared + 1))  # one delay for all, all along
     one[:shared, :shared] = np.eye(shared)
-    one[shared:, -1] = 1.0
+    one[shared::2, -1] = 1.0
     apart, together = _solved(matrix, right), one @ _solved(one.T @ matrix @ one, one.T @ right)
-    own_s, known = apart[shared:], np.diag(matrix)[shared:]
-    return own_s - float(known @ own_s) / max(float(np.sum(known)), 1e-300), float(right @ (apart - together))
+    own_s, known = apart[shared:].reshape(-1, 2), np.diag(matrix)[shared::2]
+    own_s[:, 0] -= float(known @ own_s[:, 0]) / max(float(np.sum(known)), 1e-300)
+    return own_s, float(right @ (apart - together))
 
 
 def _solved(matrix: Array, right: Array) -> Array:
@@ -119,7 +126,11 @@ def _solved(matrix: Array, right: Array) -> Array:
     return np.asarray(inverse @ (right / size) / size)
 
 
-def _later(trace: Trace, late_s: float) -> Trace:
+def _later(trace: Trace, late_s: float, changing_s: float) -> Trace:
+    """The run with its torque so much later in its middle, and by ``changing_s`` more at its end than there."""
     given = trace.torque
     assert given is not None
-    return replace(trace, torque=TorqueSignal(given.time_s + late_s, given.torque_nm, given.hold), _series={})
+    half_s = 0.5 * trace.step_s * max(len(trace.measured) - 1, 1)
+    along = np.clip((given.time_s - trace.start_s) / half_s - 1.0, -1.0, 1.0)
+    later = given.time_s + late_s + changing_s * along
+    return replace(trace, torque=TorqueSignal(later, given.torque_nm, given.hold), _series={})

@@ -22,7 +22,8 @@ from scipy.stats import chi2, rankdata
 from identify.bounds.cramer_rao import DELAY
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
-from identify.likelihood.fit import Columns, Fit, orthogonal_part
+from identify.estimate.covariance import orthogonal_part
+from identify.likelihood.fit import Columns, Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.select.lags import KnownDelays, takes_damping
