@@ -22,6 +22,7 @@ from identify.likelihood.noise_grid import kinds_of_noise, noise_on_grid
 from identify.likelihood.normal_equations import (
     COST_TOLERANCE,
     MAX_LOG_STEP,
+    Floor,
     Step,
     level_of,
     normal_equations,
@@ -157,7 +158,7 @@ class Descent:
     def scores(self) -> list[Columns]:
         """The same with what the parameters do through the gains, and to the variance of the innovations."""
         parts = self._derivatives(False, True)
-        variance, level = level_of(parts, self.count, self.problem.variance_of)
+        variance, level = level_of(parts, self.count, self.floor(()))
         return [d.with_variance(level, variance) for d in parts]
 
     def looks_at(self, x: Array, noise: Noise, shots: Sequence[Shots]) -> list[Look]:
@@ -172,7 +173,7 @@ class Descent:
         if not np.isfinite(squares) or squares <= 0.0:
             return np.inf
         log = sum(float(np.sum(np.log(q.variance[w]))) for q, w in zip(looks, self.weights, strict=True))
-        variance, _ = self.problem.variance_of(squares, self.count)
+        variance = max(squares / max(self.count, 1), looks[0].floor)
         return float(self.count * (np.log(variance) - 1.0) + squares / variance + log)
 
     def _squares(self, looks: Sequence[Look]) -> float:
@@ -207,14 +208,31 @@ class Descent:
         """The normal equations where the descent stands; the information of the parameters is kept."""
         kinds = len(self.kinds) if of_noise else 0
         parts = self._derivatives(of_noise, of_gains)
-        found = normal_equations(parts, len(self.x), kinds, self.count, self.problem.variance_of)
+        found = normal_equations(parts, len(self.x), kinds, self.count, self.floor(self.kinds[:kinds]))
         self.information, self._informed = found.information, (self.noise, self.x.tobytes())
         return found
 
     def of_noise(self) -> Step:
         """The normal equations of the noise and the runs' own unknowns, where the descent stands."""
         parts = derivatives(self._operating_point(), {}, self.kinds)
-        return normal_equations(parts, len(self.x), len(self.kinds), self.count, self.problem.variance_of)
+        return normal_equations(parts, len(self.x), len(self.kinds), self.count, self.floor(self.kinds))
+
+    def floor(self, kinds: Sequence[str]) -> Floor:
+        """The least variance of one reading where the descent stands, and what parameters and noise do to it."""
+        p, here, fall = self.problem, self.looks[0].floor, np.zeros(len(self.x) + len(kinds))
+        lags = [k for k, n in enumerate(self.names) if len(n) > 1 and effects.get(n[0]).lag is not None]
+
+        def falls(x: Array, noise: Noise) -> float:
+            return float(np.log(here / p.floor_at(self.shots[0], self.structure, self.names, x, noise)))
+
+        for k in lags:
+            there = self.x.copy()
+            there[k] += (step := DIFFERENCE_STEP * self.scale[k])
+            fall[k] = falls(there, self.noise) / step
+        if lags and "ahead" in kinds:
+            more = replace(self.noise, ahead=self.noise.ahead * float(np.exp(DIFFERENCE_STEP)))
+            fall[len(self.x) + list(kinds).index("ahead")] = falls(self.x, more) / DIFFERENCE_STEP
+        return Floor(here, fall)
 
     def try_step(self, of_noise: bool, enough: float = 0.0) -> bool:
         """One step of parameters, biases and, if asked for, the noise; False where none leads down by ``enough``."""
@@ -265,7 +283,7 @@ class Descent:
             for q, s in zip(self.looks, self.shots, strict=True)
         ]  # fmt: skip
         first, spread = [q.innovations[:, 0] for q in self.looks], [q.variance[:, 0] for q in self.looks]
-        variance, _ = self.problem.variance_of(self._squares(self.looks), self.count)
+        variance = max(self._squares(self.looks) / max(self.count, 1), self.looks[0].floor)
         costs = [np.sum(q.innovations**2 / (v := q.variance * variance) + np.log(v), axis=1) for q in self.looks]
         return Fit(
             self.structure, self.names, self.x, self.count, variance, self.cost, self.information, self.noise,

@@ -24,6 +24,7 @@ class Look:
     variance: Array  # (n, m)
     state: Array  # angle, rate, slow torque after each sample, (n, 3)
     gains: Gains
+    floor: float  # the variance of one reading is no less
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ def settle_biases(descent: Descent) -> None:
         return
     for _ in range(BIAS_STEPS):
         there = OperatingPoint(d.problem, d.structure, d.names, d.x, d.noise, d.shots, d.looks)
-        found = normal_equations(derivatives(there, {}, []), len(d.x), 0, d.count, d.problem.variance_of)
+        found = normal_equations(derivatives(there, {}, []), len(d.x), 0, d.count, d.floor(()))
         if not all(np.all(np.isfinite(taken)) for _, taken in found.own):
             return
         shots = [changed(s, taken) for s, (_, taken) in zip(d.shots, found.own, strict=True)]

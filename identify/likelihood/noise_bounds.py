@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identify.signals.filtered_noise import filtered_density
 from rig.arrays import Array
 from rig.dynamics.gains import Noise
 
@@ -72,6 +73,15 @@ class NoiseBounds:
             np.inf if self.gyro else float(np.clip(noise.walk_s, SHORTEST_SAMPLES * self.step_s, self.slowest_s)),
             float(np.clip(noise.smooth, self.slow(MIN_DISTURBANCE), self.slow(MAX_SMOOTH))),
         )
+
+    def shown_above(self, noise: Noise, lag: tuple[float, float]) -> float:
+        """The sensor's noise where the readings' own is read off (``noise_of``), over the variance of one reading.
+
+        One for a sensor without a low-pass; with one, what that lets through of the noise ahead of it comes on top.
+        """
+        if not self.gyro or lag == (0.0, 0.0):
+            return 1.0
+        return 1.0 + noise.ahead * filtered_density(lag, self.step_s)
 
     def extremes(self, noise: Noise, kinds: Sequence[str]) -> tuple[Array, Array]:
         """By how many times itself each number of the noise may be smaller and larger, (k,) each."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,28 @@ from identify.likelihood.derivatives import Derivatives
 from identify.simulate.shots import Shots, moved, with_bias
 from rig.arrays import Array
 
-VarianceOf = Callable[[float, int], tuple[float, bool]]
+
+@dataclass(frozen=True)
+class Floor:
+    """Least variance of one reading.
+
+    Attributes
+    ----------
+    variance
+        It.
+    falls
+        By how much its logarithm falls with the parameters and the logarithms of the noise, (p + k,).
+    """
+
+    variance: float
+    falls: Array
+
+    def variance_of(self, squares: float, count: int) -> tuple[float, bool]:
+        """Of one reading whose ``count`` scaled innovations have these squares, and whether they decide it."""
+        found = squares / max(count, 1)
+        return max(found, self.variance), found > self.variance
+
+
 NORMAL_RCOND = 1e-9  # of the largest singular value of a scaled normal matrix
 COST_TOLERANCE = 0.5  # fall of the cost below which a fit has arrived
 MAX_LOG_STEP = 4.0  # by which a logarithm of the noise may fall in one step
@@ -31,28 +52,26 @@ class Step:
     promised: float  # by how much the cost falls with what the runs' own unknowns take
 
 
-def level_of(parts: Sequence[Derivatives], count: int, variance_of: VarianceOf) -> tuple[float, Array]:
+def level_of(parts: Sequence[Derivatives], count: int, floor: Floor) -> tuple[float, Array]:
     """The variance of one reading, and by how much it falls with parameters and noise, (p + k,).
 
-    Where it stands at the sensor's floor it does not fall: then every variance tells, not only how they differ.
+    Where it stands at the sensor's floor it falls as that does: then every variance tells, not only how they differ.
     """
     squares = sum(float(d.columns.scaled @ d.columns.scaled) for d in parts)
-    variance, free = variance_of(squares, count)
-    spread = np.sum([d.spread.sum(axis=0) for d in parts], axis=0) / max(count, 1)
-    return variance, spread if free else 0.0 * spread
+    variance, free = floor.variance_of(squares, count)
+    return variance, np.sum([d.spread.sum(axis=0) for d in parts], axis=0) / max(count, 1) if free else floor.falls
 
 
 def normal_equations(
-    parts: Sequence[Derivatives], p: int, k: int, count: int, variance_of: VarianceOf
+    parts: Sequence[Derivatives], p: int, k: int, count: int, floor: Floor
 ) -> Step:  # fmt: skip
     """Of ``p`` parameters and ``k`` numbers of the noise, from every run's derivatives.
 
-    ``count`` is the number of readings that count; ``variance_of`` says from the sum of their squares and their number
-    what the variance of one is, and whether that is free.
+    ``count`` is the number of readings that count.
     """
     matrix, right = np.zeros((p + k, p + k)), np.zeros(p + k)
     information, own, promised = np.zeros((p, p)), [], 0.0
-    variance, level = level_of(parts, count, variance_of)
+    variance, level = level_of(parts, count, floor)
     for d in parts:
         z, wide = d.columns.scaled, d.pulled.copy()
         wide[:, :p] += d.columns.columns

@@ -93,10 +93,13 @@ class PredictionError:
         begun = StartVariance() if self.fits_starts else self._start_variance()
         self._gains = KeptGains(self.step_s, max(len(t.measured) for t in traces), begun)
 
-    def variance_of(self, squares: float, count: int) -> tuple[float, bool]:
-        """Of one reading, and whether the innovations decide it: no sensor is far better than its own floor shows."""
-        found, least = squares / max(count, 1), self.least_variance
-        return max(found, least), found > least
+    def floor_of(self, lag: tuple[float, float], noise: Noise) -> float:
+        """Least variance of one reading: no sensor is far better than the end of its spectrum shows.
+
+        What a gyro's low-pass lets through of the noise ahead of it shows there, too. Beside an encoder, whose noise
+        goes with that of the gyro, it does not count.
+        """
+        return self.least_variance / (1.0 if self.both else self.bounds.shown_above(noise, lag))
 
     def columns_at(self, fit: Fit, with_variance: bool = False) -> list[Columns]:
         """Derivatives of every run's innovations where a fit stands; ``with_variance``, of their whole likelihood."""
@@ -183,7 +186,12 @@ class PredictionError:
             s.starts, measured, trace.keep, gains, sensing.rate, s.bias, trace.offset_s, trace, s.reads, low_pass,
             smoothing,
         )  # fmt: skip
-        return Look(measured - predicted, gains.variance, state, gains)
+        return Look(measured - predicted, gains.variance, state, gains, self.floor_of(sensing.lag, noise))
+
+    def floor_at(self, s: Shots, structure: Structure, names: Sequence[Name], x: Array, noise: Noise) -> float:
+        """Least variance of one reading at a parameter vector, which no reading is needed for."""
+        equations = equations_of(structure, names, x, s.number, s.added)
+        return self.floor_of(self._sensing(s.trace, equations).lag, noise)
 
     def gains_at(self, s: Shots, structure: Structure, names: Sequence[Name], x: Array, noise: Noise) -> Gains:
         """One run's gains at a parameter vector, which no reading is needed for."""

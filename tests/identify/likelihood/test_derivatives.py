@@ -25,7 +25,7 @@ def test_a_step_of_the_noise_beside_a_backlash_changes_the_cost_as_the_derivativ
     values = {(k,): v for k, v in zip(TERMS, TRUTH, strict=True)} | {("backlash", "half_gap"): 1.5 * GAP_RAD}
     disturbed = Noise(problem.bounds.white(0.01), problem.bounds.slow(0.02), 0.05, problem.bounds.walk(1e-3))
     d = Descent(problem, Structure(effects=("backlash",)), values, disturbed, None, ())  # type: ignore[arg-type]
-    found = normal_equations(d._derivatives(True, True), len(d.x), len(d.kinds), d.count, problem.variance_of)
+    found = normal_equations(d._derivatives(True, True), len(d.x), len(d.kinds), d.count, d.floor(d.kinds))
     for k, kind in enumerate(d.kinds):
         costs = []
         for h in (0.01, -0.01):

@@ -8,7 +8,7 @@ from scipy.optimize import lsq_linear
 
 from identify.likelihood.derivatives import Derivatives
 from identify.likelihood.fit import Columns
-from identify.likelihood.normal_equations import COST_TOLERANCE, bounded_step, normal_equations
+from identify.likelihood.normal_equations import COST_TOLERANCE, Floor, bounded_step, normal_equations
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
 from identify.signals.prepare import one_noise
@@ -57,7 +57,7 @@ def test_where_nothing_may_move_no_step_is_taken() -> None:
 def test_where_a_model_runs_away_and_nothing_is_left_to_predict_no_step_is_promised() -> None:
     nothing = np.zeros((6, 2))
     columns = Columns(nothing, np.ones((6, 1)), np.zeros(6), np.full(6, np.inf))
-    found = normal_equations([Derivatives(columns, nothing, nothing)], 2, 0, 6, lambda squares, count: (1e-12, False))
+    found = normal_equations([Derivatives(columns, nothing, nothing)], 2, 0, 6, Floor(1.0, np.zeros(2)))
     assert found.promised == 0.0
     assert np.array_equal(bounded_step(found.matrix, found.right, -np.ones(2), np.ones(2)), np.zeros(2))
 
