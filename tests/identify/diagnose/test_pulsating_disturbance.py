@@ -93,6 +93,7 @@ def test_noise_of_the_torque_does_not_pulsate(runs: int) -> None:
     assert disturbance_of(regression, fit, regression.noise_floor_nm(fit.values), "N*m").depends_on == ()
 
 
+@pytest.mark.slow
 def test_a_spring_that_something_shakes_is_not_accepted_and_the_frequency_is_the_next_step() -> None:
     found = identify(Recording((run_with({"angle": 0.3}, 0),)), DECLARED, IdentifyConfig())
     assert not found.accepted

@@ -128,7 +128,8 @@ def test_noise_in_the_recorded_torque_swells_at_the_resonance_and_is_not_the_sen
     assert 0.1 < found.disturbance.torque_rms < 1.0  # of 3 N m a sample: what lies in the band of the motion
 
 
-@pytest.mark.parametrize("filtered", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("filtered", [True, False])
 def test_what_a_clean_torque_leaves_is_not_blamed_on_its_noise(filtered: bool) -> None:
     found, _ = found_without_its_effect() if filtered else found_in(recorded(None, CUBIC), [])
     assert found.verdict.unexplained

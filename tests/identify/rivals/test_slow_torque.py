@@ -42,6 +42,7 @@ def run(seed: int) -> Run:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_what_a_free_run_leaves_beyond_white_noise_is_looked_at_as_a_torque() -> None:
     found = identify(Recording((run(1), run(2))), DECLARED, IdentifyConfig(candidates=tuple(HIDDEN)))
     assert set(found.verdict.effects) == set(HIDDEN)
