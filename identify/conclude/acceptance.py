@@ -66,9 +66,14 @@ def _against_negative_damping(final: ModelResult) -> list[str]:
 
 def reasons_against_disturbance(left: Disturbance, accept: AcceptConfig, axis: str) -> list[str]:
     """Why the residual torque is material, one sentence a limit; nothing where it is immaterial."""
-    if not left.depends_on:
-        return []
     torque = "force" if axis == "linear" else "torque"
+    if not left.depends_on:
+        return [
+            f"without {plain(effect)} the fit would change {changes}, more than is allowed ({keys}), and what is held "
+            "out is explained as well: whether it is there has to be known before the parameters are; record more "
+            "where it shows"
+            for effect, changes, keys in _beyond(left, accept)
+        ]
     on = joined(list(dict.fromkeys(depends_on(d.on, axis) for d in left.depends_on)))
     out = []
     if left.material_percent > accept.torque_percent:
@@ -85,15 +90,22 @@ def reasons_against_disturbance(left: Disturbance, accept: AcceptConfig, axis: s
                 f"{number(moved, 2)} %; "
                 f"{number(most, 2)} % is allowed (identify.accept.{name}_percent)"
             )
+    out += [
+        f"{plain(effect)} would change {changes}, more than is allowed ({keys}), and can follow almost any "
+        f"{torque}: how much of what depends on the {on} belongs to that is not known"
+        for effect, changes, keys in _beyond(left, accept)
+    ]
+    return out
+
+
+def _beyond(left: Disturbance, accept: AcceptConfig) -> list[tuple[str, str, str]]:
+    """Effects without which J, C or K differ by more than is allowed: each, by how much, and the keys that allow it."""
+    out = []
     for effect, moves in left.moves_without_percent.items():
         beyond = {k: v for k, v in moves.items() if v > getattr(accept, f"{k}_percent")}
         if beyond:
             changes = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in beyond.items()])
-            keys = joined([f"identify.accept.{k}_percent" for k in beyond])
-            out.append(
-                f"{plain(effect)} would change {changes}, more than is allowed ({keys}), and can follow almost any "
-                f"{torque}: how much of what depends on the {on} belongs to that is not known"
-            )
+            out.append((effect, changes, joined([f"identify.accept.{k}_percent" for k in beyond])))
     return out
 
 

@@ -1,9 +1,10 @@
 """Named effects that may only take up what something else leaves, and how far J, C and K hang on them.
 
 A few effects follow almost anything: a second mass on a spring answers an amplifier's coarse steps, a torque that
-repeats over the angle a cable that pulls at one place. As long as nothing is left over, the evidence speaks for them.
-Where something is left that no effect describes, nobody knows how much of it they have taken up, nor what they did to
-J, C and K in its place. Where that is little beside what an effect takes, the effect is no stand-in for it.
+repeats over the angle a cable that pulls at one place. As long as nothing is left over, the evidence speaks for them,
+unless samples that were held out are explained as well without. Where something is left that no effect describes,
+nobody knows how much of it they have taken up, nor what they did to J, C and K in its place. Where that is little
+beside what an effect takes, the effect is no stand-in for it.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callab
     the effect is noted.
     """
     depends = found.disturbance.depends_on  # the largest first
-    flexible = [name for name in found.named if effects.get(name).is_flexible] if depends else []
+    if not depends:
+        return _with_unproven(found)
+    flexible = [name for name in found.named if effects.get(name).is_flexible]
     apart = {name: found.without(name) for name in flexible}
     flexible = [name for name in flexible if _is_in_doubt(found, apart[name])]
     if not flexible:
@@ -52,6 +55,19 @@ def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callab
     for name in flexible:
         less = found.without(name) if stand_ins else apart[name]
         moves[effects.first_of(name)] = moved(found.after, less.after)
+    return replace(found, disturbance=replace(found.disturbance, moves_without_percent=moves))
+
+
+def _with_unproven(found: Found) -> Found:
+    """The same with how far J, C and K move without a flexible effect that does nothing for samples that were held out.
+
+    The name is kept, for its evidence lies elsewhere (a mode beyond what was excited shows as the inertia it takes).
+    """
+    gained = found.search.contribution
+    unproven = [n for n in found.named if effects.get(n).is_flexible and gained.get(n, np.inf) <= 1.0]
+    if not unproven:
+        return found
+    moves = {effects.first_of(name): moved(found.after, found.without(name).after) for name in unproven}
     return replace(found, disturbance=replace(found.disturbance, moves_without_percent=moves))
 
 

@@ -63,3 +63,14 @@ def test_a_negative_damping_is_a_reason_of_its_own() -> None:
     assert of(0.05) == of(-0.05) == []
     assert len(of(-2.4)) == 1
     assert "damping C is negative (-2.40 N*m*s/rad)" in of(-2.4)[0]
+
+
+def test_where_an_effect_that_may_be_missing_moves_a_parameter_the_result_is_not_accepted() -> None:
+    moves = {"flexible_mode": {"inertia": 33.0, "stiffness": 0.3}}
+    (reason,) = reasons_against_disturbance(
+        Disturbance(0.01, "N*m", 0.01, moves_without_percent=moves), AcceptConfig(), "rotary"
+    )
+    assert (
+        "without flexible mode the fit would change J by 33 %" in reason and "identify.accept.inertia_percent" in reason
+    )
+    assert "K by" not in reason

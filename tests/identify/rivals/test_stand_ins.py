@@ -97,6 +97,16 @@ def test_where_nothing_is_left_or_nothing_is_flexible_nothing_changes(
     assert asked == []
 
 
+def test_where_nothing_is_left_an_effect_that_does_nothing_for_held_out_samples_is_looked_at_without() -> None:
+    begun, asked = found(("flexible_mode", "coulomb_friction"))
+    begun.search.contribution.update(flexible_mode=0.9999, coulomb_friction=0.9999)
+    kept = looked_at(begun)
+    assert kept.named == begun.named and asked == [("flexible_mode",)]
+    assert kept.disturbance.moves_without_percent == {"flexible_mode": {"inertia": pytest.approx(6.0)}}
+    begun.search.contribution.update(flexible_mode=1.2)
+    assert looked_at(begun) is begun
+
+
 def test_a_move_within_what_the_fits_are_uncertain_by_is_none() -> None:
     assert moved(final(1.0, 0.05), final(1.06, 0.05)) == {}
     assert moved(final(1.0, 0.01), final(1.06, 0.01)) == {"inertia": pytest.approx(6.0)}
