@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
 
 MAX_SAMPLES = 120_000  # that are looked at
-AKAIKE = 2.0  # for each of the delays' numbers: no name hangs on them, and the intervals pay for them anyhow
 ROUNDS, FIT_STEPS = 4, 3  # of moving them, and of the model in each
 SURE_RATIO = 10.0  # times what clocks bring: no name that brings more is theirs
 MAX_SHIFT_S = 50e-6  # of a run: two clocks that disagree by more show something else
@@ -76,7 +75,7 @@ def aligned(traces: Sequence[Trace], use: Sequence[Any], best: Fit) -> Aligned |
         if not np.isfinite(best.cost):
             break
         own_s, brought = _own_delays(problem, best)
-        likelier = brought > AKAIKE * (own_s.size - 1)
+        likelier = brought > (own_s.size - 1) * np.log(max(best.count, 2))
         if not likelier or np.max(np.sum(np.abs(own_s), axis=1)) > MAX_SHIFT_S:
             break
         later = [_later(t, *line_s) for t, line_s in zip(runs, own_s.tolist(), strict=True)]
