@@ -23,27 +23,29 @@ class KeptGains:
     ----------
     step_s, longest
         The step that most runs have, and the samples of the longest run.
-    begun
-        How well the start of a stretch is known.
     """
 
-    def __init__(self, step_s: float, longest: int, begun: StartVariance) -> None:
-        self.step_s, self.longest, self.begun = step_s, longest, begun
+    def __init__(self, step_s: float, longest: int) -> None:
+        self.step_s, self.longest = step_s, longest
         self._gains: dict[tuple[object, ...], tuple[dict[tuple[object, ...], Gains], Lock]] = {}
 
     def of(
-        self, trace: Trace, linear: LinearPart, noise: Noise, sensing: Sensing, spans: list[tuple[int, int]]
+        self, trace: Trace, linear: LinearPart, noise: Noise, sensing: Sensing, spans: list[tuple[int, int]],
+        begun: StartVariance,
     ) -> Gains:  # fmt: skip
-        """A run's gains; the last few are kept, because most looks change an effect and not the linear part."""
+        """A run's gains; the last few are kept, because most looks change an effect and not the linear part.
+
+        ``begun`` is how well the start of a stretch is known.
+        """
         keep, spans, group = self._same_sampling(trace, spans)
         even = abs(trace.step_s / self.step_s - 1.0) < SAME_STEP
         step_s = self.step_s if even else trace.step_s
-        key = (linear, noise, sensing, step_s, *spans)
+        key = (linear, noise, sensing, step_s, begun, *spans)
         kept, lock = self._gains.setdefault(group, ({}, Lock()))
         with lock:
             found = kept.get(key)
             if found is None:
-                found = gains_of(linear, noise, step_s, sensing, keep, spans, self.begun)
+                found = gains_of(linear, noise, step_s, sensing, keep, spans, begun)
                 for old in list(kept)[: max(0, len(kept) + 1 - GAIN_CACHE_SIZE)]:
                     kept.pop(old, None)
                 kept[key] = found

@@ -29,7 +29,7 @@ from identify.model.parameters import Name, equations_of
 from identify.model.structure import Structure
 from identify.signals.trace import MOST_BIAS_RAD_S, Trace
 from identify.simulate.mean_slopes import mean_slopes
-from identify.simulate.shots import RUNAWAY, Shots
+from identify.simulate.shots import RUNAWAY, Shots, begins_at_rest
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.equations import Equations
@@ -90,8 +90,10 @@ class PredictionError:
         # A decay shows nothing but how it began and how it swings on, far beyond what is linear about its prediction:
         # where it began is fitted, and not corrected as the readings come in.
         self.fits_starts = self.torque_free
-        begun = StartVariance() if self.fits_starts else self._start_variance()
-        self._gains = KeptGains(self.step_s, max(len(t.measured) for t in traces), begun)
+        self._begun = StartVariance() if self.fits_starts else self._start_variance()
+        alone = all(t.channel == "rate" for t in traces) and not self.both
+        self._begins_at_zero = alone and all(begins_at_rest(t) and len(t.stretches) == 1 for t in traces)
+        self._gains = KeptGains(self.step_s, max(len(t.measured) for t in traces))
 
     def floor_of(self, lag: tuple[float, float], noise: Noise) -> float:
         """Least variance of one reading: no sensor is far better than the end of its spectrum shows.
@@ -178,7 +180,9 @@ class PredictionError:
         trace = s.trace
         spans = [(a, b - 1) for a, b in s.edges]
         sensing = self._sensing(trace, equations)
-        gains = kept or self._gains.of(s.trace, self._linear_part(equations), noise, sensing, spans)
+        gains = kept or self._gains.of(
+            s.trace, self._linear_part(equations), noise, sensing, spans, self._begun_of(structure)
+        )
         measured, low_pass = self._readings(trace), trace.low_pass
         smoothing = None if low_pass is None else s.grid.smoothing(equations, low_pass)
         predicted, state = predict_ahead(
@@ -198,7 +202,19 @@ class PredictionError:
         equations = equations_of(structure, names, x, s.number, s.added)
         spans = [(a, b - 1) for a, b in s.edges]
         linear = self._linear_part(equations)
-        return self._gains.of(s.trace, linear, noise, self._sensing(s.trace, equations), spans)
+        return self._gains.of(
+            s.trace, linear, noise, self._sensing(s.trace, equations), spans, self._begun_of(structure)
+        )
+
+    def _begun_of(self, structure: Structure) -> StartVariance:
+        """How well the start of a stretch is known.
+
+        A gyro's angle counts from where a run begins. A spring has an origin of its own, and a platform that swings
+        or is held by friction may begin anywhere about it. Without one, a run that begins at rest begins at zero; were
+        that left open, the first readings would throw the angle across the waves of what depends on it.
+        """
+        at_zero = self._begins_at_zero and "stiffness" not in structure.terms
+        return self._begun._replace(angle=0.0) if at_zero else self._begun
 
     def _linear_part(self, equations: Equations) -> LinearPart:
         """The platform as a Kalman filter takes it, with the effects' mean slopes along the motion.

@@ -44,8 +44,8 @@ def slots(channel: Channel, readings: Readings | None) -> tuple[Array, tuple[flo
 @lru_cache(maxsize=512)
 def _kernels(
     names: tuple[str, ...],
-) -> tuple[Any, Any, Any, int, tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    """Typed kernel lists of a set of effects: loads with frictions, drive, sensor."""
+) -> tuple[Any, Any, Any, int, tuple[str, ...], tuple[str, ...], tuple[str, ...], bool]:
+    """Typed kernel lists of a set of effects: loads with frictions, drive, sensor; whether the first are all steady."""
     by_place: dict[Place, list[Effect]] = {place: [] for place in Place}
     for name in names:
         effect = effects.get(name)
@@ -59,6 +59,7 @@ def _kernels(
         tuple(e.name for e in body),
         tuple(e.name for e in by_place[Place.DRIVE]),
         tuple(e.name for e in by_place[Place.SENSOR]),
+        all(e.is_steady for e in body),
     )
 
 
@@ -96,7 +97,7 @@ class Equations:
     """A platform laid out for the compiled integrator."""
 
     def __init__(self, platform: Platform) -> None:
-        kernels, drive, sensor, loads, body, drives, sensors = _kernels(tuple(platform.effects))
+        kernels, drive, sensor, loads, body, drives, sensors, self.steady = _kernels(tuple(platform.effects))
         self.jck = np.array([platform.inertia_kg_m2, platform.damping_nm_s_rad, platform.stiffness_nm_rad], dtype=float)
         values = {name: effects.get(name).values(given) for name, given in platform.effects.items()}
         self.kernels, self.loads = kernels, loads
@@ -229,6 +230,7 @@ class Equations:
             p,
             self.p_at,
             self.kinks,
+            self.steady,
             out,
         )
         return out
@@ -247,6 +249,6 @@ class Equations:
             return out
         integrator.run_spans(
             starts, np.array(spans, dtype=np.int64), offset_s, self.rest_states(*starts[0]), step_s, torque,
-            self.jck, self.kernels, self.loads, self.z_at, p, self.p_at, self.kinks, out,
+            self.jck, self.kernels, self.loads, self.z_at, p, self.p_at, self.kinks, self.steady, out,
         )  # fmt: skip
         return out

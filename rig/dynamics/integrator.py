@@ -4,14 +4,15 @@ One fine step of length h is a classical fourth-order Runge-Kutta step while the
 direction. Dry friction makes the right-hand side jump where the rate changes sign; smoothing that jump
 moves ten seconds of simulated rate by many sigma however fine the step is, so the instants of
 sticking, breaking away and reversing are found by root search and the step is split there. Where the
-angle passes a kink of the torque (a gap, a support on one side) it is split as well.
+angle passes a kink of the torque (a gap, a support on one side) it is split as well. A platform under nothing but
+constant torques and dry friction of a constant level is linear while it slides: there the step is a matrix.
 
 Layout of the arrays, so that any set of effects runs through one compiled function:
 ``motion`` holds angle, rate, slip direction (-1, 0 stuck, +1) and time; ``z`` the internal states of all
 kernels end to end, ``z_at`` where each kernel's begin; ``p`` the parameter vectors end to end, ``p_at``
 where each begins. LOAD kernels come first, FRICTION kernels from ``loads`` on. Behind the last parameter
 vector of ``p`` stands for every internal state the angle over which it follows the motion, infinite where it follows
-something else, and before these their least.
+something else, and before these their least. ``jck`` holds inertia, damping, stiffness and one over the inertia.
 
 One step and the loops over many stand in one file: Numba's cache checks the file of the function that is called, so a
 change of the step would not reach loops of another file that are compiled already.
@@ -70,7 +71,7 @@ def acceleration(th, w, t, m, slip, z, dz, jck, body):  # type: ignore[no-untype
         net -= resisting(0, loads, th, w, t, m, z, dz, *body[2:])
     if slip != 0.0 and count > loads:
         net -= slip * resisting(loads, count, th, abs(w), t, m, z, dz, *body[2:])
-    return net / jck[0]
+    return net * jck[3]
 
 
 @jit
@@ -126,7 +127,7 @@ def _advance_to(motion, saved, zs, x0, x1, h, m0, m1, m2, n, z, w0, k1, k2, k3, 
         motion[3] += (x1 - x0) * h
         return
     # An infinite inertia does not move; the internal states do.
-    _rk4(motion, x0, x1, h, m0, m1, m2, n, z, w0, k1, k2, k3, k4, (np.inf, jck[1], jck[2]), body)
+    _rk4(motion, x0, x1, h, m0, m1, m2, n, z, w0, k1, k2, k3, k4, (np.inf, jck[1], jck[2], 0.0), body)
     motion[0] = saved[0]
     motion[1] = 0.0
 
@@ -248,6 +249,57 @@ def step_over_kinks(motion, n, z, work, saved, h, m0, m1, m2, jck, body, kinks, 
 
 
 @jit
+def step_matrix(h, jck):  # type: ignore[no-untyped-def]
+    """A Runge-Kutta step of a platform with nothing on its shaft, (2, 5).
+
+    Angle and rate after it from a unit of angle, of rate, and of the torque at its start, middle and end.
+    """
+    body = (0, 0, integers_at(0), integers_at(0), floats_at(0), integers_at(0))  # no kernel is called
+    none = np.zeros(1)
+    unit, push = np.zeros(4), np.zeros(3)
+    z = pointer(none)
+    matrix = np.zeros((2, 5))
+    for k in range(5):
+        unit[:], push[:] = 0.0, 0.0
+        if k < 2:
+            unit[k] = 1.0
+        else:
+            push[k - 2] = 1.0
+        _rk4(pointer(unit), 0.0, 1.0, h, push[0], push[1], push[2], 0, z, z, z, z, z, z, jck, body)
+        matrix[0, k], matrix[1, k] = unit[0], unit[1] + 0.0 * none[0]  # keeps the scratch alive
+    return matrix
+
+
+@jit
+def matrix_step(matrix, th, w, m0, m1, m2):  # type: ignore[no-untyped-def]
+    """Angle and rate after a step of ``step_matrix``."""
+    return (
+        matrix[0, 0] * th + matrix[0, 1] * w + matrix[0, 2] * m0 + matrix[0, 3] * m1 + matrix[0, 4] * m2,
+        matrix[1, 0] * th + matrix[1, 1] * w + matrix[1, 2] * m0 + matrix[1, 3] * m1 + matrix[1, 4] * m2,
+    )
+
+
+@jit
+def slide(motion, matrix, load, level, sticks, h, m0, m1, m2):  # type: ignore[no-untyped-def]
+    """``step`` under a constant torque ``load`` and a constant level of dry friction.
+
+    False where the platform does not slide to the end of the step; nothing was done then.
+    """
+    slip, rest = 0.0, load
+    if sticks:
+        slip = motion[2]
+        if slip == 0.0:
+            return False
+        rest += slip * level
+    th, w = matrix_step(matrix, motion[0], motion[1], m0 - rest, m1 - rest, m2 - rest)
+    if w * slip < 0.0:
+        return False
+    motion[0], motion[1], motion[2] = th, w, slip
+    motion[3] += h
+    return True
+
+
+@jit
 def pull(angle, z, jck, kernels, loads, z_at, p, p_at):  # type: ignore[no-untyped-def]
     """Torque of spring and loads on a platform that stands still at an angle, at time zero."""
     scratch = np.zeros(max(1, len(z)))
@@ -260,11 +312,22 @@ def pull(angle, z, jck, kernels, loads, z_at, p, p_at):  # type: ignore[no-untyp
 
 
 @jit
-def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, kinks, out):  # type: ignore[no-untyped-def]
+def steady_torques(z, dz, body):  # type: ignore[no-untyped-def]
+    """Sum of the loads and of the levels of dry friction, of kernels that give one value whatever they are asked."""
+    loads, count = body[0], body[1]
+    return (
+        resisting(0, loads, 0.0, 0.0, 0.0, 0.0, z, dz, *body[2:]),
+        resisting(loads, count, 0.0, 0.0, 0.0, 0.0, z, dz, *body[2:]),
+    )
+
+
+@jit
+def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, kinks, steady, out):  # type: ignore[no-untyped-def]
     """Integrate ``len(torque)`` fine steps.
 
-    ``torque`` has shape (n, 3): start, middle, end of each step. ``out`` has shape (n + 1, 3) and takes
-    angle, rate and acceleration at every fine instant, the start included.
+    ``torque`` has shape (n, 3): start, middle, end of each step. ``steady``: all kernels give one value whatever they
+    are asked. ``out`` has shape (n + 1, 3) and takes angle, rate and acceleration at every fine instant, the start
+    included.
     """
     n, states = torque.shape[0], len(z)
     room = np.zeros((10, max(4, states)))
@@ -274,20 +337,26 @@ def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, kinks, o
     )  # fmt: skip
     saved, dz, before, bends = pointer(room[6]), pointer(room[7]), pointer(room[8:]), pointer(kinks)
     mo, zp = pointer(motion), pointer(z)
-    jck = (jck[0], jck[1], jck[2])
+    jck = (jck[0], jck[1], jck[2], 1.0 / jck[0])
     body = (loads, len(kernels), pointer(kernels), pointer(z_at), pointer(p), pointer(p_at))
     t0 = motion[3]
+    sticks, matrix = len(kernels) > loads, step_matrix(h, jck)
+    load, level = steady_torques(zp, dz, body) if steady else (0.0, 0.0)
     for i in range(n + 1):
         m = torque[i, 0] if i < n else torque[n - 1, 2]
-        a = acceleration(mo[0], mo[1], mo[3], m, mo[2], zp, dz, jck, body)
-        if mo[2] == 0.0 and len(kernels) > loads:
+        if mo[2] == 0.0 and sticks:
             a = 0.0
+        elif steady:
+            a = (m - load - (mo[2] * level if sticks else 0.0) - jck[1] * mo[1] - jck[2] * mo[0]) * jck[3]
+        else:
+            a = acceleration(mo[0], mo[1], mo[3], m, mo[2], zp, dz, jck, body)
         out[i, 0], out[i, 1], out[i, 2] = mo[0], mo[1], a
         if i < n:
-            step_over_kinks(
-                mo, states, zp, work, saved, h, torque[i, 0], torque[i, 1], torque[i, 2], jck, body,
-                bends, len(kinks), before,
-            )  # fmt: skip
+            m0, m1, m2 = torque[i, 0], torque[i, 1], torque[i, 2]
+            if not steady or not slide(mo, matrix, load, level, sticks, h, m0, m1, m2):
+                step_over_kinks(
+                    mo, states, zp, work, saved, h, m0, m1, m2, jck, body, bends, len(kinks), before
+                )  # fmt: skip
             mo[3] = t0 + (i + 1) * h
             if not abs(mo[0]) < 1e9:  # diverged (or not a number): nothing after it means anything
                 out[i + 1 :, :] = np.nan
@@ -296,42 +365,9 @@ def run_steps(motion, z, h, torque, jck, kernels, loads, z_at, p, p_at, kinks, o
 
 
 @jit
-def run_linear(motion, h, torque, jck, out):  # type: ignore[no-untyped-def]
-    """``run_steps`` of a platform with nothing on its shaft: the same Runge-Kutta step, as the matrix that it is."""
-    n = torque.shape[0]
-    body = (0, 0, integers_at(0), integers_at(0), floats_at(0), integers_at(0))  # no kernel is called
-    none = np.zeros(1)
-    unit, push = np.zeros(4), np.zeros(3)
-    z = pointer(none)
-    table = np.zeros((2, 5))  # angle and rate after a step from a unit of angle, rate, and torque at its three instants
-    for k in range(5):
-        unit[:], push[:] = 0.0, 0.0
-        if k < 2:
-            unit[k] = 1.0
-        else:
-            push[k - 2] = 1.0
-        _rk4(pointer(unit), 0.0, 1.0, h, push[0], push[1], push[2], 0, z, z, z, z, z, z, jck, body)
-        table[0, k], table[1, k] = unit[0], unit[1]
-    a00, a01, b00, b01, b02 = table[0, 0], table[0, 1], table[0, 2], table[0, 3], table[0, 4]
-    a10, a11, b10, b11, b12 = table[1, 0], table[1, 1], table[1, 2], table[1, 3], table[1, 4]
-    j, c, k_ = jck
-    th, w = motion[0], motion[1]
-    for i in range(n):
-        m0, m1, m2 = torque[i, 0], torque[i, 1], torque[i, 2]
-        out[i, 0], out[i, 1], out[i, 2] = th, w, (m0 - c * w - k_ * th) / j
-        th, w = (
-            a00 * th + a01 * w + (b00 * m0 + b01 * m1 + b02 * m2),
-            a10 * th + a11 * w + (b10 * m0 + b11 * m1 + b12 * m2),
-        )
-        if not abs(th) < 1e9:  # diverged
-            out[i + 1 :, :] = np.nan
-            return none[0]
-    out[n, 0], out[n, 1], out[n, 2] = th, w, (torque[n - 1, 2] - c * w - k_ * th) / j
-    return none[0]
-
-
-@jit
-def run_spans(starts, spans, offset_s, z, h, torque, jck, kernels, loads, z_at, p, p_at, kinks, out):  # type: ignore[no-untyped-def]
+def run_spans(  # type: ignore[no-untyped-def]
+    starts, spans, offset_s, z, h, torque, jck, kernels, loads, z_at, p, p_at, kinks, steady, out
+):
     """``run_steps`` over spans (first, last) of fine steps, each begun from its row of ``starts``.
 
     Internal states go on from span to span.
@@ -341,11 +377,8 @@ def run_spans(starts, spans, offset_s, z, h, torque, jck, kernels, loads, z_at, 
         first, last = spans[k, 0], spans[k, 1]
         motion[0], motion[1] = starts[k, 0], starts[k, 1]
         motion[2], motion[3] = np.sign(starts[k, 1]), offset_s + first * h
-        if len(kernels) == 0:
-            run_linear(motion, h, torque[first:last], (jck[0], jck[1], jck[2]), out[first : last + 1])
-            continue
         run_steps(
-            motion, z, h, torque[first:last], jck, kernels, loads, z_at, p, p_at, kinks, out[first : last + 1]
+            motion, z, h, torque[first:last], jck, kernels, loads, z_at, p, p_at, kinks, steady, out[first : last + 1]
         )  # fmt: skip
 
 
@@ -357,7 +390,7 @@ def laid_out(table):  # type: ignore[no-untyped-def]
         table[4], table[5], integers_at(table[6]), integers_at(table[7]), floats_at(table[8]), integers_at(table[9]),
     )  # fmt: skip
     constants = floats_at(table[10])
-    jck = (constants[0], constants[1], constants[2])
+    jck = (constants[0], constants[1], constants[2], 1.0 / constants[0])
     work = (
         scratch, offset(scratch, width), offset(scratch, 2 * width),
         offset(scratch, 3 * width), offset(scratch, 4 * width), offset(scratch, 5 * width),

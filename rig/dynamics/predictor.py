@@ -23,7 +23,15 @@ from rig.dynamics.equations import Equations, Readings
 from rig.dynamics.exact_lags import CHORDS, lag_table
 from rig.dynamics.gains import BIAS, STATES, Gains
 from rig.dynamics.grid import Smoothing
-from rig.dynamics.integrator import acceleration, resisting, step_over_kinks
+from rig.dynamics.integrator import (
+    acceleration,
+    matrix_step,
+    resisting,
+    slide,
+    steady_torques,
+    step_matrix,
+    step_over_kinks,
+)
 from rig.dynamics.low_pass import corner_table
 from rig.dynamics.native import call_filter, jit, offset, pointer
 
@@ -87,26 +95,10 @@ def _rounded(motion, smooth, torque, rise, corner, table, reach_s, jck, z, spare
 
 
 @jit
-def _linear_step(x, h, m0, m1, m2, jck):  # type: ignore[no-untyped-def]
-    """Angle and rate of a linear platform under a torque, over one step (fourth-order Runge-Kutta)."""
-    j, c, k = jck
-    th, w = x[0], x[1]
-    a1 = (m0 - c * w - k * th) / j
-    w2 = w + 0.5 * h * a1
-    a2 = (m1 - c * w2 - k * (th + 0.5 * h * w)) / j
-    w3 = w + 0.5 * h * a2
-    a3 = (m1 - c * w3 - k * (th + 0.5 * h * w2)) / j
-    w4 = w + h * a3
-    a4 = (m2 - c * w4 - k * (th + h * w3)) / j
-    x[0] = th + h * (w + 2.0 * w2 + 2.0 * w3 + w4) / 6.0
-    x[1] = w + h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
-
-
-@jit
 def _predict(  # type: ignore[no-untyped-def]
     starts, spans, offset_s, z, h, ratio, torque, jck, kernels, loads, z_at, p, p_at, kinks,
     filters, fs, fs_at, fp, fp_at, lags, behind, measured, keep, gain, tracked, coloured, decay, walks, walk_decay,
-    rate, bias, reads, smoothing, settled, corners, reach_s, out, state,
+    rate, bias, reads, smoothing, settled, corners, reach_s, steady, out, state,
 ):  # fmt: skip
     n_states, readings = len(z), measured.shape[1]
     room = np.zeros((10, max(4, n_states)))
@@ -118,9 +110,11 @@ def _predict(  # type: ignore[no-untyped-def]
     motion, corner, smooth = np.empty(4), np.empty(2), np.empty(2)
     smooths = len(smoothing) > 0
     mo, zp = pointer(motion), pointer(z)
-    jck3 = (jck[0], jck[1], jck[2])
+    jck4 = (jck[0], jck[1], jck[2], 1.0 / jck[0])
     body = (loads, len(kernels), pointer(kernels), pointer(z_at), pointer(p), pointer(p_at))
     frictions, filtered = len(kernels) > loads, len(filters) > 0 or len(lags) > 0
+    matrix = step_matrix(h, jck4)
+    load, level = steady_torques(zp, spare, body) if steady else (0.0, 0.0)
     for k in range(len(spans)):
         first, last = spans[k, 0], spans[k, 1]
         motion[0], motion[1], motion[2] = starts[k, 0], starts[k, 1], np.sign(starts[k, 1])
@@ -145,7 +139,7 @@ def _predict(  # type: ignore[no-untyped-def]
                 now = torque[s, at] + smoothing[s, at] + slow
                 rise = (now - before_nm) / (ratio * h) if i > first else 0.0
                 before_nm = now
-                rounded = _rounded(motion, smooth, now, rise, corner, corners, reach_s, jck3, zp, spare, body)
+                rounded = _rounded(motion, smooth, now, rise, corner, corners, reach_s, jck4, zp, spare, body)
             for m in range(readings):
                 y = sensed + held + bias + rounded if rate and m == 0 else motion[0]
                 y += walks[m] * walked
@@ -173,16 +167,17 @@ def _predict(  # type: ignore[no-untyped-def]
                 w0, slip, a0 = motion[1] + smooth[1], motion[2], 0.0
                 if filtered and (slip != 0.0 or not frictions):
                     a0 = acceleration(
-                        mo[0], mo[1], mo[3], torque[s, 0] + acting, slip, zp, spare, jck3, body
+                        mo[0], mo[1], mo[3], torque[s, 0] + acting, slip, zp, spare, jck4, body
                     )  # fmt: skip
                 if smooths:
                     m0, m1, m2 = smoothing[s, 0], smoothing[s, 1], smoothing[s, 2]
                     a0 += (m0 - jck[1] * smooth[1] - jck[2] * smooth[0]) / jck[0]
-                    _linear_step(smooth, h, m0, m1, m2, jck3)
-                step_over_kinks(
-                    mo, n_states, zp, work, saved, h, torque[s, 0] + acting, torque[s, 1] + acting,
-                    torque[s, 2] + acting, jck3, body, bends, len(kinks), before,
-                )  # fmt: skip
+                    smooth[0], smooth[1] = matrix_step(matrix, smooth[0], smooth[1], m0, m1, m2)
+                n0, n1, n2 = torque[s, 0] + acting, torque[s, 1] + acting, torque[s, 2] + acting
+                if not steady or not slide(mo, matrix, load, level, frictions, h, n0, n1, n2):
+                    step_over_kinks(
+                        mo, n_states, zp, work, saved, h, n0, n1, n2, jck4, body, bends, len(kinks), before
+                    )  # fmt: skip
                 motion[3] = offset_s + (s + 1) * h
                 w1 = motion[1] + smooth[1]
                 if not filtered:
@@ -190,7 +185,7 @@ def _predict(  # type: ignore[no-untyped-def]
                     continue
                 a1 = 0.0
                 if motion[2] != 0.0 or not frictions:
-                    a1 = acceleration(mo[0], mo[1], mo[3], torque[s, 2] + acting, mo[2], zp, spare, jck3, body)
+                    a1 = acceleration(mo[0], mo[1], mo[3], torque[s, 2] + acting, mo[2], zp, spare, jck4, body)
                 if smooths:
                     a1 += (smoothing[s, 2] - jck[1] * smooth[1] - jck[2] * smooth[0]) / jck[0]
                 same = slip == motion[2]
@@ -270,7 +265,7 @@ def predict_ahead(
         lags, np.zeros((len(lags), 2)),
         measured, keep, gains.gain, gains.of_effects, gains.coloured, gains.held,
         np.ascontiguousarray(gains.reads[:, BIAS]), gains.walk_decay, rate, bias, reads,
-        smoothing.torque_nm, smoothing.begins, corners, reach_s,
+        smoothing.torque_nm, smoothing.begins, corners, reach_s, equations.steady,
         out, state,
     )  # fmt: skip
     return out, state

@@ -180,10 +180,15 @@ class Effect:
         return in_motion and self.foreseen and self.reads is None
 
     @property
+    def is_steady(self) -> bool:
+        """Whether its torque on the shaft, or its level of dry friction, depends on nothing."""
+        varies = any(x in self.formula for x in ("angle_rad", "rate_rad_s", "torque_nm"))
+        return self.place in (Place.LOAD, Place.FRICTION) and bool(self.formula) and not varies
+
+    @property
     def is_constant(self) -> bool:
         """Whether it is a torque that depends on nothing."""
-        varies = any(x in self.formula for x in ("angle_rad", "rate_rad_s", "torque_nm"))
-        return self.place is Place.LOAD and bool(self.formula) and not varies
+        return self.place is Place.LOAD and self.is_steady
 
     def late_s(self, values: tuple[float, ...]) -> float:
         """By how much later slow motion is read because of it, wherever between torque and reading it acts."""
