@@ -63,11 +63,14 @@ class Descent:
         Parameters that stay at their start value.
     smooth
         Whether the grid has a smooth disturbance, a rough one, or both.
+    stays
+        It only looks from where a fit of the same runs stands, which ``carry`` is of.
     """
 
     def __init__(
         self, problem: PredictionError, structure: Structure, start: Mapping[Name, float], noise: Noise | None,
         carry: Sequence[Shots] | None, fixed: Sequence[Name], smooth: Sequence[bool] = (False, True),
+        stays: bool = False,
     ) -> None:  # fmt: skip
         p = self.problem = problem
         self.structure, self.names = structure, names_of(structure, p.runs)
@@ -78,10 +81,10 @@ class Descent:
         still = [*fixed, *([("inertia",)] if p.torque_free else [])]
         self.still = held_still(self.names, p.traces, p.use, still)
         self.scale = np.maximum(np.abs(self.x), [self._unit(n) for n in self.names])
-        self.shots = shots_for(p.traces, structure, self.names, self.x, None, p.use, None, p.coarse, ahead=True)
+        self.shots = list(carry or ()) if stays else self._runs()
         # Start states are carried over only where they are fitted: where a driven run begins stuck is a matter of the
         # friction that is tried.
-        if carry:
+        if carry and not stays:
             self.shots = [with_bias(s, earlier.bias) for s, earlier in zip(self.shots, carry, strict=True)]
         for s, earlier in zip(self.shots, carry or (), strict=bool(carry)):
             if p.fits_starts and np.array_equal(earlier.first, s.first):
@@ -93,11 +96,16 @@ class Descent:
         self.alone = noise is None or not self._begins(p.bounds.within(noise))  # nobody has looked for the noise yet
         if self.alone:
             self._begins(noise_on_grid(p.bounds, lambda q: self.cost_of(self.looks_at(self.x, q, self.shots)), smooth))
-        settle_biases(self)
+        if not stays:
+            settle_biases(self)
         if self.alone and not structure.acts_on_motion:  # else every look is a prediction
             noise_alone(self)
         self.information: Array = np.zeros((len(self.x), len(self.x)))
         self._informed: tuple[Noise, bytes] | None = None
+
+    def _runs(self) -> list[Shots]:
+        p = self.problem
+        return shots_for(p.traces, self.structure, self.names, self.x, None, p.use, None, p.coarse, ahead=True)
 
     def _begins(self, noise: Noise) -> bool:
         """Begin from a noise; False where the prediction runs away with it."""

@@ -106,7 +106,8 @@ class PredictionError:
     def columns_at(self, fit: Fit, with_variance: bool = False) -> list[Columns]:
         """Derivatives of every run's innovations where a fit stands; ``with_variance``, of their whole likelihood."""
         with np.errstate(all="ignore"):
-            descent = Descent(self, fit.structure, fit.values, fit.noise, fit.shots, ())
+            here = all(s.trace is t for s, t in zip(fit.shots, self.traces, strict=True))
+            descent = Descent(self, fit.structure, fit.values, fit.noise, fit.shots, (), stays=here)
             return descent.scores() if with_variance else descent.columns()
 
     def noise_of(self, fit: Fit) -> Noise:
