@@ -19,7 +19,8 @@ def torque_along(kernel, angle, rate, time, torque, step, z, substeps, p, fricti
     states = len(z)
     dz, mid = np.zeros(max(1, states)), np.zeros(max(1, states))
     zz = np.zeros(max(1, states))
-    zz[:states] = z
+    for j in range(states):  # an assignment to a slice compiles for seconds
+        zz[j] = z[j]
     pz, pd, pm, pp = pointer(zz), pointer(dz), pointer(mid), pointer(p)
     h = step / substeps
     for i in range(n):

@@ -289,7 +289,8 @@ def _follow(spans, e, state, keep, gain, other, phi, reads, coloured, walk_decay
                 for b in range(2):
                     ahead[TORQUE + a] += (phi[TORQUE + a, TORQUE + b] - coloured[a, b]) * state[i, TORQUE + b]
             ahead[BIAS] += (phi[BIAS, BIAS] - walk_decay) * state[i, AIM + 1]
-            d[:] = ahead
+            for a in range(states):  # an assignment to a slice compiles for seconds
+                d[a] = ahead[a]
 
 
 def innovations_with(

@@ -256,11 +256,10 @@ def step_matrix(h, jck):  # type: ignore[no-untyped-def]
     """
     body = (0, 0, integers_at(0), integers_at(0), floats_at(0), integers_at(0))  # no kernel is called
     none = np.zeros(1)
-    unit, push = np.zeros(4), np.zeros(3)
     z = pointer(none)
     matrix = np.zeros((2, 5))
     for k in range(5):
-        unit[:], push[:] = 0.0, 0.0
+        unit, push = np.zeros(4), np.zeros(3)
         if k < 2:
             unit[k] = 1.0
         else:
@@ -304,7 +303,8 @@ def pull(angle, z, jck, kernels, loads, z_at, p, p_at):  # type: ignore[no-untyp
     """Torque of spring and loads on a platform that stands still at an angle, at time zero."""
     scratch = np.zeros(max(1, len(z)))
     held = np.zeros(max(1, len(z)))
-    held[: len(z)] = z
+    for i in range(len(z)):
+        held[i] = z[i]
     return jck[2] * angle + resisting(
         0, loads, angle, 0.0, 0.0, 0.0, pointer(held), pointer(scratch), pointer(kernels), pointer(z_at),
         pointer(p), pointer(p_at),

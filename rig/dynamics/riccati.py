@@ -161,6 +161,14 @@ def _leap(over, p, out, work):  # type: ignore[no-untyped-def]
 
 
 @jit
+def _assign(source, target):  # type: ignore[no-untyped-def]
+    """A copy by loops: an assignment to a slice compiles for seconds."""
+    for a in range(len(source)):
+        for b in range(len(source)):
+            target[a, b] = source[a, b]
+
+
+@jit
 def _off(before, here, middle, end, back, step, least):  # type: ignore[no-untyped-def]
     """By how many tolerances the middle of a leap lies off the parabola through its ends and what was ``back`` before.
 
@@ -196,7 +204,8 @@ def riccati(phi, q, reads, noises, p, keep, first, last, gain, variance):  # typ
     n, m = len(q), len(reads)
     g, work, both = np.zeros(n), np.zeros((3, n, n)), np.zeros((n, 2 * n))
     maps = np.zeros((LEVELS, 3, n, n))
-    maps[0, 0], maps[0, 2] = phi, q
+    _assign(phi, maps[0, 0])
+    _assign(q, maps[0, 2])
     for k in range(m):
         for a in range(n):
             for b in range(n):
@@ -227,10 +236,11 @@ def riccati(phi, q, reads, noises, p, keep, first, last, gain, variance):  # typ
             _double(maps, known, work, both)
         _leap(maps[level - 1], p, at_middle, work)
         _leap(maps[level], p, at_end, work)
-        for which, there in enumerate((at_middle, at_end)):
-            after[:] = there
-            _read(reads, noises, True, after, g, gains[which], spreads[which])
-        after[:] = p
+        _assign(at_middle, after)
+        _read(reads, noises, True, after, g, gains[0], spreads[0])
+        _assign(at_end, after)
+        _read(reads, noises, True, after, g, gains[1], spreads[1])
+        _assign(p, after)
         _read(reads, noises, True, after, g, gain[i], variance[i])
         off = 0.0
         for k in range(m):
@@ -248,7 +258,7 @@ def riccati(phi, q, reads, noises, p, keep, first, last, gain, variance):  # typ
                     variance[i + s, k] = begin * variance[i, k] + middle * spreads[0, k] + end * spreads[1, k]
                     for a in range(n):
                         gain[i + s, k, a] = begin * gain[i, k, a] + middle * gains[0, k, a] + end * gains[1, k, a]
-            p[:] = at_end
+            _assign(at_end, p)
             i += step
             back = step
             if off <= 0.125:  # a leap twice as long lies off eight times as far

@@ -112,7 +112,8 @@ def _respond(table, spans, push, angle, rate, z, out):  # type: ignore[no-untype
     """What a push, (m, 3), and other starts add to angle and rate at every fine instant."""
     n = table.shape[1]
     x, new = np.zeros(n), np.zeros(n)
-    x[2:] = z
+    for j in range(len(z)):  # an assignment to a slice compiles for seconds
+        x[2 + j] = z[j]
     pushed = len(push) > 0
     for s in range(len(spans)):
         x[0], x[1] = angle, rate
