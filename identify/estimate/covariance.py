@@ -13,6 +13,7 @@ from identify.simulate.sensitivities import INFORMATION_RCOND
 from rig.recording.run import Array
 
 BLOCKS_PER_RUN = 20  # blocks at most, over which scores scatter
+ALIKE_BLOCKS = 3  # in a row that may be pulled alike
 RESIDUAL_SEGMENT_SAMPLES = 256  # samples of a stretch whose spectrum is averaged
 
 
@@ -46,11 +47,7 @@ def sandwich(parts: Sequence[tuple[Array, Array]], sigma: float) -> tuple[Array,
     information = np.sum([x.T @ x for x, _ in parts], axis=0)
     inverse, determined = _inverse(information)
     plain = inverse * sigma**2
-    blocks = [
-        x[part].T @ r[part]
-        for x, r in parts for part in np.array_split(np.arange(len(r)), min(BLOCKS_PER_RUN, max(len(r) // 50, 1)))
-    ]  # fmt: skip
-    scores = np.array(blocks)
+    scores = np.concatenate(_block_scores(parts))
     m = len(scores)
     if is_white([r for _, r in parts]) or m < 3 * len(information):
         return plain, determined
@@ -59,6 +56,43 @@ def sandwich(parts: Sequence[tuple[Array, Array]], sigma: float) -> tuple[Array,
     ratio = np.diag(by_spectrum) / np.maximum(np.diag(by_blocks), 1e-300)
     wider = np.sqrt(np.maximum(1.0, ratio))
     return by_blocks * np.outer(wider, wider), determined
+
+
+def _block_scores(parts: Sequence[tuple[Array, Array]]) -> list[Array]:
+    """What every block of a run pulls the parameters by, (blocks, p) of every run."""
+    return [
+        np.array([
+            x[part].T @ r[part] for part in np.array_split(np.arange(len(r)), min(BLOCKS_PER_RUN, max(len(r) // 50, 1)))
+        ]) for x, r in parts
+    ]  # fmt: skip
+
+
+def score_scatter(parts: Sequence[tuple[Array, Array]]) -> Array:
+    """By how many times standard errors are larger than the information says, (p,), at least one.
+
+    Where a likelihood is right the scores of blocks scatter as their information says, each by itself. What it does not
+    know of (a delay that wanders from second to second) shows in how they do, and in neighbours that are alike (White,
+    Econometrica 50, 1982; Newey and West, Econometrica 55, 1987). One where there are too few blocks.
+
+    Parameters
+    ----------
+    parts
+        Every run's columns (m, p) and residual (m,) of unit variance.
+    """
+    information = np.sum([x.T @ x for x, _ in parts], axis=0)
+    inverse, _ = _inverse(information)
+    runs = _block_scores(parts)
+    m = sum(len(scores) for scores in runs)
+    if m < 3 * len(information):
+        return np.ones(len(information))
+    scatter = np.zeros_like(information)
+    for scores in runs:
+        scatter += scores.T @ scores
+        for apart in range(1, min(ALIKE_BLOCKS, len(scores))):
+            both = scores[apart:].T @ scores[:-apart]
+            scatter += (1.0 - apart / ALIKE_BLOCKS) * (both + both.T)
+    seen = np.diag(inverse @ (scatter * m / (m - 1.0)) @ inverse)
+    return np.asarray(np.sqrt(np.maximum(1.0, seen / np.maximum(np.diag(inverse), 1e-300))))
 
 
 def covariance_of(parts: Sequence[tuple[Array, Array]], fitted: int) -> tuple[Array, tuple[bool, ...]]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from identify.estimate.covariance import orthogonal_part
+from identify.estimate.covariance import orthogonal_part, score_scatter
 from identify.estimate.final_fit import FinalFit, free_run_of
 from identify.estimate.own_delays import beside_own_delay, freed, have_own_delays, position
 from identify.likelihood.fit import Fit
@@ -62,11 +62,19 @@ def as_final(problem: PredictionError, fit: Fit, traces: Sequence[Trace], everyt
 
 
 def _covariance(problem: PredictionError, fit: Fit) -> Array:
-    """Of all parameters, (p, p), where clocks differ beside a delay of each run's own."""
-    if not have_own_delays(problem.traces, fit.names):
+    """Of all parameters, (p, p), where clocks differ beside a delay of each run's own.
+
+    As wide as what is pulled by parts of the runs scatters, if that is more than the likelihood says.
+    """
+    if not np.isfinite(fit.cost):  # a model that runs away knows nothing of any number
         return fit.covariance
-    parts = [orthogonal_part(c.own, c.columns) for c in problem.columns_at(fit)]
-    along = [position(s.trace, s.weight, problem.readings) for s in fit.shots]
-    seen = [beside_own_delay(x, fit.names, u) for x, u in zip(parts, along, strict=True)]
-    information = np.sum([x.T @ x for x in seen], axis=0)
-    return freed(replace(fit, information=information).covariance, fit.covariance, fit.names)
+    whole = [orthogonal_part(c.own, np.column_stack([c.columns, c.scaled])) for c in problem.columns_at(fit)]
+    parts = [(x[:, :-1], x[:, -1] / np.sqrt(fit.variance)) for x in whole]
+    covariance = fit.covariance
+    if have_own_delays(problem.traces, fit.names):
+        along = [position(s.trace, s.weight, problem.readings) for s in fit.shots]
+        parts = [(beside_own_delay(x, fit.names, u), r) for (x, r), u in zip(parts, along, strict=True)]
+        information = np.sum([x.T @ x for x, _ in parts], axis=0)
+        covariance = freed(replace(fit, information=information).covariance, covariance, fit.names)
+    wider = score_scatter(parts)
+    return covariance * np.outer(wider, wider)

@@ -39,10 +39,8 @@ from rig.arrays import Array
 from rig.platform import TERMS
 
 PREDICTS_TO_NOISE = 1.1  # reduced chi-square: a model that predicts as closely leaves no disturbance
-# What only costs time.
 PROMISING = 0.1  # of the score of what was added: another with less was no rival then and is not asked again
 MIN_RIVAL_SHARE = 0.1  # of what an effect explains: another that leaves more than that is no rival
-
 
 _Key = tuple[frozenset[str], frozenset[str]]
 
@@ -158,6 +156,8 @@ class Stepwise:
             fits: dict[str, Fit] = {name: now, **others}
             fits |= zip(near, self.trials.all_further([others[n] for n in near]), strict=True)
             fits = {n: self._without_absorbing_stiffness(f) for n, f in fits.items()}
+            fits = self.trials.no_worse_than_special_cases(rest, fits)
+            now = min(now, fits[name], key=lambda f: f.cost)
             seen = self.weigher.all(rest, fits)
             self._needed[name] = seen[name].support
             chosen, alike = self._best_of(name, seen)

@@ -18,6 +18,7 @@ from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.propose.innovation_score import InnovationScores, Score
+from identify.propose.starts import OTHER_START, about_a_sample, as_special_case, gain_of, is_small
 from identify.propose.torque_looks import CandidateTorque, candidate_torques
 from identify.runs.measured_channels import simplicity
 from identify.runs.observability import one_more, shows_a_period
@@ -41,7 +42,6 @@ COMPARABLE = 0.3  # of the score of an effect, that another or a curve has in it
 FOLLOWED_LINES = 2  # of the disturbance: lines at which a periodic torque is looked for beside those of what is left
 FOLLOWS = 1.1  # reduced chi-square: where a prediction errs by less, no disturbance follows the readings
 FOLLOWS_LESS = 0.5  # of the excess beside which lags were tried: only then may one show that did not before
-OTHER_START = 1.5  # times the power in torque that a look leaves: a fit that leaves more is begun from there, too
 
 
 @dataclass
@@ -101,7 +101,7 @@ class TrialFits:
             v[0].effect: [v[0].start] for v in self.shortlist(now, looks)
         }
         for name in self.unseen(now, names):
-            starts.setdefault(name, []).append(self.start_values(name, now))
+            starts.setdefault(name, []).append(about_a_sample(name, self.scale(now), self.problem.step_s))
         for look in self.largest_torques(now, names):
             starts.setdefault(look.effect, []).append(look)
         fits = self.each_fitted(now, starts)
@@ -110,7 +110,7 @@ class TrialFits:
         # A special case that is as good is taken in the place of what contains it.
         near = [n for n in near if not set(effects.get(n).nests) & set(near)]
         fits |= zip(near, self.all_further([fits[n] for n in near]), strict=True)
-        return [v[0] for v in looks], fits
+        return [v[0] for v in looks], self.no_worse_than_special_cases(now, fits)
 
     def pairs(self, now: Fit, singles: Sequence[Score]) -> list[tuple[str, Fit]]:
         """Two effects at once where one alone shows little, fitted: those with the largest gains."""
@@ -143,14 +143,6 @@ class TrialFits:
             return []
         self._excess_with_lags = excess
         return lags
-
-    def start_values(self, name: str, now: Fit) -> dict[Name, float]:
-        """An effect without gains, its times about a sample long."""
-        scale = self.scale(now)
-        return {
-            (name, p.name): sorted(p.start(scale), key=lambda t: abs(np.log(t / self.problem.step_s)))[0]
-            for p in effects.get(name).parameters if p.start is not None
-        }  # fmt: skip
 
     def each_fitted(
         self, now: Fit, starts: Mapping[str, Sequence[Mapping[Name, float] | CandidateTorque]]
@@ -212,7 +204,7 @@ class TrialFits:
         for start in starts:
             if isinstance(start, CandidateTorque):  # the rest begins there, too, and the disturbance is looked for anew
                 begun = starts[0] if fits and not isinstance(starts[0], CandidateTorque) else {}
-                if not fits or self._leaves_more(fits[0], start) or self._begun_small(name, begun, start):
+                if not fits or self._leaves_more(fits[0], start) or is_small(name, begun, start):
                     begin = {**rest, **start.start}
                     begun_there = self.problem.fit(
                         structure.plus(name), begin, None, TRIAL_ITERATIONS,
@@ -222,7 +214,7 @@ class TrialFits:
                 continue
             own = {k: v for k, v in start.items() if k[0] not in held}
             for special in held:
-                own = {k: v + _gain(now, special) if k[0] == name and k[1] in linear else v for k, v in own.items()}
+                own = {k: v + gain_of(now, special) if k[0] == name and k[1] in linear else v for k, v in own.items()}
             fits.append(begun_where_it_stands(own))
         best = min(fits, key=lambda f: f.cost)
         if not held and not best.cost < now.cost:  # a model is no worse than what it contains: from there, then
@@ -232,18 +224,27 @@ class TrialFits:
         shown = shows_a_period(name, best.values, self.problem.traces)
         return best if np.isfinite(best.cost) and shown else None
 
-    @staticmethod
-    def _begun_small(name: str, begun: Mapping[Name, float], start: CandidateTorque) -> bool:
-        """Whether dry friction was begun far below what it has in torque: where it sticks, a fit stays there."""
-        if effects.get(name).place is not Place.FRICTION:
-            return False
-        gains = [(name, p.name) for p in effects.get(name).parameters if p.linear]
-        return any(OTHER_START * abs(begun.get(g, 0.0)) < abs(start.start.get(g, 0.0)) for g in gains)
-
     def _leaves_more(self, fit: Fit, start: CandidateTorque) -> bool:
         """Whether a fit has missed what the same effect takes in torque."""
         left = self.weigher.left(self.weigher.in_torque(fit))
         return left > OTHER_START * self.weigher.left(start.fit)
+
+    def no_worse_than_special_cases(self, now: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
+        """Fits of candidates on top of a model; one that came out worse than its special case begins again there."""
+        out = dict(fits)
+        for name in sorted(fits, key=lambda n: len(effects.get(n).nests)):
+            for special in effects.get(name).nests:
+                if special not in out or not out[special].cost < out[name].cost:
+                    continue
+                values, there = as_special_case(name, out[name], special, out[special]), out[special]
+                if values is None:
+                    continue
+                again = self.problem.fit(
+                    out[name].structure, values, there.noise, FULL_ITERATIONS, carry=there.shots, thorough=False,
+                    against=now.cost,
+                )  # fmt: skip
+                out[name] = again if again.cost < out[name].cost else out[name]
+        return out
 
     def further(self, fit: Fit) -> Fit:
         """The same with more steps."""
@@ -266,7 +267,7 @@ class TrialFits:
             if other not in self.names(now) or not all(p.linear and not p.per_run for p in parameters):
                 continue
             structure = replace(now.structure, effects=tuple(other if e == name else e for e in now.structure.effects))
-            own: dict[Name, float] = {(other, p.name): _gain(now, name) for p in parameters}
+            own: dict[Name, float] = {(other, p.name): gain_of(now, name) for p in parameters}
             fits[other] = self.problem.fit(
                 structure, {**rest_values, **own}, now.noise, TRIAL_ITERATIONS,
                 carry=now.shots, thorough=False, against=rest.cost,
@@ -293,8 +294,3 @@ class TrialFits:
 
 def _batches(items: Sequence[_Item], size: int) -> list[Sequence[_Item]]:
     return [items[k : k + size] for k in range(0, len(items), size)]
-
-
-def _gain(fit: Fit, name: str) -> float:
-    """An effect's first gain."""
-    return next((fit.values[(name, p.name)] for p in effects.get(name).parameters if p.linear and not p.per_run), 0.0)

@@ -179,6 +179,8 @@ def _discrete(linear: LinearPart, noise: Noise, lag: tuple[float, float], step_s
     f[BIAS, BIAS] = -1.0 / noise.walk_s
     density[BIAS, BIAS] = noise.walk
     at = np.ix_(sorted(there), sorted(there))
+    if not (np.all(np.isfinite(f)) and np.all(np.isfinite(density))):  # no platform, and nothing to be told of it
+        return np.full_like(f, np.nan), np.full_like(f, np.nan)
     # A state far faster than a sample (the lag of a quick gyro) cancels badly: a part of a sample in which it is slow
     # is doubled until it is the sample.
     fastest = float(np.max(np.abs(np.linalg.eigvals(f[at])))) * step_s

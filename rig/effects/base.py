@@ -148,6 +148,8 @@ class Effect:
     ordered: tuple[tuple[str, str], ...] = ()  # pairs of parameters of which the first is the smaller
     lower_order: tuple[str, ...] = ()  # effects that have to be in the model first: a constant before a slope
     nests: tuple[str, ...] = ()  # simpler effects that this one contains as a special case
+    # By special case, from its values: own values by name with which this one does the same, whatever the others are.
+    from_special: Mapping[str, Callable[[tuple[float, ...]], Mapping[str, float]]] | None = None
     never_separable: Mapping[str, Alike] | None = None  # rival -> why no data of torque and rate can tell them apart
     # By rival of never_separable, from its own values: the values of that rival, and what the change adds to J, C, K.
     as_rival: Mapping[str, Callable[[tuple[float, ...]], LargeStart]] | None = None

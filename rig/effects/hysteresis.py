@@ -52,6 +52,7 @@ EFFECT = Effect(
     fastest_rad_s=_fastest,
     follows_within_rad=lambda values: values[4] / values[5],
     nests=("presliding_friction",),
+    from_special={"presliding_friction": lambda v: {"level": v[0], "yield_angle": v[1], "exponent": 1.0, "share": 1.0}},
     is_flexible=True,
     goes_with=("history", "direction"),
     stays="the initial deflection of the contact is not known before the run",

@@ -33,6 +33,7 @@ EFFECT = Effect(
     formula="coulomb_nm + (static_nm - coulomb_nm) * exp(-(rate_rad_s / speed_rad_s) * (rate_rad_s / speed_rad_s))",
     ordered=(("coulomb", "static"),),
     nests=("coulomb_friction",),
+    from_special={"coulomb_friction": lambda v: {"coulomb": v[0], "static": v[0]}},
     stays="friction holds the platform anywhere within a band, so its rest angle is not known before the run",
     separated_by="from Coulomb friction: spend more time at low speed; ramp slowly, hold and release",
 )

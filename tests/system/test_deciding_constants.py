@@ -36,6 +36,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "likelihood/settling.py": "LARGEST_SHARE LEAD_SHARE LONGEST_LEAD SETTLING_SAMPLES",
     "likelihood/workers.py": "PATIENCE SHORTEST_WAIT_S",
     "propose/innovation_score.py": "LITTLE SCALED SHAPES",
+    "propose/starts.py": "OTHER_START",
     "propose/torque_looks.py": "EVALUATIONS",
     "rivals/own_low_pass.py": "BEGUN_SAMPLES",
     "rivals/run_delays.py": "FIT_STEPS MAX_SAMPLES MAX_SHIFT_S RCOND ROUNDS SURE_RATIO",
@@ -50,7 +51,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "select/stepwise.py": "MIN_RIVAL_SHARE PROMISING",
     "select/torque_search.py": "POLISHED RIVAL WORTH_EVIDENCE",
     "select/trial_fits.py": "BEHIND COMPARABLE FAINT_SCORE FOLLOWED_LINES FOLLOWS FOLLOWS_LESS FULL_FIT_RATIO "
-    "FULL_ITERATIONS HEAVIEST MIN_TRIAL_SCORE OTHER_START PAIRS TRIAL_ITERATIONS TRIED",
+    "FULL_ITERATIONS HEAVIEST MIN_TRIAL_SCORE PAIRS TRIAL_ITERATIONS TRIED",
 }
 
 

@@ -97,3 +97,10 @@ def test_noise_ahead_of_a_quick_low_pass_is_white_noise_as_large_as_it_comes_thr
     second = gains_of(LinearPart(*JCK), noise, 0.02, Sensing(True, 0.0, (1e-7, 0.5e-14)), keep, spans)
     assert still.variance[-1, 0] == pytest.approx(1.0 + 3.0, rel=1e-3)
     assert second.variance[-1, 0] == pytest.approx(1.0 + 3.0, rel=1e-3)
+
+
+def test_numbers_that_are_no_platform_predict_nothing_and_stop_nothing() -> None:
+    gains = gains_of(
+        LinearPart(1.0, 0.1, np.nan), Noise(white=0.1), 1e-3, Sensing(True), np.ones(200, dtype=bool), [(0, 199)]
+    )
+    assert not np.any(np.isfinite(gains.variance[1:]))
