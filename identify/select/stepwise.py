@@ -157,7 +157,7 @@ class Stepwise:
             fits |= zip(near, self.trials.all_further([others[n] for n in near]), strict=True)
             fits = {n: self._without_absorbing_stiffness(f) for n, f in fits.items()}
             fits = self.trials.no_worse_than_special_cases(rest, fits)
-            now = min(now, fits[name], key=lambda f: f.cost)
+            now = min((f for f in (now, fits[name]) if f.structure == now.structure), key=lambda f: f.cost)
             seen = self.weigher.all(rest, fits)
             self._needed[name] = seen[name].support
             chosen, alike = self._best_of(name, seen)

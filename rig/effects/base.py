@@ -185,7 +185,7 @@ class Effect:
     def is_steady(self) -> bool:
         """Whether its torque on the shaft, or its level of dry friction, depends on nothing."""
         varies = any(x in self.formula for x in ("angle_rad", "rate_rad_s", "torque_nm"))
-        return self.place in (Place.LOAD, Place.FRICTION) and bool(self.formula) and not varies
+        return self.place in (Place.LOAD, Place.FRICTION) and bool(self.formula) and not varies and not self.states
 
     @property
     def is_constant(self) -> bool:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
@@ -17,12 +18,17 @@ PLAIN = Structure(("inertia", "damping", "stiffness"))
 PLATFORM: dict[Name, float] = dict(zip([("inertia",), ("damping",), ("stiffness",)], TRUTH, strict=True))
 
 
-def test_a_richer_friction_that_ended_elsewhere_begins_again_where_its_special_case_stands() -> None:
-    run = sine_run(67.0, 6.0, effects={"coulomb_friction": {"level": 2.0}}, duration_s=2.0)
+def fitted(duration_s: float) -> tuple[PredictionError, Fit, Fit]:
+    """A run with Coulomb friction, and fits of it without and with that."""
+    run = sine_run(67.0, 6.0, effects={"coulomb_friction": {"level": 2.0}}, duration_s=duration_s)
     problem = PredictionError(one_noise([prepare(run)], False))
     now = problem.fit(PLAIN, PLATFORM, iterations=3, thorough=False)
     level: dict[Name, float] = {("coulomb_friction", "level"): 2.0}
-    coulomb = problem.fit(PLAIN.plus("coulomb_friction"), {**PLATFORM, **level}, now.noise, thorough=False)
+    return problem, now, problem.fit(PLAIN.plus("coulomb_friction"), {**PLATFORM, **level}, now.noise, thorough=False)
+
+
+def test_a_richer_friction_that_ended_elsewhere_begins_again_where_its_special_case_stands() -> None:
+    problem, now, coulomb = fitted(2.0)
     off: dict[Name, float] = {
         ("stribeck_friction", "coulomb"): 0.1,
         ("stribeck_friction", "static"): 5.0,
@@ -38,11 +44,7 @@ def test_a_richer_friction_that_ended_elsewhere_begins_again_where_its_special_c
 
 
 def test_a_fit_that_is_no_worse_stays() -> None:
-    run = sine_run(67.0, 6.0, effects={"coulomb_friction": {"level": 2.0}}, duration_s=1.0)
-    problem = PredictionError(one_noise([prepare(run)], False))
-    now = problem.fit(PLAIN, PLATFORM, iterations=3, thorough=False)
-    level: dict[Name, float] = {("coulomb_friction", "level"): 2.0}
-    coulomb = problem.fit(PLAIN.plus("coulomb_friction"), {**PLATFORM, **level}, now.noise, thorough=False)
+    problem, now, coulomb = fitted(1.0)
     better = replace(coulomb, cost=coulomb.cost - 1.0)
     trials = TrialFits(problem, PLAIN, [], None)  # type: ignore[arg-type]
     fits = trials.no_worse_than_special_cases(now, {"stribeck_friction": better, "coulomb_friction": coulomb})
