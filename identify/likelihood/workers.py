@@ -45,9 +45,10 @@ class Workers:
         self._pool = ThreadPoolExecutor(self.AT_ONCE) if threads else None
         self._busy = False  # in a child, or beside one
 
-    def map(self, work: Callable[[_In], _Out], items: Iterable[_In]) -> Iterable[_Out]:
+    def map(self, work: Callable[[_In], _Out], items: Sequence[_In]) -> Iterable[_Out]:
         """Work on parts of one fit, in their order; one after the other where fits are side by side."""
-        return map(work, items) if self._busy or self._pool is None else self._pool.map(work, items)
+        alone = self._busy or len(items) < self.AT_ONCE  # handing one over costs more than it brings
+        return map(work, items) if alone or self._pool is None else self._pool.map(work, items)
 
     def each(self, work: Callable[[_In], _Out], items: Sequence[_In]) -> list[_Out]:
         """Work on many items that have nothing to do with each other, in their order."""

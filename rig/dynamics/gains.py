@@ -8,18 +8,17 @@ its slope (what its low-pass still holds back), the gyro's bias, which walks, an
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from rig.arrays import Array
 from rig.dynamics.linear_part import LinearPart
 from rig.dynamics.native import jit
+from rig.dynamics.over_a_sample import over_a_sample
 from rig.dynamics.riccati import riccati
 
 STATES = 7  # angle, rate, disturbance torque and what it is heading for, sensor output, its slope, bias; effects behind
@@ -150,7 +149,7 @@ class Gains:
 
 @lru_cache(maxsize=64)
 def _discrete(linear: LinearPart, noise: Noise, lag: tuple[float, float], step_s: float) -> tuple[Array, Array]:
-    """Transition and disturbance covariance of the linear part over a sample (van Loan 1978), (7 + s, 7 + s) each.
+    """Transition and disturbance covariance of the linear part over a sample, (7 + s, 7 + s) each.
 
     States that are not there (a low-pass of first order has no slope) keep nothing and get nothing.
     """
@@ -181,21 +180,11 @@ def _discrete(linear: LinearPart, noise: Noise, lag: tuple[float, float], step_s
     at = np.ix_(sorted(there), sorted(there))
     if not (np.all(np.isfinite(f)) and np.all(np.isfinite(density))):  # no platform, and nothing to be told of it
         return np.full_like(f, np.nan), np.full_like(f, np.nan)
-    # A state far faster than a sample (the lag of a quick gyro) cancels badly: a part of a sample in which it is slow
-    # is doubled until it is the sample.
-    fastest = float(np.max(np.abs(np.linalg.eigvals(f[at])))) * step_s
-    doublings = max(0, math.ceil(math.log2(max(fastest, 1.0))))
-    n = len(there)
-    big = np.zeros((2 * n, 2 * n))
-    big[:n, :n], big[:n, n:], big[n:, n:] = -f[at], density[at], f[at].T
-    van_loan = expm(big * (step_s / 2**doublings))
-    onward = van_loan[n:, n:].T
-    driven = onward @ van_loan[:n, n:]
-    for _ in range(doublings):
-        driven, onward = driven + onward @ driven @ onward.T, onward @ onward
+    onward, driven = np.empty((len(there), len(there))), np.empty((len(there), len(there)))
+    over_a_sample(f[at], density[at], step_s, onward, driven)
     phi, q = np.zeros((every, every)), np.zeros((every, every))
     phi[at], q[at] = onward, driven
-    return np.ascontiguousarray(phi), 0.5 * (q + q.T)
+    return phi, q
 
 
 def gains_of(

@@ -54,7 +54,7 @@ def pendulum(
 )
 def test_a_decay_at_the_sensors_noise_names_gravity_friction_and_drag(offered: list[str] | None) -> None:
     settings = IdentifyConfig.model_validate({"candidates": offered})
-    found = identify(Recording((pendulum(0.01, 30.0),)), Platform(1.0, 0.1, 20.0), settings)
+    found = identify(Recording((pendulum(0.01, 15.0),)), Platform(1.0, 0.1, 20.0), settings)
     assert set(found.verdict.effects) == {"unbalance", "coulomb_friction", "quadratic_damping"}
     effects = found.final.effect_parameters
     assert effects["unbalance"]["sine"].value == pytest.approx(GRAVITY, rel=1e-3)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Mapping
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
@@ -97,6 +98,7 @@ def constants_of(path: Path) -> dict[str, object]:
     return {name: value for name, value in values.items() if is_numeric(value)}
 
 
+@cache  # every row asks
 def in_the_code() -> dict[tuple[str, str], object]:
     paths = [path for package in PACKAGES for path in sorted((ROOT / "identify" / package).rglob("*.py"))]
     return {
