@@ -59,8 +59,8 @@ class GaussNewton:
         self.workers, self.shots, self.structure, self.names, self.x = workers, shots, structure, names, x
         self.still = still
         self.scale = np.where(np.abs(x) > 0, np.abs(x), 1.0)
-        self.low = np.array([bounds_of(n)[0] for n in names])
-        self.high = np.array([bounds_of(n)[1] for n in names])
+        self.low = np.array([bounds_of(n, names)[0] for n in names])
+        self.high = np.array([bounds_of(n, names)[1] for n in names])
         self.damping = 1e-6
         self.counts = np.concatenate([s.counts for s in shots])
         self.count = int(np.sum(self.counts))

@@ -45,7 +45,7 @@ def sharpened(
     """
     structure, names = fit.structure, fit.names
     still = held_still(names, traces, use, fixed)
-    low, high = (np.array([bounds_of(n)[i] for n in names]) for i in (0, 1))
+    low, high = (np.array([bounds_of(n, names)[i] for n in names]) for i in (0, 1))
     with ThreadPoolExecutor(2) as workers:
 
         def residuals(shots: Sequence[Shots], x: Array) -> tuple[list[Array], float]:

@@ -184,7 +184,7 @@ def _where_it_rings(centre: OutputErrorFit, slope: Array, refit: Refit) -> Outpu
     looks = inertia * np.exp(np.arange(np.log(COARSE[0]), np.log(COARSE[-1]), ratio))
     if not 1 < len(looks) < MAX_GRID_POINTS:
         return None
-    low, high = (np.array([bounds_of(n)[i] for n in names]) for i in (0, 1))
+    low, high = (np.array([bounds_of(n, names)[i] for n in names]) for i in (0, 1))
     moved = [ordered(names, np.clip(centre.vector + slope * (look - inertia), low, high)) for look in looks]
     squares = [_squares_along(centre, x) / noise**2 for x in moved]
     best = int(np.argmin(squares))

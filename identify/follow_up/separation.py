@@ -159,7 +159,7 @@ def _descend(imitation: Imitation, several: Sequence[Shots], start: Array) -> fl
     """The least chi square, price of moving included, that is found from a start."""
     structure, names, origin = vector_of(imitation.model, 1)
     kept = [i for i, n in enumerate(names) if len(n) < 3]
-    low, high = np.array([bounds_of(n) for n in names]).T
+    low, high = np.array([bounds_of(n, names) for n in names]).T
 
     def at(values: Array) -> tuple[Share, float]:
         share = _total(platform_of(structure, names, values), several)

@@ -75,8 +75,8 @@ class Descent:
         p = self.problem = problem
         self.structure, self.names = structure, names_of(structure, p.runs)
         self.x = np.array([start.get(n, 0.0) for n in self.names])
-        self.low = np.array([bounds_of(n)[0] for n in self.names])
-        self.high = np.array([bounds_of(n)[1] for n in self.names])
+        self.low = np.array([bounds_of(n, self.names)[0] for n in self.names])
+        self.high = np.array([bounds_of(n, self.names)[1] for n in self.names])
         self.x = ordered(self.names, np.clip(self.x, self.low, self.high))
         still = [*fixed, *([("inertia",)] if p.torque_free else [])]
         self.still = held_still(self.names, p.traces, p.use, still)

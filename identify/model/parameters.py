@@ -31,12 +31,18 @@ def is_gain(name: Name) -> bool:
     return next(p.linear for p in effects.get(name[0]).parameters if p.name == name[1])
 
 
-def bounds_of(name: Name) -> tuple[float, float]:
-    """Bounds of a parameter: inertia is positive, damping and stiffness are free, effects say their own."""
-    if len(name) == 1:
-        return (1e-12, np.inf) if name[0] == "inertia" else (-np.inf, np.inf)
-    parameter = next(p for p in effects.get(name[0]).parameters if p.name == name[1])
-    return parameter.low, parameter.high
+def bounds_of(name: Name, beside: Sequence[Name] = ()) -> tuple[float, float]:
+    """Bounds of a parameter: inertia is positive, damping is free, effects say their own.
+
+    Stiffness is free as well, for gravity may push. Where an effect among ``beside``, the parameters of the same model,
+    may push itself, the stiffness is that of a spring, which pulls.
+    """
+    if len(name) > 1:
+        parameter = next(p for p in effects.get(name[0]).parameters if p.name == name[1])
+        return parameter.low, parameter.high
+    if name[0] == "stiffness" and any(effects.get(n[0]).may_push for n in beside if len(n) > 1):
+        return 0.0, np.inf
+    return (1e-12, np.inf) if name[0] == "inertia" else (-np.inf, np.inf)
 
 
 def platform_of(

@@ -188,7 +188,7 @@ class InnovationScores:
         for name, value, change in zip(self.fit.names, self.fit.vector, moved, strict=True):
             linear = len(name) == 1 or next(p.linear for p in effects.get(name[0]).parameters if p.name == name[1])
             if linear:
-                there[name] = float(np.clip(value + change, *bounds_of(name)))
+                there[name] = float(np.clip(value + change, *bounds_of(name, self.fit.names)))
         kept = self.fit.values.get(("inertia",), 0.0)
         near = abs(there.get(("inertia",), kept) - kept) <= MAX_LINEAR_INERTIA_CHANGE * abs(kept)
         return there if near and all(np.isfinite(list(there.values()))) else {}

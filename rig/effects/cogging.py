@@ -38,6 +38,7 @@ EFFECT = Effect(
         Parameter("order", "1/rad", "periods per turn", low=0.5, high=2000.0, start=_orders),
     ),
     kernel=_torque,
+    may_push=True,
     formula="sine_nm * sin(order * angle_rad) + cosine_nm * cos(order * angle_rad)",
     is_flexible=True,
     goes_with=("angle",),

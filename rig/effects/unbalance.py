@@ -37,6 +37,7 @@ EFFECT = Effect(
         Parameter("cosine", "N*m", "m g r sin(phase)", linear=True, low=-float("inf"), suffix="nm"),
     ),
     kernel=_torque,
+    may_push=True,
     formula="sine_nm * sin(angle_rad) + cosine_nm * cos(angle_rad)",
     never_separable={
         "quadratic_stiffness": COSINE,
