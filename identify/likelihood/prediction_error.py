@@ -182,7 +182,7 @@ class PredictionError:
         spans = [(a, b - 1) for a, b in s.edges]
         sensing = self._sensing(trace, equations)
         gains = kept or self._gains.of(
-            s.trace, self._linear_part(equations), noise, sensing, spans, self._begun_of(structure)
+            s.trace, self._linear_part(equations), noise, sensing, spans, self._begun_of(structure, sensing.lag, noise)
         )
         measured, low_pass = self._readings(trace), trace.low_pass
         smoothing = None if low_pass is None else s.grid.smoothing(equations, low_pass)
@@ -202,20 +202,23 @@ class PredictionError:
         """One run's gains at a parameter vector, which no reading is needed for."""
         equations = equations_of(structure, names, x, s.number, s.added)
         spans = [(a, b - 1) for a, b in s.edges]
-        linear = self._linear_part(equations)
-        return self._gains.of(
-            s.trace, linear, noise, self._sensing(s.trace, equations), spans, self._begun_of(structure)
-        )
+        linear, sensing = self._linear_part(equations), self._sensing(s.trace, equations)
+        begun = self._begun_of(structure, sensing.lag, noise)
+        return self._gains.of(s.trace, linear, noise, sensing, spans, begun)
 
-    def _begun_of(self, structure: Structure) -> StartVariance:
+    def _begun_of(self, structure: Structure, lag: tuple[float, float], noise: Noise) -> StartVariance:
         """How well the start of a stretch is known.
 
+        In rad and rad/s that is so whatever the noise is. Where the gyro's comes from ahead of its low-pass a reading's
+        own, in whose variance all is counted, is a small part of it.
         A gyro's angle counts from where a run begins. A spring has an origin of its own, and a platform that swings
         or is held by friction may begin anywhere about it. Without one, a run that begins at rest begins at zero; were
         that left open, the first readings would throw the angle across the waves of what depends on it.
         """
         at_zero = self._begins_at_zero and "stiffness" not in structure.terms
-        return self._begun._replace(angle=0.0) if at_zero else self._begun
+        begun = self._begun._replace(angle=0.0) if at_zero else self._begun
+        own = 1.0 if self.both else self.bounds.shown_above(noise, lag)
+        return begun if own == 1.0 else StartVariance(*(own * x for x in begun))
 
     def _linear_part(self, equations: Equations) -> LinearPart:
         """The platform as a Kalman filter takes it, with the effects' mean slopes along the motion.
