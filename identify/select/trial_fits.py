@@ -23,6 +23,7 @@ from identify.propose.torque_looks import CandidateTorque, candidate_torques
 from identify.runs.measured_channels import simplicity
 from identify.runs.observability import one_more, shows_a_period
 from identify.select.evidence import WEIGHT, EvidenceModel
+from identify.signals.resonances import resonances_hz
 from identify.signals.spectral_lines import foreign_lines_hz, ringing_hz, rings_hz
 from rig import effects
 from rig.effects.base import Place, Scale
@@ -85,7 +86,7 @@ class TrialFits:
         also = foreign_lines_hz(traces, followed, size_nm, natural_hz)[:FOLLOWED_LINES] if size_nm > 0.0 else ()
         lines = (*lines, *also)
         scale = scale_of(traces, (inertia, damping, stiffness), lines, ringing_hz(traces, natural_hz))
-        return replace(scale, rings_hz=rings_hz(traces, left, natural_hz))
+        return replace(scale, rings_hz=rings_hz(traces, left, natural_hz), modes_hz=resonances_hz(traces, followed))
 
     def names(self, now: Fit) -> list[str]:
         """What may be added, or put in the place of a special case; of an effect that is there, one more of it."""

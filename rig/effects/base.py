@@ -66,6 +66,7 @@ class Scale:
     lines_hz: tuple[float, ...] = ()  # spectral lines of the current residual
     orders: tuple[float, ...] = ()  # lines of the current residual against the angle, periods a turn
     rings_hz: tuple[float, ...] = ()  # frequencies that decay in the residual after the start of runs
+    modes_hz: tuple[float, ...] = ()  # of second masses on the shaft that carry most of the torque nobody recorded
     ringing_hz: float = 0.0  # strongest spectral line of the measured motion next to the natural frequency
 
 

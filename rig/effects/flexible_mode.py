@@ -22,7 +22,7 @@ def _frequencies(scale: Scale) -> tuple[float, ...]:
     highest = 0.35 / scale.step_s
     lowest = max(0.5, 2.0 / scale.duration_s)
     count = 20
-    return tuple(lowest * (highest / lowest) ** (i / (count - 1)) for i in range(count))
+    return (*(lowest * (highest / lowest) ** (i / (count - 1)) for i in range(count)), *scale.modes_hz)
 
 
 def _large(jck: tuple[float, float, float], scale: Scale) -> tuple[LargeStart, ...]:
