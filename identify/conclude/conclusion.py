@@ -22,6 +22,7 @@ from identify.conclude.verdict import sentences_of
 from identify.diagnose.diagnosis import with_diagnosis
 from identify.diagnose.disturbance import disturbance_of
 from identify.estimate.final_fit import FinalFit
+from identify.genetic.per_set import has_arrived
 from identify.model.parameter_fit import reduced_chi_square
 from identify.model.structure import Structure
 from identify.residual import Disturbance
@@ -91,13 +92,18 @@ def conclude(
         explained_fraction=1.0 - _fraction(measured_before, measured_after, floor) if changed else 0.0,
     )
     searched = [g for g in (*(s.genetic for s in per_set), joint) if g is not None]
+    if case.settings.j_dec is None:  # no search gets below its minimum: what is left there is judged as a torque
+        searched = [g for g in searched if not has_arrived(g)]
     reasons = reasons_against_fit(searched if after.sensor_limited else (), final)
     reference, per_set = with_max_error(per_set, case.settings.reference)
     unsettled = measured is None and unexplained and not search.left_open
     seen = _seen_in_torque(case, after) if unsettled else measured
     if seen is not None:
         reasons += reasons_against_disturbance(of_reported(seen, final), case.settings.accept, case.recording.axis)
-    unknown = seen is None or not (measured or seen.depends_on or seen.relative <= _allowed_share(case))
+    # The band of the final errors holds the motion; the other reaches as far as the sensor tells a torque from noise.
+    shares = [x for x in (left, None if seen is None else seen.relative) if x is not None]
+    small = seen is not None and min(shares) <= _allowed_share(case)
+    unknown = seen is None or not (measured or seen.depends_on or small)
     material = unexplained and unknown  # what is left, and nothing shows what it would do to J, C and K
     found = Identification(
         accepted=not reasons and not material, reasons=(), axis=case.recording.axis, before=result_before,
@@ -123,7 +129,7 @@ def _allowed_share(case: Case) -> float:
 
 def _seen_in_torque(case: Case, after: FinalFit) -> Disturbance | None:
     """What a free run leaves above the sensor's noise, as a torque: whether it matters is no question of the sensor."""
-    if case.regression is None or case.colour is not None:
+    if case.regression is None:
         return None
     fit = case.regression.solve(after.structure, after.structure.shapes_of(after.values))
     floor_nm = case.regression.noise_floor_nm(after.values)

@@ -113,6 +113,12 @@ def _j_dec(minimum: float, floor: float) -> float:
     return max(ALLOWANCE * floor, ARRIVED * minimum) if near else ALLOWANCE * floor
 
 
+def has_arrived(run: GeneticRun) -> bool:
+    """Whether a search has come as low as its objective goes."""
+    lowest = run.closed_form_objective
+    return lowest is not None and run.objective <= ARRIVED * lowest
+
+
 def search_range(
     terms: Sequence[str], optimum: Array, centre: Mapping[str, float], factor: float
 ) -> tuple[Array, Array]:

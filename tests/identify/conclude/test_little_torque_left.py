@@ -38,3 +38,28 @@ def test_a_hundred_thousandth_of_the_torque_is_accepted_though_a_free_run_shows_
     assert found.verdict.effects == ()
     for value, true in zip(found.final.parameters.values(), TRUTH, strict=True):
         assert value.value == pytest.approx(true, abs=4.0 * value.std_error)
+
+
+def beside_a_mode(torque_nm: float, low_hz: float, high_hz: float, seed: int) -> Run:
+    """A chirp or a sine beside a small second mass, with a torque noise of 0.3 % that is not recorded."""
+    time = np.arange(8001) * 1e-3
+    rng = np.random.default_rng(seed)
+    known = torque_nm * np.sin(2 * np.pi * (low_hz * time + (high_hz - low_hz) / 16.0 * time**2))
+    noise = lfilter([0.3], [1.0, -0.7], rng.standard_normal(len(time)))
+    real = TorqueSignal(time, known + 0.003 * 0.7 * torque_nm * noise / np.std(noise))
+    platform = Platform(0.01, 0.02, 5.0, {"flexible_mode": {"inertia": 2e-4, "frequency": 30.0, "ratio": 0.015}})
+    rate = simulate(platform, time, real, start=(0.0, 0.0), substeps=16).sensed_rate_rad_s
+    return Run(
+        f"{low_hz:g} Hz", time, np.ones(len(time), bool), torque_time_s=time, torque_nm=known,
+        rate_rad_s=rate + 3e-3 * rng.standard_normal(len(time)),
+    )  # fmt: skip
+
+
+def test_what_depends_on_nothing_and_is_a_thousandth_of_the_torque_refuses_no_model_that_is_right() -> None:
+    sets = ((0.3, 1.0, 50.0), (0.3, 2.0, 2.0), (0.4, 5.0, 5.0), (0.6, 12.0, 12.0))
+    runs = tuple(beside_a_mode(*given, seed=i) for i, given in enumerate(sets))
+    declared = Platform(0.009, 0.03, 5.5)
+    found = identify(Recording(runs), declared, IdentifyConfig(candidates=("flexible_mode", "coulomb_friction")))
+    assert found.verdict.effects == ("flexible_mode",)
+    assert found.final.parameters["inertia"].value == pytest.approx(0.01, rel=2e-3)
+    assert found.accepted, found.reasons

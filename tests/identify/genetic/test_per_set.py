@@ -11,8 +11,9 @@ from identify.estimate.final_fit import FinalFit, by_output_error
 from identify.estimate.initial_guess import Start, first_guess
 from identify.estimate.regression import Regression, fit
 from identify.genetic.linear_traces import linear_traces
-from identify.genetic.per_set import _j_dec, condense, each_set, genetic, search_range
+from identify.genetic.per_set import _j_dec, condense, each_set, genetic, has_arrived, search_range
 from identify.model.structure import Structure
+from identify.results import GeneticRun
 from identify.runs.holdout import split
 from identify.signals.trace import Trace
 from rig.config.identify import IdentifyConfig
@@ -135,3 +136,13 @@ def test_a_set_that_hardly_tells_its_numbers_apart_says_so_in_their_errors(seed:
 @pytest.mark.parametrize(("minimum", "j_dec"), [(1.0, 1.2), (1.3, 1.326), (2.5, 1.2)])
 def test_j_dec_is_out_of_reach_only_of_a_set_that_is_far_from_the_noise(minimum: float, j_dec: float) -> None:
     assert _j_dec(minimum, 1.0) == pytest.approx(j_dec)
+
+
+@pytest.mark.parametrize(("objective", "lowest", "arrived"), [(1.01, 1.0, True), (1.2, 1.0, False), (1.0, None, False)])
+def test_a_search_has_arrived_where_its_objective_goes_no_lower(
+    objective: float, lowest: float | None, arrived: bool
+) -> None:
+    run = GeneticRun(
+        "1 Hz", {}, {}, {}, objective, 0.5, 5, False, np.ones(3), {}, {}, closed_form_objective=lowest,
+    )  # fmt: skip
+    assert has_arrived(run) is arrived
