@@ -80,6 +80,8 @@ class Dependence:
         The torque there, N m, without the constant and the linear part that J, C and K take up.
     wave_on, wave_hz
         Of what is "angle", "rate" or "torque" times a wave over the time: which, and the wave's frequency.
+    changes
+        "inertia", "damping" or "friction" where one of these, changing with what it depends on, gives this torque.
     """
 
     on: str
@@ -90,6 +92,7 @@ class Dependence:
     shape_nm: tuple[float, ...] = ()
     wave_on: str = ""
     wave_hz: float | None = None
+    changes: str = ""
 
 
 @dataclass(frozen=True)

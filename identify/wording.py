@@ -223,7 +223,7 @@ def residual_torque_sentence(left: Disturbance, axis: str) -> str:
         )
     each = joined(
         [
-            f"{number(100.0 * d.relative, 2)} % depends on the {depends_on(d.on, axis)}{_wave(d)}"
+            f"{number(100.0 * d.relative, 2)} % depends on the {depends_on(d.on, axis)}{_how(d, axis)}"
             for d in left.depends_on
         ]
     )
@@ -232,8 +232,10 @@ def residual_torque_sentence(left: Disturbance, axis: str) -> str:
     return f"The final model leaves a residual {torque} of {size}. Of the {torque}, {each}.{change}"
 
 
-def _wave(part: Dependence) -> str:
-    """Of what changes as a wave: what, and how fast."""
+def _how(part: Dependence, axis: str) -> str:
+    """Of what changes as a wave: what, and how fast; of what changes with a quantity: what."""
+    if part.changes:
+        return f", as if the {part.changes} changed with the {depends_on(part.on, axis)}"
     if part.wave_hz is None:
         return ""
     return f", as if something changed the {PULSATING[part.wave_on]} at {number(part.wave_hz, 3)} Hz"

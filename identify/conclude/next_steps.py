@@ -45,6 +45,11 @@ RUN = {
     ),
 }
 RUN["direction"] = RUN["rate"]
+CHANGING = {
+    "inertia": "a crank, a linkage, a load that shifts or a second axis that stands elsewhere",
+    "damping": "a magnet or a brake that is not centred, or a gap that changes",
+    "friction": "a seal, a bearing or a cable that rubs at some places more than at others",
+}
 # What the steps above are called in the `excitation` section: only where a campaign was played is there one.
 RAMP, SCALES, ABRUPT = "kind: ramp_hold_release", "repeat_scales: [0.5, 0.25]", "soft_start_s: 0"
 KEYS = {
@@ -186,9 +191,8 @@ def _by_dependence(found: Identification) -> list[str]:
             "before the torque."
         ]
     free = torque_free(found)
-    pulsating = _pulsating(found)
-    if pulsating:
-        return [*late, pulsating]
+    if changing := _pulsating(found) or _changing(found):
+        return [*late, changing]
     name, sentence = _dependence(found)
     runs = DECAY_RUN if free else RUN
     if name not in runs:
@@ -211,6 +215,19 @@ def _pulsating(found: Identification) -> str:
     return (
         f"Something changes the {PULSATING[most.wave_on]} at {number(most.wave_hz, 3)} Hz: look for a machine, a fan "
         "or a controller that runs at this frequency, switch it off and record the runs again."
+    )
+
+
+def _changing(found: Identification) -> str:
+    """Where to look for an inertia, a damping or a friction that changes with the angle; empty where none does."""
+    parts = () if found.disturbance is None else found.disturbance.depends_on
+    most = max(parts, key=lambda d: d.relative, default=None)
+    if most is None or not most.changes:
+        return ""
+    position = "position" if found.axis == "linear" else "angle"
+    return (
+        f"The {most.changes} changes with the {position}: look for {CHANGING[most.changes]}. Record runs about "
+        f"several {position}s with a small travel: J, C and K of each are those there."
     )
 
 

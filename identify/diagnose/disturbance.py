@@ -42,6 +42,7 @@ class FreeForm:
     of_each_run: bool = False  # columns that belong to one run each
     wave_on: str = ""
     wave_hz: float | None = None
+    changes: str = ""
 
 
 def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float, unit: str) -> Disturbance:
@@ -83,8 +84,9 @@ def _dependence(
     size = float(np.sqrt(share)) * fit.held_nm
     at, shape_nm = tuple(term.at.tolist()), tuple((term.shape @ gains).tolist())
     found = Dependence(
-        term.on, size, size / regression.torque_nm, float(norm.sf(sure)), at, shape_nm, term.wave_on, term.wave_hz
-    )
+        term.on, size, size / regression.torque_nm, float(norm.sf(sure)), at, shape_nm, term.wave_on, term.wave_hz,
+        term.changes,
+    )  # fmt: skip
     return found, _moved(regression, fit, richer, term, gains)
 
 
@@ -106,7 +108,7 @@ def _moved(
     if term.on == "torque":
         return regression.moved_by(fit, term.columns @ gains)
     moved = {n: v - fit.values[n] for n, v in richer.values.items() if n in fit.values}
-    if term.on == "angle" and ("stiffness",) in moved:
+    if term.on == "angle" and term.at.size and ("stiffness",) in moved:
         slope = np.gradient(term.shape @ gains, term.at)
         start = float(np.clip(0.0, term.at[0], term.at[-1]))
         moved[("stiffness",)] += float(np.interp(start, term.at, slope))
@@ -139,6 +141,7 @@ def free_forms(regression: TorqueRegression) -> list[FreeForm]:
     if float(np.max(time)) > 0.0:
         angle = regression.series()[0]
         out += [_over_time(time), _changing(time, [angle, rate, *([] if regression.torque_free else [torque])])]
+        out += _along_angle(regression)
     out.append(_history(rate, run, regression))
     return [f for f in out if f.columns.shape[1] > 0 and np.all(np.isfinite(f.columns))]
 
@@ -199,6 +202,33 @@ def _changing(time: Array, series: Sequence[Array]) -> FreeForm:
     return FreeForm(
         "time", np.column_stack([shape * x[:, None] for x in series]), np.zeros(0), np.zeros((0, 2 * len(series)))
     )  # fmt: skip
+
+
+def _along_angle(regression: TorqueRegression) -> list[FreeForm]:
+    """Inertia, damping and dry friction that change with the angle: a crank, an eccentric magnet, a seal.
+
+    A turning inertia that changes with the angle gives the square of the rate besides, by half its slope (Lagrange).
+    """
+    angle, rate, acceleration = regression.series()[:3]
+    free, _ = _free_splines(angle)
+    if free is None:
+        return []
+
+    def shape(at: Array) -> Array:
+        return np.column_stack([at, free(at)])
+
+    beside = 1e-4 * float(np.ptp(angle))
+    slope = (shape(angle + beside) - shape(angle - beside)) / (2.0 * beside)
+    here = shape(angle)
+    here = here - np.mean(here, axis=0)
+    slow = 0.05 * float(np.sqrt(np.mean(rate**2))) + 1e-300
+    terms = {
+        "inertia": here * acceleration[:, None] + 0.5 * slope * rate[:, None] ** 2,
+        "damping": here * rate[:, None],
+        "friction": here * np.tanh(rate / slow)[:, None],
+    }
+    none = np.zeros((0, here.shape[1]))
+    return [FreeForm("angle", columns, np.zeros(0), none, changes=what) for what, columns in terms.items()]
 
 
 def _pulsating(regression: TorqueRegression, fit: TorqueFit) -> list[FreeForm]:
