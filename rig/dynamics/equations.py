@@ -160,14 +160,14 @@ class Equations:
             return 0.0
         at = 0.0
         for _ in range(_NEWTON):
-            here, beside = self._pull_nm(at), self._pull_nm(at + _BESIDE_RAD)
+            here, beside = self.pull_nm(at), self.pull_nm(at + _BESIDE_RAD)
             slope = (beside - here) / _BESIDE_RAD
             if not slope > 0.0 or not abs(at) < 2.0 * np.pi:
                 return 0.0
             at -= here / slope
-        return at if abs(self._pull_nm(at)) <= 1e-9 * self.jck[2] else 0.0
+        return at if abs(self.pull_nm(at)) <= 1e-9 * self.jck[2] else 0.0
 
-    def _pull_nm(self, angle_rad: float) -> float:
+    def pull_nm(self, angle_rad: float) -> float:
         """Torque by which spring and loads pull a platform back that stands still at an angle."""
         return float(integrator.pull(angle_rad, self.rest_states(0.0, 0.0), self.jck, *self._loads_only()))
 
