@@ -38,6 +38,7 @@ from identify.runs.measured_channels import offer_of, with_causes
 from identify.runs.observability import why_unseen
 from identify.runs.reduced import reduced
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_without_motion
+from identify.runs.turns import describe_turns
 from identify.runs.usable import runs_used
 from identify.select.field_search import Found, Judged, search_in_torque, with_free_form
 from identify.select.free_form_residual import curves_left, dependence_on
@@ -108,7 +109,7 @@ class _Identifier:
         channels = channels_of(runs)
         traces = [prepare(r, i, noise, full_scale=beyond, channels=channels) for i, r in enumerate(runs)]
         self.traces, self.left_out = runs_used(traces, recording.noise is not None, recording.axis, say)
-        self.left_out += describe_excerpts(recording.runs, say)
+        self.left_out += describe_excerpts(recording.runs, say) + describe_turns(recording.runs, say)
         self.torque_free, self.search = free, cast(LikelihoodSearch | None, None)  # that runs, or has run
         self.torque_noise_above_hz: float | None = None
         self.curve: tuple[Dependence, dict[str, float]] | None = None  # over what is left of a decay

@@ -104,7 +104,7 @@ def identify(
         _require_readings(asked)
         section = asked.config.recorded
         assert section is not None  # it was built with one
-        recording = recording_of(time_s, arrays, asked.readings, asked.uses, section.torque_hold)
+        recording = recording_of(time_s, arrays, asked.readings, asked.uses, section.torque_hold, section.axis)
         recording = replace(recording, axis=section.axis, noise=section.noise)
     try:
         found = _found(recording, asked, progress)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from rig.arrays import Array, Mask
 from rig.errors import InputError, RecordingError
 from rig.recording.checks import check_run
 from rig.recording.run import Recording, Run
+from rig.recording.turns import on_one_turn, unwrapped
 from rig.signals import TorqueHold, Use
 
 SAMPLED = ("torque_nm", "rate_rad_s", "angle_rad", "valid")
@@ -24,12 +25,13 @@ _ARGUMENT = {"time": "time_s", "torque": "torque_nm", "rate": "rate_rad_s", "ang
 _FACTOR = re.compile(r"(?:set )?recorded\.scale\.(time|torque|rate|angle): ([-\d.e]+)")
 _UNIT = re.compile(r"recorded\.scale\.(time|torque|rate|angle)")
 _COLUMN = re.compile(r"recorded\.columns\.(time|torque|rate|angle)")
+_SPLIT = re.compile(r"split the run there \(.*?\)")
 _BELIEVED = re.compile(r"; if it is in seconds.*$")
 
 
 def recording_of(
     time_s: Any, arrays: Mapping[str, Any], channels: Mapping[str, Any], uses: Sequence[Use] | None,
-    torque_hold: TorqueHold,
+    torque_hold: TorqueHold, axis: Literal["rotary", "linear"] = "rotary",
 ) -> Recording:  # fmt: skip
     """A Recording of arrays.
 
@@ -43,6 +45,8 @@ def recording_of(
         Readings of further channels by name, each as ``time_s`` is.
     uses
         "auto", "fit" or "holdout" for every run, or None.
+    axis
+        An angle of a rotary one may begin anew after a turn.
 
     Raises
     ------
@@ -60,7 +64,7 @@ def recording_of(
         one = {name: values[i] for name, values in given.items()}
         run = _run(f"run {i + 1}", times, one, {name: values[i] for name, values in read.items()}, where)
         runs.append(replace(run, torque_hold=torque_hold))
-    return with_uses(Recording(tuple(checked(run, count is not None) for run in runs)), uses)
+    return with_uses(Recording(_checked(runs, axis, count is not None), axis), uses)
 
 
 def with_uses(recording: Recording, uses: Sequence[Use] | None) -> Recording:
@@ -78,13 +82,22 @@ def checked_recording(recording: Recording) -> Recording:
     """A recording made by hand, its arrays converted and checked. Raises InputError."""
     if not recording.runs:
         raise InputError("the recording has no runs: pass at least one")
-    return replace(recording, runs=tuple(checked(_converted(run), True) for run in recording.runs))
+    return replace(recording, runs=_checked([_converted(run) for run in recording.runs], recording.axis, True))
 
 
-def checked(run: Run, named: bool) -> Run:
-    """The run, once it is known to be fit for identification. Raises InputError, with the cure for arrays."""
+def _checked(runs: Sequence[Run], axis: Literal["rotary", "linear"], named: bool) -> tuple[Run, ...]:
+    """The runs, once they are known to be fit for identification; an angle within one turn is made to go on.
+
+    Raises InputError, with the cure for arrays.
+    """
+    each = [_checked_run(run, axis, named) for run in runs]
+    return tuple(on_one_turn(each) if axis == "rotary" else each)
+
+
+def _checked_run(run: Run, axis: Literal["rotary", "linear"], named: bool) -> Run:
+    path = Path(run.name)
     try:
-        return check_run(run, Path(run.name))
+        return check_run(unwrapped(run, path) if axis == "rotary" else run, path, axis=axis)
     except RecordingError as error:
         text = str(error)
         raise InputError(for_arrays(text if named else text.removeprefix(f"{run.name}: "))) from None
@@ -95,6 +108,7 @@ def for_arrays(message: str) -> str:
     text = _FACTOR.sub(lambda m: f"multiply {_ARGUMENT[m[1]]} by {m[2]}", message)
     text = _UNIT.sub(lambda m: f"the unit of {_ARGUMENT[m[1]]}", text)
     text = _COLUMN.sub(lambda m: _ARGUMENT[m[1]], _BELIEVED.sub("", text))
+    text = _SPLIT.sub("pass the samples before and behind it as two runs", text)
     text = text.replace(", or name no angle column and delete that one", ", or leave angle_rad out")
     return text.replace(", or widen from_s and to_s", "")
 

@@ -18,7 +18,7 @@ from identify.model.parameters import Name
 from identify.model.structure import UNIT, Shapes, Structure
 from identify.runs.holdout import Split
 from identify.signals.low_pass import EDGE_PERIODS, low_pass
-from identify.signals.trace import UPSAMPLING, Trace
+from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace
 from rig import effects
 from rig.arrays import Array
 from rig.effects.base import Effect, Place, Scale
@@ -51,7 +51,9 @@ class LowPassedTorque:
         self.by_gyro = all(t.channel == "rate" for t in traces)  # whose low-pass delays the motion that is seen here
         self.runs = 1 + max(t.number for t in traces)
         step = max(1, int(1.0 / (SAMPLES_A_PERIOD * cutoff_hz * traces[0].step_s)))
-        self._rows = [self._rows_of(t, step) for t in traces]
+        self._rows = [self._rows_of(t, step, t.keep & ~self._standing(t)) for t in traces]
+        if sum(map(len, self._rows)) < SHORTEST_STRETCH:  # no motion stands out of the noise: rest cannot be told
+            self._rows = [self._rows_of(t, step, t.keep) for t in traces]
         declared = any(t.run.use == "holdout" for t in traces)
         fit = [np.asarray(m)[r] for m, r in zip(split.fit, self._rows, strict=True)]
         judge = [np.asarray(m)[r] for m, r in zip(split.judge, self._rows, strict=True)]
@@ -74,12 +76,13 @@ class LowPassedTorque:
         """Which block of its run every sample belongs to."""
         return np.minimum(self._rows[i] * FOLD_BLOCKS // max(len(self.traces[i].measured), 1), FOLD_BLOCKS - 1)
 
-    def _rows_of(self, t: Trace, step: int) -> Any:
+    def _rows_of(self, t: Trace, step: int, counts: Any) -> Any:
+        """Every ``step``-th sample of a run that ``counts``, (m,), clear of what the low-pass does at its ends."""
         edge = int(np.ceil(EDGE_PERIODS / (self.cutoff_hz * t.step_s)))
         n = len(t.measured)
         rows = np.arange(0, n, step)
         inside = (rows >= edge) & (rows < n - edge) if n > 20 * edge else np.ones(len(rows), dtype=bool)
-        return rows[inside & t.keep[rows] & ~self._standing(t)[rows]]
+        return rows[inside & counts[rows]]
 
     def _standing(self, t: Trace) -> Any:
         """Samples at which the platform stands or turns back, (n,).

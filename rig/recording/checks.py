@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from rig.errors import RecordingError
 from rig.recording.consistency import check_angle_against_rate, check_time_unit
 from rig.recording.run import Run
 from rig.recording.table import Table
+from rig.recording.turns import check_jumps
 from rig.signals import TorqueHold, Use
 
 MIN_SAMPLES = 40  # in a row, fewer tell nothing of two states, three parameters and the noise
@@ -86,10 +87,18 @@ def check_channel(table: Table, name: str, values: Array, count: int) -> None:
         )
 
 
-def check_run(run: Run, path: Path, scales_given: Collection[str] = ()) -> Run:
+def check_run(
+    run: Run, path: Path, scales_given: Collection[str] = (), axis: Literal["rotary", "linear"] = "rotary"
+) -> Run:
     """``run`` itself, once it is known to be fit for identification.
 
-    ``scales_given`` names the quantities whose factor the user stated: a stated time scale is believed.
+    Parameters
+    ----------
+    scales_given
+        The quantities whose factor the user stated: a stated time scale is believed.
+    axis
+        What an angle that jumps is called.
+
     Raises RecordingError.
     """
     _check_fields(run, path)
@@ -101,6 +110,7 @@ def check_run(run: Run, path: Path, scales_given: Collection[str] = ()) -> Run:
             f"{path}: {count} valid samples, at least {MIN_SAMPLES} are needed: record longer, or widen from_s and to_s"
         )
     _check_motion(run, path)
+    check_jumps(run, path, axis)
     agrees = check_angle_against_rate(run, path)
     if "time" not in scales_given and not agrees:
         check_time_unit(run, path)

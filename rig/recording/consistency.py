@@ -63,10 +63,8 @@ def _without_trend(time_s: Array, values: Array) -> Array:
 def check_angle_against_rate(run: Run, path: Path) -> bool:
     """True where angle and rate were seen to agree, False where that cannot be told.
 
-    Raises RecordingError where they disagree by a constant factor, where one is the other's column, or where the angle
-    wraps.
+    Raises RecordingError where they disagree by a constant factor or where one is the other's column.
     """
-    _check_wrap(run, path)
     compared = angle_over_rate(run)
     if compared is None:
         return False
@@ -102,21 +100,6 @@ def _meaning(factor: float) -> tuple[str, str]:
         if abs(factor / known - 1) < 0.03:
             return meaning, cure
     return "one of them is scaled wrongly", f"recorded.scale.rate: {factor:.4g} if the angle is right"
-
-
-def _check_wrap(run: Run, path: Path) -> None:
-    if run.angle_rad is None:
-        return
-    angle = run.angle_rad[run.valid]
-    jump = np.abs(np.diff(angle))
-    largest = float(jump.max(initial=0.0))
-    usual = float(np.quantile(jump, 0.99)) if len(jump) > 100 else largest
-    if abs(largest - 2 * np.pi) < 0.3 and usual < 1.0 and np.ptp(angle) < 7.0:
-        i = int(np.argmax(jump))
-        raise RecordingError(
-            f"{path}: the angle jumps by a whole turn ({angle[i]:.3f} to {angle[i + 1]:.3f} rad, sample {i}): "
-            "unwrap it (numpy.unwrap) before export, or leave the angle out where there is a rate"
-        )
 
 
 def check_time_unit(run: Run, path: Path) -> None:

@@ -16,6 +16,7 @@ from rig.recording.readers import read_file
 from rig.recording.run import Recording, Run, printable
 from rig.recording.stated_units import with_factors_in_place
 from rig.recording.tables import factors_of, run_of_table
+from rig.recording.turns import on_one_turn, unwrapped
 
 if TYPE_CHECKING:
     from rig.config.load import LoadedConfig
@@ -50,6 +51,7 @@ def read_recording(loaded: LoadedConfig) -> Recording:
     wrong = faults.lines() or _fitted_and_held_out(runs, sources)
     if wrong:
         raise RecordingError("\n".join(wrong))
+    runs = on_one_turn(runs)
     runs = shortened(runs, own, section.most_samples)
     info = {"backend": "recorded", "files": [str(path) for path in sources], "config_text": loaded.text}
     return Recording(_with_unique_names(runs), axis=section.axis, noise=section.noise, info=info)
@@ -77,7 +79,10 @@ def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> tup
             factors = factors_of(content, section)
             run = run_of_table(content, factors, entry, section)
         try:
-            runs.append(check_run(_window(run, entry, path), path, section.scale.model_fields_set))
+            run = _window(run, entry, path)
+            if section.axis == "rotary" and not isinstance(content, Run):
+                run = unwrapped(run, path)
+            runs.append(check_run(run, path, section.scale.model_fields_set, section.axis))
         except RecordingError as error:
             raise RecordingError(with_factors_in_place(str(error), factors)) from None
     return runs, any(isinstance(content, Run) for content in contents)

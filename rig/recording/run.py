@@ -81,6 +81,8 @@ class Run:
         already taken off ``time_s``; the rounding is in ``rate_rad_s`` (see ``rig.dynamics.low_pass``).
     excerpt
         What was made of a recording longer than ``recorded.most_samples``; None for all of it as it is.
+    wraps
+        How often the angle began anew after a whole turn in the file; in ``angle_rad`` it goes on.
     """
 
     name: str
@@ -100,6 +102,7 @@ class Run:
     rate_corner_hz: float | None = None
     rate_delay_s: float | None = None
     excerpt: Excerpt | None = None
+    wraps: int = 0
 
     @property
     def duration_s(self) -> float:

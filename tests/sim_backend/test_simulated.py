@@ -197,6 +197,7 @@ def test_a_run_has_no_place_where_truth_could_hide() -> None:
         "use", "min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "channels", "causes",
             "rate_corner_hz", "rate_delay_s",  # of the gyro's data sheet
             "excerpt",  # of a long recording
+            "wraps",  # of an angle within one turn
     }  # fmt: skip
     assert not played(config()).recording.runs[0].channels
 

@@ -14,12 +14,13 @@ import numpy as np
 from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.recording.checks import check_run
-from rig.recording.long.blocks import BlockTable, block_table
+from rig.recording.long.blocks import BLOCK, BlockTable, block_table
 from rig.recording.long.excerpt import Taken, take
 from rig.recording.run import Run
 from rig.recording.stated_units import with_factors_in_place
 from rig.recording.table import MAX_SAMPLES
 from rig.recording.tables import channels_of, columns_of, factors_of
+from rig.recording.turns import Turns, turns_along
 
 if TYPE_CHECKING:
     from rig.config.recorded import RecordedConfig, RecordedRun
@@ -49,8 +50,14 @@ class LongFile:
         def rows(first: int, last: int) -> Mapping[str, Array]:
             table = self.table.rows(first, last)
             channels = channels_of(table, section)
-            return columns_of(table, factors, section) | {CHANNEL + name: x for name, x in channels.items()}
+            found = columns_of(table, factors, section) | {CHANNEL + name: x for name, x in channels.items()}
+            if turns is not None:
+                found["angle"] = found["angle"] + turns.added(first, last)
+            return found
 
+        turns: Turns | None = None
+        if section.axis == "rotary" and "angle" in factors:
+            turns = turns_along(rows, self.first, self.last, BLOCK)
         taken = take(rows, self.first, self.last, self.most, held=held)
         named = Run(
             name=path.name,
@@ -62,9 +69,9 @@ class LongFile:
             added_inertia_kg_m2=entry.added_inertia_kg_m2,
             causes={name: config.channel(name) for name, config in section.columns.channels.items()},
         )
-        run = with_columns(named, taken)
+        run = dataclasses.replace(with_columns(named, taken), wraps=0 if turns is None else len(turns.rows))
         try:
-            return check_run(run, path, section.scale.model_fields_set)
+            return check_run(run, path, section.scale.model_fields_set, section.axis)
         except RecordingError as error:
             raise RecordingError(with_factors_in_place(str(error), factors)) from None
 

@@ -156,12 +156,12 @@ ARRAYS: dict[str, tuple[Columns, str, str, str, str]] = {
         "1.3 times as fast",
         "recorded.scale.rate: 1.3",
     ),
-    "angle wraps": (
-        changed(angle_rad=np.mod(30 * T + np.pi, 2 * np.pi) - np.pi, rate_rad_s=np.full(500, 30.0) + T),
+    "angle jumps": (
+        changed(angle_rad=0.05 * np.sin(40 * T) + 0.5 * (T > 0.2)),
         "",
         "",
-        "jumps by a whole turn",
-        "unwrap it",
+        "jumps between two samples by 0.49",
+        "split the run there",
     ),
     "columns of different length": (
         changed(torque_nm=np.ones(499)),

@@ -1,0 +1,221 @@
+"""An angle that begins anew after every turn, made one that goes on; one that jumps by no whole turn, refused.
+
+Within a turn a sensor says where the platform is, not how often it has gone round. As long as the platform turns by
+less than a quarter of a turn from sample to sample, the missing turn is known: it is the one that leaves the motion as
+slow as it is before and after.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from rig.arrays import Array
+from rig.errors import RecordingError
+from rig.recording.run import Run
+from rig.units import TURN
+
+NEAR_TURN = 0.05  # of a turn: a jump that differs more from a whole turn, the motion aside, is none
+SLOW_STEP_RAD = TURN / 4  # from sample to sample, nearly always: four samples a turn
+NEIGHBOURS = 7  # steps about one that tell the motion there
+BESIDE = 1.5  # times the usual spacing: samples that stand farther apart have lost some between them
+MOST_JUMPS = 8  # in one run; more of them are what the platform does, or noise
+JUMP_RATIO = 4.0  # times the largest step that the run makes elsewhere: no inertia lets a rate come and go like that
+JUMP_SIGMAS = 30.0  # times the noise
+MEDIAN = 0.6745  # of the size of a normal variable, in standard deviations
+
+
+def turns_missing(time_s: Array, angle_rad: Array, good: Any) -> Array:
+    """How many whole turns have to be added to every sample so that the angle goes on, shape (n,), 0 at the first.
+
+    Parameters
+    ----------
+    time_s, angle_rad
+        Shape (n,).
+    good
+        Shape (n,), boolean: samples that are there; others go with the one before.
+
+    All zero where the angle never jumps by a whole turn, or moves too fast for that to be told.
+    """
+    out = np.zeros(len(angle_rad))
+    at = np.flatnonzero(good)
+    if len(at) <= NEIGHBOURS:
+        return out
+    spacing, step = np.diff(time_s[at]), np.diff(angle_rad[at])
+    if not np.all(spacing > 0.0):
+        return out  # the check of the times says so
+    within = _within_half_a_turn(step)
+    if float(np.quantile(np.abs(within), 0.99)) >= SLOW_STEP_RAD:
+        return out
+    foretold = spacing * _running_median(within / spacing)
+    turns = -np.rint((step - foretold) / TURN)
+    together = spacing < BESIDE * np.median(spacing)
+    near = np.abs(step + TURN * turns - foretold) < NEAR_TURN * TURN
+    sure = together & near & (turns != 0.0)
+    if not np.any(sure):
+        return out  # over a hole alone nobody knows how far the platform turned
+    added = np.where(sure | ~together, turns, 0.0)
+    out[at[1:]] = added
+    return np.cumsum(out)
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Where in a file of many rows the angle begins anew: ``rows``, shape (k,), and whole turns to add from each on."""
+
+    rows: Array
+    turns: Array
+
+    def added(self, first: int, last: int) -> Array:
+        """Radians to add to rows first..last (excluded), shape (n,)."""
+        behind = np.searchsorted(self.rows, np.arange(first, last), side="right")
+        return TURN * np.concatenate([[0.0], self.turns])[behind]
+
+
+def turns_along(rows: Callable[[int, int], Mapping[str, Array]], first: int, last: int, block: int) -> Turns:
+    """As ``turns_missing``, of rows first..last (excluded), ``block`` of them at a time.
+
+    Parameters
+    ----------
+    rows
+        Gives "time", "angle" and "valid" of some rows, each of shape (n,).
+    """
+    where, added = [], []
+    lead = 2 * NEIGHBOURS  # rows that a block shares with the one before and the one behind
+    for at in range(first, last, block):
+        begin, end = max(first, at - lead), min(last, at + block + lead)
+        columns = rows(begin, end)
+        good = columns["valid"].astype(bool) & np.isfinite(columns["time"]) & np.isfinite(columns["angle"])
+        missing = np.diff(turns_missing(columns["time"], columns["angle"], good), prepend=0.0)
+        own = begin + np.flatnonzero(missing)
+        inside = (own >= at) & (own < at + block)
+        where.append(own[inside])
+        added.append(missing[own[inside] - begin])
+    return Turns(np.concatenate(where), np.cumsum(np.concatenate(added)))
+
+
+def unwrapped(run: Run, path: Path) -> Run:
+    """The run with an angle that goes on over whole turns, and how often it had begun anew.
+
+    Raises RecordingError for an angle within one turn that moves too far between samples to be unwrapped.
+    """
+    if run.angle_rad is None or len(run.angle_rad) != len(run.time_s):
+        return run
+    good = run.valid & np.isfinite(run.angle_rad)
+    _check_turns(path, run.time_s, run.angle_rad, good)
+    turns = turns_missing(run.time_s, run.angle_rad, good)
+    wraps = int(np.count_nonzero(np.diff(turns)))
+    if not wraps:
+        return run
+    return replace(run, angle_rad=run.angle_rad + TURN * turns, wraps=wraps)
+
+
+def on_one_turn(runs: Sequence[Run]) -> list[Run]:
+    """Runs of one sensor that begins anew after a turn, all counted from the same zero.
+
+    Which whole turn a run was in nobody recorded: the first is put within half a turn of zero, the others as near to it
+    as can be. Runs of a sensor that never began anew stay as they are.
+    """
+    if not any(run.wraps for run in runs):
+        return list(runs)
+    out, near = [], 0.0
+    for run in runs:
+        if run.angle_rad is None:
+            out.append(run)
+            continue
+        middle = float(np.median(run.angle_rad[run.valid & np.isfinite(run.angle_rad)]))
+        turns = np.rint((middle - near) / TURN)
+        near = middle - TURN * turns
+        out.append(replace(run, angle_rad=run.angle_rad - TURN * turns))
+    return out
+
+
+def check_jumps(run: Run, path: Path, axis: Literal["rotary", "linear"]) -> None:
+    """Raise RecordingError where the angle jumps between two samples and stays there.
+
+    A sample that stands apart alone is none of this: it is left out later.
+    """
+    if run.angle_rad is None:
+        return
+    at = np.flatnonzero(run.valid & np.isfinite(run.angle_rad))
+    time_s, angle = run.time_s[at], run.angle_rad[at]
+    found = _jumps(time_s, angle)
+    if not len(found):
+        return
+    unit = "rad" if axis == "rotary" else "m"
+    what = "the angle" if axis == "rotary" else "the position"
+    where = ", ".join(f"by {angle[i + 1] - angle[i]:.4g} {unit} at {time_s[i + 1]:.6g} s" for i in found)
+    no_turn = ", which is no whole turn" if axis == "rotary" else ""
+    ratio = f"more than {JUMP_RATIO:g} times as far as in any other step"
+    first = found[0]
+    split = f"to_s: {time_s[first]:.9g} and a second run of the same file with from_s: {time_s[first + 1]:.9g}"
+    scale = "; where the sensor begins anew after a turn there, correct recorded.scale.angle" if no_turn else ""
+    raise RecordingError(
+        f"{path}: {what} jumps between two samples {where}{no_turn} and {ratio}: "
+        f"split the run there ({split}), or leave the angle out where there is a rate{scale}"
+    )
+
+
+def _check_turns(path: Path, time_s: Array, angle_rad: Array, good: Any) -> None:
+    """Raise RecordingError for an angle within one turn that moves too far between samples to be unwrapped."""
+    at = np.flatnonzero(good)
+    step = np.diff(angle_rad[at])
+    if len(step) <= NEIGHBOURS or np.ptp(angle_rad[at]) > (1.0 + NEAR_TURN) * TURN:
+        return
+    within = float(np.quantile(np.abs(_within_half_a_turn(step)), 0.99))
+    largest = int(np.argmax(np.abs(step)))
+    if within < SLOW_STEP_RAD or abs(step[largest]) < TURN / 2:
+        return
+    raise RecordingError(
+        f"{path}: the angle stays within one turn and changes by up to {abs(step[largest]):.4g} rad from one sample to "
+        f"the next (at {time_s[at[largest + 1]]:.6g} s): where it begins anew after each turn cannot be told, as that "
+        "needs at least four samples a turn: sample faster, name the right column under recorded.columns.angle, or "
+        "leave the angle out where there is a rate"
+    )
+
+
+def _jumps(time_s: Array, angle: Array) -> Array:
+    """The samples behind which the angle has jumped to another level, shape (k,); at most ``MOST_JUMPS``."""
+    none = np.zeros(0, dtype=int)
+    if len(angle) < 50:
+        return none
+    step, spacing = np.diff(angle), np.diff(time_s)
+    # How far lines through two samples on either side miss each other half way between samples i and i + 1: once
+    # through the nearest two, once through the two behind those, which a single wrong sample leaves out.
+    near, far = np.zeros(len(step)), np.zeros(len(step))
+    y = angle
+    near[3:-3] = _missed(y[2:-5], y[3:-4], y[4:-3], y[5:-2], 0.5)
+    far[3:-3] = _missed(y[0:-7], y[1:-6], y[6:-1], y[7:], 2.5)
+    level = np.where(near * far > 0.0, np.minimum(np.abs(near), np.abs(far)), 0.0)
+    level[spacing > BESIDE * np.median(spacing)] = 0.0
+    noise = float(np.median(np.abs(np.diff(angle, 4)))) / (MEDIAN * np.sqrt(70.0))
+    left, usual, peaks = level.copy(), np.abs(step), []
+    for _ in range(MOST_JUMPS):
+        i = int(np.argmax(left))
+        if left[i] < JUMP_SIGMAS * noise or left[i] == 0.0:
+            break
+        peaks.append(i)
+        left[max(0, i - 5) : i + 6] = 0.0
+        usual[i] = 0.0
+    resolution = float(np.min(np.abs(step)[step != 0.0], initial=np.inf))  # of an encoder that stands from time to time
+    ordinary = max(float(np.max(usual)), resolution)
+    return np.array(sorted(i for i in peaks if level[i] > JUMP_RATIO * ordinary), dtype=int)
+
+
+def _missed(a: Array, b: Array, c: Array, d: Array, reach: float) -> Array:
+    return (c - reach * (d - c)) - (b + reach * (b - a))
+
+
+def _within_half_a_turn(step: Array) -> Array:
+    return step - TURN * np.rint(step / TURN)
+
+
+def _running_median(values: Array) -> Array:
+    """Of ``NEIGHBOURS`` values about each, the first and last repeated at the ends, shape (n,)."""
+    half = NEIGHBOURS // 2
+    padded = np.pad(values, half, mode="edge")
+    return np.median(np.lib.stride_tricks.sliding_window_view(padded, NEIGHBOURS), axis=1)
