@@ -33,6 +33,11 @@ ResultsDir = Annotated[
     Path, typer.Argument(metavar="DIR", help="The results folder of a campaign.", show_default=False)
 ]
 
+EffectFiles = Annotated[
+    list[Path] | None,
+    typer.Option("--effects", metavar="FILE", help="A file with effects of your own, whose code is run; repeatable."),
+]
+
 app = new_app("Prepare, check and play a campaign on the rig. To identify from it: identify-run.")
 
 
@@ -143,19 +148,22 @@ def export(
     to: Annotated[
         str,
         typer.Option(
-            metavar="FORMAT", help="csv, mat, npz; of the CAN log: blf, asc, mf4; compensation: C, Python, a table."
+            metavar="FORMAT",
+            help="csv, mat or npz: the runs; blf, asc or mf4: the CAN log; compensation (or C, python, table): "
+            "the compensating torque as C, Python and a table.",
         ),
     ],
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="A folder that does not exist yet. Default: FROM/export_FORMAT/")
     ] = None,
+    effects: EffectFiles = None,
 ) -> None:
     """Write a recording for other programs at full precision, with a rig.yaml that reads it back."""
 
     def command() -> int:
         from commands.rig.export import export_recording
 
-        return export_recording(source, to, out)
+        return export_recording(source, to, out, effects or [])
 
     raise typer.Exit(run_to_exit_code(command))
 
@@ -163,12 +171,7 @@ def export(
 @app.command()
 def report(
     folder: ResultsDir,
-    effects: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--effects", metavar="FILE", help="A file with effects of your own, whose code is run; repeatable."
-        ),
-    ] = None,
+    effects: EffectFiles = None,
 ) -> None:
     """Rebuild report.html of a results folder."""
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from identify.report.files import result_json
+from identify.report.own_effects import make_effects_known
 from identify.report.page import report_html
 from identify.report.replaced_file import replace_file
 from identify.report.report_data import FILE, ReportData, read_report_data
 from identify.report.result_file import RESULT, read_result
 from identify.results import Identification
-from rig import effects
 from rig.errors import RecordingError, UsageError
 from rig.recording.hdf5 import read_recording_h5
 from rig.recording.run import Recording
@@ -41,7 +41,7 @@ def rebuild_report(folder: Path, effect_files: Sequence[Path] = ()) -> Path:
             raise RecordingError(f"{folder}: has no {file}: {cure}. The report is left as it is")
     result, data = read_result(folder / RESULT), read_report_data(folder / FILE)
     _check_same(folder, result, data.identification)
-    _make_effects_known(data, effect_files)
+    make_effects_known(data, effect_files)
     recording = _identified_from(folder / RECORDING, data)
     page = report_html(data.identification, recording, data.name)
     try:
@@ -70,29 +70,6 @@ def _check_same(folder: Path, result: dict[str, Any], identification: Identifica
 
 def _numbers(model: Any) -> Any:
     return [model.get(key) for key in ("parameters", "effect_parameters")] if isinstance(model, dict) else model
-
-
-def _make_effects_known(data: ReportData, files: Sequence[Path]) -> None:
-    for file in files:
-        effects.read_file(file)
-    effects.declare_channels(data.channels)
-    missing = [name for name in dict.fromkeys(_effects_in(data.identification)) if not effects.exists(name)]
-    if missing:
-        sources = {data.own_effects[name] for name in missing if name in data.own_effects}
-        asked = " ".join(f"--effects {source}" for source in sorted(sources)) or "--effects FILE"
-        raise UsageError(
-            f"the model has effects of your own ({', '.join(missing)}), and code is not run unasked: give their file "
-            f"with {asked}"
-        )
-
-
-def _effects_in(identification: Identification) -> Iterator[str]:
-    """The effects that the page looks up."""
-    yield from identification.verdict.effects
-    for model in (identification.before, identification.after):
-        if model is not None:
-            yield from model.effect_parameters
-            yield from model.platform.effects if model.platform is not None else ()
 
 
 def _identified_from(path: Path, data: ReportData) -> Recording:
