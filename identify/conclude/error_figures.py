@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from identify.model.structure import Structure
 from identify.results import Errors, ModelResult, NoiseFloor
 from identify.runs.holdout import Split
 from identify.select.field_search import TorqueErrors
-from identify.signals.low_pass import EDGE_PERIODS
+from identify.signals.low_pass import clear_of_ends
 from identify.signals.trace import Trace, pooled_noise
 from rig.recording.run import Array
 
@@ -37,7 +36,7 @@ def measure(traces: Sequence[Trace], split: Split, fitted: FinalFit, cutoff_hz: 
     if fitted.sensor_limited:  # friction along the model's own motion knows when it sticks; a noisy sign does not
         structure, along = Structure(structure.terms), linear_traces(traces, fitted)
     parts = [torque_residual(t, structure, fitted.values, cutoff_hz) for t in along]
-    inside = [_inside(t, cutoff_hz) for t in traces]
+    inside = [clear_of_ends(len(t.measured), t.step_s, cutoff_hz) for t in traces]
     everything = relative(parts, [m & i for m, i in zip(split.everything, inside, strict=True)])
     held = relative(parts, [m & i for m, i in zip(split.judge, inside, strict=True)])
     if fitted.free_run is None:
@@ -67,15 +66,6 @@ def in_torque(measured: Measured, found: TorqueErrors) -> Measured:
     return replace(measured, errors=errors)
 
 
-def _inside(trace: Trace, cutoff_hz: float) -> Any:
-    """Samples far enough from the ends of the run for a zero-phase filter to have settled, (n,)."""
-    edge = int(np.ceil(EDGE_PERIODS / (cutoff_hz * trace.step_s)))
-    out = np.ones(len(trace.measured), dtype=bool)
-    if len(out) > 20 * edge:
-        out[:edge] = out[-edge:] = False
-    return out
-
-
 def _free_run(traces: Sequence[Trace], split: Split, simulated: Sequence[Array]) -> tuple[float | None, float | None]:
     error, signal = [], []
     for trace, mask, y in zip(traces, split.judge, simulated, strict=True):
@@ -91,7 +81,8 @@ def _free_run(traces: Sequence[Trace], split: Split, simulated: Sequence[Array])
 
 def floor_of(traces: Sequence[Trace], split: Split, fitted: FinalFit, cutoff_hz: float, given: bool) -> NoiseFloor:
     """What the sensor's noise alone leaves."""
-    masks = split.everything
+    inside = [clear_of_ends(len(t.measured), t.step_s, cutoff_hz) for t in traces]
+    masks = [m & i for m, i in zip(split.everything, inside, strict=True)]
     torque = torque_noise_floor(traces, fitted.values, cutoff_hz, masks)
     return NoiseFloor(
         residual_rms_torque=None if np.isnan(torque) else torque,

@@ -1,10 +1,17 @@
-"""Short moments of a campaign that hold most of what a model leaves: somebody touched the bench, something slipped."""
+"""Short moments of a campaign that hold most of what a model leaves: somebody touched the bench, something slipped.
+
+A moment is something that happens once and that the excitation does not explain. What a model lacks leaves most where
+the motion is largest, as at the resonance that a chirp crosses; so a moment has to leave far more than other moments do
+in which the excitation moves the platform as far and as fast, and drives it as hard.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identify.diagnose.memory import RunResiduals
 from identify.results import Moment
@@ -17,6 +24,21 @@ MIN_TOTAL_SHARE = 0.5  # of the residual's power of all runs that they hold toge
 RARE = 0.1  # of all windows at most
 MIN_EVENT_SHARE = 0.05  # of the power: a moment with less is not told
 MANY = 3  # moments: more are no accident
+ALIKE = 0.8  # of the angle, rate and torque of a window; what grows as the fifth power of them differs by 0.8^10 = 1/9
+
+
+@dataclass(frozen=True)
+class _Windows:
+    """One run in windows: squares of the residual in each, and how large angle, rate and torque are about it.
+
+    ``power`` and ``there`` (whether at least half of its samples count) have shape (windows,), ``size`` (windows, 3).
+    """
+
+    window_s: float
+    end_s: float
+    power: Array
+    there: NDArray[np.bool_]
+    size: Array
 
 
 def moments(
@@ -29,25 +51,40 @@ def moments(
     return tuple(_of_one([_windows(r, i) for r in runs], begins_s, names) for i in range(2))
 
 
-def _windows(run: RunResiduals, model: int) -> tuple[float, Array]:
-    """Length of a window in s, and the squares in each, (windows,)."""
+def _windows(run: RunResiduals, model: int) -> _Windows:
     length = max(1, round(WINDOW_S / run.step_s))
+    at = np.arange(0, len(run.use), length)
     squares = np.where(run.use, run.left[:, model], 0.0) ** 2
-    return length * run.step_s, np.add.reduceat(squares, np.arange(0, len(squares), length))
+    counts = np.add.reduceat(run.use.astype(int), at)
+    # What the excitation makes of the platform, which a push does not; as measured where no model runs near the data.
+    known = bool(np.any(run.rate_by_model))
+    moved = (run.angle_by_model, run.rate_by_model) if known else (run.angle, run.rate)
+    peaks = [np.maximum.reduceat(np.abs(x), at) for x in (moved[0] - np.median(moved[0]), moved[1], run.torque)]
+    about = [np.max(np.stack([np.append(x[1:], x[-1]), x, np.append(x[0], x[:-1])]), axis=0) for x in peaks]
+    end_s = (len(run.use) - 1) * run.step_s
+    return _Windows(
+        length * run.step_s, end_s, np.add.reduceat(squares, at), counts >= 0.5 * length, np.stack(about, axis=1)
+    )
 
 
-def _of_one(runs: Sequence[tuple[float, Array]], begins_s: Sequence[float], names: Sequence[str]) -> tuple[Moment, ...]:
-    total = sum(float(np.sum(power)) for _, power in runs)
+def _of_one(runs: Sequence[_Windows], begins_s: Sequence[float], names: Sequence[str]) -> tuple[Moment, ...]:
+    total = sum(float(np.sum(run.power)) for run in runs)
+    sizes = np.concatenate([run.size[run.there] for run in runs])
+    powers = np.concatenate([run.power[run.there] for run in runs])
     found, count = [], 0
-    for (window_s, power), begin_s, name in zip(runs, begins_s, names, strict=True):
-        loud = power > EVENT_POWER_RATIO * float(np.median(power))
-        if len(power) < MIN_WINDOWS or total <= 0.0 or not np.any(loud):
+    for run, begin_s, name in zip(runs, begins_s, names, strict=True):
+        if np.sum(run.there) < MIN_WINDOWS or total <= 0.0:
             continue
+        loud = run.power > EVENT_POWER_RATIO * float(np.median(run.power[run.there]))
+        for k in np.flatnonzero(loud):
+            alike = np.all(sizes >= ALIKE * run.size[k], axis=1)
+            loud[k] = np.any(alike) and run.power[k] > EVENT_POWER_RATIO * float(np.median(powers[alike]))
         count += int(np.sum(loud))
         edges = np.flatnonzero(np.diff(np.concatenate([[0], loud.astype(int), [0]])))
         for a, b in edges.reshape(-1, 2).tolist():
-            share = float(np.sum(power[a:b])) / total
-            found.append(Moment(name, begin_s + a * window_s, begin_s + b * window_s, share))
-    rare = count <= RARE * sum(len(power) for _, power in runs)
+            share = float(np.sum(run.power[a:b])) / total
+            end_s = min(b * run.window_s, run.end_s)
+            found.append(Moment(name, begin_s + a * run.window_s, begin_s + end_s, share))
+    rare = count <= RARE * sum(len(run.power) for run in runs)
     main = sorted((m for m in found if m.share > MIN_EVENT_SHARE), key=lambda m: -m.share)[:MANY]
     return tuple(main) if rare and sum(m.share for m in main) > MIN_TOTAL_SHARE else ()

@@ -17,7 +17,7 @@ from scipy.interpolate import make_interp_spline
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.results import RunTraces
-from identify.signals.low_pass import EDGE_PERIODS, low_pass
+from identify.signals.low_pass import clear_of_ends, low_pass
 from identify.signals.trace import UPSAMPLING, Trace
 from rig import effects
 from rig.effects.base import Place
@@ -103,10 +103,11 @@ def torque_residual(
     residual = torque - model - low_pass(extra, cutoff_hz, trace.step_s)
     if trace.biased:
         t = trace.step_s * np.arange(len(angle))
+        clear = trace.keep & clear_of_ends(len(angle), trace.step_s, cutoff_hz)
         for first, last in trace.stretches:  # behind a gap the angle begins anew
             here = slice(first, last + 1)
             nuisance = np.column_stack([np.ones(last + 1 - first), t[here]])
-            keep = trace.keep[here]
+            keep = clear[here] if np.sum(clear[here]) > len(nuisance) // 2 else trace.keep[here]
             fitted = np.linalg.lstsq(nuisance[keep], residual[here][keep], rcond=None)[0]
             residual[here] -= nuisance @ fitted
     return TorqueResidual(residual, torque)
@@ -181,9 +182,8 @@ def dependence(traces: Sequence[RunTraces], cutoff_hz: float) -> dict[str, float
         y = trace.torque_residual_after
         values = trace.measured - trace.simulated_after if y is None else np.asarray(y)
         time = trace.time_s - trace.time_s[0]
-        edge = EDGE_PERIODS / cutoff_hz if y is not None else 0.0
-        edge = edge if time[-1] > 20.0 * edge else 0.0
-        use = (trace.keep > 0.0) & np.isfinite(values) & (time >= edge) & (time <= time[-1] - edge)
+        inside = clear_of_ends(len(time), float(time[-1]) / max(len(time) - 1, 1), None if y is None else cutoff_hz)
+        use = (trace.keep > 0.0) & np.isfinite(values) & inside
         left.append(np.where(use, values, 0.0))
         known.append(use)
     use = np.concatenate(known) if known else np.zeros(0, dtype=bool)

@@ -11,6 +11,8 @@ from identify.conclude.error_figures import Measured, floor_of, measure
 from identify.estimate.final_fit import by_output_error
 from identify.model.structure import Structure
 from identify.runs.holdout import split
+from identify.signals.low_pass import clear_of_ends
+from rig.recording.run import Recording, Run
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
 
 JCK = {("inertia",): TRUTH[0], ("damping",): TRUTH[1], ("stiffness",): TRUTH[2]}
@@ -53,3 +55,29 @@ def test_the_floor_says_where_it_comes_from(given: bool, source: str) -> None:
     assert floor.source == source
     assert floor.holdout_rate_rms == pytest.approx(NOISE_RAD_S, rel=0.1)
     assert floor.residual_rms_torque == pytest.approx(0.01, rel=0.5), "hundredths of a newton metre"
+
+
+@pytest.mark.parametrize("biased", [False, True])
+def test_what_the_low_pass_does_at_the_ends_of_a_short_run_is_in_no_figure(biased: bool) -> None:
+    """Runs of a platform without a spring that are cut out of its motion, thirteen edges of the filter long."""
+    runs = []
+    for f in (1.1, 1.9):
+        time = 2e-3 * np.arange(5000)
+        phase = 2 * np.pi * f * time + 0.7
+        rate, acceleration = 3.0 * np.sin(phase) + 0.4 * time, 3.0 * 2 * np.pi * f * np.cos(phase) + 0.4
+        angle = -3.0 / (2 * np.pi * f) * (np.cos(phase) - np.cos(0.7)) + 0.2 * time**2
+        read = rate + 1e-4 * np.random.default_rng(1).standard_normal(5000)
+        runs.append(
+            Run(
+                f"{f} Hz", time, np.ones(5000, dtype=bool), read, None if biased else angle,
+                time, 2.0 * acceleration + 0.5 * rate,
+            )
+        )  # fmt: skip
+    traces = traces_of(Recording(tuple(runs), noise=1e-4))
+    parts = split(traces)
+    values = {("inertia",): 2.0, ("damping",): 0.5}
+    fitted = by_output_error(traces, Structure(("inertia", "damping")), values, 0.1, parts.final, parts.everything)
+    found, floor = measure(traces, parts, fitted, 4.0).errors, floor_of(traces, parts, fitted, 4.0, True)
+    assert found.residual_rms_torque is not None and floor.residual_rms_torque is not None
+    assert found.residual_torque_relative is not None and found.residual_torque_relative < 1e-3
+    assert clear_of_ends(400, 2e-3, 4.0).sum() == 200 and clear_of_ends(400, 2e-3, None).all()

@@ -54,6 +54,31 @@ def test_what_is_spread_over_a_run_is_no_moment(sort: str) -> None:
     assert moments([run(left)], [0.0], ["a"]) == ((), ())
 
 
+def moving(left: Array, rate: Array) -> RunResiduals:
+    """A run whose model follows a rate, with its angle and a torque in proportion."""
+    angle = STEP_S * np.cumsum(rate)
+    return RunResiduals(STEP_S, angle, rate, rate, angle, rate, np.ones(len(left), bool), np.column_stack([left, left]))
+
+
+@pytest.mark.parametrize("power", [1, 2, 3])
+def test_the_resonance_that_a_chirp_crosses_is_no_moment_and_a_touch_beside_it_is(power: int) -> None:
+    time = STEP_S * np.arange(7500)
+    crossing = 0.1 + np.exp(-(((time - 6.2) / 0.9) ** 2))
+    rate = crossing * np.sin(2 * np.pi * (0.5 * time + 0.25 * time**2))
+    left = 0.01 * white(7, 15.0) + 5.0 * np.sign(rate) * np.abs(rate) ** power
+    assert moments([moving(left, rate)], [0.0], ["a"])[0] == ()
+    left[5500:5750] += 60.0
+    (found,) = moments([moving(left, rate)], [0.0], ["a"])[0]
+    assert (found.from_s, found.to_s) == (pytest.approx(11.0, abs=0.26), pytest.approx(11.5, abs=0.26))
+
+
+def test_a_moment_ends_with_its_run() -> None:
+    left = white(8)
+    left[-250:] += 40.0
+    (found,) = moments([run(left[:4990])], [2.0], ["a"])[0]
+    assert found.to_s == pytest.approx(2.0 + 4989 * STEP_S)
+
+
 def test_samples_that_do_not_count_are_no_moment() -> None:
     left = white(6)
     left[1000:1100] = 1e6

@@ -25,13 +25,12 @@ from identify.report.page.plots.motion import motion_error
 from identify.report.page.plots.thinning import binned_mean, cloud, line
 from identify.report.page.quantities import QUANTITIES, axis
 from identify.results import Identification, RunTraces
-from identify.signals.low_pass import EDGE_PERIODS
+from identify.signals.low_pass import clear_of_ends
 from rig.recording.run import Array
 
 LINE_POINTS = 4000  # drawn against time, of all runs together
 SMOOTH_BINS = 60  # of a run: the slow part of what is left
 CLOUD_POINTS = 1500  # drawn of a cloud
-SHORTEST_EDGES = 20.0  # a run has to be this many times longer
 FORWARD, BACKWARD = SETS[2], SETS[3]
 Which = Literal["before", "after"]
 NAMES = {"before": "declared model", "after": "final model"}
@@ -59,21 +58,13 @@ def torque_known(traces: Sequence[RunTraces]) -> bool:
     return all(t.torque_residual_before is not None and t.torque_residual_after is not None for t in traces)
 
 
-def settled(trace: RunTraces, lowpass_hz: float | None) -> Array:
-    """1.0 where the zero-phase low-pass stands clear of the ends of the run, (n,)."""
-    inside = np.ones(len(trace.time_s))
-    edge = 0.0 if not lowpass_hz else EDGE_PERIODS / lowpass_hz
-    time = trace.time_s - trace.time_s[0]
-    if time[-1] > SHORTEST_EDGES * edge:
-        inside[(time < edge) | (time > time[-1] - edge)] = 0.0
-    return inside
-
-
 def residual_of(trace: RunTraces, which: Which, torque: bool, lowpass_hz: float | None = None) -> Array:
     """Torque residual where there is one, else measured less simulated; NaN where a sample does not count."""
     if torque:
         found = trace.torque_residual_before if which == "before" else trace.torque_residual_after
-        return np.where(trace.keep * settled(trace, lowpass_hz) > 0.0, np.asarray(found), np.nan)
+        step_s = float(trace.time_s[-1] - trace.time_s[0]) / max(len(trace.time_s) - 1, 1)
+        inside = clear_of_ends(len(trace.time_s), step_s, lowpass_hz)
+        return np.where((trace.keep > 0.0) & inside, np.asarray(found), np.nan)
     return motion_error(trace, trace.simulated_before if which == "before" else trace.simulated_after)
 
 
