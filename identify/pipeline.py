@@ -32,13 +32,12 @@ from identify.rivals.stand_ins import with_stand_ins
 from identify.rivals.whiteness_test import fails_whiteness_test, leaves_more_than_noise
 from identify.rivals.whole_runs import FreeRunFitter
 from identify.runs.clipping import full_scale_of
-from identify.runs.excerpts import describe_excerpts
 from identify.runs.holdout import Split, split
 from identify.runs.measured_channels import offer_of, with_causes
 from identify.runs.observability import why_unseen
+from identify.runs.reading import describe_reading
 from identify.runs.reduced import reduced
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_without_motion
-from identify.runs.turns import describe_turns
 from identify.runs.usable import runs_used
 from identify.select.field_search import Found, Judged, search_in_torque, with_free_form
 from identify.select.free_form_residual import curves_left, dependence_on
@@ -109,7 +108,7 @@ class _Identifier:
         channels = channels_of(runs)
         traces = [prepare(r, i, noise, full_scale=beyond, channels=channels) for i, r in enumerate(runs)]
         self.traces, self.left_out = runs_used(traces, recording.noise is not None, recording.axis, say)
-        self.left_out += describe_excerpts(recording.runs, say) + describe_turns(recording.runs, say)
+        self.left_out += describe_reading(recording.runs, say)
         self.torque_free, self.search = free, cast(LikelihoodSearch | None, None)  # that runs, or has run
         self.torque_noise_above_hz: float | None = None
         self.curve: tuple[Dependence, dict[str, float]] | None = None  # over what is left of a decay

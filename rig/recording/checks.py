@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.arrays import Array, Mask
 from rig.errors import RecordingError
@@ -34,34 +35,40 @@ def missing_column(table: Table, quantity: str, names: Sequence[str], *, mapped:
     return RecordingError(f"{table.path}: has no column {wanted}{hint} (it has: {there}): {cure}")
 
 
-def check_samples(table: Table, columns: Mapping[str, Array]) -> Mask:
-    """Check lengths and numbers of the columns as stored; gives the mask of valid samples, shape (n,).
-
-    Raises RecordingError.
-    """
+def check_lengths(table: Table, columns: Mapping[str, Array]) -> None:
+    """Raise RecordingError where the columns are not equally long."""
     lengths = {quantity: len(values) for quantity, values in columns.items()}
     if len(set(lengths.values())) > 1:
         listed = ", ".join(f"{quantity} {count}" for quantity, count in lengths.items())
         raise RecordingError(
             f"{table.path}: columns of different length ({listed}): export one value per sample for each"
         )
+
+
+def check_samples(table: Table, columns: Mapping[str, Array], rows: NDArray[np.intp]) -> Mask:
+    """Check the numbers of the columns as stored; gives the mask of valid samples, shape (n,).
+
+    ``rows``, shape (n,), are their places in the table. Raises RecordingError.
+    """
     flags = columns.get("valid")
     if flags is not None and not np.isfinite(flags).all():
-        at = table.label(int(np.argmin(np.isfinite(flags))))
+        at = table.label(int(rows[np.argmin(np.isfinite(flags))]))
         raise RecordingError(f"{table.path}: {at}: valid is empty: write 1 for a good sample, 0 for a lost one")
     if flags is not None and not np.isin(flags, (0.0, 1.0)).all():
         i = int(np.argmin(np.isin(flags, (0.0, 1.0))))
         raise RecordingError(
-            f"{table.path}: {table.label(i)}: valid is {flags[i]:g}: write 1 for a good sample, 0 for a lost one"
+            f"{table.path}: {table.label(int(rows[i]))}: valid is {flags[i]:g}: write 1 for a good sample, 0 for a "
+            "lost one"
         )
-    valid = np.ones(lengths["time"], dtype=bool) if flags is None else flags != 0
+    valid = np.ones(len(rows), dtype=bool) if flags is None else flags != 0
     for quantity, values in columns.items():
         bad = valid & ~(np.abs(values) <= MAX_VALUE)
         if quantity != "valid" and bad.any():
             i = int(np.argmax(bad))
             cure = "correct it, delete the row, or mark the row valid = 0"
             raise RecordingError(
-                f"{table.path}: {table.label(i)}: {quantity} is {values[i]:g} ({bad.sum()} such samples): {cure}"
+                f"{table.path}: {table.label(int(rows[i]))}: {quantity} is {values[i]:g} ({bad.sum()} such samples): "
+                f"{cure}"
             )
     return valid
 

@@ -15,7 +15,7 @@ from rig.recording.long.files import long_files, shortened
 from rig.recording.readers import read_file
 from rig.recording.run import Recording, Run, printable
 from rig.recording.stated_units import with_factors_in_place
-from rig.recording.tables import factors_of, run_of_table
+from rig.recording.tables import between, factors_of, run_of_table
 from rig.recording.turns import on_one_turn, unwrapped
 
 if TYPE_CHECKING:
@@ -74,12 +74,11 @@ def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> tup
     for content in contents:
         factors: Mapping[str, float] = {}
         if isinstance(content, Run):
-            run = _own_run(path, content, entry, section)
+            run = _window(_own_run(path, content, entry, section), entry, path)
         else:
             factors = factors_of(content, section)
             run = run_of_table(content, factors, entry, section)
         try:
-            run = _window(run, entry, path)
             if section.axis == "rotary" and not isinstance(content, Run):
                 run = unwrapped(run, path)
             runs.append(check_run(run, path, section.scale.model_fields_set, section.axis))
@@ -106,16 +105,11 @@ def _window(run: Run, entry: RecordedRun, path: Path) -> Run:
     """The samples between from_s and to_s, both included."""
     if entry.from_s is None and entry.to_s is None:
         return run
-    start = -math.inf if entry.from_s is None else entry.from_s
-    end = math.inf if entry.to_s is None else entry.to_s
-    keep = (run.time_s >= start) & (run.time_s <= end)
-    if not keep.any():
-        raise RecordingError(
-            f"{path}: no sample between from_s = {start:g} and to_s = {end:g}: "
-            f"the file runs from {run.time_s.min():g} to {run.time_s.max():g} s"
-        )
+    keep = between(run.time_s, entry, path)
     cut = None
     if run.torque_time_s is not None:
+        start = -math.inf if entry.from_s is None else entry.from_s
+        end = math.inf if entry.to_s is None else entry.to_s
         cut = (run.torque_time_s >= start) & (run.torque_time_s <= end)
     return dataclasses.replace(
         run,

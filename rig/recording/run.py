@@ -42,6 +42,34 @@ class Excerpt:
 
 
 @dataclass(frozen=True)
+class Missing:
+    """Rows of a file in which a needed column has no value.
+
+    Attributes
+    ----------
+    before, after
+        How many are left out at the beginning and at the end.
+    within
+        How many between those count as lost.
+    quantities
+        What has no value there.
+    between
+        Quantities that stand in rows of their own and are read between them by straight lines.
+    """
+
+    before: int = 0
+    after: int = 0
+    within: int = 0
+    quantities: tuple[str, ...] = ()
+    between: tuple[str, ...] = ()
+
+    @property
+    def told(self) -> bool:
+        """Whether there is anything to say of it."""
+        return bool(self.before or self.after or self.within or self.between)
+
+
+@dataclass(frozen=True)
 class Run:
     """One stretch of motion, played or recorded; all arrays are one-dimensional and read-only by custom.
 
@@ -83,6 +111,8 @@ class Run:
         What was made of a recording longer than ``recorded.most_samples``; None for all of it as it is.
     wraps
         How often the angle began anew after a whole turn in the file; in ``angle_rad`` it goes on.
+    missing
+        What was left out for want of a value; None where nothing was.
     """
 
     name: str
@@ -103,6 +133,7 @@ class Run:
     rate_delay_s: float | None = None
     excerpt: Excerpt | None = None
     wraps: int = 0
+    missing: Missing | None = None
 
     @property
     def duration_s(self) -> float:

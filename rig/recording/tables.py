@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rig.arrays import Array
-from rig.recording.checks import check_channel, check_samples, missing_column
+from rig.arrays import Array, Mask
+from rig.errors import RecordingError
+from rig.recording.checks import check_channel, check_lengths, check_samples, missing_column
+from rig.recording.missing import Rows, lost_within, read_between, with_values
 from rig.recording.run import Run
 from rig.recording.stated_units import column_named, factor_of
 from rig.recording.table import Table
@@ -29,27 +34,38 @@ DEFAULT_NAMES: Mapping[Quantity, Mapping[str, float]] = {
 
 
 def columns_of(table: Table, factors: Mapping[str, float], section: RecordedConfig) -> dict[str, Array]:
-    """Every quantity that the file has, in SI units, and "valid", each of shape (n,).
+    """Every quantity that rows of a file have, in SI units, and "valid", each of shape (n,).
 
-    Raises RecordingError for a sample that is said to be valid and is not a number.
+    A row without a value is lost. Raises RecordingError where a column "valid" says that it is not.
     """
-    names = _names(table, section)
-    values = table.read(list(names.values()))
-    columns: dict[str, Array] = {quantity: values[name] for quantity, name in names.items()}
-    valid = check_samples(table, columns)
-    scaled: dict[str, Array] = {
-        q: x if factors[q] == 1.0 else x * factors[q] for q, x in columns.items() if q != "valid"
-    }
-    return {**scaled, "valid": valid.astype(float)}
+    columns, at = _as_stored(table, section)
+    return _checked(table, Rows(lost_within(columns), at), factors)
+
+
+def time_of(table: Table, factors: Mapping[str, float], section: RecordedConfig) -> Array:
+    """The times in s alone, not checked, shape (n,)."""
+    name = _names(table, section)["time"]
+    return table.read([name])[name] * factors["time"]
 
 
 def run_of_table(table: Table, factors: Mapping[str, float], entry: RecordedRun, section: RecordedConfig) -> Run:
-    """The whole table as a run, not yet checked. Raises RecordingError."""
-    columns = columns_of(table, factors, section)
-    valid = columns["valid"].astype(bool)
+    """The table between from_s and to_s as a run, not yet checked.
+
+    Raises RecordingError. What lies outside from_s and to_s may hold anything.
+    """
+    columns, at = _as_stored(table, section)
     channels = channels_of(table, section)
     for name, x in channels.items():
-        check_channel(table, name, x, len(valid))
+        check_channel(table, name, x, len(at))
+    inside = between(columns["time"] * factors["time"], entry, table.path)
+    rows = with_values(Rows(columns, at).only(inside), table)
+    if rows.missing and rows.missing.between:
+        stamps = columns["time"]
+        channels = {name: read_between(stamps, x, stamps[rows.at]) for name, x in channels.items()}
+    else:
+        channels = {name: x[rows.at] for name, x in channels.items()}
+    columns = _checked(table, rows, factors)
+    valid = columns["valid"].astype(bool)
     time_s, rate, angle, torque = (columns.get(q) for q in ("time", "rate", "angle", "torque"))
     assert time_s is not None  # _names refuses a table without time
     keep = np.isfinite(time_s)  # a lost sample may have lost its time too
@@ -68,7 +84,39 @@ def run_of_table(table: Table, factors: Mapping[str, float], entry: RecordedRun,
         added_inertia_kg_m2=entry.added_inertia_kg_m2,
         channels={name: values[keep] for name, values in channels.items()},
         causes={name: config.channel(name) for name, config in section.columns.channels.items()},
+        missing=rows.missing,
     )
+
+
+def between(time_s: Array, entry: RecordedRun, path: Path) -> Mask:
+    """The samples between from_s and to_s, both included, shape (n,). Raises RecordingError where there is none."""
+    if entry.from_s is None and entry.to_s is None:
+        return np.ones(len(time_s), dtype=bool)
+    start = -math.inf if entry.from_s is None else entry.from_s
+    end = math.inf if entry.to_s is None else entry.to_s
+    keep = (time_s >= start) & (time_s <= end)
+    if not keep.any():
+        there = time_s[np.isfinite(time_s)]
+        span = f"the file runs from {there.min():g} to {there.max():g} s" if len(there) else "it holds no time"
+        raise RecordingError(f"{path}: no sample between from_s = {start:g} and to_s = {end:g}: {span}")
+    return keep
+
+
+def _as_stored(table: Table, section: RecordedConfig) -> tuple[dict[str, Array], NDArray[np.intp]]:
+    """Every quantity that the file has, as stored, and the numbers of the rows. Raises RecordingError."""
+    names = _names(table, section)
+    values = table.read(list(names.values()))
+    columns: dict[str, Array] = {quantity: values[name] for quantity, name in names.items()}
+    check_lengths(table, columns)
+    return columns, np.arange(len(columns["time"]))
+
+
+def _checked(table: Table, rows: Rows, factors: Mapping[str, float]) -> dict[str, Array]:
+    valid = check_samples(table, rows.columns, rows.at)
+    scaled: dict[str, Array] = {
+        q: x if factors[q] == 1.0 else x * factors[q] for q, x in rows.columns.items() if q != "valid"
+    }
+    return {**scaled, "valid": valid.astype(float)}
 
 
 def channels_of(table: Table, section: RecordedConfig) -> dict[str, Array]:

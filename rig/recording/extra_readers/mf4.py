@@ -43,11 +43,12 @@ def _group(file: Any, index: int) -> Group:
     for i, channel in enumerate(file.groups[index].channels):
         if i == master or str(channel.name).startswith(RAW_CAN):
             continue
-        signal = file.get(group=index, index=i)
+        signal = file.get(group=index, index=i, ignore_invalidation_bits=True)
         values = np.asarray(signal.samples)
         if values.ndim != 1 or values.dtype.kind not in "fiub":
             continue
         if signal.invalidation_bits is not None:
+            # As NaN, and not left out: every channel keeps the times of its group.
             values = np.where(np.asarray(signal.invalidation_bits), np.nan, values.astype(float))
         time_s = np.asarray(signal.timestamps, dtype=float)
         columns[signal.name] = values

@@ -13,6 +13,7 @@ from rig.recording.extra_readers.rasters import Group, one_table, require
 from rig.recording.table import Table
 
 NS = 1e-9
+UNSET = np.datetime64("1904-01-02")  # LabVIEW's zero, and some hours of a time zone
 
 
 def read(path: Path) -> Sequence[Table]:
@@ -22,19 +23,34 @@ def read(path: Path) -> Sequence[Table]:
 
     try:
         file = TdmsFile.read(path)
-        groups = [one for group in file.groups() for one in _groups(group)]
+        begins = [at for group in file.groups() for c in group.channels() if (at := _begin(c)) is not None]
+        first = min(begins, default=None)
+        groups = [one for group in file.groups() for one in _groups(group, first)]
     except Exception as error:
         raise RecordingError(f"{path}: is not a valid TDMS file ({error}): export the recording again") from error
     return [one_table(path, groups)]
 
 
-def _groups(group: Any) -> list[Group]:
-    """The channels of one TDMS group, by their sampling: waveforms of several rates may stand in one."""
+def _begin(channel: Any) -> Any:
+    """When a waveform begins, as datetime64; None where the file does not say."""
+    at = channel.properties.get("wf_start_time")
+    if not isinstance(at, np.datetime64) or np.isnat(at) or at <= UNSET:
+        return None
+    return at.astype("datetime64[ns]")
+
+
+def _groups(group: Any, first: Any) -> list[Group]:
+    """The channels of one TDMS group, by their sampling: waveforms of several rates may stand in one.
+
+    ``first`` is when the first waveform of the file begins; one that does not say when it does begins with it.
+    """
     by_sampling: dict[tuple[float, float, int], list[Any]] = {}
     for channel in group.channels():
         properties = channel.properties
         step = float(properties.get("wf_increment", 0.0) or 0.0)
         offset = float(properties.get("wf_start_offset", 0.0) or 0.0)
+        begin = _begin(channel)
+        offset += 0.0 if begin is None else NS * int((begin - first).astype(np.int64))
         by_sampling.setdefault((step, offset, len(channel)), []).append(channel)
     out = []
     for (step, offset, count), channels in by_sampling.items():

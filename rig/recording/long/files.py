@@ -16,10 +16,10 @@ from rig.errors import RecordingError
 from rig.recording.checks import check_run
 from rig.recording.long.blocks import BLOCK, BlockTable, block_table
 from rig.recording.long.excerpt import Taken, take
-from rig.recording.run import Run
+from rig.recording.run import Missing, Run
 from rig.recording.stated_units import with_factors_in_place
 from rig.recording.table import MAX_SAMPLES
-from rig.recording.tables import channels_of, columns_of, factors_of
+from rig.recording.tables import channels_of, columns_of, factors_of, time_of
 from rig.recording.turns import Turns, turns_along
 
 if TYPE_CHECKING:
@@ -47,10 +47,14 @@ class LongFile:
         factors = factors_of(whole, section)
         held = section.torque_hold == "zero_order"
 
+        lost: dict[tuple[int, int], tuple[int, list[str]]] = {}
+
         def rows(first: int, last: int) -> Mapping[str, Array]:
             table = self.table.rows(first, last)
             channels = channels_of(table, section)
-            found = columns_of(table, factors, section) | {CHANNEL + name: x for name, x in channels.items()}
+            columns = columns_of(table, factors, section)
+            lost[first, last] = _without_a_value(columns, "valid" in factors)
+            found = columns | {CHANNEL + name: x for name, x in channels.items()}
             if turns is not None:
                 found["angle"] = found["angle"] + turns.added(first, last)
             return found
@@ -69,7 +73,14 @@ class LongFile:
             added_inertia_kg_m2=entry.added_inertia_kg_m2,
             causes={name: config.channel(name) for name, config in section.columns.channels.items()},
         )
-        run = dataclasses.replace(with_columns(named, taken), wraps=0 if turns is None else len(turns.rows))
+        starts = range(self.first, self.last, BLOCK)  # as the scan of all rows takes them
+        blocks = [lost.get((at, min(at + BLOCK, self.last)), (0, [])) for at in starts]
+        quantities = dict.fromkeys(q for _, lacking in blocks for q in lacking)
+        missing = Missing(within=sum(count for count, _ in blocks), quantities=tuple(quantities))
+        run = dataclasses.replace(
+            with_columns(named, taken), wraps=0 if turns is None else len(turns.rows),
+            missing=missing if missing.told else None,
+        )  # fmt: skip
         try:
             return check_run(run, path, section.scale.model_fields_set, section.axis)
         except RecordingError as error:
@@ -144,6 +155,14 @@ def with_columns(run: Run, taken: Taken) -> Run:
     )
 
 
+def _without_a_value(columns: Mapping[str, Array], flagged: bool) -> tuple[int, list[str]]:
+    """How many rows of a block are lost for want of a value, and of what; none where a column says which are."""
+    gone = columns["valid"] == 0.0
+    if flagged or not gone.any():
+        return 0, []
+    return int(np.sum(gone)), [q for q, x in columns.items() if np.any(np.isnan(x[gone]))]
+
+
 def _window(table: BlockTable, entry: RecordedRun, section: RecordedConfig) -> tuple[int, int]:
     """First row and the row behind the last one between from_s and to_s; the time increases."""
     if entry.from_s is None and entry.to_s is None:
@@ -151,7 +170,7 @@ def _window(table: BlockTable, entry: RecordedRun, section: RecordedConfig) -> t
     factors = factors_of(table.rows(), section)
 
     def time_at(row: int) -> float:
-        return float(columns_of(table.rows(row, row + 1), factors, section)["time"][0])
+        return float(time_of(table.rows(row, row + 1), factors, section)[0])
 
     start = -math.inf if entry.from_s is None else entry.from_s
     end = math.inf if entry.to_s is None else entry.to_s

@@ -50,7 +50,7 @@ TEXTS = {
         "a row of units that are not",
     ),
     "underscore": (line_replaced(7, "0.005,1_000,2,0"), "line 7, column 'torque_nm': '1_000'", "correct it"),
-    "empty field": (line_replaced(7, "0.005,,2,0"), "line 7: torque is nan", "mark the row valid = 0"),
+    "empty time": (line_replaced(7, ",1,2,0"), "line 7: time is nan", "mark the row valid = 0"),
     "cut row": (GOOD[: GOOD.rindex(",")], "line 501 has 3 fields where the header names 4", "may be cut"),
     "row too long": (line_replaced(7, "0.005,1,2,0,9"), "line 7 has 5 fields", "complete or delete"),
     "decimal commas between commas": (
@@ -81,8 +81,8 @@ def test_text_that_cannot_be_trusted_is_refused(tmp_path: Path, case: str) -> No
 
 
 def test_the_line_is_right_behind_comments_and_blank_lines(tmp_path: Path) -> None:
-    (tmp_path / "run.csv").write_text("# made by hand\n\n" + line_replaced(7, "0.005,,2,0"))
-    assert "line 9: torque is nan" in refusal(tmp_path, "run.csv")
+    (tmp_path / "run.csv").write_text("# made by hand\n\n" + line_replaced(7, ",1,2,0"))
+    assert "line 9: time is nan" in refusal(tmp_path, "run.csv")
 
 
 def npy(values: Any) -> bytes:

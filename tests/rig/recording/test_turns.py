@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from identify.api.runs import recording_of
-from identify.runs.turns import describe_turns
+from identify.runs.reading import describe_turns
 from rig.errors import InputError
 from rig.recording.turns import turns_missing
 from tests.rig.recording.support import csv_of, read, refusal

@@ -85,9 +85,20 @@ def test_memory_does_not_grow_with_the_recording(tmp_path: Path) -> None:
 def test_a_valid_sample_that_is_no_number_is_named_by_its_place_in_the_file(tmp_path: Path) -> None:
     write_h5(tmp_path / "r.h5", 600_000, 10_000.0)
     with h5py.File(tmp_path / "r.h5", "r+") as file:
-        file["rate_rad_s"][555_555] = np.nan
-    with pytest.raises(RecordingError, match="index 555555: rate is nan"):
+        file["rate_rad_s"][555_555] = np.inf
+    with pytest.raises(RecordingError, match="index 555555: rate is inf"):
         read(tmp_path, "[{file: r.h5}]")
+
+
+def test_rows_without_a_value_are_lost_and_counted(tmp_path: Path) -> None:
+    write_h5(tmp_path / "r.h5", 600_000, 10_000.0)
+    with h5py.File(tmp_path / "r.h5", "r+") as file:
+        file["rate_rad_s"][:3000] = file["torque_nm"][555_555] = np.nan
+    (run,) = read(tmp_path, "[{file: r.h5}]")
+    assert run.missing is not None and run.missing.within == 3001
+    assert set(run.missing.quantities) == {"rate", "torque"}
+    assert run.rate_rad_s is not None and np.isfinite(run.rate_rad_s[run.valid]).all()
+    assert not run.valid[run.time_s < 0.29].any() and run.valid[run.time_s > 0.35].mean() > 0.99
 
 
 def test_what_was_left_out_is_said() -> None:
