@@ -2,13 +2,16 @@
 
 A moment is something that happens once and that the excitation does not explain. What a model lacks leaves most where
 the motion is largest, as at the resonance that a chirp crosses; so a moment has to leave far more than other moments do
-in which the excitation moves the platform as far and as fast, and drives it as hard.
+in which the excitation moves the platform as far and as fast, and drives it as hard. Nor is it a moment if most of what
+is left there keeps step with the torque for several cycles: that is where a chirp passes a frequency at which the model
+is wrong.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +28,16 @@ RARE = 0.1  # of all windows at most
 MIN_EVENT_SHARE = 0.05  # of the power: a moment with less is not told
 MANY = 3  # moments: more are no accident
 ALIKE = 0.8  # of the angle, rate and torque of a window; what grows as the fifth power of them differs by 0.8^10 = 1/9
+CYCLES = 4.0  # of the torque: over fewer, a push may look like a piece of it
+IN_STEP = 0.5  # of the power of a moment: what keeps step with the torque that far is no event
 
 
 @dataclass(frozen=True)
 class _Windows:
     """One run in windows: squares of the residual in each, and how large angle, rate and torque are about it.
 
-    ``power`` and ``there`` (whether at least half of its samples count) have shape (windows,), ``size`` (windows, 3).
+    ``power`` and ``there`` (whether at least half of its samples count) have shape (windows,), ``size`` (windows, 3);
+    ``left``, (n,), is the residual of the ``run``.
     """
 
     window_s: float
@@ -39,6 +45,32 @@ class _Windows:
     power: Array
     there: NDArray[np.bool_]
     size: Array
+    run: RunResiduals
+    left: Array
+
+    def in_step(self, first: int, last: int) -> float:
+        """Share of the power in windows first..last (excluded) that keeps step with the torque; 0 over few cycles."""
+        length = round(self.window_s / self.run.step_s)
+        span = slice(first * length, min(last * length, len(self.left)))
+        left, torque = self.left[span], self.in_quadrature[span]
+        cycles = np.abs(np.unwrap(np.angle(torque)) - np.angle(torque[0])) / (2.0 * np.pi)
+        blocks = int(cycles[-1] / CYCLES)
+        if blocks < 1:
+            return 0.0
+        block = np.minimum(cycles / cycles[-1] * blocks, blocks - 1).astype(int)
+        told = 0.0
+        for k in range(blocks):
+            here = block == k
+            columns = np.column_stack([torque[here].real, torque[here].imag])
+            told += float(np.sum((columns @ np.linalg.lstsq(columns, left[here], rcond=None)[0]) ** 2))
+        return told / max(float(left @ left), 1e-300)
+
+    @cached_property
+    def in_quadrature(self) -> NDArray[np.complex128]:
+        """The torque less its mean, and as imaginary part the same a quarter of a cycle later, (n,)."""
+        from scipy import signal  # noqa: PLC0415  slow to load
+
+        return np.asarray(signal.hilbert(self.run.torque - np.mean(self.run.torque)))
 
 
 def moments(
@@ -63,8 +95,9 @@ def _windows(run: RunResiduals, model: int) -> _Windows:
     about = [np.max(np.stack([np.append(x[1:], x[-1]), x, np.append(x[0], x[:-1])]), axis=0) for x in peaks]
     end_s = (len(run.use) - 1) * run.step_s
     return _Windows(
-        length * run.step_s, end_s, np.add.reduceat(squares, at), counts >= 0.5 * length, np.stack(about, axis=1)
-    )
+        length * run.step_s, end_s, np.add.reduceat(squares, at), counts >= 0.5 * length, np.stack(about, axis=1),
+        run, np.where(run.use, run.left[:, model], 0.0),
+    )  # fmt: skip
 
 
 def _of_one(runs: Sequence[_Windows], begins_s: Sequence[float], names: Sequence[str]) -> tuple[Moment, ...]:
@@ -79,9 +112,11 @@ def _of_one(runs: Sequence[_Windows], begins_s: Sequence[float], names: Sequence
         for k in np.flatnonzero(loud):
             alike = np.all(sizes >= ALIKE * run.size[k], axis=1)
             loud[k] = np.any(alike) and run.power[k] > EVENT_POWER_RATIO * float(np.median(powers[alike]))
-        count += int(np.sum(loud))
         edges = np.flatnonzero(np.diff(np.concatenate([[0], loud.astype(int), [0]])))
         for a, b in edges.reshape(-1, 2).tolist():
+            if run.in_step(a, b) > IN_STEP:
+                continue
+            count += b - a
             share = float(np.sum(run.power[a:b])) / total
             end_s = min(b * run.window_s, run.end_s)
             found.append(Moment(name, begin_s + a * run.window_s, begin_s + end_s, share))

@@ -72,6 +72,22 @@ def test_the_resonance_that_a_chirp_crosses_is_no_moment_and_a_touch_beside_it_i
     assert (found.from_s, found.to_s) == (pytest.approx(11.0, abs=0.26), pytest.approx(11.5, abs=0.26))
 
 
+@pytest.mark.parametrize("turn", [0.0, np.pi])
+def test_a_frequency_at_which_the_model_is_wrong_is_no_moment_of_a_chirp(turn: float) -> None:
+    """A narrow mode at 9 Hz that the model lacks; ``turn`` is by how much the phase turns across it."""
+    time = STEP_S * np.arange(7500)
+    hz = 0.8 * time
+    phase = 2 * np.pi * 0.4 * time**2
+    across = np.clip((hz - 9.0) / 0.4, -1.0, 1.0)
+    left = 0.01 * white(9, 15.0) + np.exp(-(((hz - 9.0) / 0.4) ** 2)) * np.sin(phase + 0.5 * turn * across)
+    one, other = moving(left, np.sin(phase)), moving(0.01 * white(10, 15.0), np.sin(2 * np.pi * time))
+    assert moments([one, other], [0.0, 0.0], ["a", "b"])[0] == ()
+    touched = one.left.copy()
+    touched[4000:4250] += 3.0
+    (found,) = moments([replace(one, left=touched), other], [0.0, 0.0], ["a", "b"])[0]
+    assert found.from_s == pytest.approx(8.0, abs=0.26)
+
+
 def test_a_moment_ends_with_its_run() -> None:
     left = white(8)
     left[-250:] += 40.0
