@@ -14,19 +14,45 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rig.arrays import Array
+from rig.arrays import Array, Mask
 from rig.errors import RecordingError
 from rig.recording.run import Run
 from rig.units import TURN
 
 NEAR_TURN = 0.05  # of a turn: a jump that differs more from a whole turn, the motion aside, is none
 SLOW_STEP_RAD = TURN / 4  # from sample to sample, nearly always: four samples a turn
+NEARLY_ALWAYS = 0.9  # of the steps
 NEIGHBOURS = 7  # steps about one that tell the motion there
-BESIDE = 1.5  # times the usual spacing: samples that stand farther apart have lost some between them
-MOST_JUMPS = 8  # in one run; more of them are what the platform does, or noise
+LOST = 2.5  # times the usual spacing: samples that stand farther apart have lost more than one between them
 JUMP_RATIO = 4.0  # times the largest step that the run makes elsewhere: no inertia lets a rate come and go like that
+MOST_TOLD = 3  # jumps that a message names
 JUMP_SIGMAS = 30.0  # times the noise
 MEDIAN = 0.6745  # of the size of a normal variable, in standard deviations
+
+
+def on_the_way(time_s: Array, angle_rad: Array, good: Any) -> Mask:
+    """Samples between two readings a whole turn apart: an analogue output on its way back to zero, shape (n,).
+
+    Parameters
+    ----------
+    time_s, angle_rad, good
+        As for ``turns_missing``.
+    """
+    out = np.zeros(len(angle_rad), dtype=bool)
+    at = np.flatnonzero(good)
+    if len(at) <= NEIGHBOURS or not np.all(np.diff(time_s[at]) > 0.0):
+        return out
+    step, spacing = np.diff(angle_rad[at]), np.diff(time_s[at])
+    within = _within_half_a_turn(step)
+    if float(np.quantile(np.abs(within), NEARLY_ALWAYS)) >= SLOW_STEP_RAD:
+        return out
+    off = step - spacing * _running_median(within / spacing)
+    far = np.abs(_within_half_a_turn(off)) > NEAR_TURN * TURN
+    both = off[1:] + off[:-1]
+    turned = (np.rint(both / TURN) != 0.0) & (np.abs(_within_half_a_turn(both)) < NEAR_TURN * TURN)
+    together = spacing[1:] + spacing[:-1] < LOST * np.median(spacing)
+    out[at[1:-1]] = far[1:] & far[:-1] & turned & together
+    return out
 
 
 def turns_missing(time_s: Array, angle_rad: Array, good: Any) -> Array:
@@ -49,11 +75,11 @@ def turns_missing(time_s: Array, angle_rad: Array, good: Any) -> Array:
     if not np.all(spacing > 0.0):
         return out  # the check of the times says so
     within = _within_half_a_turn(step)
-    if float(np.quantile(np.abs(within), 0.99)) >= SLOW_STEP_RAD:
+    if float(np.quantile(np.abs(within), NEARLY_ALWAYS)) >= SLOW_STEP_RAD:
         return out
     foretold = spacing * _running_median(within / spacing)
     turns = -np.rint((step - foretold) / TURN)
-    together = spacing < BESIDE * np.median(spacing)
+    together = spacing < LOST * np.median(spacing)
     near = np.abs(step + TURN * turns - foretold) < NEAR_TURN * TURN
     sure = together & near & (turns != 0.0)
     if not np.any(sure):
@@ -65,10 +91,14 @@ def turns_missing(time_s: Array, angle_rad: Array, good: Any) -> Array:
 
 @dataclass(frozen=True)
 class Turns:
-    """Where in a file of many rows the angle begins anew: ``rows``, shape (k,), and whole turns to add from each on."""
+    """Where in a file of many rows the angle begins anew: ``rows``, shape (k,), and whole turns to add from each on.
+
+    ``passing`` are rows between two that lie a turn apart, shape (m,).
+    """
 
     rows: Array
     turns: Array
+    passing: Array
 
     def added(self, first: int, last: int) -> Array:
         """Radians to add to rows first..last (excluded), shape (n,)."""
@@ -84,18 +114,21 @@ def turns_along(rows: Callable[[int, int], Mapping[str, Array]], first: int, las
     rows
         Gives "time", "angle" and "valid" of some rows, each of shape (n,).
     """
-    where, added = [], []
+    where, added, passing = [], [], []
     lead = 2 * NEIGHBOURS  # rows that a block shares with the one before and the one behind
     for at in range(first, last, block):
         begin, end = max(first, at - lead), min(last, at + block + lead)
         columns = rows(begin, end)
         good = columns["valid"].astype(bool) & np.isfinite(columns["time"]) & np.isfinite(columns["angle"])
-        missing = np.diff(turns_missing(columns["time"], columns["angle"], good), prepend=0.0)
+        between = on_the_way(columns["time"], columns["angle"], good)
+        missing = np.diff(turns_missing(columns["time"], columns["angle"], good & ~between), prepend=0.0)
+        on_way = begin + np.flatnonzero(between)
+        passing.append(on_way[(on_way >= at) & (on_way < at + block)])
         own = begin + np.flatnonzero(missing)
         inside = (own >= at) & (own < at + block)
         where.append(own[inside])
         added.append(missing[own[inside] - begin])
-    return Turns(np.concatenate(where), np.cumsum(np.concatenate(added)))
+    return Turns(np.concatenate(where), np.cumsum(np.concatenate(added)), np.concatenate(passing))
 
 
 def unwrapped(run: Run, path: Path) -> Run:
@@ -107,11 +140,12 @@ def unwrapped(run: Run, path: Path) -> Run:
         return run
     good = run.valid & np.isfinite(run.angle_rad)
     _check_turns(path, run.time_s, run.angle_rad, good)
-    turns = turns_missing(run.time_s, run.angle_rad, good)
+    passing = on_the_way(run.time_s, run.angle_rad, good)
+    turns = turns_missing(run.time_s, run.angle_rad, good & ~passing)
     wraps = int(np.count_nonzero(np.diff(turns)))
     if not wraps:
         return run
-    return replace(run, angle_rad=run.angle_rad + TURN * turns, wraps=wraps)
+    return replace(run, angle_rad=run.angle_rad + TURN * turns, valid=run.valid & ~passing, wraps=wraps)
 
 
 def on_one_turn(runs: Sequence[Run]) -> list[Run]:
@@ -144,18 +178,20 @@ def check_jumps(run: Run, path: Path, axis: Literal["rotary", "linear"]) -> None
     at = np.flatnonzero(run.valid & np.isfinite(run.angle_rad))
     time_s, angle = run.time_s[at], run.angle_rad[at]
     found = _jumps(time_s, angle)
-    if not len(found):
+    if not found:
         return
     unit = "rad" if axis == "rotary" else "m"
     what = "the angle" if axis == "rotary" else "the position"
-    where = ", ".join(f"by {angle[i + 1] - angle[i]:.4g} {unit} at {time_s[i + 1]:.6g} s" for i in found)
+    where = ", ".join(f"by {angle[j] - angle[i]:.4g} {unit} at {time_s[j]:.6g} s" for i, j in found[:MOST_TOLD])
+    if len(found) > MOST_TOLD:
+        where += f" and {len(found) - MOST_TOLD} times more"
     no_turn = ", which is no whole turn" if axis == "rotary" else ""
     ratio = f"more than {JUMP_RATIO:g} times as far as in any other step"
-    first = found[0]
-    split = f"to_s: {time_s[first]:.9g} and a second run of the same file with from_s: {time_s[first + 1]:.9g}"
+    before, behind = found[0]
+    split = f"to_s: {time_s[before]:.9g} and a second run of the same file with from_s: {time_s[behind]:.9g}"
     scale = "; where the sensor begins anew after a turn there, correct recorded.scale.angle" if no_turn else ""
     raise RecordingError(
-        f"{path}: {what} jumps between two samples {where}{no_turn} and {ratio}: "
+        f"{path}: {what} jumps {where}{no_turn} and {ratio}: "
         f"split the run there ({split}), or leave the angle out where there is a rate{scale}"
     )
 
@@ -166,7 +202,7 @@ def _check_turns(path: Path, time_s: Array, angle_rad: Array, good: Any) -> None
     step = np.diff(angle_rad[at])
     if len(step) <= NEIGHBOURS or np.ptp(angle_rad[at]) > (1.0 + NEAR_TURN) * TURN:
         return
-    within = float(np.quantile(np.abs(_within_half_a_turn(step)), 0.99))
+    within = float(np.quantile(np.abs(_within_half_a_turn(step)), NEARLY_ALWAYS))
     largest = int(np.argmax(np.abs(step)))
     if within < SLOW_STEP_RAD or abs(step[largest]) < TURN / 2:
         return
@@ -178,32 +214,55 @@ def _check_turns(path: Path, time_s: Array, angle_rad: Array, good: Any) -> None
     )
 
 
-def _jumps(time_s: Array, angle: Array) -> Array:
-    """The samples behind which the angle has jumped to another level, shape (k,); at most ``MOST_JUMPS``."""
-    none = np.zeros(0, dtype=int)
+def _jumps(time_s: Array, angle: Array) -> list[tuple[int, int]]:
+    """The samples before and behind each jump of the angle to another level.
+
+    A jump is looked for from one sample to the next, and where there is none, over one sample on the way.
+    """
     if len(angle) < 50:
-        return none
-    step, spacing = np.diff(angle), np.diff(time_s)
-    # How far lines through two samples on either side miss each other half way between samples i and i + 1: once
-    # through the nearest two, once through the two behind those, which a single wrong sample leaves out.
-    near, far = np.zeros(len(step)), np.zeros(len(step))
-    y = angle
+        return []
+    y, step, spacing = angle, np.abs(np.diff(angle)), np.diff(time_s)
+    hole = spacing > LOST * np.median(spacing)
+    step[hole] = 0.0  # what the platform did there nobody knows
+    blind = np.max([np.roll(hole, k) for k in range(-3, 4)], axis=0)
+    # How far lines through two samples on either side miss each other half way between samples i and i + 1: through the
+    # nearest two, and through those one and two farther out. A single wrong sample is in some of these lines only.
+    near, middle, far = np.zeros((3, len(step)))
     near[3:-3] = _missed(y[2:-5], y[3:-4], y[4:-3], y[5:-2], 0.5)
+    middle[3:-3] = _missed(y[1:-6], y[2:-5], y[5:-2], y[6:-1], 1.5)
     far[3:-3] = _missed(y[0:-7], y[1:-6], y[6:-1], y[7:], 2.5)
-    level = np.where(near * far > 0.0, np.minimum(np.abs(near), np.abs(far)), 0.0)
-    level[spacing > BESIDE * np.median(spacing)] = 0.0
     noise = float(np.median(np.abs(np.diff(angle, 4)))) / (MEDIAN * np.sqrt(70.0))
-    left, usual, peaks = level.copy(), np.abs(step), []
-    for _ in range(MOST_JUMPS):
-        i = int(np.argmax(left))
-        if left[i] < JUMP_SIGMAS * noise or left[i] == 0.0:
-            break
-        peaks.append(i)
-        left[max(0, i - 5) : i + 6] = 0.0
-        usual[i] = 0.0
-    resolution = float(np.min(np.abs(step)[step != 0.0], initial=np.inf))  # of an encoder that stands from time to time
-    ordinary = max(float(np.max(usual)), resolution)
-    return np.array(sorted(i for i in peaks if level[i] > JUMP_RATIO * ordinary), dtype=int)
+    resolution = float(np.min(step[step > 0.0], initial=np.inf))  # of an encoder that stands from time to time
+    for beside, reach in ((near, 0), (middle, 1)):
+        level = np.where(beside * far > 0.0, np.minimum(np.abs(beside), np.abs(far)), 0.0)
+        level[blind | (level < JUMP_SIGMAS * noise)] = 0.0
+        found = np.array(_standing_out(level, step, reach, resolution), dtype=int)
+        if len(found):
+            groups = np.split(found, 1 + np.flatnonzero(np.diff(found) > 2 * reach + 1))
+            return [(int(g[0]) - reach, int(g[-1]) + 1 + reach) for g in groups]
+    return []
+
+
+def _standing_out(level: Array, step: Array, reach: int, resolution: float) -> list[int]:
+    """Where the level rises by more than ``JUMP_RATIO`` times every step that is no such rise, in order of time.
+
+    Parameters
+    ----------
+    level, step
+        Shape (n,): by how much the level rises over each step, and the size of the step.
+    reach
+        Steps on either side that belong to a rise.
+    """
+    order = np.argsort(-level)
+    order = order[: np.count_nonzero(level)]
+    if not len(order):
+        return []
+    about = np.max([np.roll(step, k) for k in range(-reach, reach + 1)], axis=0)
+    part = np.max([np.roll(level > 0.0, k) for k in range(-reach, reach + 1)], axis=0)
+    elsewhere = max(float(np.max(step[~part], initial=0.0)), resolution)
+    rest = np.append(np.maximum.accumulate(about[order][::-1])[::-1][1:], 0.0)
+    sure = np.flatnonzero(level[order] > JUMP_RATIO * np.maximum(rest, elsewhere))
+    return sorted(order[: sure[-1] + 1].tolist()) if len(sure) else []
 
 
 def _missed(a: Array, b: Array, c: Array, d: Array, reach: float) -> Array:

@@ -57,6 +57,7 @@ class LongFile:
             found = columns | {CHANNEL + name: x for name, x in channels.items()}
             if turns is not None:
                 found["angle"] = found["angle"] + turns.added(first, last)
+                found["valid"] = np.where(np.isin(np.arange(first, last), turns.passing), 0.0, found["valid"])
             return found
 
         turns: Turns | None = None

@@ -173,7 +173,7 @@ ARRAYS: dict[str, tuple[Columns, str, str, str, str]] = {
         changed(angle_rad=0.05 * np.sin(40 * T) + 0.5 * (T > 0.2)),
         "",
         "",
-        "jumps between two samples by 0.49",
+        "jumps by 0.49",
         "split the run there",
     ),
     "columns of different length": (
