@@ -37,7 +37,7 @@ def test_rows_at_the_ends_without_a_value_are_left_out_and_told(tmp_path: Path) 
     run = only(tmp_path, file)
     assert (run.time_s[0], run.time_s[-1]) == (0.25, pytest.approx(1.899)) and run.valid.all()
     (said,) = describe_missing([run], lambda _: None)
-    assert "run.csv (250 at the beginning and 100 at the end, no torque and rate)" in said
+    assert "run.csv (250 at the beginning and 100 at the end, no torque or rate)" in said
 
 
 def test_rows_within_without_a_value_are_lost(tmp_path: Path) -> None:
@@ -45,7 +45,7 @@ def test_rows_within_without_a_value_are_lost(tmp_path: Path) -> None:
     assert np.flatnonzero(~run.valid).tolist() == [700, *range(900, 906)]
     assert run.torque_nm is not None and len(run.torque_nm) == 1994
     (said,) = describe_missing([run], lambda _: None)
-    assert "7 within, no torque and angle" in said
+    assert "7 within, no torque or angle" in said
 
 
 def test_from_s_and_to_s_count_before_the_numbers_are_checked(tmp_path: Path) -> None:
