@@ -81,7 +81,8 @@ class Dependence:
     wave_on, wave_hz
         Of what is "angle", "rate" or "torque" times a wave over the time: which, and the wave's frequency.
     changes
-        "inertia", "damping" or "friction" where one of these, changing with what it depends on, gives this torque.
+        "inertia", "stiffness", "damping", "friction" or "torque of the drive" where one of these, changing with what
+        it depends on, gives this torque.
     """
 
     on: str

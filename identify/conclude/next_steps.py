@@ -222,7 +222,7 @@ def _changing(found: Identification) -> str:
     """Where to look for an inertia, a damping or a friction that changes with the angle; empty where none does."""
     parts = () if found.disturbance is None else found.disturbance.depends_on
     most = max(parts, key=lambda d: d.relative, default=None)
-    if most is None or not most.changes:
+    if most is None or most.changes not in CHANGING or most.on == "time":
         return ""
     position = "position" if found.axis == "linear" else "angle"
     return (

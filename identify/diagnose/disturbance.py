@@ -140,7 +140,8 @@ def free_forms(regression: TorqueRegression) -> list[FreeForm]:
     ]  # fmt: skip
     if float(np.max(time)) > 0.0:
         angle = regression.series()[0]
-        out += [_over_time(time), _changing(time, [angle, rate, *([] if regression.torque_free else [torque])])]
+        out += [_over_time(time), *_changing(time, {"stiffness": angle, "damping": rate})]
+        out += [] if regression.torque_free else _changing(time, {"torque of the drive": torque})
         out += _along_angle(regression)
     out.append(_history(rate, run, regression))
     return [f for f in out if f.columns.shape[1] > 0 and np.all(np.isfinite(f.columns))]
@@ -195,13 +196,12 @@ def _beyond(on: str, regression: TorqueRegression) -> FreeForm:
     return FreeForm(on, regression.along(on, hinges), at, hinges(at))
 
 
-def _changing(time: Array, series: Sequence[Array]) -> FreeForm:
-    """What angle, rate and torque pass on, changing with time: a gain that warms up, a spring that sets."""
+def _changing(time: Array, series: Mapping[str, Array]) -> list[FreeForm]:
+    """What angle, rate and torque pass on, changing with time: a spring that sets, grease or a drive that warms up."""
     along = (time - np.mean(time)) / max(float(np.ptp(time)), 1e-300)
     shape = np.stack([along, along**2 - np.mean(along**2)], axis=1)
-    return FreeForm(
-        "time", np.column_stack([shape * x[:, None] for x in series]), np.zeros(0), np.zeros((0, 2 * len(series)))
-    )  # fmt: skip
+    none = np.zeros((0, 2))
+    return [FreeForm("time", shape * x[:, None], np.zeros(0), none, changes=what) for what, x in series.items()]
 
 
 def _along_angle(regression: TorqueRegression) -> list[FreeForm]:

@@ -16,8 +16,8 @@ from rig.recording.run import Recording, Run
 JC = (0.05, 0.2)
 
 
-def turned(seed: int, inertia_share: float, damping_share: float) -> Run:
-    """A motion over most of a turn, and the torque that it takes where J and C change with the angle."""
+def turned(seed: int, inertia_share: float, damping_share: float, drift: float = 0.0) -> Run:
+    """A motion over most of a turn, and the torque that it takes where J and C change with the angle, or C in a run."""
     time = np.arange(6001) * 2e-3
     rng = np.random.default_rng(seed)
     swings = [(0.6 / hz, hz, rng.uniform(0.0, 2.0 * np.pi)) for hz in (0.31, 0.57, 1.03, 1.71, 2.9)]
@@ -25,6 +25,7 @@ def turned(seed: int, inertia_share: float, damping_share: float) -> Run:
     inertia = JC[0] * (1.0 + inertia_share * np.sin(2.0 * angle))
     slope = JC[0] * inertia_share * 2.0 * np.cos(2.0 * angle)
     torque = inertia * acceleration + 0.5 * slope * rate**2 + JC[1] * (1.0 + damping_share * np.sin(2 * angle)) * rate
+    torque = torque + JC[1] * drift * (time / time[-1] - 0.5) * rate
     torque = torque + 2e-3 * np.std(torque) * rng.standard_normal(len(time))
     return Run(
         f"run {seed}", time, np.ones(len(time), bool), rate_rad_s=rate + 4e-3 * rng.standard_normal(len(time)),
@@ -44,8 +45,8 @@ def _turn(size: float, hz: float, phase: float, time: Array) -> Array:
     return -size * (2.0 * np.pi * hz) ** 2 * np.sin(2.0 * np.pi * hz * time + phase)
 
 
-def identified(inertia_share: float, damping_share: float) -> Identification:
-    runs = tuple(turned(seed, inertia_share, damping_share) for seed in range(3))
+def identified(inertia_share: float, damping_share: float, drift: float = 0.0) -> Identification:
+    runs = tuple(turned(seed, inertia_share, damping_share, drift) for seed in range(3))
     declared = Platform(0.045, 0.25, 0.0, terms=("inertia", "damping"))
     return identify(Recording(runs), declared, IdentifyConfig(candidates=("coulomb_friction",)))
 
@@ -67,3 +68,10 @@ def test_one_that_does_not_change_is_accepted() -> None:
     found = identified(0.0, 0.0)
     assert found.accepted, found.reasons
     assert found.final.parameters["inertia"].value == pytest.approx(JC[0], rel=5e-3)
+
+
+def test_a_damping_that_falls_in_every_run_is_told_as_such() -> None:
+    found = identified(0.0, 0.0, -0.4)
+    assert found.disturbance is not None
+    assert [(d.on, d.changes) for d in found.disturbance.depends_on] == [("time", "damping")]
+    assert "as if the damping changed with the time" in " ".join(found.verdict.sentences)
