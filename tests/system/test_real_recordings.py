@@ -186,13 +186,15 @@ def test_friction_that_depends_on_the_direction_explains_all_but_a_fortieth_of_t
 def test_the_pendulum_shows_gravity_then_friction_then_drag_and_gives_ratios_to_its_inertia() -> None:
     _, found = pendulum()
     assert {"inertia", "damping", "stiffness"}.isdisjoint(found.final.parameters)
-    assert found.verdict.effects == ("unbalance", "coulomb_friction", "quadratic_damping")
+    # Dry friction that lets go over 3 mrad predicts the swing three times better than one that lets go at once.
+    assert set(found.verdict.effects) == {"unbalance", "presliding_friction", "quadratic_damping"}
     assert found.noise_floor.residual_rms_torque is None
     # Gravity over inertia is the square of the small swing's frequency.
     platform = found.final.platform
     assert platform is not None
     assert np.sqrt(platform.effects["unbalance"]["sine"]) == pytest.approx(swing_rad_s(), rel=0.02)
-    assert free_run_error_of_the_pendulum(platform) < 0.015
+    assert platform.effects["presliding_friction"]["level"] == pytest.approx(0.0539, rel=0.03)
+    assert free_run_error_of_the_pendulum(platform) < 0.008
 
 
 def free_run_error_of_the_pendulum(platform: Platform) -> float:
@@ -203,14 +205,17 @@ def free_run_error_of_the_pendulum(platform: Platform) -> float:
     time, angle = time[used][::10], angle[used][::10]
     e = platform.effects
     sine, cosine = e["unbalance"]["sine"], e["unbalance"]["cosine"]
-    level, drag = e["coulomb_friction"]["level"], e["quadratic_damping"]["factor"]
+    level, within = e["presliding_friction"]["level"], e["presliding_friction"]["displacement"]
+    drag = e["quadratic_damping"]["factor"]
 
     def slope(_: float, y: Array) -> list[float]:
-        friction = level * np.tanh(y[1] / 1e-3) + drag * y[1] * abs(y[1]) + platform.damping_nm_s_rad * y[1]
-        return [y[1], -(sine * np.sin(y[0]) + cosine * np.cos(y[0]) + friction + platform.stiffness_nm_rad * y[0])]
+        friction = level * y[2] + drag * y[1] * abs(y[1]) + platform.damping_nm_s_rad * y[1]
+        pull = sine * np.sin(y[0]) + cosine * np.cos(y[0]) + platform.stiffness_nm_rad * y[0]
+        return [y[1], -(pull + friction), (y[1] - abs(y[1]) * y[2]) / within]
 
     def residual(start: Array) -> Array:
-        return np.asarray(solve_ivp(slope, (time[0], time[-1]), start, t_eval=time, rtol=1e-7, atol=1e-9).y[0] - angle)
+        begin = [*start, np.sign(start[1])]  # it slides
+        return np.asarray(solve_ivp(slope, (time[0], time[-1]), begin, t_eval=time, rtol=1e-7, atol=1e-9).y[0] - angle)
 
     rate = float(np.polyfit(time[:8], angle[:8], 1)[0])
     fitted = optimize.least_squares(residual, [angle[0], rate], diff_step=1e-4)
