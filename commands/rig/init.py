@@ -10,7 +10,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from commands.rig.init_questions import LISTED, Ask, Questions, column_named, factor_from, show
+from commands.rig.init_questions import (
+    LISTED,
+    NONE,
+    Ask,
+    Questions,
+    column_named,
+    column_option,
+    factor_from,
+    show,
+)
 from commands.rig.init_yaml import Entry, number_value, recorded_yaml, text_value
 from commands.terminal.exit_codes import OK
 from rig.errors import RecordingError, UsageError
@@ -124,8 +133,11 @@ def _of_table(table: Table, file: str, options: InitOptions, ask: Ask | None) ->
     show(_listing(table, columns))
     named: dict[Quantity, Column | None] = {q: column_named(columns, q, text) for q, text in options.columns.items()}
     questions = Questions(options.yes, ask)
-    roles = {q: questions.column(q, choice, columns) for q, choice in guess_roles(columns, named).items()}
-    _refuse_unread(table, columns, roles, options)
+    guessed = guess_roles(columns, named)
+    _refuse_unread(table, columns, guessed, options)
+    roles = {q: questions.column(q, choice, columns) for q, choice in guessed.items()}
+    if roles["time"].column is None:
+        questions.finish()
     _require_motion(table, roles)
     axis = options.axis or axis_of(roles)
     factors = guess_factors(roles, axis, {q: list(DEFAULT_NAMES[q]) for q in roles})
@@ -139,6 +151,10 @@ def _of_table(table: Table, file: str, options: InitOptions, ask: Ask | None) ->
     entries = [
         Entry(q, text_value(c.name), f"{roles[q].why}; {factors[q].why}", questions.is_guess(q, "column"))
         for q, c in found
+    ]
+    # Said in the file too: by itself the reader takes a column of a usual name.
+    entries += [
+        Entry(q, NONE, "not read, as you said", False) for q in ORDER if roles[q].column is None and roles[q].said
     ]
     scales = [
         Entry(q, number_value(value), factors[q].why, questions.is_guess(q, "scale"))
@@ -176,13 +192,11 @@ def _refuse_unread(
             why = column.why_not.removeprefix(f"column {column.name!r} ")
             raise RecordingError(
                 f"{table.path}: column {column.name!r} looks like the {quantity} but cannot be used: {why}; or give "
-                f"another column with --{quantity} COL (or none)"
+                f"another column with {column_option(quantity)}"
             )
 
 
 def _require_motion(table: Table, roles: dict[Quantity, Choice]) -> None:
-    if roles["time"].column is None:
-        raise UsageError(f"{table.path}: no column was named or found as the time: give it with --time COL")
     if roles["rate"].column is None and roles["angle"].column is None:
         raise UsageError(f"{table.path}: no rate and no angle was named or found: give --rate COL or --angle COL")
 

@@ -10,6 +10,7 @@ from commands.rig.init_yaml import number_value
 from commands.terminal.display import plain
 from commands.terminal.exit_codes import say
 from rig.errors import UsageError
+from rig.signals import NO_COLUMN
 
 if TYPE_CHECKING:
     from rig.recording.guessing.columns import Column
@@ -18,9 +19,16 @@ if TYPE_CHECKING:
 
 Ask = Callable[[str], str]
 Answer = TypeVar("Answer")
-NONE = "none"  # as an answer: there is no such column
+NONE = NO_COLUMN  # as an answer: there is no such column
 TRIES = 3
 LISTED = 40  # columns
+# What may be said besides a column: every recording has a time, and one without torque is another experiment.
+_OR_NONE = {
+    "time": "",
+    "torque": f", or --torque {NONE} if the platform moved freely",
+    "rate": f" (or {NONE})",
+    "angle": f" (or {NONE})",
+}
 
 
 def show(lines: Sequence[str]) -> None:
@@ -32,10 +40,16 @@ def show(lines: Sequence[str]) -> None:
 def column_named(columns: tuple[Column, ...], quantity: str, name: str) -> Column | None:
     """The column of that name; None for "none". Raises UsageError."""
     found = next((c for c in columns if c.name == name and c.values is not None), None)
-    if found is not None or name == NONE:
+    if found is not None or (name == NONE and quantity != "time"):
         return found
     usable = ", ".join(repr(c.name) for c in columns[:LISTED] if c.values is not None)
-    raise UsageError(f"--{quantity} {name[:60]!r} is no column of numbers: choose one of {usable}, or {NONE}")
+    none = "" if quantity == "time" else f", or {NONE}"
+    raise UsageError(f"--{quantity} {name[:60]!r} is no column of numbers: choose one of {usable}{none}")
+
+
+def column_option(quantity: str) -> str:
+    """How a column is given, and how it is said that there is none."""
+    return f"--{quantity} COL{_OR_NONE[quantity]}"
 
 
 def factor_from(quantity: str, text: str, axis: str) -> Factor:
@@ -78,12 +92,17 @@ class Questions:
 
         if choice.sure:
             return choice
-        guess = choice.column.name if choice.column else NONE
+        guess = choice.column.name if choice.column else ""
         if self._ask is not None:
-            question = f"Which column is the {quantity}? (guess: {choice.why}; {NONE}: there is none) [{plain(guess)}] "
+            none = "" if quantity == "time" else f"; {NONE}: there is none"
+            said = f"guess: {choice.why}" if guess else choice.why
+            question = f"Which column is the {quantity}? ({plain(said)}{none}) {f'[{plain(guess)}] ' if guess else ''}"
             found = self._answer(question, guess, lambda text: column_named(columns, quantity, text))
-            return Choice(found, "as answered", True)
-        self._take(quantity, "column", guess, choice.why, f"--{quantity} COL")
+            return Choice(found, "as answered", True, said=True)
+        if guess:
+            self._take(quantity, "column", guess, choice.why, f"--{quantity} COL")
+        else:
+            self._miss(f"{quantity}: {choice.why}: give {column_option(quantity)}")
         return choice
 
     def factor(self, quantity: Quantity, found: Factor, column: Column, axis: str) -> Factor:
@@ -96,8 +115,7 @@ class Questions:
             return self._answer(question, guess, lambda text: factor_from(quantity, text, axis))
         option = f"--{quantity}-scale FACTOR (or a unit)"
         if found.value is None:
-            self._missing.append(f"{quantity}: column {column.name!r}: {found.why}: give {option}")
-            self._have_guesses = False
+            self._miss(f"{quantity}: column {column.name!r}: {found.why}: give {option}")
         else:
             self._take(quantity, "scale", guess, found.why, option)
         return found
@@ -117,6 +135,11 @@ class Questions:
             except UsageError as error:
                 say(str(error))
         raise UsageError(f"no answer that could be used in {TRIES} tries: give it as an option (rig init --help)")
+
+    def _miss(self, line: str) -> None:
+        """Something that nobody can guess."""
+        self._missing.append(line)
+        self._have_guesses = False
 
     def _take(self, quantity: str, what: str, guess: str, why: str, option: str) -> None:
         if self._yes:

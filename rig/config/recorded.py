@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from rig.config.base import NonNegative, Positive, Section
 from rig.config.channels import ChannelConfig, check_channels
+from rig.signals import NO_COLUMN
 
 MAX_RUNS = 1000
 MOST_SAMPLES = 50_000  # the five sets of ten seconds at 1 kHz of the paper; about 0.9 GiB of memory
@@ -76,11 +77,11 @@ class Columns(Section):
     time: ColumnName | None = None
     """Column of the time."""
     torque: ColumnName | None = None
-    """Column of the torque."""
+    """Column of the torque; none: a free decay, whatever the file has."""
     rate: ColumnName | None = None
-    """Column of the rate."""
+    """Column of the rate; none: it is not read."""
     angle: ColumnName | None = None
-    """Column of the angle."""
+    """Column of the angle; none: it is not read."""
     valid: ColumnName | None = None
     """Column that is 0 where a sample was lost."""
     channels: ChannelColumns = Field(default_factory=dict)
@@ -90,7 +91,7 @@ class Columns(Section):
     def _each_column_once(self) -> Self:
         given = [name for name in (self.time, self.torque, self.rate, self.angle, self.valid) if name]
         given += [channel.column or name for name, channel in self.channels.items()]
-        twice = sorted({name for name in given if given.count(name) > 1})
+        twice = sorted({name for name in given if given.count(name) > 1 and name != NO_COLUMN})
         if twice:
             raise ValueError(f"column {twice[0]!r} is used for two quantities: each needs its own")
         return self

@@ -9,6 +9,7 @@ from typing import Literal
 
 from rig.errors import RecordingError
 from rig.recording.table import Table
+from rig.signals import NO_COLUMN
 from rig.units import DIMENSIONS, SI, name_and_unit, unit_of
 
 # What a column with a unit over it may be called, besides the default names, which carry theirs.
@@ -33,12 +34,19 @@ def column_named(table: Table, quantity: str, named: str | None, defaults: Seque
     """The column of a quantity, None where there is none.
 
     ``named`` is what the configuration calls it, with or without the unit that the file has behind the name. Where it
-    calls it nothing: one of ``defaults``, else a plain name with a unit over it.
+    calls it nothing: one of ``defaults``, else a plain name with a unit over it; where it says "none", nothing.
     """
+    if is_none(table, named):
+        return None
     if named is not None:
         return named if named in table.names else _only(table, (named,), any_case=False)
     default = next((name for name in defaults if name in table.names), None)
     return default or _only(table, _PLAIN_NAMES[quantity], any_case=True)
+
+
+def is_none(table: Table, named: str | None) -> bool:
+    """Whether the configuration says that a quantity is not to be read, and not that its column is called "none"."""
+    return named == NO_COLUMN and NO_COLUMN not in table.names
 
 
 def _only(table: Table, plain: Sequence[str], *, any_case: bool) -> str | None:

@@ -15,7 +15,7 @@ from rig.errors import RecordingError
 from rig.recording.checks import check_channel, check_lengths, check_samples, missing_column
 from rig.recording.missing import Rows, lost_within, read_between, with_values
 from rig.recording.run import Run
-from rig.recording.stated_units import column_named, factor_of
+from rig.recording.stated_units import column_named, factor_of, is_none
 from rig.recording.table import Table
 from rig.units import DEG
 
@@ -136,7 +136,7 @@ def _names(table: Table, section: RecordedConfig) -> dict[Quantity, str]:
     for quantity, defaults in DEFAULT_NAMES.items():
         named = getattr(section.columns, quantity)
         name = column_named(table, quantity, named, list(defaults))
-        if named is not None and name is None:
+        if named is not None and name is None and not is_none(table, named):
             raise missing_column(table, quantity, [named], mapped=True)
         if name is not None:
             names[quantity] = name

@@ -36,21 +36,26 @@ CURRENT = _words("current i iq strom amps")
 NOT_MEASURED = _words("ref reference cmd command set setpoint soll target demand desired error err limit")
 COUNTERS = _words("index sample samples n nr no count counter row id zeile")
 LONG = 5  # letters from which a word counts inside of another: motordrehmoment
+LISTED = 8  # columns in a sentence
 SAME_MOTION = 0.99  # correlation of an angle and an integrated rate
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The column of a quantity, None for none; ``why`` in words, ``sure`` where nobody has to be asked."""
+    """The column of a quantity; ``why`` in words, ``sure`` where nobody has to be asked.
+
+    None that is sure: there is no such column. None that is not: somebody has to say it, for there is no guess.
+    """
 
     column: Column | None
     why: str
     sure: bool
+    said: bool = False  # by a person
 
 
 def guess_roles(columns: Sequence[Column], given: dict[Quantity, Column | None]) -> dict[Quantity, Choice]:
     """One choice a quantity. ``given`` are those that somebody named, None for "there is none"."""
-    chosen = {q: Choice(c, "as given", True) for q, c in given.items()}
+    chosen = {q: Choice(c, "as given", True, said=True) for q, c in given.items()}
     left = [c for c in columns if c.values is not None and all(c is not g for g in given.values())]
     for quantity in QUANTITIES:
         if quantity in chosen:
@@ -66,6 +71,8 @@ def guess_roles(columns: Sequence[Column], given: dict[Quantity, Column | None])
         chosen["rate"] = _last_that_moves(chosen, left)
     if chosen["torque"].column is None and "torque" not in given:
         chosen["torque"] = _remaining_torque(left)
+    elif "torque" not in given:
+        chosen["torque"] = _acting(chosen["torque"])
     return chosen
 
 
@@ -166,6 +173,18 @@ def _remaining_torque(left: Sequence[Column]) -> Choice:
     moving = [c for c in left if c.moves and c.known_unit is None and not set(c.words) & COUNTERS]
     if len(moving) == 1:
         return Choice(moving[0], "it is the only column left", False)
-    if not moving:
-        return Choice(None, "no column is left, so this is a free decay", True)
-    return Choice(None, "no name or unit says so", False)
+    unused = [c.name for c in left if c.moves]
+    more = f" and {len(unused) - LISTED} more" if len(unused) > LISTED else ""
+    listed = ", ".join(repr(name) for name in unused[:LISTED]) + more
+    others = f"not used, but they move: {listed}" if unused else "and no other column moves"
+    # A recording whose torque was overlooked and one without torque are the same to the identification.
+    return Choice(None, f"no torque was recognised ({others})", False)
+
+
+def _acting(torque: Choice) -> Choice:
+    """The same, unless the column never changes: a drive that was off, a channel that was not connected."""
+    column = torque.column
+    if column is None or column.values is None or column.moves:
+        return torque
+    value = float(column.values[np.isfinite(column.values)][0]) + 0.0  # no -0
+    return Choice(None, f"column {column.name!r} says so by its name or unit, but is {value:g} throughout", False)

@@ -212,5 +212,51 @@ def test_a_recording_of_this_program_needs_no_columns_and_takes_none(tmp_path: P
 
 def test_a_free_decay_needs_no_torque(tmp_path: Path) -> None:
     (tmp_path / "r.csv").write_text("t/s,angle/deg\n" + rows(TIME, np.degrees(ANGLE)), encoding="utf-8")
-    run = made(tmp_path, "r.csv")
+    run = made(tmp_path, "r.csv", "--torque", "none")
     assert run.torque_nm is None and run.angle_rad is not None
+
+
+NO_TORQUE = {
+    "no other column": ("t/s,angle/deg\n", [TIME, np.degrees(ANGLE)], "no torque was recognised"),
+    "columns of another kind": (
+        "t/s,angle/deg,sensor 1 [V],sensor 2 [V]\n",
+        [TIME, np.degrees(ANGLE), TORQUE, RATE],
+        "not used, but they move: 'sensor 1 [V]', 'sensor 2 [V]'",
+    ),
+    "zero": ("time_s,torque_nm,rate_rad_s\n", [TIME, 0 * TORQUE, RATE], "column 'torque_nm'"),
+    "constant": ("t/s,torque [Nm],angle/deg\n", [TIME, 0 * TORQUE + 2, np.degrees(ANGLE)], "but is 2 throughout"),
+}
+
+
+@pytest.mark.parametrize("case", NO_TORQUE)
+def test_without_a_torque_that_acts_somebody_has_to_say_that_it_is_a_free_decay(case: str, tmp_path: Path) -> None:
+    header, columns, words = NO_TORQUE[case]
+    (tmp_path / "r.csv").write_text(header + rows(*columns), encoding="utf-8")
+    for options in ([], ["--yes"]):
+        done = command(app, "init", tmp_path / "r.csv", "--out", tmp_path / "rig.yaml", *options)
+        assert done.exit_code == 2
+        assert words in done.stderr and "or --torque none if the platform moved freely" in done.stderr
+        assert not (tmp_path / "rig.yaml").exists()
+    assert made(tmp_path, "r.csv", "--torque", "none").torque_nm is None
+    assert "torque: none" in (tmp_path / "rig.yaml").read_text(encoding="utf-8")
+
+
+def test_on_a_terminal_a_torque_that_was_not_recognised_is_asked_without_a_guess(tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text("t/s,angle/rad,u [V]\n" + rows(TIME, ANGLE, TORQUE / 2), encoding="utf-8")
+    asked: list[str] = []
+    answers = iter(["", "u [V]", "2"])
+
+    def ask(question: str) -> str:
+        asked.append(question)
+        return next(answers)
+
+    assert init(tmp_path / "r.csv", InitOptions(out=tmp_path / "rig.yaml"), ask) == 0
+    assert asked[0] == asked[1] and asked[0].endswith("; none: there is none) ")
+    agrees(read_recording(load_config(tmp_path / "rig.yaml")).runs[0])
+
+
+def test_the_time_cannot_be_none(tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text(GOOD, encoding="utf-8")
+    done = command(app, "init", tmp_path / "r.csv", "--out", tmp_path / "rig.yaml", "--time", "none")
+    assert done.exit_code == 2 and "--time 'none' is no column of numbers" in done.stderr
+    assert "or none" not in done.stderr
