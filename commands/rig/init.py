@@ -146,6 +146,7 @@ def _of_table(table: Table, file: str, options: InitOptions, ask: Ask | None) ->
             raise UsageError(f"--{q}-scale was given, but there is no column of the {q}: add --{q} COL")
         factors[q] = factor_from(q, text, axis)
     found: list[tuple[Quantity, Column]] = [(q, c) for q in ORDER if (c := roles[q].column) is not None]
+    written = {*options.scales, *(q for q, factor in factors.items() if not factor.sure)}
     factors = {q: questions.factor(q, factors[q], column, axis) for q, column in found}
     questions.finish()
     entries = [
@@ -159,7 +160,7 @@ def _of_table(table: Table, file: str, options: InitOptions, ask: Ask | None) ->
     scales = [
         Entry(q, number_value(value), factors[q].why, questions.is_guess(q, "scale"))
         for q, c in found
-        if (value := factors[q].value) is not None and (value != 1.0 or q in options.scales or c.unit_text)
+        if (value := factors[q].value) is not None and (value != 1.0 or q in written or c.unit_text)
     ]  # fmt: skip
     about = f"{max(len(c.values) for c in columns if c.values is not None)} rows"
     return recorded_yaml(file, about, entries, scales, axis, options.out.name)

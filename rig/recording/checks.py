@@ -45,10 +45,13 @@ def check_lengths(table: Table, columns: Mapping[str, Array]) -> None:
         )
 
 
-def check_samples(table: Table, columns: Mapping[str, Array], rows: NDArray[np.intp]) -> Mask:
+def check_samples(
+    table: Table, columns: Mapping[str, Array], rows: NDArray[np.intp], factors: Mapping[str, float]
+) -> Mask:
     """Check the numbers of the columns as stored; gives the mask of valid samples, shape (n,).
 
-    ``rows``, shape (n,), are their places in the table. Raises RecordingError.
+    ``rows``, shape (n,), are their places in the table, ``factors`` those to SI units, by quantity: nanoseconds since
+    1970 are large numbers and no large time. Raises RecordingError.
     """
     flags = columns.get("valid")
     if flags is not None and not np.isfinite(flags).all():
@@ -62,7 +65,8 @@ def check_samples(table: Table, columns: Mapping[str, Array], rows: NDArray[np.i
         )
     valid = np.ones(len(rows), dtype=bool) if flags is None else flags != 0
     for quantity, values in columns.items():
-        bad = valid & ~(np.abs(values) <= MAX_VALUE)
+        # A factor that makes sound numbers large is wrong itself, which ``check_run`` says.
+        bad = valid & ~(min(1.0, abs(factors.get(quantity, 1.0))) * np.abs(values) <= MAX_VALUE)
         if quantity != "valid" and bad.any():
             i = int(np.argmax(bad))
             cure = "correct it, delete the row, or mark the row valid = 0"

@@ -31,6 +31,9 @@ LIKELY_CORRELATION = 0.9
 LIKELY_DEVIATION = 0.3
 # Four samples a second or fewer: no platform with a spring is seen through that.
 SLOWEST_STEP_S = 0.25
+FASTEST_STEP_S = 1e-6  # a millionth: a thousand times as fast as the fastest platform needs
+DAY_S = 86_400.0
+EXCEL_DAYS = (20_000.0, 80_000.0)  # how Excel and LibreOffice count the days of the years 1954 to 2119
 
 
 def angle_over_rate(run: Run) -> tuple[float, float] | None:
@@ -102,9 +105,32 @@ def _meaning(factor: float) -> tuple[str, str]:
     return "one of them is scaled wrongly", f"recorded.scale.rate: {factor:.4g} if the angle is right"
 
 
+def usual_step(time: Array) -> float:
+    """The median distance of samples, in the unit of the time, shape (n,); lost ones left out."""
+    known = time[np.isfinite(time)]
+    return float(np.median(np.diff(known))) if len(known) > 1 else 0.0
+
+
+def is_excel_date(time: Array) -> bool:
+    """Whether these numbers, shape (n,), are dates as a spreadsheet counts them, in days.
+
+    As seconds they would be samples of a fraction of a second, taken hundreds of thousands of times a second.
+    """
+    first, last, step = float(np.nanmin(time)), float(np.nanmax(time)), usual_step(time)
+    return (
+        EXCEL_DAYS[0] <= first and last <= EXCEL_DAYS[1] and last - first < 1.0 and 0.0 < step * DAY_S < SLOWEST_STEP_S
+    )
+
+
 def check_time_unit(run: Run, path: Path) -> None:
-    """Raise RecordingError where samples stand so far apart that the time can hardly be in seconds."""
-    step = float(np.median(np.diff(run.time_s)))
+    """Raise RecordingError where samples stand too far apart, or too close, for the time to be in seconds."""
+    step = usual_step(run.time_s)
+    if is_excel_date(run.time_s):
+        raise RecordingError(
+            f"{path}: samples are {step:.3g} s apart (median) around {run.time_s[0]:.7g} s: that looks like dates in "
+            f"days, as Excel counts them: set recorded.scale.time: {DAY_S:g}; if it is in seconds, set "
+            "recorded.scale.time: 1"
+        )
     if step < SLOWEST_STEP_S:
         return
     unit, factor = min(

@@ -112,7 +112,7 @@ def _as_stored(table: Table, section: RecordedConfig) -> tuple[dict[str, Array],
 
 
 def _checked(table: Table, rows: Rows, factors: Mapping[str, float]) -> dict[str, Array]:
-    valid = check_samples(table, rows.columns, rows.at)
+    valid = check_samples(table, rows.columns, rows.at, factors)
     scaled: dict[str, Array] = {
         q: x if factors[q] == 1.0 else x * factors[q] for q, x in rows.columns.items() if q != "valid"
     }

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from rig.recording.consistency import SLOWEST_STEP_S
 from rig.recording.guessing.columns import Column
-from rig.recording.guessing.roles import COUNTERS, Choice, Quantity, relation
+from rig.recording.guessing.factor import Factor, stated_factor
+from rig.recording.guessing.roles import Choice, Quantity, relation
+from rig.recording.guessing.time_unit import time_factor
 from rig.units import DEG, DIMENSIONS, SI, TURN
 
 FACTOR_TOLERANCE = 0.03  # relative, of a factor between angle and rate
@@ -27,25 +26,6 @@ PAIRS = (
     ("rev", TURN, "deg/s", DEG),
     ("rev", TURN, "rpm", TURN / 60),
 )
-
-
-@dataclass(frozen=True)
-class Factor:
-    """How the numbers of a column become SI units.
-
-    Attributes
-    ----------
-    value
-        The factor for ``recorded.scale``; None where none has to be written, because the reader knows the unit.
-    why
-        In words, with the unit.
-    sure
-        Whether nobody has to be asked; where not, ``value`` may be None: then there is no guess either.
-    """
-
-    value: float | None
-    why: str
-    sure: bool
 
 
 def axis_of(roles: dict[Quantity, Choice]) -> str:
@@ -68,44 +48,16 @@ def guess_factors(
 
 
 def _alone(quantity: Quantity, column: Column, axis: str, is_default: bool) -> Factor:
-    stated = _stated(quantity, column, axis, is_default)
+    stated = stated_factor(quantity, column, axis, is_default)
+    if quantity == "time":
+        return time_factor(column, stated)
     if stated is not None:
         return stated
-    if quantity == "time":
-        return _time(column)
     dimension = DIMENSIONS[axis][quantity]
     peak = _peak(column)
     if axis == "rotary" and peak > DEGREES_FROM.get(quantity, np.inf):
         return Factor(DEG, f"deg{'/s' if quantity == 'rate' else ''}, as it reaches {peak:.4g}", False)
     return Factor(1.0, f"{SI[dimension]}, as no unit is stated", False)
-
-
-def _stated(quantity: Quantity, column: Column, axis: str, is_default: bool) -> Factor | None:
-    """What the file or the name says; None where neither says anything."""
-    dimension = DIMENSIONS[axis][quantity]
-    if column.unit is not None and column.unit.dimension == dimension:
-        return Factor(None, f"{column.unit.text}, as the file says", True)
-    if is_default:
-        return Factor(None, "the unit is in its name", True)
-    if column.suffix is not None and column.suffix.dimension == dimension:
-        return Factor(column.suffix.factor, f"{column.suffix.text}, as its name says", True)
-    if column.unit_text or (column.suffix is not None and column.suffix.dimension == "current"):
-        what = column.unit_text or "A"
-        return Factor(None, f"its numbers are in {what!r}, which is no unit of {dimension} that is known", False)
-    return None
-
-
-def _time(column: Column) -> Factor:
-    assert column.values is not None
-    step = float(np.median(np.diff(column.values)))
-    whole = bool(np.all(np.diff(column.values) == 1.0))
-    if set(column.words) & COUNTERS and whole:
-        return Factor(None, "it counts samples, so the time between two of them has to be known", False)
-    if 0.0 < step < SLOWEST_STEP_S:
-        return Factor(1.0, f"s, as samples are {step:.4g} apart", True)
-    guesses = (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
-    unit, factor = min(guesses, key=lambda g: abs(np.log10(max(step, 1e-12) * g[1]) + 3.0))
-    return Factor(factor, f"{unit}, as samples are {step:.4g} apart", False)
 
 
 def _peak(column: Column) -> float:
