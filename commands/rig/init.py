@@ -16,7 +16,6 @@ from commands.rig.init_questions import (
     Ask,
     Questions,
     column_named,
-    column_option,
     factor_from,
     show,
 )
@@ -190,10 +189,11 @@ def _refuse_unread(
     for quantity in ORDER:
         column = unread(columns, quantity)
         if roles[quantity].column is None and column is not None and quantity not in options.columns:
+            none = f" (or {NONE})" if quantity in ("rate", "angle") else ""
             why = column.why_not.removeprefix(f"column {column.name!r} ")
             raise RecordingError(
                 f"{table.path}: column {column.name!r} looks like the {quantity} but cannot be used: {why}; or give "
-                f"another column with {column_option(quantity)}"
+                f"another column with --{quantity} COL{none}"
             )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.recording.readers.csv_layout import Layout, all_lines, layout_of
+from rig.recording.readers.thousands import first_grouped, may_be_grouped
 from rig.recording.readers.timestamps import Stamps
 from rig.recording.table import MAX_SAMPLES, Table, too_long
 
@@ -61,7 +62,23 @@ def _columns(layout: Layout, names: Sequence[str]) -> Mapping[str, Array]:
         raise RecordingError(f"{layout.path}: is damaged ({error}): export the file again") from error
     if not len(values):
         raise RecordingError(f"{layout.path}: only a header, no data: export the recording again")
+    for i, name in enumerate(names):
+        if may_be_grouped(values[:, i]):
+            _check_thousands(layout, name, positions[i])
     return {name: np.ascontiguousarray(values[:, i]) for i, name in enumerate(names)}
+
+
+def _check_thousands(layout: Layout, name: str, position: int) -> None:
+    """Raise RecordingError where a sign between thousands was read as a decimal sign."""
+    lines = list(_data_lines(layout))
+    found = first_grouped(layout.fields(text)[position] for _, text in lines)
+    if found is not None:
+        row, text, small = found
+        raise RecordingError(
+            f"{layout.path}: line {lines[row][0]}, column {name!r}: {text!r} beside whole numbers such as {small!r}: "
+            f"the {'comma' if ',' in text else 'point'} stands between thousands, and would be read as a decimal sign: "
+            "export the numbers without a sign between thousands"
+        )
 
 
 def _fast(layout: Layout, positions: Sequence[int]) -> Array | None:
