@@ -123,6 +123,7 @@ def _bench(options: InitOptions) -> int:
 
 
 def _of_table(table: Table, file: str, options: InitOptions, ask: Ask | None) -> str:
+    from rig.recording.guessing.clocks import with_one_clock
     from rig.recording.guessing.columns import columns_of
     from rig.recording.guessing.roles import guess_roles
     from rig.recording.guessing.scales import axis_of, guess_factors
@@ -132,7 +133,7 @@ def _of_table(table: Table, file: str, options: InitOptions, ask: Ask | None) ->
     show(_listing(table, columns))
     named: dict[Quantity, Column | None] = {q: column_named(columns, q, text) for q, text in options.columns.items()}
     questions = Questions(options.yes, ask)
-    guessed = guess_roles(columns, named)
+    guessed = with_one_clock(guess_roles(columns, named), columns, next(iter(DEFAULT_NAMES["time"])))
     _refuse_unread(table, columns, guessed, options)
     roles = {q: questions.column(q, choice, columns) for q, choice in guessed.items()}
     if roles["time"].column is None:

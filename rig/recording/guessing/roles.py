@@ -92,6 +92,15 @@ def _score(column: Column, quantity: Quantity) -> float:
     return score - (1.0 if score > 0 and set(column.words) & NOT_MEASURED else 0.0)
 
 
+def says_time(column: Column) -> bool:
+    """Whether a column is a time by its unit or by the last word of its name, or by any word where it increases."""
+    if column.known_unit is not None:
+        return column.known_unit.dimension == "time"
+    return column.words[-1:] in (("time",), ("zeit",), ("timestamp",)) or (
+        _has_word(column, WORDS["time"]) and column.increases
+    )
+
+
 def unread(columns: Sequence[Column], quantity: Quantity) -> Column | None:
     """A column whose name or unit says that it is the quantity, but whose values cannot be read; None for none."""
     lost = [(score, c) for c in columns if c.values is None and (score := _score(c, quantity)) > 0.0]
