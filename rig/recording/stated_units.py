@@ -10,7 +10,7 @@ from typing import Literal
 from rig.errors import RecordingError
 from rig.recording.table import Table
 from rig.signals import NO_COLUMN
-from rig.units import DIMENSIONS, SI, name_and_unit, unit_of
+from rig.units import DIMENSIONS, SI, bare, name_and_unit, unit_of
 
 # What a column with a unit over it may be called, besides the default names, which carry theirs.
 _PLAIN_NAMES = {
@@ -26,8 +26,13 @@ _CURE = re.compile(r"(recorded\.scale\.(time|torque|rate|angle): )([-\d.e]+)")
 
 
 def stated_unit(table: Table, column: str) -> str:
-    """What stands as the unit of a column, in its name or below it; empty where nothing does."""
-    return table.units.get(column) or name_and_unit(column)[1]
+    """What stands as the unit of a column, in its name or below it, or is all of its name; empty where nothing does."""
+    return table.units.get(column) or name_and_unit(column)[1] or (bare(column) if _is_bare_unit(column) else "")
+
+
+def _is_bare_unit(column: str) -> bool:
+    """A header that has units and no names: [s], [N m]."""
+    return bare(column) != column.strip() and unit_of(column) is not None
 
 
 def column_named(table: Table, quantity: str, named: str | None, defaults: Sequence[str]) -> str | None:

@@ -32,10 +32,12 @@ WORDS: dict[Quantity, frozenset[str]] = {
     ),
     "angle": _words("angle position pos theta th phi q winkel lage encoder enc ang weg θ φ"),
 }
+LONG = 5  # letters from which a word counts inside of another: motordrehmoment
 CURRENT = _words("current i iq strom amps")
+ONLY_CURRENT = CURRENT - {"current"}  # which, in "current position", means the present one
+PLAIN = {q: frozenset(w for w in WORDS[q] if len(w) >= LONG) for q in WORDS}  # and say a quantity beyond doubt
 NOT_MEASURED = _words("ref reference cmd command set setpoint soll target demand desired error err limit")
 COUNTERS = _words("index sample samples n nr no count counter row id zeile")
-LONG = 5  # letters from which a word counts inside of another: motordrehmoment
 LISTED = 8  # columns in a sentence
 SAME_MOTION = 0.99  # correlation of an angle and an integrated rate
 
@@ -57,10 +59,16 @@ def guess_roles(columns: Sequence[Column], given: dict[Quantity, Column | None])
     """One choice a quantity. ``given`` are those that somebody named, None for "there is none"."""
     chosen = {q: Choice(c, "as given", True, said=True) for q, c in given.items()}
     left = [c for c in columns if c.values is not None and all(c is not g for g in given.values())]
+    if "time" in given:
+        left = [c for c in left if not says_time(c)]
     for quantity in QUANTITIES:
         if quantity in chosen:
             continue
-        made = _time(left) if quantity == "time" else _by_words(quantity, left)
+        if quantity == "time":
+            made = _time(left)
+            left = [c for c in left if not says_time(c)]
+        else:
+            made = _by_words(quantity, left)
         if made.column is not None:
             left = [c for c in left if c is not made.column]
         chosen[quantity] = made
@@ -87,6 +95,8 @@ def _score(column: Column, quantity: Quantity) -> float:
     score += 2.0 if _has_word(column, WORDS[quantity]) else 0.0
     if quantity == "torque" and _has_word(column, CURRENT):
         score += 0.5
+    elif _has_word(column, ONLY_CURRENT):
+        score -= 4.0  # the q of i_q is no angle
     if quantity == "angle" and _has_word(column, WORDS["rate"]):
         score -= 1.5  # angular velocity, angle rate
     return score - (1.0 if score > 0 and set(column.words) & NOT_MEASURED else 0.0)
@@ -117,11 +127,29 @@ def _by_words(quantity: Quantity, left: Sequence[Column]) -> Choice:
     if best <= 0.0:
         return Choice(None, "no name or unit says so", quantity in ("rate", "angle"))
     several = [c for s, c in scores if s == best]
-    why = "by its name" if _has_word(several[0], WORDS[quantity]) else "by its unit"
+    is_named = _has_word(several[0], WORDS[quantity])
+    why = "by its name" if is_named else "by its unit" if several[0].known_unit else "as a current"
     if len(several) > 1:
-        others = ", ".join(repr(c.name) for c in several[1:4])
-        return Choice(several[0], f"{why}, as {others} might be, too", False)
+        first = _liveliest(several)
+        others = ", ".join(repr(c.name) for c in [c for c in several if c is not first][:3])
+        return Choice(first, f"{why}, as {others} might be, too", False)
+    another = next((q for q in PLAIN if q != quantity and _has_word(several[0], PLAIN[q])), None)
+    if another is not None and not is_named:
+        return Choice(several[0], f"by its unit, though its name says {another}", False)
     return Choice(several[0], why, True)
+
+
+def _liveliest(columns: Sequence[Column]) -> Column:
+    """The one that moves most (of a gyro's three axes the driven one); the first where their units differ in kind."""
+    if len({None if c.known_unit is None else c.known_unit.dimension for c in columns}) > 1:
+        return columns[0]
+    return max(columns, key=_size)
+
+
+def _size(column: Column) -> float:
+    """The standard deviation, in SI units where the unit is known."""
+    factor = 1.0 if column.known_unit is None else column.known_unit.factor
+    return 0.0 if column.values is None else factor * float(np.nanstd(column.values))
 
 
 def _time(left: Sequence[Column]) -> Choice:
@@ -146,7 +174,7 @@ def _by_motion(chosen: dict[Quantity, Choice], left: Sequence[Column]) -> dict[Q
     time, named = chosen["time"].column, [one for q in ("rate", "angle") if (one := chosen[q]).column is not None]
     if any(one.sure for one in named) or len(named) == 2:
         return {}
-    among = [c for one in named if (c := one.column)] + [c for c in left if c.moves and c.known_unit is None]
+    among = [c for one in named if (c := one.column)] + [c for c in left if _may_be_any(c)]
     if named:  # several columns fit one word: those alone
         quantity: Quantity = "rate" if chosen["rate"].column is not None else "angle"
         among = [c for c in among if _score(c, quantity) > 0.0]
@@ -164,8 +192,14 @@ def _by_motion(chosen: dict[Quantity, Choice], left: Sequence[Column]) -> dict[Q
     return {} if named else {"rate": _last_that_moves(chosen, left)}
 
 
+def _may_be_any(column: Column) -> bool:
+    """Whether a column of which nothing is said may be a measured channel: it moves, and is no flag of 0 and 1."""
+    is_flag = column.values is not None and bool(np.isin(column.values, (0.0, 1.0)).all())
+    return column.moves and column.known_unit is None and not is_flag
+
+
 def _last_that_moves(chosen: dict[Quantity, Choice], left: Sequence[Column]) -> Choice:
-    moving = [c for c in left if c.moves and c.known_unit is None and c is not chosen["torque"].column]
+    moving = [c for c in left if _may_be_any(c) and c is not chosen["torque"].column]
     return Choice(moving[-1], "it is the last column that moves", False) if moving else Choice(None, "", True)
 
 
@@ -179,7 +213,7 @@ def relation(time_s: Array, angle: Column, rate: Column) -> tuple[float, float] 
 
 
 def _remaining_torque(left: Sequence[Column]) -> Choice:
-    moving = [c for c in left if c.moves and c.known_unit is None and not set(c.words) & COUNTERS]
+    moving = [c for c in left if _may_be_any(c) and not set(c.words) & COUNTERS]
     if len(moving) == 1:
         return Choice(moving[0], "it is the only column left", False)
     unused = [c.name for c in left if c.moves]

@@ -63,12 +63,12 @@ class Layout:
 def layout_of(path: Path) -> Layout:
     """The layout of a file. Raises RecordingError where there is no header or no text, and what reading it raises."""
     encoding = _encoding(path)
-    comment, lines = _first_lines(path, encoding)
+    comments, lines = _first_lines(path, encoding)
     if not lines:
         raise RecordingError(f"{path}: holds no data: a header line and one line a sample are needed")
     at, delimiter = _first_data(lines)
     if at == 0:
-        return _without_header(path, encoding, comment, lines, delimiter)
+        return _without_header(path, encoding, comments, lines, delimiter)
     names_at, units_at = _header(lines, at, delimiter)
     width = len(_trimmed(_split(lines[at][1], delimiter))) if at < len(lines) else 0
     names = _names(lines[names_at][1], delimiter, width)
@@ -77,8 +77,7 @@ def layout_of(path: Path) -> Layout:
             f"{path}: the data begin in line {lines[at][0]}, and no line above names their {width} columns: add one, "
             "e.g. time_s,torque_nm,rate_rad_s, and delete what stands above it"
         )
-    row = [] if units_at is None else _names(lines[units_at][1], delimiter, width)
-    units = {name: bare(unit) for name, unit in zip(names, row, strict=False) if bare(unit).lower() not in _EMPTY}
+    units = _units_of(names, [] if units_at is None else _names(lines[units_at][1], delimiter, width))
     comma = _decimal_comma([text for _, text in lines[at : at + DATA_LINES]], delimiter)
     return Layout(path, encoding, tuple(names), delimiter, comma, lines[at - 1][0], units)
 
@@ -126,19 +125,19 @@ def _encoding(path: Path) -> str:
     return "utf-8-sig"
 
 
-def _first_lines(path: Path, encoding: str) -> tuple[str, list[tuple[int, str]]]:
-    """The last comment before the first line, and the lines that are neither empty nor comments."""
-    comment, lines = "", list[tuple[int, str]]()
+def _first_lines(path: Path, encoding: str) -> tuple[list[str], list[tuple[int, str]]]:
+    """The comments before the first line, and the lines that are neither empty nor comments."""
+    comments, lines = list[str](), list[tuple[int, str]]()
     for number, text in all_lines(path, encoding):
         if not text.strip() or _SEPARATOR_LINE.match(text.strip()):
             continue
         if text.lstrip().startswith("#"):
-            comment = comment if lines else text.lstrip().lstrip("#").strip()
+            comments += [] if lines else [text.lstrip().lstrip("#").strip()]
             continue
         lines.append((number, text))
         if len(lines) == LOOKED_AT:
             break
-    return comment, lines
+    return comments, lines
 
 
 def _first_data(lines: Sequence[tuple[int, str]]) -> tuple[int, str | None]:
@@ -187,19 +186,27 @@ def _header(lines: Sequence[tuple[int, str]], at: int, delimiter: str | None) ->
 
 
 def _without_header(
-    path: Path, encoding: str, comment: str, lines: Sequence[tuple[int, str]], delimiter: str | None
+    path: Path, encoding: str, comments: Sequence[str], lines: Sequence[tuple[int, str]], delimiter: str | None
 ) -> Layout:
-    """Data from the first line on: numpy.savetxt writes its header as a comment."""
+    """Data from the first line on: numpy.savetxt writes its header as a comment, some add one with the units."""
     line, first = lines[0]
-    marks = _delimiter(comment)
-    names = _split(comment, marks)
-    if not comment or len(names) != len(_split(first, delimiter)):
+    rows = [_split(comment, _delimiter(comment)) for comment in comments[-2:]]
+    width = len(_split(first, delimiter))
+    has_units = len(rows) == 2 and _is_units(rows[1]) and len(rows[0]) == len(rows[1]) == width
+    names = rows[0] if has_units else rows[-1] if rows else []
+    units = _units_of(names, rows[1]) if has_units else {}
+    if len(names) != width:
         raise RecordingError(
             f"{path}: line {line} holds numbers where the header has to be: "
             "add a first line that names the columns, e.g. time_s,torque_nm,rate_rad_s"
         )
     comma = _decimal_comma([text for _, text in lines[:DATA_LINES]], delimiter)
-    return Layout(path, encoding, tuple(names), delimiter, comma, line - 1)
+    return Layout(path, encoding, tuple(names), delimiter, comma, line - 1, units)
+
+
+def _units_of(names: Sequence[str], row: Sequence[str]) -> dict[str, str]:
+    """Name -> unit of those that have one in the row of units."""
+    return {name: bare(unit) for name, unit in zip(names, row, strict=False) if bare(unit).lower() not in _EMPTY}
 
 
 def _names(line: str, delimiter: str | None, width: int) -> list[str]:

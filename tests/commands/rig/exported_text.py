@@ -105,6 +105,10 @@ FILES: dict[str, tuple[str, tuple[str, ...]]] = {
         "TIME,Torque (N*m),Gyro (deg/s)\n" + rows(TIME - 0.1, TORQUE, np.degrees(RATE), form="{:.9e}"),
         (),
     ),
+    "commented.csv": (
+        "# bench 3\n#time,torque,rate\n#[ms],[mNm],[deg/s]\n" + rows(1e3 * TIME, 1e3 * TORQUE, np.degrees(RATE)),
+        (),
+    ),
     "catman.txt": (
         "Messzeit [s]\tMoment [Nm]\tDrehwinkel [°]\n\t\t\n" + german(rows(TIME, TORQUE, np.degrees(ANGLE), by="\t")),
         (),

@@ -109,6 +109,35 @@ def test_what_nobody_can_guess_has_no_guess() -> None:
     assert factors["torque"].value is None and "in 'A'" in factors["torque"].why
 
 
+def test_a_time_or_a_flag_is_never_a_measured_channel() -> None:
+    roles, _ = guessed(**{"torque.Time": T, "torque.Data": TORQUE, "rate.Time": T, "rate.Data": RATE})
+    assert names_of(roles) == {"time": "torque.Time", "torque": "torque.Data", "rate": "rate.Data", "angle": None}
+    roles, _ = guessed(t=T, M=TORQUE, a=RATE, b=(T > 0.3).astype(float))
+    assert names_of(roles)["rate"] == "a"
+
+
+def test_the_q_of_a_current_is_no_angle() -> None:
+    roles, _ = guessed(t=T, i_q=TORQUE, theta=ANGLE)
+    assert names_of(roles) == {"time": "t", "torque": "i_q", "rate": None, "angle": "theta"}
+    roles, _ = guessed(**{"t": T, "torque": TORQUE, "current__position": ANGLE})
+    assert names_of(roles)["angle"] == "current position"
+
+
+def test_of_several_axes_of_a_gyro_the_one_that_moves_most_is_guessed() -> None:
+    roles, _ = guessed(t=T, torque=TORQUE, gyro_x=0.01 * TORQUE, gyro_y=RATE, gyro_z=0.01 * RATE)
+    assert names_of(roles)["rate"] == "gyro_y" and not roles["rate"].sure
+    assert "'gyro_x', 'gyro_z' might be" in roles["rate"].why
+
+
+def test_a_unit_of_something_else_and_a_name_of_something_else_are_not_sure() -> None:
+    roles, _ = guessed(**{"time": T, "torque__[deg]": ANGLE, "angle__[Nm]": TORQUE})
+    assert names_of(roles) == {"time": "time", "torque": "angle [Nm]", "rate": None, "angle": "torque [deg]"}
+    assert not roles["torque"].sure and "though its name says angle" in roles["torque"].why
+    roles, factors = guessed(**{"[s]": T, "[Nm]": TORQUE, "[deg/s]": RATE})
+    assert names_of(roles) == {"time": "[s]", "torque": "[Nm]", "rate": "[deg/s]", "angle": None}
+    assert all(factor.sure for factor in factors.values())
+
+
 def test_a_linear_axis_is_known_by_its_units() -> None:
     roles, factors = guessed(t_s=T, force_N=TORQUE, position_mm=1e3 * ANGLE)
     assert axis_of(roles) == "linear"
