@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from rig.recording.guessing.columns import Column
-from rig.recording.guessing.roles import Quantity
+from rig.recording.guessing.roles import CURRENT, WORDS, Quantity
 from rig.units import DIMENSIONS
+
+_AMPERES_OR_VOLTS = re.compile(r"_([AV])$")  # or one of several axes: so it only takes the guess away
 
 
 @dataclass(frozen=True)
@@ -40,4 +43,15 @@ def stated_factor(quantity: Quantity, column: Column, axis: str, is_default: boo
     if column.unit_text or (column.suffix is not None and column.suffix.dimension == "current"):
         what = column.unit_text or "A"
         return Factor(None, f"its numbers are in {what!r}, which is no unit of {dimension} that is known", False)
+    return _doubtful(quantity, column, dimension)
+
+
+def _doubtful(quantity: Quantity, column: Column, dimension: str) -> Factor | None:
+    """What a name says against the unit that is usual; None where it says nothing."""
+    electrical = _AMPERES_OR_VOLTS.search(column.name)
+    if quantity != "time" and electrical is not None:
+        what = {"A": "amperes", "V": "volts"}[electrical[1]]
+        return Factor(None, f"its name ends in {electrical[0]}, which may be {what} and no unit of {dimension}", False)
+    if quantity == "torque" and set(column.words) & CURRENT and not set(column.words) & WORDS["torque"]:
+        return Factor(None, f"by its name it is a current, which is no {dimension}", False)
     return None

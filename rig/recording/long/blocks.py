@@ -71,6 +71,7 @@ def _of_h5(path: Path) -> BlockTable | None:
         inner = h5.datasets(file)
         columns = {name: file[at] for name, at in inner.items()}
         plain = {name for name, data in columns.items() if _is_plain(data)}
+        units = h5.units_of(file, inner)
         counts = {columns[name].shape[0] for name in plain}
     if len(counts) != 1:
         return None
@@ -79,7 +80,7 @@ def _of_h5(path: Path) -> BlockTable | None:
         with h5py.File(path, "r") as file:
             return {name: _h5_rows(path, name, file[inner[name]], first, last) for name in names}
 
-    return BlockTable(path, tuple(inner), counts.pop(), read)
+    return BlockTable(path, tuple(inner), counts.pop(), read, units=units)
 
 
 def _is_plain(data: Any) -> bool:

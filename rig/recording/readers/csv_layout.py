@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import IO, cast
 
 from rig.errors import RecordingError
+from rig.recording.readers.preamble import is_labelled, stated_separator, stated_units
 from rig.recording.readers.timestamps import is_stamp
 from rig.recording.table import MAX_SAMPLES
 from rig.units import bare, unit_of
@@ -26,7 +27,6 @@ DATA_LINES = 50  # of which the decimal sign is read
 SURE = 3  # lines in a row that look like data before a preamble is believed
 _EMPTY = ("", "na", "n/a", "null", "none", "-")
 _SEPARATOR_LINE = re.compile(r'^"?sep=.?"?$', re.IGNORECASE)  # as spreadsheets write it
-_STATED_SEPARATOR = re.compile(r"^Separator\s+(Tab|Comma|Semicolon)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Layout:
     header_line
         The last line before the data: that of the names, or of the units below them.
     units
-        Column -> unit, where a row of units stands below the names.
+        Column -> unit, where a row of units stands below the names, or above them in a preamble.
     """
 
     path: Path
@@ -77,7 +77,8 @@ def layout_of(path: Path) -> Layout:
             f"{path}: the data begin in line {lines[at][0]}, and no line above names their {width} columns: add one, "
             "e.g. time_s,torque_nm,rate_rad_s, and delete what stands above it"
         )
-    units = _units_of(names, [] if units_at is None else _names(lines[units_at][1], delimiter, width))
+    above = stated_units([text for _, text in lines[:names_at]], names, lambda text: _split(text, delimiter))
+    units = above | _units_of(names, [] if units_at is None else _names(lines[units_at][1], delimiter, width))
     comma = _decimal_comma([text for _, text in lines[at : at + DATA_LINES]], delimiter)
     return Layout(path, encoding, tuple(names), delimiter, comma, lines[at - 1][0], units)
 
@@ -152,7 +153,7 @@ def _first_data(lines: Sequence[tuple[int, str]]) -> tuple[int, str | None]:
         has_numbers = any(_is_number(f) for f in _split(lines[at][1], plain) if f.lower() not in _EMPTY)
         if (at == 1 and _is_data(lines[1][1], plain)) or (at == 2 and has_numbers and _units_below(lines, 2)):
             return at, plain
-    stated = _stated_separator(lines)
+    stated = stated_separator(lines)
     for at in range(1, len(lines)):
         delimiter = stated or _delimiter(lines[at][1])
         following = [text for _, text in lines[at : at + SURE]]
@@ -166,12 +167,6 @@ def _first_data(lines: Sequence[tuple[int, str]]) -> tuple[int, str | None]:
     return (1, plain) if is_damaged else (at, delimiter)
 
 
-def _stated_separator(lines: Sequence[tuple[int, str]]) -> str | None:
-    """What a LabVIEW measurement file says of itself."""
-    found = next((m for _, text in lines[:40] if (m := _STATED_SEPARATOR.match(text))), None)
-    return {"tab": "\t", "comma": ",", "semicolon": ";"}[found[1].lower()] if found else None
-
-
 def _units_below(lines: Sequence[tuple[int, str]], at: int) -> bool:
     return at >= 2 and _is_units(_split(lines[at - 1][1], _delimiter(lines[at][1])))
 
@@ -180,8 +175,10 @@ def _header(lines: Sequence[tuple[int, str]], at: int, delimiter: str | None) ->
     """Which line before the data has the names, and which below it the units."""
     if at >= len(lines):
         return 0, None
-    if at >= 2 and _is_units(_split(lines[at - 1][1], delimiter)):
-        return at - 2, at - 1
+    if at >= 2 and _is_units(last := _split(lines[at - 1][1], delimiter)):
+        # A column may be called M; then the line before it is no row of names.
+        above = _split(lines[at - 2][1], delimiter)
+        return (at - 2, at - 1) if len(_trimmed(above)) >= len(_trimmed(last)) else (at - 1, None)
     return (at - 1 if at >= 1 else 0), None
 
 
@@ -264,7 +261,9 @@ def _is_data(line: str, delimiter: str | None) -> bool:
 def _is_units(fields: Sequence[str]) -> bool:
     """Whether these stand below the names to say their units: no number among them, and one at least a known unit."""
     known = [f for f in fields if f.lower() not in _EMPTY]
-    return any(unit_of(f) is not None for f in known) and not any(_is_number(f) for f in known)
+    if is_labelled(fields) or any(_is_number(f) for f in known):
+        return False
+    return any(unit_of(f) is not None for f in known)
 
 
 def _decimal_comma(data: Sequence[str], delimiter: str | None) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,8 @@ from rig.recording.memory import at_most
 from rig.recording.run import Run
 from rig.recording.table import MAX_SAMPLES, Table, read_each, too_long
 
+UNIT_ATTRIBUTES = ("units", "unit", "Units", "Unit")
+LONGEST_UNIT_BYTES = 1000
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, MemoryError)
 
 
@@ -28,13 +30,16 @@ def read(path: Path) -> Sequence[Table | Run]:
             with at_most(hdf5.MAX_TEXT_BYTES):
                 ours = file.attrs.get("format") == hdf5.FORMAT
             columns = {} if ours else datasets(file)
+            with at_most(hdf5.MAX_TEXT_BYTES):
+                units = units_of(file, columns)
     except _DAMAGE as error:
         raise RecordingError(f"{path}: is not an HDF5 file that can be read ({error}): export it again") from error
     if ours:
         return hdf5.read_recording_h5(path, with_info=False).runs
     if not columns:
         raise RecordingError(f"{path}: holds no datasets: write time_s, torque_nm, rate_rad_s as datasets")
-    return [Table(path, tuple(columns), read_each(path, lambda name: _array(path, name, columns[name])))]
+    read = read_each(path, lambda name: _array(path, name, columns[name]))
+    return [Table(path, tuple(columns), read, units=units)]
 
 
 def datasets(file: h5py.File) -> dict[str, str]:
@@ -51,6 +56,27 @@ def datasets(file: h5py.File) -> dict[str, str]:
     file.visititems(visit)
     leaves = Counter(path.rpartition("/")[2] for path in paths)
     return {leaf if leaves[leaf := path.rpartition("/")[2]] == 1 else path: path for path in paths}
+
+
+def units_of(file: h5py.File, columns: Mapping[str, str]) -> dict[str, str]:
+    """Column -> unit, where an attribute of its dataset states one."""
+    found: dict[str, str] = {}
+    for name, inner in columns.items():
+        attributes = file[inner].attrs
+        key = next((key for key in UNIT_ATTRIBUTES if key in attributes), None)
+        if key is not None and (text := _text(attributes, key)):
+            found[name] = text
+    return found
+
+
+def _text(attributes: h5py.AttributeManager, key: str) -> str:
+    """A text, whether it is kept as one, as bytes or as an array of one; empty for anything else."""
+    kept = attributes.get_id(key)
+    if kept.get_storage_size() > LONGEST_UNIT_BYTES or kept.shape not in ((), (1,)):
+        return ""
+    value = np.asarray(attributes[key]).reshape(-1)[0]
+    text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+    return text.strip() if isinstance(text, str) else ""
 
 
 def _array(path: Path, name: str, inner: str) -> Any:

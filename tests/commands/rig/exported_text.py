@@ -42,6 +42,12 @@ FILES: dict[str, tuple[str, tuple[str, ...]]] = {
         LVM + "X_Value\tMotor torque (N m)\tGyro (deg/s)\tComment\n" + rows(TIME, TORQUE, np.degrees(RATE), by="\t"),
         (),
     ),
+    "labview_units.lvm": (LVM + "X_Value\tM\tGyro\tComment\n" + rows(TIME, TORQUE, np.degrees(RATE), by="\t"), ()),
+    "scope_units.csv": (
+        "Model,MSO44\n\nHorizontal Units,mS,\nSample Interval,2,\nVertical Units,mN m,°/s\nLabel,a,b\nTIME,CH1,CH2\n"
+        + rows(1e3 * TIME, 1e3 * TORQUE, np.degrees(RATE), form="{:.9e}"),
+        (),
+    ),
     "labview_text.txt": ("Time (s)\tTorque (N·m)\tAngle (°)\n" + rows(TIME, TORQUE, np.degrees(ANGLE), by="\t"), ()),
     "matlab_writetable.csv": ("t,M,w,phi\n" + rows(TIME, TORQUE, RATE, ANGLE), ("--yes",)),
     "oscilloscope.csv": (

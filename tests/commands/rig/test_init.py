@@ -55,10 +55,19 @@ def _h5(path: Path) -> None:
             file[f"scope/{name}"] = values
 
 
+def _h5_attributes(path: Path) -> None:
+    columns = {"time": (1e3 * TIME, "ms"), "torque": (1e3 * TORQUE, np.bytes_("mN m")), "rate": (RATE, ["rad/s"])}
+    with h5py.File(path, "w") as file:
+        for (name, (values, unit)), key in zip(columns.items(), ("units", "unit", "Unit"), strict=True):
+            file[f"log/{name}"] = values
+            file[f"log/{name}"].attrs[key] = unit
+
+
 BINARY: dict[str, Callable[[Path], None]] = {
     "run.npz": lambda p: np.savez(p, t=TIME, torque_Nm=TORQUE, gyro_deg_s=np.degrees(RATE), fs=500.0),
     "run.mat": lambda p: savemat(p, {"data": {"time_s": TIME, "torque_Nm": TORQUE, "omega_rad_s": RATE}, "note": "a"}),
     "run.h5": _h5,
+    "attributes.h5": _h5_attributes,
 }
 
 

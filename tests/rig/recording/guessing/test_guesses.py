@@ -107,6 +107,11 @@ def test_what_nobody_can_guess_has_no_guess() -> None:
     assert factors["time"].value is None and not factors["time"].sure
     _, factors = guessed(**{"time_s": T, "current__[A]": TORQUE, "rate_rad_s": RATE})
     assert factors["torque"].value is None and "in 'A'" in factors["torque"].why
+    _, factors = guessed(time_s=T, torque_A=TORQUE, gyro_V=RATE)
+    assert factors["torque"].value is None and "ends in _A, which may be amperes" in factors["torque"].why
+    assert factors["rate"].value is None and "ends in _V, which may be volts" in factors["rate"].why
+    _, factors = guessed(t=T, i_q=TORQUE, theta=ANGLE)
+    assert factors["torque"].value is None and "by its name it is a current" in factors["torque"].why
 
 
 def test_a_time_or_a_flag_is_never_a_measured_channel() -> None:
