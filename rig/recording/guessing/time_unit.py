@@ -46,9 +46,9 @@ def _by_numbers(column: Column, values: Array, step: float) -> Factor:
     plain = Factor(1.0, f"s, as samples are {step:.4g} apart", True)
     if 0.0 < step < SLOWEST_STEP_S:
         return _doubted(values, step, 1.0, plain) or plain
-    unit, factor = min(
-        ((u, f) for u, f in _SHORT.items() if u != "s"), key=lambda g: abs(np.log10(max(step, 1e-12) * g[1]) + 3.0)
-    )
+    if step <= 0.0:
+        return Factor(1.0, "s, as no unit is stated and samples have the same time", False)
+    unit, factor = min(((u, f) for u, f in _SHORT.items() if u != "s"), key=lambda g: abs(np.log10(step * g[1]) + 3.0))
     return Factor(factor, f"{unit}, as samples are {step:.4g} apart", False)
 
 

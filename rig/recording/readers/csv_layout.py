@@ -26,6 +26,7 @@ LOOKED_AT = 400  # lines, comments and empty ones not counted, in which the data
 DATA_LINES = 50  # of which the decimal sign is read
 SURE = 3  # lines in a row that look like data before a preamble is believed
 _EMPTY = ("", "na", "n/a", "null", "none", "-")
+_TRUTH = {"true": 1.0, "false": 0.0}
 _SEPARATOR_LINE = re.compile(r'^"?sep=.?"?$', re.IGNORECASE)  # as spreadsheets write it
 
 
@@ -240,6 +241,8 @@ def _number(text: str, decimal_comma: bool) -> float:
         return float("nan")
     if "_" in text:
         raise ValueError(text)
+    if text.lower() in _TRUTH:
+        return _TRUTH[text.lower()]
     return float(text.replace(",", ".") if decimal_comma else text)
 
 

@@ -14,6 +14,7 @@ from rig.errors import RecordingError
 from rig.recording.readers.csv_layout import Layout, all_lines, layout_of
 from rig.recording.readers.thousands import first_grouped, may_be_grouped
 from rig.recording.readers.timestamps import Stamps
+from rig.recording.readers.unreadable import unreadable
 from rig.recording.table import MAX_SAMPLES, Table, too_long
 
 _DAMAGE = (OSError, EOFError, zlib.error, UnicodeError)
@@ -124,10 +125,13 @@ def _careful(layout: Layout, positions: Sequence[int]) -> Array:
             fields.pop()
         if len(fields) != width:
             raise RecordingError(_ragged(layout, number, len(fields)))
-        try:
-            values.extend([_value(layout, fields[i], i, stamps, first=count == 0) for i in positions])
-        except ValueError:
-            raise RecordingError(_not_a_number(layout, number, fields, positions, count)) from None
+        for i in positions:
+            try:
+                values.append(_value(layout, fields[i], i, stamps, first=count == 0))
+            except ValueError as error:
+                cure = unreadable(fields, i, first=count == 0, error=error)
+                where = f"{layout.path}: line {number}, column {layout.names[i]!r}"
+                raise RecordingError(f"{where}: {fields[i][:40]!r} {cure}") from None
         count += 1
     return np.array(values, dtype=np.float64).reshape(count, len(positions))
 
@@ -152,26 +156,6 @@ def _ragged(layout: Layout, number: int, count: int) -> str:
     if layout.delimiter == "," and count >= 2 * len(layout.names) - 1:
         return text + "with decimal commas, separate the columns by semicolons"
     return text + "complete or delete the line (the last one may be cut)"
-
-
-def _not_a_number(layout: Layout, number: int, fields: Sequence[str], positions: Sequence[int], row: int) -> str:
-    for i in positions:
-        try:
-            layout.number(fields[i])
-        except ValueError:
-            break
-    text = f"{layout.path}: line {number}, column {layout.names[i]!r}: {fields[i][:40]!r} is not a number: "
-    if "," in fields[i] and ":" not in fields[i]:
-        return text + "use one decimal sign in the whole file, and no sign between thousands"
-    if row == 0:
-        return text + _first_row_cure(fields[i])
-    return text + "correct it, or leave it empty and add a column valid that is 0 there"
-
-
-def _first_row_cure(field: str) -> str:
-    if ":" in field and "/" in field:
-        return "write the date as 2024-12-31 or 31.12.2024: with slashes, day and month cannot be told apart"
-    return "a row of units that are not known? delete it, or begin it with #"
 
 
 def _line_of(layout: Layout, index: int) -> int:

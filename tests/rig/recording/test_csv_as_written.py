@@ -140,6 +140,13 @@ def test_a_factor_that_is_advised_takes_the_place_of_the_one_that_was_applied(tm
         "%d.%m.%Y %H:%M:%S,%f",
         "%Y/%m/%d %H:%M:%S.%f",
         "%H:%M:%S.%f",
+        "%m/%d/%Y %H:%M:%S.%f",
+        "%d/%m/%Y %H:%M:%S.%f",
+        "%m/%d/%Y %I:%M:%S.%f %p",
+        "%Y-%m-%d %I:%M:%S.%f %p",
+        "%I:%M:%S.%f %p",
+        "%Y%m%dT%H%M%S.%f",
+        "%d-%b-%Y %H:%M:%S.%f",
     ],
 )
 def test_time_stamps_are_seconds(stamp: str, tmp_path: Path) -> None:
@@ -154,10 +161,73 @@ def test_time_stamps_are_seconds(stamp: str, tmp_path: Path) -> None:
 
 
 def test_a_date_that_may_be_two_is_refused_with_the_cure(tmp_path: Path) -> None:
-    (tmp_path / "r.csv").write_text("time_s,torque_nm,rate_rad_s\n" + "05/06/2024 12:00:00.1,1,2\n" * 3)
+    days = "05/06/2024 23:59:59.9,1,2\n06/06/2024 00:00:00.0,1,2\n"
+    (tmp_path / "r.csv").write_text("time_s,torque_nm,rate_rad_s\n" + days)
     assert "write the date as 2024-12-31 or 31.12.2024" in refusal(tmp_path, "r.csv")
     with pytest.raises(ValueError, match="yesterday"):
         Stamps().seconds("yesterday")
+
+
+@pytest.mark.parametrize(
+    ("first", "later", "seconds"),
+    [
+        ("05/06/2024 12:00:00.5", "05/06/2024 12:00:01.5", 1.0),  # whichever is the day
+        ("05/12/2024 23:59:59.5", "05/13/2024 00:00:00.5", 1.0),
+        ("11/28/2026 11:59:59.5 AM", "11/28/2026 12:00:00.5 PM", 1.0),
+        ("12:59:59.5 AM", "01:00:00.5 AM", 1.0),
+        ("11:59:59.5 p.m.", "12:00:00.5 a.m.", 1.0),
+        ("15:49:01:123", "15:49:02:125", 1.002),
+        ("59:59.25", "00:00.5", 0.25 + 1.0),
+        ("100:00:00.5", "100:00:01.5", 1.0),
+        ("0 days 00:00:00.000000", "1 days 00:00:01.500000", 86_401.5),
+        ("2024-10-27 02:59:59+02:00", "2024-10-27T02:00:00+01:00", 1.0),
+        ("12:00:00.000000001", "12:00:00.000000251", 2.5e-7),
+    ],
+)
+def test_stamps_of_many_kinds_are_seconds(first: str, later: str, seconds: float) -> None:
+    stamps = Stamps()
+    assert -stamps.seconds(first) + stamps.seconds(later) == pytest.approx(seconds, abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "13/13/2024 12:00",
+        "13:00 PM",
+        "2024-02-30 12:00",
+        "a:b",
+        "12:61",
+        "2024-01-01 25:00:00",
+        "1.2.3 10:00",
+        "5:6:7:8:9",
+    ],
+)
+def test_what_is_no_stamp_is_refused(text: str) -> None:
+    with pytest.raises(ValueError):
+        Stamps().seconds(text)
+
+
+@pytest.mark.parametrize(
+    ("field", "words"),
+    [
+        ("2026:332:15:49:01.123", "a form that is not known: write it as 2024-12-31 23:59:59.123"),
+        ("2026-11-28", "a date without a time of day"),
+        ("0.5 Nm", "a number with a unit"),
+        ("OK", "leave it empty and add a column valid"),
+    ],
+)
+def test_a_field_that_is_no_number_is_called_what_it_is(field: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text(f"time_s,torque_nm,rate_rad_s\n0,{field},2\n1,{field},3\n")
+    message = refusal(tmp_path, "r.csv")
+    assert f"line 2, column 'torque_nm': '{field}' is" in message and words in message
+    assert "row of units" not in message
+
+
+@pytest.mark.parametrize(("yes", "no"), [("TRUE", "FALSE"), ("True", "False"), ("true", "false")])
+def test_valid_may_be_said_in_words(yes: str, no: str, tmp_path: Path) -> None:
+    lines = [f"{line},{no if i == 7 else yes}" for i, line in enumerate(rows(T, TORQUE, RATE).splitlines())]
+    run = as_read(tmp_path, "time_s,torque_nm,rate_rad_s,valid\n" + "\n".join(lines) + "\n")
+    assert (~run.valid).nonzero()[0].tolist() == [7]
 
 
 def test_the_units_below_the_names_go_with_the_table(tmp_path: Path) -> None:
