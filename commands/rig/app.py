@@ -29,6 +29,10 @@ from commands.terminal.options import (
     new_app,
 )
 
+RECORDINGS = (
+    "Recordings of the same columns, one a run: CSV (also .tsv, .txt, .lvm, .csv.gz), NPZ, MAT, HDF5; with an extra: "
+    "Parquet, MDF4, TDMS, ROS bags. None: a bench."
+)
 ResultsDir = Annotated[
     Path, typer.Argument(metavar="DIR", help="The results folder of a campaign.", show_default=False)
 ]
@@ -215,9 +219,8 @@ def schema() -> None:
 
 @app.command()
 def init(
-    source: Annotated[
-        Path | None,
-        typer.Argument(metavar="[CSV]", help="A recording: CSV, NPZ, MAT, HDF5. None: a bench.", show_default=False),
+    sources: Annotated[
+        list[Path] | None, typer.Argument(metavar="[FILE]...", help=RECORDINGS, show_default=False)
     ] = None,
     time: TimeColumn = None,
     torque: TorqueColumn = None,
@@ -227,6 +230,9 @@ def init(
     torque_scale: ColumnScale = None,
     rate_scale: ColumnScale = None,
     angle_scale: ColumnScale = None,
+    sample_rate: Annotated[
+        str | None, typer.Option(metavar="HZ", help="Rows a second of a file without a time.", show_default=False)
+    ] = None,
     axis: Annotated[str | None, typer.Option(metavar="AXIS", help="rotary or linear. Default: by the units.")] = None,
     out: Annotated[Path, typer.Option(metavar="FILE", help="Where to write; never over a file.")] = Path("rig.yaml"),
     yes: Annotated[bool, typer.Option("--yes", help="Accept all guesses and list them.")] = False,
@@ -234,10 +240,11 @@ def init(
     """Write a commented rig.yaml: from the columns of a recording, or from the ports of this machine."""
 
     def command() -> int:
-        from commands.rig.init import InitOptions, init, terminal
+        from commands.rig.init import InitOptions, expanded, init
+        from commands.rig.init_questions import terminal
 
         columns = (time, torque, rate, angle), (time_scale, torque_scale, rate_scale, angle_scale)
-        return init(source, InitOptions.of(*columns, axis, out, yes), terminal())
+        return init(expanded(sources or []), InitOptions.of(*columns, axis, out, yes, sample_rate), terminal())
 
     raise typer.Exit(run_to_exit_code(command))
 

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import os
 import re
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from commands.rig.init_questions import (
-    LISTED,
     NONE,
+    SAMPLE_RATE,
     Ask,
     Questions,
     column_named,
     factor_from,
+    listing,
+    rate_from,
     show,
 )
 from commands.rig.init_yaml import Entry, number_value, recorded_yaml, text_value
@@ -40,23 +41,39 @@ class InitOptions:
     axis: str | None = None
     out: Path = Path("rig.yaml")
     yes: bool = False
+    sample_rate_hz: float | None = None
 
     @classmethod
     def of(
-        cls, columns: Sequence[str | None], scales: Sequence[str | None], axis: str | None, out: Path, yes: bool
-    ) -> InitOptions:  # fmt: skip
-        """From what was typed for time, torque, rate and angle, in this order."""
+        cls,
+        columns: Sequence[str | None],
+        scales: Sequence[str | None],
+        axis: str | None,
+        out: Path,
+        yes: bool,
+        sample_rate: str | None,
+    ) -> InitOptions:
+        """From what was typed for time, torque, rate and angle, in this order. Raises UsageError."""
         given = [{q: t for q, t in zip(ORDER, texts, strict=True) if t} for texts in (columns, scales)]
-        return cls(given[0], given[1], axis, out, yes)
+        rate_hz = None if sample_rate is None else rate_from(sample_rate)
+        if rate_hz is not None and ("time" in given[0] or "time" in given[1]):
+            option = "--time" if "time" in given[0] else "--time-scale"
+            raise UsageError(f"{SAMPLE_RATE} and {option} were both given: {SAMPLE_RATE} is for files without a time")
+        return cls(given[0], given[1], axis, out, yes, rate_hz)
+
+    def first(self) -> str | None:
+        """The first option about columns, None where none was given."""
+        named = [*(f"--{q}" for q in self.columns), *(f"--{q}-scale" for q in self.scales)]
+        return next(iter([*named, *([SAMPLE_RATE] if self.sample_rate_hz is not None else [])]), None)
 
 
-def init(source: Path | None, options: InitOptions, ask: Ask | None) -> int:
+def init(sources: Sequence[Path], options: InitOptions, ask: Ask | None) -> int:
     """Write a rig.yaml; returns the exit code.
 
     Parameters
     ----------
-    source
-        A recording, or None for a bench.
+    sources
+        Recordings of the same columns, one a run; none for a bench.
     ask
         Puts a question and returns the answer; None where nobody can answer.
 
@@ -72,49 +89,61 @@ def init(source: Path | None, options: InitOptions, ask: Ask | None) -> int:
         raise UsageError(f"--axis {options.axis!r:.40} is not allowed: give rotary or linear")
     if out.exists() or out.is_symlink():
         raise UsageError(f"{out} exists and is never overwritten: give another name with --out")
-    if source is None:
+    if not sources:
         return _bench(options)
     from rig.recording.readers import read_file
     from rig.recording.run import Run
 
+    for one in sources:
+        _check_is_there(one)
+    source, files = sources[0], [_relative(one, out) for one in sources]
     contents = read_file(source)
-    file = _relative(source, out)
     if all(isinstance(content, Run) for content in contents):
         show([f"{source}: a recording of this program; its columns and units are known"])
-        typed = next(iter([*options.columns, *[f"{q}-scale" for q in options.scales]]), None)
-        if typed is not None:
-            raise UsageError(f"{source} is a recording of this program, whose columns are known: leave out --{typed}")
-        text = recorded_yaml(file, f"{len(contents)} runs", (), (), options.axis or "rotary", out.name)
+        if options.first() is not None:
+            raise UsageError(
+                f"{source} is a recording of this program, whose columns are known: leave out {options.first()}"
+            )
+        text = recorded_yaml(files, f"{len(contents)} runs", (), (), options.axis or "rotary", out.name)
     else:
         table = next(content for content in contents if not isinstance(content, Run))
-        text = _of_table(table, file, options, ask)
+        text = _of_table(table, files, options, ask)
     _write(out, text, checked=True)
     show(["", f"{out}: written. Next: rig check {out}"])
     return OK
 
 
-def terminal() -> Ask | None:
-    """What asks the person at the terminal; None where there is nobody."""
-    if sys.stdin is None or not sys.stdin.isatty() or not sys.stderr.isatty():
-        return None
+def expanded(sources: Sequence[Path]) -> list[Path]:
+    """The files, patterns expanded where the shell did not, as on Windows; a pattern that fits none is kept."""
+    out: list[Path] = []
+    for source in sources:
+        found = [] if _is_there(source) else sorted(source.parent.glob(source.name))
+        out += found or [source]
+    return out
 
-    def ask(question: str) -> str:
-        sys.stderr.write(question)
-        sys.stderr.flush()
-        answer = sys.stdin.readline()
-        if not answer:
-            raise UsageError("no answer was given, so nothing was written: give the options (rig init --help)")
-        return answer
 
-    return ask
+def _is_there(source: Path) -> bool:
+    """Whether there is something to read, or to be told by the reader why it cannot be."""
+    try:
+        return source.exists() or source.is_symlink()
+    except OSError:
+        return True
+
+
+def _check_is_there(source: Path) -> None:
+    from rig.recording.readers import neighbours
+
+    if _is_there(source):
+        return
+    pattern = ": no file fits the pattern" if any(sign in source.name for sign in "*?[") else ": no such file"
+    raise UsageError(f"{source}{pattern}: correct the path{neighbours(source)}")
 
 
 def _bench(options: InitOptions) -> int:
     from commands.rig.init_bench import bench_text
 
-    named = next(iter({**options.columns, **options.scales}), None)
-    if named is not None:
-        raise UsageError(f"an option about the {named} was given without a recording: name the file, `rig init FILE`")
+    if options.first() is not None:
+        raise UsageError(f"{options.first()} was given without a recording: name the file, `rig init FILE`")
     text, seen = bench_text(options.out.name)
     show(seen)
     _write(options.out, text, checked=False)
@@ -122,30 +151,29 @@ def _bench(options: InitOptions) -> int:
     return OK
 
 
-def _of_table(table: Table, file: str, options: InitOptions, ask: Ask | None) -> str:
-    from rig.recording.guessing.clocks import with_one_clock
+def _of_table(table: Table, files: Sequence[str], options: InitOptions, ask: Ask | None) -> str:
     from rig.recording.guessing.columns import columns_of
-    from rig.recording.guessing.roles import guess_roles
+    from rig.recording.guessing.factor import Factor
+    from rig.recording.guessing.sampling import stated_rate
     from rig.recording.guessing.scales import axis_of, guess_factors
     from rig.recording.tables import DEFAULT_NAMES
 
     columns = columns_of(table)
-    show(_listing(table, columns))
-    named: dict[Quantity, Column | None] = {q: column_named(columns, q, text) for q, text in options.columns.items()}
+    show(listing(table, columns))
     questions = Questions(options.yes, ask)
-    guessed = with_one_clock(guess_roles(columns, named), columns, next(iter(DEFAULT_NAMES["time"])))
-    _refuse_unread(table, columns, guessed, options)
-    roles = {q: questions.column(q, choice, columns) for q, choice in guessed.items()}
-    if roles["time"].column is None:
-        questions.finish()
-    _require_motion(table, roles)
+    roles, rate_hz = _roles(table, columns, options, questions)
     axis = options.axis or axis_of(roles)
     factors = guess_factors(roles, axis, {q: list(DEFAULT_NAMES[q]) for q in roles})
+    if rate_hz is not None:
+        factors["time"] = Factor(1.0 / rate_hz, f"{rate_hz:g} rows a second", True)
+    elif factors["time"].value is None and not factors["time"].sure and (stated := stated_rate(columns)) is not None:
+        factors["time"] = Factor(1.0 / stated[1], f"{stated[1]:g} rows a second, as {stated[0]!r} says", False)
     for q, text in options.scales.items():
         if q not in factors:
             raise UsageError(f"--{q}-scale was given, but there is no column of the {q}: add --{q} COL")
         factors[q] = factor_from(q, text, axis)
-    found: list[tuple[Quantity, Column]] = [(q, c) for q in ORDER if (c := roles[q].column) is not None]
+    # A column without a name is the time that the file does not have.
+    found: list[tuple[Quantity, Column]] = [(q, c) for q in ORDER if (c := roles[q].column) is not None and c.name]
     written = {*options.scales, *(q for q, factor in factors.items() if not factor.sure)}
     factors = {q: questions.factor(q, factors[q], column, axis) for q, column in found}
     questions.finish()
@@ -162,23 +190,46 @@ def _of_table(table: Table, file: str, options: InitOptions, ask: Ask | None) ->
         for q, c in found
         if (value := factors[q].value) is not None and (value != 1.0 or q in written or c.unit_text)
     ]  # fmt: skip
+    rate = None
+    if rate_hz is not None and "time" not in factors:
+        is_guess = questions.is_guess("time", "sample rate")
+        rate = Entry("sample_rate_hz", number_value(rate_hz), "rows a second; the file has no time", is_guess)
     about = f"{max(len(c.values) for c in columns if c.values is not None)} rows"
-    return recorded_yaml(file, about, entries, scales, axis, options.out.name)
+    return recorded_yaml(files, about, entries, scales, axis, options.out.name, rate)
 
 
-def _listing(table: Table, columns: tuple[Column, ...]) -> list[str]:
-    """The columns as a person looks at them: unit, range, and what cannot be read."""
-    import numpy as np
+def _roles(
+    table: Table, columns: tuple[Column, ...], options: InitOptions, questions: Questions
+) -> tuple[dict[Quantity, Choice], float | None]:
+    """The column of every quantity, and the rows a second of a file without a time. Raises UsageError."""
+    from rig.recording.guessing.clocks import with_one_clock
+    from rig.recording.guessing.roles import Choice, guess_roles
+    from rig.recording.guessing.sampling import even_time, sample_counter, stated_rate
+    from rig.recording.tables import DEFAULT_NAMES
 
-    lines = [f"{table.path}: {len(columns)} columns"]
-    for c in columns[:LISTED]:
-        if c.values is None:
-            lines.append(f"  {c.name!r}: not usable: {c.why_not}")
-            continue
-        rising = ", increases" if c.increases else ""
-        unit = f" {c.known_unit.text if c.known_unit else c.unit_text}".rstrip()
-        lines.append(f"  {c.name!r}: {np.nanmin(c.values):.6g} to {np.nanmax(c.values):.6g}{unit}{rising}")
-    return lines + ([f"  ... and {len(columns) - LISTED} more"] if len(columns) > LISTED else [])
+    named: dict[Quantity, Column | None] = {q: column_named(columns, q, text) for q, text in options.columns.items()}
+    rate_hz = options.sample_rate_hz
+    guessed = guess_roles(columns, named)
+    if rate_hz is None:
+        _refuse_unread(table, columns, guessed, options)
+        if guessed["time"].column is None:
+            rate_hz = questions.sample_rate(stated_rate(columns))
+            guessed["time"] = Choice(None, "asked for", True)
+    if rate_hz is not None:
+        # A counter also counts the rows that were lost.
+        guessed = guess_roles(columns, {**named, "time": sample_counter(columns) or even_time(columns, rate_hz)})
+        _refuse_unread(table, columns, guessed, options)
+    guessed = with_one_clock(guessed, columns, next(iter(DEFAULT_NAMES["time"])))
+    roles = {q: questions.column(q, choice, columns) for q, choice in guessed.items()}
+    if roles["rate"].column is None and roles["angle"].column is None and roles["rate"].sure:
+        if ask_angle := questions.can_ask and "angle" not in named:
+            missing = Choice(None, "a rate or an angle is needed", False)
+            roles["angle"] = questions.column("angle", missing, columns)
+        if not ask_angle or roles["angle"].column is None:
+            raise UsageError(f"{table.path}: no rate and no angle was named or found: give --rate COL or --angle COL")
+    if roles["time"].column is None:
+        questions.finish()
+    return roles, rate_hz
 
 
 def _refuse_unread(
@@ -191,16 +242,12 @@ def _refuse_unread(
         column = unread(columns, quantity)
         if roles[quantity].column is None and column is not None and quantity not in options.columns:
             none = f" (or {NONE})" if quantity in ("rate", "angle") else ""
+            none = f", or {SAMPLE_RATE} HZ if the rows are evenly spaced" if quantity == "time" else none
             why = column.why_not.removeprefix(f"column {column.name!r} ")
             raise RecordingError(
                 f"{table.path}: column {column.name!r} looks like the {quantity} but cannot be used: {why}; or give "
                 f"another column with --{quantity} COL{none}"
             )
-
-
-def _require_motion(table: Table, roles: dict[Quantity, Choice]) -> None:
-    if roles["rate"].column is None and roles["angle"].column is None:
-        raise UsageError(f"{table.path}: no rate and no angle was named or found: give --rate COL or --angle COL")
 
 
 def _relative(source: Path, out: Path) -> str:

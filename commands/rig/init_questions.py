@@ -16,18 +16,20 @@ if TYPE_CHECKING:
     from rig.recording.guessing.columns import Column
     from rig.recording.guessing.roles import Choice, Quantity
     from rig.recording.guessing.scales import Factor
+    from rig.recording.table import Table
 
 Ask = Callable[[str], str]
 Answer = TypeVar("Answer")
 NONE = NO_COLUMN  # as an answer: there is no such column
 TRIES = 3
 LISTED = 40  # columns
+SAMPLE_RATE = "--sample-rate"
 # What may be said besides a column: every recording has a time, and one without torque is another experiment.
 _OR_NONE = {
     "time": "",
     "torque": f", or --torque {NONE} if the platform moved freely",
-    "rate": f" (or {NONE})",
-    "angle": f" (or {NONE})",
+    "rate": ", or --angle COL",
+    "angle": ", or --rate COL",
 }
 
 
@@ -35,6 +37,37 @@ def show(lines: Sequence[str]) -> None:
     """Lines to stdout, without what could steer a terminal."""
     sys.stdout.writelines(f"{plain(line)}\n" for line in lines)
     sys.stdout.flush()
+
+
+def terminal() -> Ask | None:
+    """What asks the person at the terminal; None where there is nobody."""
+    if sys.stdin is None or not sys.stdin.isatty() or not sys.stderr.isatty():
+        return None
+
+    def ask(question: str) -> str:
+        sys.stderr.write(question)
+        sys.stderr.flush()
+        answer = sys.stdin.readline()
+        if not answer:
+            raise UsageError("no answer was given, so nothing was written: give the options (rig init --help)")
+        return answer
+
+    return ask
+
+
+def listing(table: Table, columns: tuple[Column, ...]) -> list[str]:
+    """The columns as a person looks at them: unit, range, and what cannot be read."""
+    import numpy as np
+
+    lines = [f"{table.path}: {len(columns)} columns"]
+    for c in columns[:LISTED]:
+        if c.values is None:
+            lines.append(f"  {c.name!r}: not usable: {c.why_not}")
+            continue
+        rising = ", increases" if c.increases else ""
+        unit = f" {c.known_unit.text if c.known_unit else c.unit_text}".rstrip()
+        lines.append(f"  {c.name!r}: {np.nanmin(c.values):.6g} to {np.nanmax(c.values):.6g}{unit}{rising}")
+    return lines + ([f"  ... and {len(columns) - LISTED} more"] if len(columns) > LISTED else [])
 
 
 def column_named(columns: tuple[Column, ...], quantity: str, name: str) -> Column | None:
@@ -73,6 +106,19 @@ def factor_from(quantity: str, text: str, axis: str) -> Factor:
     return Factor(value, f"factor to {SI[dimension]}, as given", True)
 
 
+def rate_from(text: str) -> float:
+    """Rows a second as typed. Raises UsageError."""
+    try:
+        rate_hz = float(text)
+    except ValueError:
+        rate_hz = 0.0
+    if not 0.0 < rate_hz <= 1e9:
+        raise UsageError(
+            f"{SAMPLE_RATE} {text[:40]!r} is not allowed: give the rows a second, a number above 0, at most 1e9"
+        )
+    return rate_hz
+
+
 class Questions:
     """Asks what is not sure, or takes the guess, or remembers that somebody has to say it."""
 
@@ -81,6 +127,11 @@ class Questions:
         self._guessed: set[tuple[str, str]] = set()
         self._missing: list[str] = []
         self._have_guesses = True
+
+    @property
+    def can_ask(self) -> bool:
+        """Whether there is somebody to answer."""
+        return self._ask is not None
 
     def is_guess(self, quantity: str, what: str) -> bool:
         """Whether the "column" or "scale" of a quantity is a guess that nobody confirmed."""
@@ -114,11 +165,26 @@ class Questions:
             question = f"Unit of {plain(column.name)!r}, or factor to SI units? (guess: {plain(found.why)}) [{guess}] "
             return self._answer(question, guess, lambda text: factor_from(quantity, text, axis))
         option = f"--{quantity}-scale FACTOR (or a unit)"
+        option += f", or {SAMPLE_RATE} HZ" if quantity == "time" and found.value is None else ""
         if found.value is None:
             self._miss(f"{quantity}: column {column.name!r}: {found.why}: give {option}")
         else:
             self._take(quantity, "scale", guess, found.why, option)
         return found
+
+    def sample_rate(self, stated: tuple[str, float] | None) -> float | None:
+        """Rows a second, in Hz, of a file without a time; None where nobody says it. ``stated``: what the file does."""
+        guess, why = ("", "") if stated is None else (number_value(stated[1]), f"{stated[0]!r} in the file says so")
+        if self._ask is not None:
+            said = f"; guess: {plain(why)}" if guess else ""
+            question = f"No column is a time. How many rows a second, in Hz{said}? {f'[{guess}] ' if guess else ''}"
+            return self._answer(question, guess, rate_from)
+        option = f"--time COL, or {SAMPLE_RATE} HZ if the rows are evenly spaced"
+        if stated is None:
+            self._miss(f"time: no column is a time: give {option}")
+            return None
+        self._take("time", "sample rate", f"{guess} Hz", why, option)
+        return stated[1]
 
     def finish(self) -> None:
         """Raise UsageError that lists everything that somebody has to say."""

@@ -36,12 +36,22 @@ def number_value(value: float) -> str:
 
 
 def recorded_yaml(
-    file: str, about: str, columns: Sequence[Entry], scales: Sequence[Entry], axis: str, config: str
+    files: Sequence[str],
+    about: str,
+    columns: Sequence[Entry],
+    scales: Sequence[Entry],
+    axis: str,
+    config: str,
+    rate: Entry | None = None,
 ) -> str:
-    """The configuration of a campaign that is read: one run, its columns, and what may be added."""
+    """The configuration of a campaign that is read: its runs, their columns, and what may be added.
+
+    ``about`` says what is in the first file, ``rate`` how often the rows of files without a time were taken.
+    """
+    source = f"{plain(files[0])} and {len(files) - 1} more" if len(files) > 1 else plain(files[0])
     return "\n".join(
         [
-            f"# Made by `rig init` from {plain(file)}. Read the lines marked GUESS, then",
+            f"# Made by `rig init` from {source}. Read the lines marked GUESS, then",
             "#",
             f"#     rig check {plain(config)}",
             f"#     identify-run {plain(config)}",
@@ -50,7 +60,8 @@ def recorded_yaml(
             "",
             "recorded:",
             "  runs:",
-            f"    - file: {text_value(file)}  # {plain(about)}",
+            f"    - file: {text_value(files[0])}  # {plain(about)}",
+            *(f"    - file: {text_value(file)}" for file in files[1:]),
             "    # - file: another.csv       # further runs of the same columns",
             "    #   use: holdout            # fit | holdout; where no run says, the program chooses",
             "",
@@ -60,6 +71,7 @@ def recorded_yaml(
                 scales,
                 ("  # scale: {torque: 35.15}      # factors to s, N m, rad/s, rad; none: units as the file says",),
             ),
+            *([] if rate is None else [rate.line(0)[2:]]),
             f"  axis: {axis}                  # rotary: N m, rad | linear: N, m",
             "  # torque_hold: zero_order     # each torque was held until the next; default: band_limited",
             "",

@@ -129,6 +129,8 @@ class RecordedConfig(Section):
     """Names of the columns, where they differ from the default names."""
     scale: Scale = Scale()
     """Factors from the file's numbers to SI units."""
+    sample_rate_hz: Annotated[float, Field(gt=0, le=1e9)] | None = None
+    """Rows a second (Hz) of a file without a time; they are then evenly spaced from 0 s on."""
     axis: Literal["rotary", "linear"] = "rotary"
     """linear: mass in kg, force in N and position in m instead of kg m^2, N m and rad."""
     torque_hold: Literal["band_limited", "zero_order"] = "band_limited"
@@ -154,6 +156,21 @@ class RecordedConfig(Section):
         if all(run.use == "holdout" for run in self.runs):
             raise ValueError("all runs have use: holdout, so there is nothing to fit: set use: fit for at least one")
         return self
+
+    @model_validator(mode="after")
+    def _one_time(self) -> Self:
+        if self.sample_rate_hz is None:
+            return self
+        if self.columns.time not in (None, NO_COLUMN):
+            raise ValueError("sample_rate_hz and columns.time are both given: keep the column if the file has a time")
+        if "time" in self.scale.model_fields_set:
+            raise ValueError("sample_rate_hz and scale.time are both given: keep the scale if the file has a time")
+        return self
+
+    @property
+    def scales_given(self) -> frozenset[str]:
+        """The quantities whose factor to SI units the user stated; a sample rate states that of the time."""
+        return frozenset(self.scale.model_fields_set | ({"time"} if self.sample_rate_hz is not None else set()))
 
     def min_rate_of(self, run: RecordedRun) -> float:
         """The run's own threshold, else the one for all runs, in rad/s."""

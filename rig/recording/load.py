@@ -81,17 +81,18 @@ def runs_of_file(path: Path, entry: RecordedRun, section: RecordedConfig) -> tup
         try:
             if section.axis == "rotary" and not isinstance(content, Run):
                 run = unwrapped(run, path)
-            runs.append(check_run(run, path, section.scale.model_fields_set, section.axis))
+            runs.append(check_run(run, path, section.scales_given, section.axis))
         except RecordingError as error:
             raise RecordingError(with_factors_in_place(str(error), factors)) from None
     return runs, any(isinstance(content, Run) for content in contents)
 
 
 def _own_run(path: Path, run: Run, entry: RecordedRun, section: RecordedConfig) -> Run:
-    if section.columns.model_fields_set or section.scale.model_fields_set:
+    if section.columns.model_fields_set or section.scales_given:
         raise RecordingError(
             f"{path}: was written by this program, in SI units under its own names: "
-            "leave recorded.columns and recorded.scale out (a further channel of it is declared in identify.channels)"
+            "leave recorded.columns, recorded.scale and recorded.sample_rate_hz out (a further channel of it is "
+            "declared in identify.channels)"
         )
     return dataclasses.replace(
         run,

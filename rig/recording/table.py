@@ -27,7 +27,7 @@ class Table:
 
     ``read`` gives the columns asked for, each float64 of shape (n,), and raises RecordingError for what is
     not a plain column of numbers. ``label`` says where a sample stands in the file, ``units`` what stood as the unit
-    of a column besides its name.
+    of a column besides its name, ``first_row`` how many rows of the file stand before those of the table.
     """
 
     path: Path
@@ -35,6 +35,15 @@ class Table:
     read: Callable[[Sequence[str]], Mapping[str, Array]]
     label: Callable[[int], str] = index_label
     units: Mapping[str, str] = field(default_factory=dict)
+    first_row: int = 0
+
+
+class SingleNumberError(RecordingError):
+    """A number where a column is needed."""
+
+    def __init__(self, message: str, value: float) -> None:
+        super().__init__(message)
+        self.value = value
 
 
 def too_long(path: Path, count: int) -> RecordingError:
@@ -58,7 +67,7 @@ def plain_column(path: Path, name: str, values: Any) -> Array:
     if array.dtype.kind not in "fiub":
         raise RecordingError(f"{where} holds {array.dtype} values, not numbers: save it as numbers")
     if array.ndim == 0:
-        raise RecordingError(f"{where} is a single number: it needs one value per sample")
+        raise SingleNumberError(f"{where} is a single number: it needs one value per sample", float(array))
     if array.size != max(array.shape):
         raise RecordingError(
             f"{where} has shape {array.shape}: save each quantity as an array of its own, of shape (n,)"

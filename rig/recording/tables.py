@@ -44,8 +44,11 @@ def columns_of(table: Table, factors: Mapping[str, float], section: RecordedConf
 
 def time_of(table: Table, factors: Mapping[str, float], section: RecordedConfig) -> Array:
     """The times in s alone, not checked, shape (n,)."""
-    name = _names(table, section)["time"]
-    return table.read([name])[name] * factors["time"]
+    names = _names(table, section)
+    if section.sample_rate_hz is not None:
+        name = next(iter(names.values()))
+        return _even(table, len(table.read([name])[name]), section.sample_rate_hz)
+    return table.read([names["time"]])[names["time"]] * factors["time"]
 
 
 def run_of_table(table: Table, factors: Mapping[str, float], entry: RecordedRun, section: RecordedConfig) -> Run:
@@ -67,7 +70,7 @@ def run_of_table(table: Table, factors: Mapping[str, float], entry: RecordedRun,
     columns = _checked(table, rows, factors)
     valid = columns["valid"].astype(bool)
     time_s, rate, angle, torque = (columns.get(q) for q in ("time", "rate", "angle", "torque"))
-    assert time_s is not None  # _names refuses a table without time
+    assert time_s is not None  # _names refuses a table without time or sample rate
     keep = np.isfinite(time_s)  # a lost sample may have lost its time too
     has_torque = None if torque is None else keep & np.isfinite(torque)
     return Run(
@@ -108,7 +111,15 @@ def _as_stored(table: Table, section: RecordedConfig) -> tuple[dict[str, Array],
     values = table.read(list(names.values()))
     columns: dict[str, Array] = {quantity: values[name] for quantity, name in names.items()}
     check_lengths(table, columns)
-    return columns, np.arange(len(columns["time"]))
+    count = len(next(iter(columns.values())))
+    if section.sample_rate_hz is not None:
+        columns["time"] = _even(table, count, section.sample_rate_hz)
+    return columns, np.arange(count)
+
+
+def _even(table: Table, count: int, sample_rate_hz: float) -> Array:
+    """Times in s of rows that a clock took evenly, (count,)."""
+    return (table.first_row + np.arange(count)) / sample_rate_hz
 
 
 def _checked(table: Table, rows: Rows, factors: Mapping[str, float]) -> dict[str, Array]:
@@ -134,13 +145,15 @@ def _names(table: Table, section: RecordedConfig) -> dict[Quantity, str]:
     """The column of every quantity that the file has."""
     names: dict[Quantity, str] = {}
     for quantity, defaults in DEFAULT_NAMES.items():
+        if quantity == "time" and section.sample_rate_hz is not None:
+            continue
         named = getattr(section.columns, quantity)
         name = column_named(table, quantity, named, list(defaults))
         if named is not None and name is None and not is_none(table, named):
             raise missing_column(table, quantity, [named], mapped=True)
         if name is not None:
             names[quantity] = name
-    if "time" not in names:
+    if "time" not in names and section.sample_rate_hz is None:
         raise missing_column(table, "time", list(DEFAULT_NAMES["time"]), mapped=False)
     if "rate" not in names and "angle" not in names:
         either = [*DEFAULT_NAMES["rate"], *DEFAULT_NAMES["angle"]]
@@ -150,7 +163,9 @@ def _names(table: Table, section: RecordedConfig) -> dict[Quantity, str]:
 
 def factors_of(table: Table, section: RecordedConfig) -> dict[str, float]:
     """The factor to SI units of every quantity that the file has. Raises RecordingError where one is missing."""
-    return {quantity: _factor(table, name, section, quantity) for quantity, name in _names(table, section).items()}
+    known = {} if section.sample_rate_hz is None else {"time": 1.0}  # counted, in s
+    found = {quantity: _factor(table, name, section, quantity) for quantity, name in _names(table, section).items()}
+    return {**found, **known}
 
 
 def _factor(table: Table, name: str, section: RecordedConfig, quantity: Quantity) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.recording.stated_units import stated_unit
-from rig.recording.table import Table
+from rig.recording.table import SingleNumberError, Table
 from rig.units import Unit, name_and_unit, unit_of
 
 MIN_NUMBERS = 10  # numbers that make a column
@@ -33,6 +33,8 @@ class Column:
         A unit that is part of the name: the rad_s of rate_rad_s.
     values
         Shape (n,); None where it cannot be a quantity, for the reason in ``why_not``.
+    single
+        Its number, where it has but one.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Column:
     suffix: Unit | None
     values: Array | None
     why_not: str = ""
+    single: float | None = None
 
     @property
     def known_unit(self) -> Unit | None:
@@ -92,6 +95,8 @@ def _read(table: Table, names: tuple[str, ...]) -> dict[str, Array | str]:
     for name in names:
         try:
             out[name] = table.read([name])[name]
+        except SingleNumberError as error:
+            out[name] = np.array([error.value])
         except RecordingError as error:
             out[name] = str(error).removeprefix(f"{table.path}: ")
     return out
@@ -103,7 +108,9 @@ def _column(table: Table, name: str, values: Array | str, length: int) -> Column
     suffix, count = (None, 0) if text else _suffix(words)
     why_not = values if isinstance(values, str) else _unusable(values, length)
     kept = None if why_not or isinstance(values, str) else values
-    return Column(name, words[: len(words) - count], text, unit_of(text) if text else None, suffix, kept, why_not)
+    single = float(values[0]) if not isinstance(values, str) and len(values) == 1 else None
+    unit = unit_of(text) if text else None
+    return Column(name, words[: len(words) - count], text, unit, suffix, kept, why_not, single)
 
 
 def _unusable(values: Array, length: int) -> str:

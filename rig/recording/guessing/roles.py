@@ -113,7 +113,8 @@ def says_time(column: Column) -> bool:
 
 def unread(columns: Sequence[Column], quantity: Quantity) -> Column | None:
     """A column whose name or unit says that it is the quantity, but whose values cannot be read; None for none."""
-    lost = [(score, c) for c in columns if c.values is None and (score := _score(c, quantity)) > 0.0]
+    there = [c for c in columns if c.values is None and c.single is None]
+    lost = [(score, c) for c in there if (score := _score(c, quantity)) > 0.0]
     return max(lost, key=lambda one: one[0])[1] if lost else None
 
 
@@ -195,12 +196,15 @@ def _by_motion(chosen: dict[Quantity, Choice], left: Sequence[Column]) -> dict[Q
 def _may_be_any(column: Column) -> bool:
     """Whether a column of which nothing is said may be a measured channel: it moves, and is no flag of 0 and 1."""
     is_flag = column.values is not None and bool(np.isin(column.values, (0.0, 1.0)).all())
-    return column.moves and column.known_unit is None and not is_flag
+    return column.moves and column.known_unit is None and not is_flag and not set(column.words) & COUNTERS
 
 
 def _last_that_moves(chosen: dict[Quantity, Choice], left: Sequence[Column]) -> Choice:
     moving = [c for c in left if _may_be_any(c) and c is not chosen["torque"].column]
-    return Choice(moving[-1], "it is the last column that moves", False) if moving else Choice(None, "", True)
+    if moving:
+        return Choice(moving[-1], "it is the last column that moves", False)
+    others = [c for c in left if c.moves]
+    return Choice(None, f"no rate and no angle was recognised ({_unused(others)})" if others else "", not others)
 
 
 def relation(time_s: Array, angle: Column, rate: Column) -> tuple[float, float] | None:
@@ -213,15 +217,18 @@ def relation(time_s: Array, angle: Column, rate: Column) -> tuple[float, float] 
 
 
 def _remaining_torque(left: Sequence[Column]) -> Choice:
-    moving = [c for c in left if _may_be_any(c) and not set(c.words) & COUNTERS]
+    moving = [c for c in left if _may_be_any(c)]
     if len(moving) == 1:
         return Choice(moving[0], "it is the only column left", False)
-    unused = [c.name for c in left if c.moves]
-    more = f" and {len(unused) - LISTED} more" if len(unused) > LISTED else ""
-    listed = ", ".join(repr(name) for name in unused[:LISTED]) + more
-    others = f"not used, but they move: {listed}" if unused else "and no other column moves"
     # A recording whose torque was overlooked and one without torque are the same to the identification.
-    return Choice(None, f"no torque was recognised ({others})", False)
+    return Choice(None, f"no torque was recognised ({_unused([c for c in left if c.moves])})", False)
+
+
+def _unused(moving: Sequence[Column]) -> str:
+    """The columns that somebody may have to choose from, in words."""
+    more = f" and {len(moving) - LISTED} more" if len(moving) > LISTED else ""
+    listed = ", ".join(repr(c.name) for c in moving[:LISTED]) + more
+    return f"not used, but they move: {listed}" if moving else "and no other column moves"
 
 
 def _acting(torque: Choice) -> Choice:

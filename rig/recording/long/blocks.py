@@ -40,7 +40,7 @@ class BlockTable:
         end = self.count if last is None else last
         return Table(
             self.path, self.names, lambda names: self.read(names, first, end),
-            lambda index: self.label(first + index), self.units,
+            lambda index: self.label(first + index), self.units, first,
         )  # fmt: skip
 
 

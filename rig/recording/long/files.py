@@ -83,7 +83,7 @@ class LongFile:
             missing=missing if missing.told else None,
         )  # fmt: skip
         try:
-            return check_run(run, path, section.scale.model_fields_set, section.axis)
+            return check_run(run, path, section.scales_given, section.axis)
         except RecordingError as error:
             raise RecordingError(with_factors_in_place(str(error), factors)) from None
 

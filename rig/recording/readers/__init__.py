@@ -78,7 +78,7 @@ def _check_is_file(path: Path) -> None:
     except FileNotFoundError:
         raise RecordingError(
             f"{path}: no such file: `file` is relative to the yaml; correct it or give an absolute path"
-            + _neighbours(path)
+            + neighbours(path)
         ) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
@@ -95,7 +95,7 @@ def _check_is_file(path: Path) -> None:
         )
 
 
-def _neighbours(path: Path) -> str:
+def neighbours(path: Path) -> str:
     """Recordings that do stand in that folder, at most five."""
     try:
         found = sorted(p.name for p in path.parent.iterdir() if p.name.lower().endswith(tuple(_BY_SUFFIX)))

@@ -136,14 +136,14 @@ def test_on_a_terminal_only_what_is_not_clear_is_asked_and_a_wrong_answer_is_ask
         asked.append(question)
         return next(answers)
 
-    assert init(tmp_path / "r.csv", InitOptions(out=tmp_path / "rig.yaml"), ask) == 0
+    assert init([tmp_path / "r.csv"], InitOptions(out=tmp_path / "rig.yaml"), ask) == 0
     assert len(asked) == 3
     assert asked[0].startswith("Which column is the torque?") and asked[0].endswith("[x1] ")
     assert asked[2].startswith("Unit of 'x1', or factor to SI units?")
     assert "'x7' is no column of numbers: choose one of" in capsys.readouterr().err
     agrees(read_recording(load_config(tmp_path / "rig.yaml")).runs[0])
     with pytest.raises(UsageError, match="no answer that could be used in 3 tries"):
-        init(tmp_path / "r.csv", InitOptions(out=tmp_path / "two.yaml"), lambda question: "x7")
+        init([tmp_path / "r.csv"], InitOptions(out=tmp_path / "two.yaml"), lambda question: "x7")
 
 
 def test_what_is_written_passes_the_check_and_nothing_is_written_over(
@@ -262,7 +262,7 @@ def test_on_a_terminal_a_torque_that_was_not_recognised_is_asked_without_a_guess
         asked.append(question)
         return next(answers)
 
-    assert init(tmp_path / "r.csv", InitOptions(out=tmp_path / "rig.yaml"), ask) == 0
+    assert init([tmp_path / "r.csv"], InitOptions(out=tmp_path / "rig.yaml"), ask) == 0
     assert asked[0] == asked[1] and asked[0].endswith("; none: there is none) ")
     agrees(read_recording(load_config(tmp_path / "rig.yaml")).runs[0])
 
