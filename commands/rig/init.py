@@ -289,6 +289,7 @@ def _check(path: Path) -> None:
 def _as_options(message: str) -> str:
     """What to set in rig.yaml, said as the option of `rig init` that sets it."""
     text = re.sub(r"recorded\.scale\.(time|torque|rate|angle): ", r"--\1-scale ", message)
+    text = re.sub(r"recorded\.columns\.(torque|rate|angle): ", r"--\1 ", text)
     return re.sub(r"recorded\.(scale|columns)\.(time|torque|rate|angle)", lambda m: _option(m[1], m[2]), text)
 
 

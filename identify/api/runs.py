@@ -24,6 +24,7 @@ _OF_A_RUN = ("time_s", "rate_rad_s", "angle_rad", "torque_time_s", "torque_nm")
 _ARGUMENT = {"time": "time_s", "torque": "torque_nm", "rate": "rate_rad_s", "angle": "angle_rad"}
 _FACTOR = re.compile(r"(?:set )?recorded\.scale\.(time|torque|rate|angle): ([-\d.e]+)")
 _UNIT = re.compile(r"recorded\.scale\.(time|torque|rate|angle)")
+_LEFT_OUT = re.compile(r"(?:leave it out: )?set recorded\.columns\.(torque|rate|angle): none")
 _COLUMN = re.compile(r"recorded\.columns\.(time|torque|rate|angle)")
 _SPLIT = re.compile(r"split the run there \(.*?\)")
 _BELIEVED = re.compile(r"; if it is in seconds.*$")
@@ -107,7 +108,8 @@ def for_arrays(message: str) -> str:
     """What a check says of a file, said of arrays."""
     text = _FACTOR.sub(lambda m: f"multiply {_ARGUMENT[m[1]]} by {m[2]}", message)
     text = _UNIT.sub(lambda m: f"the unit of {_ARGUMENT[m[1]]}", text)
-    text = _COLUMN.sub(lambda m: _ARGUMENT[m[1]], _BELIEVED.sub("", text))
+    text = _LEFT_OUT.sub(lambda m: f"leave {_ARGUMENT[m[1]]} out", _BELIEVED.sub("", text))
+    text = _COLUMN.sub(lambda m: _ARGUMENT[m[1]], text)
     text = _SPLIT.sub("pass the samples before and behind it as two runs", text)
     text = text.replace(", or name no angle column and delete that one", ", or leave angle_rad out")
     return text.replace(", or widen from_s and to_s", "")

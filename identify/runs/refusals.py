@@ -32,7 +32,7 @@ def refuse_without_motion(traces: Sequence[Trace], free: bool) -> None:
     if not free and all(steady):
         raise RecordingError(
             "the torque has the same value in every sample of every run: J, C and K need a torque that changes; "
-            "check recorded.columns.torque, or leave the torque out for a free decay"
+            "check recorded.columns.torque, or set recorded.columns.torque: none for a free decay"
         )
 
 

@@ -186,7 +186,7 @@ def _check_motion(run: Run, path: Path) -> None:
     ):
         raise RecordingError(
             f"{path}: the angle never changes ({run.angle_rad[run.valid][0]:g}) though the rate does: check that the "
-            "encoder was connected, or name no angle column and delete that one"
+            "encoder was connected, or leave it out: set recorded.columns.angle: none"
         )
     for name, given in ((channel, values[run.valid]), ("torque", run.torque_nm)):
         largest = float(np.max(np.abs(given))) if given is not None and len(given) else 0.0

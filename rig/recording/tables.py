@@ -163,9 +163,8 @@ def _names(table: Table, section: RecordedConfig) -> dict[Quantity, str]:
 
 def factors_of(table: Table, section: RecordedConfig) -> dict[str, float]:
     """The factor to SI units of every quantity that the file has. Raises RecordingError where one is missing."""
-    known = {} if section.sample_rate_hz is None else {"time": 1.0}  # counted, in s
-    found = {quantity: _factor(table, name, section, quantity) for quantity, name in _names(table, section).items()}
-    return {**found, **known}
+    found: dict[str, float] = {q: _factor(table, name, section, q) for q, name in _names(table, section).items()}
+    return found if section.sample_rate_hz is None else {**found, "time": 1.0}  # counted, in s
 
 
 def _factor(table: Table, name: str, section: RecordedConfig, quantity: Quantity) -> float:

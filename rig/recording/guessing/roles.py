@@ -142,9 +142,10 @@ def _by_words(quantity: Quantity, left: Sequence[Column]) -> Choice:
 
 def _liveliest(columns: Sequence[Column]) -> Column:
     """The one that moves most (of a gyro's three axes the driven one); the first where their units differ in kind."""
-    if len({None if c.known_unit is None else c.known_unit.dimension for c in columns}) > 1:
-        return columns[0]
-    return max(columns, key=_size)
+    moving = [c for c in columns if c.moves] or list(columns)
+    if len({None if c.known_unit is None else c.known_unit.dimension for c in moving}) > 1:
+        return moving[0]
+    return max(moving, key=_size)
 
 
 def _size(column: Column) -> float:

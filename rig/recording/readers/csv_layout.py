@@ -73,10 +73,13 @@ def layout_of(path: Path) -> Layout:
     names_at, units_at = _header(lines, at, delimiter)
     width = len(_trimmed(_split(lines[at][1], delimiter))) if at < len(lines) else 0
     names = _names(lines[names_at][1], delimiter, width)
-    if at > 1 and (len(names) != width or any(_is_number(name) for name in names)):
+    # Below a row of units a name may be a number: of an oscilloscope's channels.
+    is_header = units_at is not None or not any(_is_number(name) for name in names)
+    if at > 1 and (len(names) != width or not is_header):
         raise RecordingError(
             f"{path}: the data begin in line {lines[at][0]}, and no line above names their {width} columns: add one, "
-            "e.g. time_s,torque_nm,rate_rad_s, and delete what stands above it"
+            "e.g. time (s),torque (N m),rate (deg/s) with the units that these numbers have, and delete what stands "
+            "above it"
         )
     above = stated_units([text for _, text in lines[:names_at]], names, lambda text: _split(text, delimiter))
     units = above | _units_of(names, [] if units_at is None else _names(lines[units_at][1], delimiter, width))

@@ -111,6 +111,10 @@ FILES: dict[str, tuple[str, tuple[str, ...]]] = {
         "TIME,Torque (N*m),Gyro (deg/s)\n" + rows(TIME - 0.1, TORQUE, np.degrees(RATE), form="{:.9e}"),
         (),
     ),
+    "numbered.csv": (
+        "x-axis,1,2\nsecond,N m,deg/s\n" + rows(TIME, TORQUE, np.degrees(RATE), form="{:+.9E}"),
+        ("--yes",),
+    ),
     "commented.csv": (
         "# bench 3\n#time,torque,rate\n#[ms],[mNm],[deg/s]\n" + rows(1e3 * TIME, 1e3 * TORQUE, np.degrees(RATE)),
         (),

@@ -80,6 +80,12 @@ REFUSED = {
         "probably the angle is in degrees: multiply angle_rad by 0.0174533",
     ),
     "swapped": (partial(identify, T, M, rate_rad_s=A, angle_rad=W), "exchange angle_rad and rate_rad_s"),
+    "still encoder": (
+        partial(identify, T, M, rate_rad_s=W, angle_rad=np.zeros(N)),
+        "check that the encoder was connected, or leave angle_rad out",
+    ),
+    "steady torque": (partial(with_rate, T, np.ones(N)), "check torque_nm, or leave torque_nm out for a free decay"),
+    "days": (partial(with_rate, 45_000 + T / 86_400, M), "as Excel counts them: multiply time_s by 86400"),
     "milliseconds": (partial(with_rate, 1e3 * T, M), "the time looks like milliseconds: multiply time_s by 0.001"),
     "holdout": (partial(good, holdout=0.9), "holdout: 0.9 is not allowed: has to be 'auto' or at most 0.5"),
     "holdout's word": (partial(good, holdout="half"), "holdout: 'half' is not allowed"),

@@ -132,6 +132,9 @@ def test_of_several_axes_of_a_gyro_the_one_that_moves_most_is_guessed() -> None:
     roles, _ = guessed(t=T, torque=TORQUE, gyro_x=0.01 * TORQUE, gyro_y=RATE, gyro_z=0.01 * RATE)
     assert names_of(roles)["rate"] == "gyro_y" and not roles["rate"].sure
     assert "'gyro_x', 'gyro_z' might be" in roles["rate"].why
+    wrench = {"force.x__[N]": 0 * T, "force.z__[N]": 0 * T, "torque.x__[Nm]": 0 * T, "torque.z__[Nm]": TORQUE}
+    roles, _ = guessed(**{"time_s": T, "rate_rad_s": RATE, **wrench})
+    assert names_of(roles)["torque"] == "torque.z [Nm]"
 
 
 def test_a_unit_of_something_else_and_a_name_of_something_else_are_not_sure() -> None:
