@@ -197,7 +197,8 @@ def _by_motion(chosen: dict[Quantity, Choice], left: Sequence[Column]) -> dict[Q
 def _may_be_any(column: Column) -> bool:
     """Whether a column of which nothing is said may be a measured channel: it moves, and is no flag of 0 and 1."""
     is_flag = column.values is not None and bool(np.isin(column.values, (0.0, 1.0)).all())
-    return column.moves and column.known_unit is None and not is_flag and not set(column.words) & COUNTERS
+    is_counter = column.increases and bool(set(column.words) & COUNTERS)  # n is a speed, too
+    return column.moves and column.known_unit is None and not is_flag and not is_counter
 
 
 def _last_that_moves(chosen: dict[Quantity, Choice], left: Sequence[Column]) -> Choice:

@@ -17,6 +17,8 @@ from rig.recording import Journal, Recording, Run
 from rig.recording.hdf5 import write_recording_h5
 from tests.rig.recording.support import csv_of, motion, read
 
+UNITS = {"time_s": "s", "torque_nm": "N m", "rate_rad_s": "rad/s", "angle_rad": "rad"}
+
 
 def make(path: Path) -> None:
     columns = motion(60)
@@ -33,6 +35,7 @@ def make(path: Path) -> None:
         with h5py.File(path, "w") as file:
             for name, values in columns.items():
                 file[name] = values
+                file[name].attrs["units"] = UNITS[name]
     elif stem == "own":
         run = Run("r", columns["time_s"], np.ones(60, dtype=bool), columns["rate_rad_s"])
         write_recording_h5(path, Recording((run,)))

@@ -119,6 +119,8 @@ def test_a_time_or_a_flag_is_never_a_measured_channel() -> None:
     assert names_of(roles) == {"time": "torque.Time", "torque": "torque.Data", "rate": "rate.Data", "angle": None}
     roles, _ = guessed(t=T, M=TORQUE, a=RATE, b=(T > 0.3).astype(float))
     assert names_of(roles)["rate"] == "a"
+    roles, _ = guessed(t=T, M=TORQUE, n=RATE, nr=np.arange(500.0))
+    assert names_of(roles)["rate"] == "n"
 
 
 def test_the_q_of_a_current_is_no_angle() -> None:
