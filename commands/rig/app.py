@@ -219,9 +219,7 @@ def schema() -> None:
 
 @app.command()
 def init(
-    sources: Annotated[
-        list[Path] | None, typer.Argument(metavar="[FILE]...", help=RECORDINGS, show_default=False)
-    ] = None,
+    sources: Annotated[list[Path] | None, typer.Argument(metavar="FILE", help=RECORDINGS, show_default=False)] = None,
     time: TimeColumn = None,
     torque: TorqueColumn = None,
     rate: RateColumn = None,
