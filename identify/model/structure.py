@@ -26,6 +26,11 @@ class Structure:
         """Whether an effect acts on the motion itself: what a disturbance does then depends on where the motion is."""
         return any(effects.get(e).place in (Place.LOAD, Place.FRICTION) for e in self.effects)
 
+    @property
+    def parts(self) -> tuple[frozenset[str], frozenset[str]]:
+        """Its terms and its effects, whatever their order."""
+        return frozenset(self.terms), frozenset(self.effects)
+
     def plus(self, *names: str) -> Structure:
         """With more effects."""
         return replace(self, effects=(*self.effects, *names))

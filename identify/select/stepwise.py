@@ -93,7 +93,7 @@ class Stepwise:
         add_effects(self)
         for other in (partial(replace_linear_terms, self), self.re_evaluate):
             before, self.best = self.best.structure, other(self.best)
-            if _key(self.best.structure) != _key(before):  # beside what was replaced, others may have shown nothing
+            if self.best.structure.parts != before.parts:  # beside what was replaced, others may have shown nothing
                 add_effects(self)
         self.best = self.backward_elimination(self.best, [*self.best.structure.terms, *self.trials.added(self.best)])
         self.best = self.compare_with_free_form(against_curves(self, self.best))
@@ -101,8 +101,8 @@ class Stepwise:
 
     def known(self, structure: Structure) -> Fit | None:
         """A structure as the search has fitted it, on the way or to ask what is needed; None where it has not."""
-        on_the_way = [r.now for r in self.rounds if _key(r.now.structure) == _key(structure)]
-        return on_the_way[-1] if on_the_way else self._lacking.get(_key(structure))
+        on_the_way = [r.now for r in self.rounds if r.now.structure.parts == structure.parts]
+        return on_the_way[-1] if on_the_way else self._lacking.get(structure.parts)
 
     def compare_with_free_form(self, now: Fit) -> Fit:
         """Without names that explain nothing beside a curve over what is left."""
@@ -184,13 +184,13 @@ class Stepwise:
         """A model without an effect, and with others in its place; from the round that added it, if that stands."""
         without = now.structure.minus(name)
         for r in reversed(self.rounds):
-            if r.chosen == name and _key(r.now.structure) == _key(without):
+            if r.chosen == name and r.now.structure.parts == without.parts:
                 tried = {n: e.fit for n, e in r.tried.items() if n != name}
                 for special, fit in self.trials.special_cases(now, r.now, name).items():
                     if special not in tried or fit.cost < tried[special].cost:
                         tried[special] = fit
                 return r.now, tried
-        rest = self._lacking.get(_key(without)) or self.without(now, name, FULL_ITERATIONS)
+        rest = self._lacking.get(without.parts) or self.without(now, name, FULL_ITERATIONS)
         return rest, self.trials.alternatives_to(now, rest, name, self._promising())
 
     def _promising(self) -> set[str]:
@@ -231,7 +231,7 @@ class Stepwise:
         """By how much J, C and K differ with rivals; a richer effect and its special case are none of each other."""
         nested = {chosen, *effects.get(chosen).nests} | {n for n in fits if chosen in effects.get(n).nests}
         models = [fits[chosen], *(f for n, f in self.rivals[chosen].items() if n not in nested)]
-        on_all = [f for m in models if (f := self._on_all.get(_key(m.structure))) is not None]
+        on_all = [f for m in models if (f := self._on_all.get(m.structure.parts)) is not None]
         return model_spread(*(on_all if len(on_all) == len(models) else models), ahead=support_difference)
 
     def _has_more(self, rich: Evidence, special: Evidence) -> bool:
@@ -242,7 +242,7 @@ class Stepwise:
     def on_all(self, fit: Fit) -> Fit:
         """The same model on all samples."""
         assert self.whole is not None
-        key = _key(fit.structure)
+        key = fit.structure.parts
         if key not in self._on_all:
             noise = self.whole.noise_of(fit)
             self._on_all[key] = self.whole.fit(fit.structure, fit.values, noise, TRIAL_ITERATIONS, thorough=False)
@@ -258,7 +258,7 @@ class Stepwise:
             without = lacking[name] if now is begun and name in lacking else self.without(now, name)
             if not np.isfinite(without.cost):  # it runs away without
                 continue
-            self._lacking[_key(without.structure)] = without
+            self._lacking[without.structure.parts] = without
             evidence = self.weigher.evidence(name, without, now)
             soaks = name == "stiffness" and self._stiffness_may_absorb(now)
             light = evidence.weight < WEIGHT and (name not in TERMS or soaks)
@@ -293,8 +293,3 @@ class Stepwise:
         if name in TERMS:
             return abs(now.values[(name,)]) < NEEDED_TERM_SIGMAS * now.std_error((name,))
         return self._needed.get(name, 0.0) < NEEDED_TERM_SIGMAS**2
-
-
-def _key(structure: Structure) -> _Key:
-    """A structure, whatever the order of its terms and effects."""
-    return frozenset(structure.terms), frozenset(structure.effects)

@@ -85,8 +85,12 @@ class TorqueSearch:
     rounds: list[tuple[TorqueCandidate, ...]] = field(default_factory=list)
 
     def run(self) -> TorqueFit:
-        """Add effects as long as one carries weight, then drop what no longer does."""
+        """Add effects as long as one carries weight, then drop what no longer does.
+
+        What falls back to a model that was there before would go round for ever: it ends with that.
+        """
         now = self.without_absorbing_stiffness(self.base)
+        before = {now.structure.parts}
         while len(now.structure.effects) < MAX_EFFECTS + len(self.base.structure.effects):
             looks = self.candidates(now)
             self.rounds.append(tuple(looks))
@@ -95,6 +99,9 @@ class TorqueSearch:
                 break
             self.say(f"added {chosen.effect}: {100.0 * chosen.weight:.0f} % of the residual torque on held-out data")
             now = self.backward_elimination(self.without_absorbing_stiffness(chosen.fit))
+            if now.structure.parts in before:
+                break
+            before.add(now.structure.parts)
         return now
 
     def left(self, fit: TorqueFit) -> float:
