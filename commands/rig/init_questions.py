@@ -24,6 +24,7 @@ NONE = NO_COLUMN  # as an answer: there is no such column
 TRIES = 3
 LISTED = 40  # columns
 SAMPLE_RATE = "--sample-rate"
+_OF_A_TIME = f"--time COL, or {SAMPLE_RATE} HZ if the rows are evenly spaced"
 # What may be said besides a column: every recording has a time, and one without torque is another experiment.
 _OR_NONE = {
     "time": "",
@@ -151,7 +152,8 @@ class Questions:
             found = self._answer(question, guess, lambda text: column_named(columns, quantity, text))
             return Choice(found, "as answered", True, said=True)
         if guess:
-            self._take(quantity, "column", guess, choice.why, f"--{quantity} COL")
+            option = _OF_A_TIME if quantity == "time" else f"--{quantity} COL"
+            self._take(quantity, "column", guess, choice.why, option)
         else:
             self._miss(f"{quantity}: {choice.why}: give {column_option(quantity)}")
         return choice
@@ -179,11 +181,10 @@ class Questions:
             said = f"; guess: {plain(why)}" if guess else ""
             question = f"No column is a time. How many rows a second, in Hz{said}? {f'[{guess}] ' if guess else ''}"
             return self._answer(question, guess, rate_from)
-        option = f"--time COL, or {SAMPLE_RATE} HZ if the rows are evenly spaced"
         if stated is None:
-            self._miss(f"time: no column is a time: give {option}")
+            self._miss(f"time: no column is a time: give {_OF_A_TIME}")
             return None
-        self._take("time", "sample rate", f"{guess} Hz", why, option)
+        self._take("time", "sample rate", f"{guess} Hz", why, _OF_A_TIME)
         return stated[1]
 
     def finish(self) -> None:

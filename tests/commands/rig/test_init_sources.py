@@ -38,6 +38,16 @@ def test_a_file_without_a_time_is_read_with_the_sample_rate_that_somebody_gives(
     assert "  sample_rate_hz: 500" in (tmp_path / "rig.yaml").read_text(encoding="utf-8")
 
 
+def test_stamps_that_repeat_are_replaced_by_a_sample_rate(tmp_path: Path) -> None:
+    coarse = np.floor(TIME * 10.0) / 10.0
+    text = "time_s,torque_nm,rate_rad_s\n" + rows(coarse, TORQUE, RATE)
+    (tmp_path / "r.csv").write_text(text, encoding="utf-8")
+    done = command(app, "init", tmp_path / "r.csv", "--out", tmp_path / "rig.yaml")
+    assert done.exit_code == 2
+    assert "give --time COL, or --sample-rate HZ if the rows are evenly spaced" in done.stderr
+    agrees(made(tmp_path, "r.csv", "--sample-rate", "500"))
+
+
 @pytest.mark.parametrize("name", ["Fs", "sample_rate", "samplingRate_Hz", "dt", "Ts", "sample_time_s"])
 def test_a_sample_rate_in_the_file_is_proposed(name: str, tmp_path: Path) -> None:
     npz(tmp_path / "r.npz", **{name: 0.002 if name.lower().startswith(("dt", "ts", "sample_time")) else 500.0})
