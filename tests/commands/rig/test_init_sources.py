@@ -156,7 +156,7 @@ def test_rows_of_a_long_file_keep_their_place_in_time(tmp_path: Path) -> None:
     )
     section = load_config(tmp_path / "rig.yaml").config.recorded
     assert section is not None
-    np.testing.assert_allclose(columns_of(table, {"rate": 1.0}, section)["time"], TIME[100:], atol=1e-12)
+    np.testing.assert_allclose(columns_of(table, {"time": 1.0, "rate": 1.0}, section)["time"], TIME[100:], atol=1e-12)
 
 
 @pytest.mark.parametrize("key", ["columns: {time: t}", "scale: {time: 0.001}"])
