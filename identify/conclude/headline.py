@@ -42,8 +42,12 @@ def _found(found: Identification) -> str:
     if found.verdict.left_open:
         return "Something is missing from the declared model, and these data do not determine what."
     if found.verdict.unexplained:
-        little = ", and too little of it to matter" if found.accepted else ""
-        return f"The declared model lacks something that no effect here describes{little}."
+        if not found.accepted:
+            return "The declared model lacks something that no effect here describes."
+        torque = "force" if found.axis == "linear" else "torque"
+        left = found.disturbance
+        size = "" if left is None else f" but for {number(100.0 * left.relative, 2)} % of the {torque}"
+        return f"The declared model describes these runs{size}: what is left is too little to matter."
     return "The declared model describes these runs: no effect is missing."
 
 

@@ -36,7 +36,7 @@ def test_without_a_change_the_model_that_stands_is_spoken_of_alone() -> None:
     assert found == "The declared model describes these runs: no effect is missing."
     assert error.startswith("Its error on held-out data is") and "falls" not in error
     lost = replace(plain, verdict=replace(plain.verdict, unexplained=True))
-    little = "The declared model lacks something that no effect here describes, and too little of it to matter."
+    little = "The declared model describes these runs: what is left is too little to matter."
     assert headline(replace(lost, accepted=True))[0] == little
     lost = replace(lost, accepted=False, reasons=("it leaves much",))
     assert headline(lost)[0] == "The declared model lacks something that no effect here describes."
