@@ -80,6 +80,17 @@ def _is_of(path: Path, beginnings: tuple[str, ...]) -> bool:
     return path.is_relative_to(HERE) and path.relative_to(HERE).as_posix().startswith(beginnings)
 
 
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Tests without deadlines give way: where workers outnumber processors, those with deadlines are on time."""
+    if "PYTEST_XDIST_WORKER" in os.environ and not _has_deadlines(item.path) and hasattr(os, "nice"):
+        _give_way()
+
+
+@cache
+def _give_way() -> None:
+    os.nice(10)  # once a worker: it has no more deadlines after this
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Those with deadlines come first: one worker takes them all. Then the longest."""
     items.sort(key=lambda item: (not _has_deadlines(item.path), not _is_of(item.path, LONGEST)))

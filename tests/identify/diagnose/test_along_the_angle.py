@@ -18,7 +18,7 @@ JC = (0.05, 0.2)
 
 def turned(seed: int, inertia_share: float, damping_share: float, drift: float = 0.0) -> Run:
     """A motion over most of a turn, and the torque that it takes where J and C change with the angle, or C in a run."""
-    time = np.arange(6001) * 2e-3
+    time = np.arange(3501) * 2e-3
     rng = np.random.default_rng(seed)
     swings = [(0.6 / hz, hz, rng.uniform(0.0, 2.0 * np.pi)) for hz in (0.31, 0.57, 1.03, 1.71, 2.9)]
     angle, rate, acceleration = (np.sum([part(*s, time) for s in swings], axis=0) for part in (_angle, _rate, _turn))
