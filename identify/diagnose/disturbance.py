@@ -58,6 +58,10 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
     left = float(np.sqrt(max(fit.held_nm**2 - floor_nm**2, 0.0)))
     relative = left / max(regression.torque_nm, 1e-300)
     found = [f for term in free_forms(regression) if (f := _dependence(regression, fit, term)) is not None]
+    # Where a trajectory repeats, these follow what anything else explains: they count where they explain more than that.
+    most = max((f[0].torque_rms for f in found), default=0.0)
+    along = [f for term in _along_angle(regression) if (f := _dependence(regression, fit, term)) is not None]
+    found += [f for f in along if f[0].torque_rms > most]
     if not found:  # asked last: it may follow, as a change over time, what an angle or a rate explains by itself
         found = [f for term in _pulsating(regression, fit) if (f := _dependence(regression, fit, term)) is not None]
     found.sort(key=lambda f: -f[0].torque_rms)
@@ -142,7 +146,6 @@ def free_forms(regression: TorqueRegression) -> list[FreeForm]:
         angle = regression.series()[0]
         out += [_over_time(time), *_changing(time, {"stiffness": angle, "damping": rate})]
         out += [] if regression.torque_free else _changing(time, {"torque of the drive": torque})
-        out += _along_angle(regression)
     out.append(_history(rate, run, regression))
     return [f for f in out if f.columns.shape[1] > 0 and np.all(np.isfinite(f.columns))]
 
@@ -208,6 +211,7 @@ def _along_angle(regression: TorqueRegression) -> list[FreeForm]:
     """Inertia, damping and dry friction that change with the angle: a crank, an eccentric magnet, a seal.
 
     A turning inertia that changes with the angle gives the square of the rate besides, by half its slope (Lagrange).
+    Each changes about what it is on average where it shows, which is the number that the model has.
     """
     angle, rate, acceleration = regression.series()[:3]
     free, _ = _free_splines(angle)
@@ -220,12 +224,16 @@ def _along_angle(regression: TorqueRegression) -> list[FreeForm]:
     beside = 1e-4 * float(np.ptp(angle))
     slope = (shape(angle + beside) - shape(angle - beside)) / (2.0 * beside)
     here = shape(angle)
-    here = here - np.mean(here, axis=0)
+
+    def about(x: Array) -> Array:
+        return here - (x**2 @ here) / max(float(x @ x), 1e-300)
+
     slow = 0.05 * float(np.sqrt(np.mean(rate**2))) + 1e-300
+    direction = np.tanh(rate / slow)
     terms = {
-        "inertia": here * acceleration[:, None] + 0.5 * slope * rate[:, None] ** 2,
-        "damping": here * rate[:, None],
-        "friction": here * np.tanh(rate / slow)[:, None],
+        "inertia": about(acceleration) * acceleration[:, None] + 0.5 * slope * rate[:, None] ** 2,
+        "damping": about(rate) * rate[:, None],
+        "friction": about(direction) * direction[:, None],
     }
     none = np.zeros((0, here.shape[1]))
     return [FreeForm("angle", columns, np.zeros(0), none, changes=what) for what, columns in terms.items()]
