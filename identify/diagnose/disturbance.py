@@ -58,7 +58,7 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
     left = float(np.sqrt(max(fit.held_nm**2 - floor_nm**2, 0.0)))
     relative = left / max(regression.torque_nm, 1e-300)
     found = [f for term in free_forms(regression) if (f := _dependence(regression, fit, term)) is not None]
-    # Where a trajectory repeats, these follow what anything else explains: they count where they explain more than that.
+    # Where a trajectory repeats, these follow what anything else explains: they count where they explain more.
     most = max((f[0].torque_rms for f in found), default=0.0)
     along = [f for term in _along_angle(regression) if (f := _dependence(regression, fit, term)) is not None]
     found += [f for f in along if f[0].torque_rms > most]
