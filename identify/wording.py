@@ -222,20 +222,17 @@ def residual_torque_sentence(left: Disturbance, axis: str) -> str:
             "counts as noise and is included in the intervals."
         )
     each = joined(
-        [
-            f"{number(100.0 * d.relative, 2)} % depends on the {depends_on(d.on, axis)}{_how(d, axis)}"
-            for d in left.depends_on
-        ]
+        [f"{number(100.0 * d.relative, 2)} % depends on the {depends_on(d.on, axis)}{_how(d)}" for d in left.depends_on]
     )
     moved = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in left.moves_percent.items()])
     change = f" Fitting this part too changes {moved}." if moved else ""
     return f"The final model leaves a residual {torque} of {size}. Of the {torque}, {each}.{change}"
 
 
-def _how(part: Dependence, axis: str) -> str:
+def _how(part: Dependence) -> str:
     """Of what changes as a wave: what, and how fast; of what changes with a quantity: what."""
     if part.changes:
-        return f", as if the {part.changes} changed with the {depends_on(part.on, axis)}"
+        return f" (as if the {part.changes} changed with it)"
     if part.wave_hz is None:
         return ""
     return f", as if something changed the {PULSATING[part.wave_on]} at {number(part.wave_hz, 3)} Hz"

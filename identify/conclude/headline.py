@@ -43,12 +43,22 @@ def _found(found: Identification) -> str:
         return "Something is missing from the declared model, and these data do not determine what."
     if found.verdict.unexplained:
         if not found.accepted:
-            return "The declared model lacks something that no effect here describes."
+            return _changing(found) or "The declared model lacks something that no effect here describes."
         torque = "force" if found.axis == "linear" else "torque"
         left = found.disturbance
         size = "" if left is None else f" but for {number(100.0 * left.relative, 2)} % of the {torque}"
         return f"The declared model describes these runs{size}: what is left is too little to matter."
     return "The declared model describes these runs: no effect is missing."
+
+
+def _changing(found: Identification) -> str:
+    """That an inertia, a damping or the like changes, where that is most of what is left; empty where it is not."""
+    parts = () if found.disturbance is None else found.disturbance.depends_on
+    most = max(parts, key=lambda d: d.relative, default=None)
+    if most is None or not most.changes:
+        return ""
+    quantity = depends_on(most.on, found.axis)
+    return f"The declared model takes the {most.changes} for constant, and it changes with the {quantity}."
 
 
 def _with_first_number(found: Identification, name: str) -> str:

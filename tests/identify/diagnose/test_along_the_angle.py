@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from identify.conclude.headline import headline
 from identify.conclude.next_steps import next_steps
 from identify.pipeline import identify
 from identify.results import Identification
@@ -60,7 +61,8 @@ def test_a_platform_that_changes_along_the_angle_is_not_accepted_and_what_change
     assert [(d.on, d.changes) for d in found.disturbance.depends_on] == [("angle", what)]
     assert not found.accepted
     assert found.verdict.unexplained
-    assert f"as if the {what} changed with the angle" in " ".join(found.verdict.sentences)
+    assert f"depends on the angle (as if the {what} changed with it)" in " ".join(found.verdict.sentences)
+    assert headline(found)[0] == f"The declared model takes the {what} for constant, and it changes with the angle."
     assert any(f"The {what} changes with the angle" in step for step in next_steps(found))
 
 
@@ -74,4 +76,4 @@ def test_a_damping_that_falls_in_every_run_is_told_as_such() -> None:
     found = identified(0.0, 0.0, -0.4)
     assert found.disturbance is not None
     assert [(d.on, d.changes) for d in found.disturbance.depends_on] == [("time", "damping")]
-    assert "as if the damping changed with the time" in " ".join(found.verdict.sentences)
+    assert "depends on the time (as if the damping changed with it)" in " ".join(found.verdict.sentences)
