@@ -42,21 +42,32 @@ def resonances_hz(traces: Sequence[Trace], torques_nm: Sequence[Array]) -> tuple
 
 def _carried(trace: Trace, torque: Array, hertz: Array) -> Array:
     """Power of one run's torque along each resonator's, (f,)."""
+    known = np.isfinite(torque)
+    moved = _resonators(trace, hertz)
+    along = moved @ np.where(trace.keep & known, np.where(known, torque, 0.0), 0.0)
+    return np.asarray(along**2)
+
+
+def _resonators(trace: Trace, hertz: Array) -> Array:
+    """What each resonator takes besides what the platform does, of unit power where samples count, (f, n).
+
+    It is the same whatever the torque is, so it is computed once for a run.
+    """
+    key = ("resonators", len(hertz), float(hertz[0]), float(hertz[-1]))
+    return np.asarray(trace.once(key, lambda: _made(trace, hertz)))
+
+
+def _made(trace: Trace, hertz: Array) -> Array:
     angle, rate = (x[::UPSAMPLING] for x in trace.fine[:2])
     acceleration = np.gradient(rate, trace.step_s)
-    keep = trace.keep & np.isfinite(torque)
-    if np.sum(keep) < 8:
-        return np.zeros(len(hertz))
-    basis = np.linalg.qr(np.column_stack([acceleration, rate, angle, np.ones(len(rate))])[keep])[0]
-    rest = torque[keep] - basis @ (basis.T @ torque[keep])
-    out = np.zeros(len(hertz))
-    for k, f in enumerate(hertz):
-        w = 2.0 * np.pi * f
-        warped = 2.0 / trace.step_s * np.tan(0.5 * w * trace.step_s)  # so that the peak stands at this frequency
-        b, a = signal.bilinear(
-            [2.0 * MODE_RATIO * warped, warped**2], [1.0, 2.0 * MODE_RATIO * warped, warped**2], 1.0 / trace.step_s
-        )
-        moved = signal.lfilter(b, a, acceleration)[keep]
-        moved = moved - basis @ (basis.T @ moved)
-        out[k] = float(moved @ rest) ** 2 / max(float(moved @ moved), 1e-300)
-    return out
+    platform = np.column_stack([acceleration, rate, angle, np.ones(len(rate))])
+    basis = np.linalg.qr(np.where(trace.keep[:, None], platform, 0.0))[0]
+    out = np.zeros((len(hertz), len(rate)))
+    for row, f in zip(out, hertz, strict=True):
+        warped = 2.0 / trace.step_s * np.tan(np.pi * f * trace.step_s)  # so that the peak stands at this frequency
+        damped = [2.0 * MODE_RATIO * warped, warped**2]
+        b, a = signal.bilinear(damped, [1.0, *damped], 1.0 / trace.step_s)
+        row[:] = np.where(trace.keep, signal.lfilter(b, a, acceleration), 0.0)
+    out -= (out @ basis) @ basis.T
+    out[:, ~trace.keep] = 0.0
+    return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -183,6 +183,12 @@ class Trace:
         """Second derivative of the rate, root mean square."""
         bend = np.diff(self.fine[1], 2) / (self.step_s / UPSAMPLING) ** 2
         return float(np.sqrt(np.mean(bend**2)))
+
+    def once(self, key: Any, make: Callable[[], Any]) -> Any:
+        """What is the same for this run whatever the model is, made the first time that it is asked for."""
+        if key not in self._series:
+            self._series[key] = make()
+        return self._series[key]
 
     def torque_pieces(self, drive: tuple[tuple[str, tuple[float, ...]], ...]) -> tuple[Array, int] | None:
         """Torque behind the given drive effects as polynomials, and how many of them a sample holds."""
