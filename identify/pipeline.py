@@ -32,6 +32,7 @@ from identify.rivals.stand_ins import with_stand_ins
 from identify.rivals.whiteness_test import fails_whiteness_test, leaves_more_than_noise
 from identify.rivals.whole_runs import FreeRunFitter
 from identify.runs.clipping import full_scale_of
+from identify.runs.gyro_drift import without_drift
 from identify.runs.holdout import Split, split
 from identify.runs.measured_channels import offer_of, with_causes
 from identify.runs.observability import why_unseen
@@ -121,12 +122,12 @@ class _Identifier:
         unseen = tuple((n, why) for n in declared.effects if (why := why_unseen(n, self.traces)))
         self.offer = replace(offer, idle=(*offer.idle, *unseen))
         still = {name for name, _ in self.offer.idle}
-        names = tuple(n for n in declared.effects if n not in still)
-        self.structure = Structure(declared.terms, names)
+        self.structure = Structure(declared.terms, tuple(n for n in declared.effects if n not in still))
         self.start: Start = first_guess(self.traces, Structure(declared.terms))
         refuse_lowpass(self.traces, settings.lowpass_hz)
         if settings.lowpass_hz is not None:
             self.start = replace(self.start, cutoff_hz=settings.lowpass_hz)
+        self.traces = without_drift(self.traces, self.start.cutoff_hz)
 
     def run(self) -> Identification:
         """The whole way; where somebody stops it in the middle, what there is so far."""

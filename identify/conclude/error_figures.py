@@ -14,7 +14,7 @@ from identify.model.structure import Structure
 from identify.results import Errors, ModelResult, NoiseFloor
 from identify.runs.holdout import Split
 from identify.select.field_search import TorqueErrors
-from identify.signals.low_pass import clear_of_ends
+from identify.signals.low_pass import settled
 from identify.signals.trace import Trace, pooled_noise
 from rig.recording.run import Array
 
@@ -36,7 +36,7 @@ def measure(traces: Sequence[Trace], split: Split, fitted: FinalFit, cutoff_hz: 
     if fitted.sensor_limited:  # friction along the model's own motion knows when it sticks; a noisy sign does not
         structure, along = Structure(structure.terms), linear_traces(traces, fitted)
     parts = [torque_residual(t, structure, fitted.values, cutoff_hz) for t in along]
-    inside = [clear_of_ends(len(t.measured), t.step_s, cutoff_hz) for t in traces]
+    inside = [settled(t.keep, t.step_s, cutoff_hz) for t in traces]
     everything = relative(parts, [m & i for m, i in zip(split.everything, inside, strict=True)])
     held = relative(parts, [m & i for m, i in zip(split.judge, inside, strict=True)])
     if fitted.free_run is None:
@@ -81,7 +81,7 @@ def _free_run(traces: Sequence[Trace], split: Split, simulated: Sequence[Array])
 
 def floor_of(traces: Sequence[Trace], split: Split, fitted: FinalFit, cutoff_hz: float, given: bool) -> NoiseFloor:
     """What the sensor's noise alone leaves."""
-    inside = [clear_of_ends(len(t.measured), t.step_s, cutoff_hz) for t in traces]
+    inside = [settled(t.keep, t.step_s, cutoff_hz) for t in traces]
     masks = [m & i for m, i in zip(split.everything, inside, strict=True)]
     torque = torque_noise_floor(traces, fitted.values, cutoff_hz, masks)
     return NoiseFloor(

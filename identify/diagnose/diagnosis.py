@@ -17,7 +17,7 @@ from identify.diagnose.harmonics import Repeated, harmonics
 from identify.diagnose.memory import RunResiduals, direction_power, memory_power
 from identify.diagnose.moments import moments
 from identify.results import UNITS, Harmonics, Identification, ResidualDiagnosis, RunTraces, Share
-from identify.signals.low_pass import clear_of_ends, low_pass
+from identify.signals.low_pass import low_pass, settled
 from identify.signals.period import torque_period_s
 from rig.platform import Platform
 from rig.recording.run import Array
@@ -104,7 +104,7 @@ def _run(trace: RunTraces, sensor: Sensor, torque: bool, number: int) -> RunResi
     """One run with both models' residuals and the draws of noise as columns."""
     time = trace.time_s - trace.time_s[0]
     step = float(time[-1]) / (len(time) - 1)
-    use = (trace.keep > 0.0) & clear_of_ends(len(time), step, sensor.lowpass_hz if torque else None)
+    use = settled(trace.keep, step, sensor.lowpass_hz if torque else None)
     if torque:
         columns = [np.asarray(trace.torque_residual_before), np.asarray(trace.torque_residual_after)]
     else:

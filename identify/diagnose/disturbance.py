@@ -24,6 +24,7 @@ from rig.platform import TERMS
 SPLINE_KNOTS = 7  # inner knots of a spline, at even shares of the samples
 DEPENDENCE_SIGMAS = 4.0  # standard errors over blocks of held-out samples; by chance once in 30,000
 MIN_POWER_SHARE = 0.02  # of the power that is left: less is not worth a word
+MIN_OVER_NOISE = 2.0  # times what the term makes of the sensor's noise alone: an integrated rate wanders with that
 SHAPE_POINTS = 25  # places at which a curve's shape is given
 OUTER = (0.8, 0.95)  # shares of the samples inside of which nothing is touched
 MISSING_IN_RUNS, MISSING_SHARE = 0.25, 0.25  # runs in which a wave may be missing: with less of its share in all
@@ -86,6 +87,8 @@ def _dependence(
     if term.of_each_run and not _in_most_runs(fit, richer, share):
         return None
     size = float(np.sqrt(share)) * fit.held_nm
+    if size < MIN_OVER_NOISE * regression.made_by_noise_nm(fit.values, term.columns):
+        return None
     at, shape_nm = tuple(term.at.tolist()), tuple((term.shape @ gains).tolist())
     found = Dependence(
         term.on, size, size / regression.torque_nm, float(norm.sf(sure)), at, shape_nm, term.wave_on, term.wave_hz,

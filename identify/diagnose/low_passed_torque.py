@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from rig.platform import TERMS
 SAMPLES_A_PERIOD = 4.0  # of the cut-off: what the low-pass passed needs no more
 FOLDS, FOLD_BLOCKS = 3, 9  # a third of the runs, or of the blocks of each run, is held out in turn
 STILL_SIGMAS, STILL_PERIODS = 5.0, 0.5  # standard deviations of the smoothed rate, for so many periods of the cut-off
+DRAWS = 3  # of the sensor's noise
 AROUND_REVERSAL, MAX_REVERSAL_SHARE = 0.6, 0.35  # periods of the cut-off left out either side, up to a share of samples
 
 _QUANTITIES = {"angle": 0, "rate": 1, "torque": 3}  # of a trace's fine motion
@@ -170,24 +171,36 @@ class LowPassedTorque:
 
     def noise_floor_nm(self, values: Mapping[Name, float]) -> float:
         """What the sensor's noise alone leaves of the torque, root mean square, from simulated noise."""
-        rng = np.random.default_rng(1)
+        return float(np.sqrt(np.mean(self._of_noise(values, 1) ** 2)))
+
+    def made_by_noise_nm(self, values: Mapping[Name, float], columns: Array) -> float:
+        """What columns, (n, k), explain of the sensor's noise alone, root mean square, from simulated noise."""
+        squares = []
+        for seed in range(1, 1 + DRAWS):
+            noise = self._kept(("noise", seed, tuple(values.items())), partial(self._of_noise, values, seed))
+            squares.append(np.mean((columns @ np.linalg.lstsq(columns, noise, rcond=None)[0]) ** 2))
+        return float(np.sqrt(np.mean(squares)))
+
+    def _of_noise(self, values: Mapping[Name, float], seed: int) -> Array:
+        """What a draw of the sensor's noise leaves of the torque at the samples of all runs, (n,)."""
+        rng = np.random.default_rng(seed)
         inertia = 1.0 if self.torque_free else values.get(("inertia",), 0.0)
-        squares: list[Array] = []
+        out: list[Array] = []
         for trace, rows in zip(self.traces, self._rows, strict=True):
             if len(rows) == 0:
                 continue
             noise = trace.noise * rng.standard_normal(len(trace.measured))
             read = trace.beside
             of_angle = None if read is None else trace.beside_noise * rng.standard_normal(len(read))
-            only = replace(trace, measured=noise, beside=of_angle, motion=None, _series={})
+            only = replace(trace, measured=noise, beside=of_angle, drift_rad=None, motion=None, _series={})
             angle, rate, acceleration = (x[rows] for x in motion(only, self.cutoff_hz))
             left = (inertia + trace.run.added_inertia_kg_m2) * acceleration + values.get(("damping",), 0.0) * rate
             left = left + values.get(("stiffness",), 0.0) * (angle - np.mean(angle))
             if trace.biased:
                 line = np.column_stack([np.ones(len(rows)), rows])
                 left = left - line @ np.linalg.lstsq(line, left, rcond=None)[0]
-            squares.append(left**2)
-        return float(np.sqrt(np.mean(np.concatenate(squares))))
+            out.append(left)
+        return np.concatenate(out)
 
     def values_of(self, quantity: str) -> Array:
         """Angle, rate or torque of all runs as they are, ahead of the low-pass, at the samples behind it, (n,)."""

@@ -17,7 +17,7 @@ from scipy.interpolate import make_interp_spline
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.results import RunTraces
-from identify.signals.low_pass import clear_of_ends, low_pass
+from identify.signals.low_pass import low_pass, settled
 from identify.signals.trace import UPSAMPLING, Trace
 from rig import effects
 from rig.effects.base import Place
@@ -43,7 +43,7 @@ def motion(trace: Trace, cutoff_hz: float) -> tuple[Array, Array, Array]:
         if trace.beside is not None:
             angle = low_pass(trace.beside, cutoff_hz, trace.step_s)
             return angle - _gyro_delay_s(angle - integrated, rate, trace.keep) * rate, rate, acceleration
-        return trace.on_the_encoder(integrated, t), rate, acceleration
+        return trace.put_right(integrated, t), rate, acceleration
     return np.asarray(spline(t)), np.asarray(spline.derivative()(t)), np.asarray(spline.derivative(2)(t))
 
 
@@ -103,7 +103,7 @@ def torque_residual(
     residual = torque - model - low_pass(extra, cutoff_hz, trace.step_s)
     if trace.biased:
         t = trace.step_s * np.arange(len(angle))
-        clear = trace.keep & clear_of_ends(len(angle), trace.step_s, cutoff_hz)
+        clear = settled(trace.keep, trace.step_s, cutoff_hz)
         for first, last in trace.stretches:  # behind a gap the angle begins anew
             here = slice(first, last + 1)
             nuisance = np.column_stack([np.ones(last + 1 - first), t[here]])
@@ -163,10 +163,9 @@ def torque_noise_floor(
 def _noise_only(trace: Trace, rng: np.random.Generator) -> Trace:
     from dataclasses import replace  # noqa: PLC0415
 
-    return replace(
-        trace, measured=trace.noise * rng.standard_normal(len(trace.measured)), motion=None, _series={},
-        torque=None if trace.torque is None else replace(trace.torque, torque_nm=np.zeros_like(trace.torque.torque_nm)),
-    )  # fmt: skip
+    still = None if trace.torque is None else replace(trace.torque, torque_nm=np.zeros_like(trace.torque.torque_nm))
+    noise = trace.noise * rng.standard_normal(len(trace.measured))
+    return replace(trace, measured=noise, torque=still, drift_rad=None, motion=None, _series={})
 
 
 def dependence(traces: Sequence[RunTraces], cutoff_hz: float) -> dict[str, float]:
@@ -182,8 +181,8 @@ def dependence(traces: Sequence[RunTraces], cutoff_hz: float) -> dict[str, float
         y = trace.torque_residual_after
         values = trace.measured - trace.simulated_after if y is None else np.asarray(y)
         time = trace.time_s - trace.time_s[0]
-        inside = clear_of_ends(len(time), float(time[-1]) / max(len(time) - 1, 1), None if y is None else cutoff_hz)
-        use = (trace.keep > 0.0) & np.isfinite(values) & inside
+        step_s = float(time[-1]) / max(len(time) - 1, 1)
+        use = settled(trace.keep, step_s, None if y is None else cutoff_hz) & np.isfinite(values)
         left.append(np.where(use, values, 0.0))
         known.append(use)
     use = np.concatenate(known) if known else np.zeros(0, dtype=bool)

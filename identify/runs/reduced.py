@@ -129,6 +129,7 @@ def decimated(trace: Trace, factor: int) -> Trace:
         trace, measured=measured, keep=keep & inside, stretches=stretches, step_s=factor * trace.step_s,
         noise=less * trace.noise, beside=None if trace.beside is None else passed(trace.beside),
         beside_noise=less * trace.beside_noise, motion=None, _series={},
+        drift_rad=None if trace.drift_rad is None else trace.drift_rad[::factor],
     )  # fmt: skip
 
 

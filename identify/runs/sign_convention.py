@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identify.results import RunTraces
-from identify.signals.low_pass import clear_of_ends, low_pass
+from identify.signals.low_pass import low_pass, settled
 from rig.recording.run import Array
 
 SIGN_SIGMAS = 4.0  # standard errors from zero
@@ -96,7 +96,7 @@ def equations(swing: Swing, cutoff_hz: float) -> tuple[Array, Array] | None:
     step = float(swing.time_s[-1] - swing.time_s[0]) / (len(swing.time_s) - 1)
     rate, angle, torque = (low_pass(v, cutoff_hz, step) for v in (swing.rate_rad_s, swing.angle_rad, swing.torque_nm))
     columns = np.stack([np.gradient(rate, step), rate, angle, torque], axis=1)
-    keep = (swing.keep > 0.0) & clear_of_ends(len(swing.keep), step, cutoff_hz)
+    keep = settled(swing.keep, step, cutoff_hz)
     if int(np.sum(keep)) < 4 * INDEPENDENT_BLOCKS or not np.all(np.isfinite(columns)):
         return None
     unknown = np.stack([np.ones(len(keep)), np.linspace(-1.0, 1.0, len(keep))], axis=1)[keep]

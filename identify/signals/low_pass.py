@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from scipy import signal
 from rig.recording.run import Array
 
 EDGE_PERIODS = 3.0  # of the cut-off: so much at either end of a run the filter has not settled
+GAP_PERIODS = 0.5  # of the cut-off: over a shorter gap what stands in for the motion is as good as it
 
 
 @lru_cache(maxsize=64)
@@ -19,16 +21,32 @@ def _sections(wn: float) -> Array:
     return np.asarray(signal.butter(2, wn, output="sos"))
 
 
-def clear_of_ends(n: int, step_s: float, cutoff_hz: float | None) -> NDArray[np.bool_]:
-    """Samples of a run of ``n`` at which the low-pass has settled, (n,): not those at its ends.
+def settled(keep: NDArray[Any], step_s: float, cutoff_hz: float | None) -> NDArray[np.bool_]:
+    """Samples of a run that count and at which the low-pass has settled, (n,): not at its ends, nor beside a gap.
 
-    Of a run so short that this would be most of it the middle half stays. All of it where there is no low-pass.
+    Where samples are missing for longer than half a period of the cut-off, what stands in for the motion is none, and
+    the torque went on. Of a run so short, or so full of gaps, that this would be most of it, more stays: the middle
+    half, and what lies beside gaps. All samples that count where there is no low-pass.
+
+    Parameters
+    ----------
+    keep
+        Shape (n,): samples that count (true, or above zero).
     """
-    out = np.ones(n, dtype=bool)
-    if cutoff_hz:
-        edge = min(int(np.ceil(EDGE_PERIODS / (cutoff_hz * step_s))), n // 4)
-        out[:edge] = out[n - edge :] = False
-    return out
+    out = np.asarray(keep) > 0.0
+    if not cutoff_hz:
+        return out
+    period = 1.0 / (cutoff_hz * step_s)
+    reach = int(np.ceil(EDGE_PERIODS * period))
+    edges = np.diff(np.concatenate([[0], (~out).astype(np.int8), [0]]))
+    beside = np.zeros(len(out), dtype=bool)
+    for first, behind in zip(np.nonzero(edges == 1)[0].tolist(), np.nonzero(edges == -1)[0].tolist(), strict=True):
+        if behind - first > GAP_PERIODS * period:
+            beside[max(0, first - reach) : behind + reach] = True
+    end = min(reach, len(out) // 4)
+    out[:end] = out[len(out) - end :] = False
+    clear = out & ~beside
+    return clear if 2 * np.sum(clear) >= np.sum(out) else out
 
 
 def low_pass(values: Array, cutoff_hz: float, step_s: float) -> Array:

@@ -27,6 +27,7 @@ UPSAMPLING = 4  # nonlinear torques have corners between samples
 SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than it tells
 LEAD_S = 0.1  # of torque ahead of a piece of a run, for a drive with memory
 RUNAWAY_TORQUE = 1e100  # torque of an effect along a noisy motion, in any unit: it was integrated beyond all bounds
+MAX_BIAS_WALK = 0.01  # of the rate, that a gyro's bias walks over a run
 MOST_BIAS_RAD_S = 0.05  # of a gyro: what its integral runs away faster with is the motion itself
 STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
 
@@ -64,6 +65,7 @@ class Trace:
     motion: tuple[Array, Array, Array, Array, float] | None = None  # of a piece: cut out of the whole run's
     beside: Array | None = None  # (n,): the other channel, where an encoder and a gyro read independently of each other
     beside_noise: float = 0.0
+    drift_rad: Array | None = None  # (n,): of the integrated rate, where a spring tells it
     _series: dict[Any, Any] = field(default_factory=dict)
     _tables: dict[Channel, tuple[Array, float]] = field(default_factory=dict)  # shared by the pieces of a run
 
@@ -90,6 +92,7 @@ class Trace:
             measured=self.measured[first : last + 1],
             keep=self.keep[first : last + 1],
             beside=None if self.beside is None else self.beside[first : last + 1],
+            drift_rad=None if self.drift_rad is None else self.drift_rad[first : last + 1],
             stretches=kept,
             offset_s=self.offset_s + first * self.step_s,
             motion=(angle[fine], rate[fine], time[fine], torque[fine], left),
@@ -162,15 +165,17 @@ class Trace:
             angle, rate = Polynomials(spline.antiderivative())(fine_t), Polynomials(spline)(fine_t)
             left = self.noise * np.sqrt(min(1.0, wn))
             angle = angle + self._offset(angle[::UPSAMPLING], t)
+            if self.drift_rad is not None:
+                angle = angle - np.interp(fine_t, t, self.drift_rad)
         else:
             angle, rate = Polynomials(spline)(fine_t), Polynomials(spline.derivative())(fine_t)
             left = self.noise * 2.0 * np.pi * self.cutoff_hz / np.sqrt(3.0) * np.sqrt(min(1.0, wn))
         torque = np.zeros_like(fine_t) if self.torque is None else self.torque.at(fine_t + self.start_s)
         return angle, rate, fine_t + self.offset_s, torque, float(left)
 
-    def on_the_encoder(self, angle_rad: Array, time_s: Array) -> Array:
-        """An angle integrated from the rate, moved to where the encoder reads it, if there is one."""
-        return angle_rad + self._offset(angle_rad, time_s)
+    def put_right(self, angle_rad: Array, time_s: Array) -> Array:
+        """An angle integrated from the rate, (n,), where an encoder reads it or the spring holds it."""
+        return angle_rad + self._offset(angle_rad, time_s) - (0.0 if self.drift_rad is None else self.drift_rad)
 
     def _offset(self, angle_rad: Array, time_s: Array) -> float:
         if self.run.angle_rad is None:

@@ -10,7 +10,6 @@ import numpy as np
 from identify.model.parameters import Name, platform_of
 from identify.model.structure import Structure
 from identify.signals.trace import Trace
-from identify.simulate.anchored_start import anchor
 from identify.simulate.shots import Shots, from_rest, make_shots, may_rest
 from identify.simulate.stuck_start import stuck_initial_state
 from rig.dynamics import Equations
@@ -72,10 +71,9 @@ def shots_for(
         counting = None if use is None else use[i]
         held = may_rest(trace, equations) and (rests if carry is None else carry[i].rests)
         shots = from_rest(make_shots(trace, substeps, length, counting, equations, held), equations)
-        anchor(shots, equations)
         shots.reads = -(-reads // substeps) if ahead else 1
         if carry is not None and np.array_equal(carry[i].first, shots.first):
-            shots.starts, shots.bias, shots.anchored = carry[i].starts.copy(), carry[i].bias, carry[i].anchored
+            shots.starts, shots.bias = carry[i].starts.copy(), carry[i].bias
         elif length is None and equations.sticks:
             stuck_initial_state(shots, equations)
         out.append(shots)

@@ -33,7 +33,6 @@ class Shots:
     bias: float = 0.0
     weight: Any = field(default=None)  # (n,) boolean: samples that count
     rests: bool = False  # the first shot begins at rest, for certain: its start state is not fitted
-    anchored: Any = None  # (s,) boolean: shots whose angle counts from where they begin; None: from where the run does
     reads: int = 1  # how often in a fine step a sensor's filter is fed, where the motion is predicted sample by sample
 
     @property
@@ -48,9 +47,9 @@ class Shots:
 
     @cached_property
     def since_s(self) -> Array:
-        """Time over which the angle at the start of each shot was integrated, (s,)."""
+        """Time over which the angle at the start of each shot was integrated, bias and all, (s,)."""
         since = np.asarray(self.trace.offset_s + self.trace.step_s * self.first)
-        return since if self.anchored is None else np.where(self.anchored, 0.0, since)
+        return since if self.trace.drift_rad is None else np.zeros_like(since)
 
     @cached_property
     def active(self) -> Any:

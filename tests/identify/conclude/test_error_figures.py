@@ -11,7 +11,7 @@ from identify.conclude.error_figures import Measured, floor_of, measure
 from identify.estimate.final_fit import by_output_error
 from identify.model.structure import Structure
 from identify.runs.holdout import split
-from identify.signals.low_pass import clear_of_ends
+from identify.signals.low_pass import settled
 from rig.recording.run import Recording, Run
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
 
@@ -80,4 +80,4 @@ def test_what_the_low_pass_does_at_the_ends_of_a_short_run_is_in_no_figure(biase
     found, floor = measure(traces, parts, fitted, 4.0).errors, floor_of(traces, parts, fitted, 4.0, True)
     assert found.residual_rms_torque is not None and floor.residual_rms_torque is not None
     assert found.residual_torque_relative is not None and found.residual_torque_relative < 1e-3
-    assert clear_of_ends(400, 2e-3, 4.0).sum() == 200 and clear_of_ends(400, 2e-3, None).all()
+    assert settled(np.ones(400), 2e-3, 4.0).sum() == 200 and settled(np.ones(400), 2e-3, None).all()

@@ -25,7 +25,7 @@ from identify.report.page.plots.motion import motion_error
 from identify.report.page.plots.thinning import binned_mean, cloud, line
 from identify.report.page.quantities import QUANTITIES, axis
 from identify.results import Identification, RunTraces
-from identify.signals.low_pass import clear_of_ends
+from identify.signals.low_pass import settled
 from rig.recording.run import Array
 
 LINE_POINTS = 4000  # drawn against time, of all runs together
@@ -63,8 +63,7 @@ def residual_of(trace: RunTraces, which: Which, torque: bool, lowpass_hz: float 
     if torque:
         found = trace.torque_residual_before if which == "before" else trace.torque_residual_after
         step_s = float(trace.time_s[-1] - trace.time_s[0]) / max(len(trace.time_s) - 1, 1)
-        inside = clear_of_ends(len(trace.time_s), step_s, lowpass_hz)
-        return np.where((trace.keep > 0.0) & inside, np.asarray(found), np.nan)
+        return np.where(settled(trace.keep, step_s, lowpass_hz), np.asarray(found), np.nan)
     return motion_error(trace, trace.simulated_before if which == "before" else trace.simulated_after)
 
 
