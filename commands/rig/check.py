@@ -72,17 +72,19 @@ def recordings(subject: CheckSubject) -> list[str]:
     """That every recording can be read and trusted. Raises RecordingError."""
     if subject.stage is not None:
         return []
+    from identify.runs.reading import describe_reading
     from rig.recording.load import read_recording
 
     lines = []
-    for run in read_recording(subject.loaded).runs:
+    runs = read_recording(subject.loaded).runs
+    for run in runs:
         channels = [name for name, values in (("rate", run.rate_rad_s), ("angle", run.angle_rad)) if values is not None]
         torque = "with torque" if run.torque_nm is not None else "without torque (free decay)"
         lines.append(
             f"recording {plain(run.name)}: {len(run.time_s)} samples of {' and '.join(channels)} over "
             f"{run.duration_s:.3g} s, {int((~run.valid).sum())} invalid, {torque}, use: {run.use}"
         )
-    return lines
+    return lines + [f"reading {plain(said)}" for said in describe_reading(runs, lambda _: None)]
 
 
 def identifiability(subject: CheckSubject) -> list[str]:

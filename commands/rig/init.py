@@ -265,7 +265,7 @@ def _write(out: Path, text: str, checked: bool) -> None:
         out.parent.mkdir(parents=True, exist_ok=True)
         partial.write_text(text, encoding="utf-8", newline="\n")
         if checked:
-            _check(partial)
+            show(_read_with(partial))
         with out.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
     except FileExistsError:
@@ -276,12 +276,14 @@ def _write(out: Path, text: str, checked: bool) -> None:
         partial.unlink(missing_ok=True)
 
 
-def _check(path: Path) -> None:
+def _read_with(path: Path) -> Sequence[str]:
+    """What was made of the recording as this configuration reads it. Raises RecordingError."""
+    from identify.runs.reading import describe_reading
     from rig.config.load import load_config
     from rig.recording.load import read_recording
 
     try:
-        read_recording(load_config(path))
+        return describe_reading(read_recording(load_config(path)).runs, lambda _: None)
     except RecordingError as error:
         raise RecordingError(f"{_as_options(str(error))}\nNothing was written.") from None
 

@@ -67,7 +67,8 @@ def listing(table: Table, columns: tuple[Column, ...]) -> list[str]:
             continue
         rising = ", increases" if c.increases else ""
         unit = f" {c.known_unit.text if c.known_unit else c.unit_text}".rstrip()
-        lines.append(f"  {c.name!r}: {np.nanmin(c.values):.6g} to {np.nanmax(c.values):.6g}{unit}{rising}")
+        instead = f", and {c.instead} for no reading" if c.instead else ""
+        lines.append(f"  {c.name!r}: {np.nanmin(c.values):.6g} to {np.nanmax(c.values):.6g}{unit}{rising}{instead}")
     return lines + ([f"  ... and {len(columns) - LISTED} more"] if len(columns) > LISTED else [])
 
 

@@ -50,4 +50,5 @@ def _times(count: int) -> str:
 
 def _rows(found: Missing) -> str:
     places = ((found.before, "at the beginning"), (found.within, "within"), (found.after, "at the end"))
-    return f"{joined([f'{n} {where}' for n, where in places if n])}, no {' or '.join(found.quantities)}"
+    instead = f"; the file has {joined(found.instead)}" if found.instead else ""
+    return f"{joined([f'{n} {where}' for n, where in places if n])}, no {' or '.join(found.quantities)}{instead}"

@@ -55,6 +55,8 @@ class Missing:
         What has no value there.
     between
         Quantities that stand in rows of their own and are read between them by straight lines.
+    instead
+        What the file has there in the place of nothing, in words: "-9999 as torque".
     """
 
     before: int = 0
@@ -62,6 +64,7 @@ class Missing:
     within: int = 0
     quantities: tuple[str, ...] = ()
     between: tuple[str, ...] = ()
+    instead: tuple[str, ...] = ()
 
     @property
     def told(self) -> bool:

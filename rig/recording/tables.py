@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +16,7 @@ from rig.errors import RecordingError
 from rig.recording.checks import check_channel, check_lengths, check_samples, missing_column
 from rig.recording.missing import Rows, lost_within, read_between, with_values
 from rig.recording.run import Run
+from rig.recording.stand_ins import in_words, stand_ins, without
 from rig.recording.stated_units import column_named, factor_of, is_none
 from rig.recording.table import Table
 from rig.units import DEG
@@ -39,7 +41,8 @@ def columns_of(table: Table, factors: Mapping[str, float], section: RecordedConf
     A row without a value is lost. Raises RecordingError where a column "valid" says that it is not.
     """
     columns, at = _as_stored(table, section)
-    return _checked(table, Rows(lost_within(columns), at), factors)
+    rows, _ = _without_stand_ins(Rows(columns, at), table)
+    return _checked(table, dataclasses.replace(rows, columns=lost_within(rows.columns)), factors)
 
 
 def time_of(table: Table, factors: Mapping[str, float], section: RecordedConfig) -> Array:
@@ -61,7 +64,8 @@ def run_of_table(table: Table, factors: Mapping[str, float], entry: RecordedRun,
     for name, x in channels.items():
         check_channel(table, name, x, len(at))
     inside = between(columns["time"] * factors["time"], entry, table.path)
-    rows = with_values(Rows(columns, at).only(inside), table)
+    rows, instead = _without_stand_ins(Rows(columns, at).only(inside), table)
+    rows = with_values(rows, table)
     if rows.missing and rows.missing.between:
         stamps = columns["time"]
         channels = {name: read_between(stamps, x, stamps[rows.at]) for name, x in channels.items()}
@@ -87,7 +91,7 @@ def run_of_table(table: Table, factors: Mapping[str, float], entry: RecordedRun,
         added_inertia_kg_m2=entry.added_inertia_kg_m2,
         channels={name: values[keep] for name, values in channels.items()},
         causes={name: config.channel(name) for name, config in section.columns.channels.items()},
-        missing=rows.missing,
+        missing=rows.missing and dataclasses.replace(rows.missing, instead=instead),
     )
 
 
@@ -117,6 +121,31 @@ def _as_stored(table: Table, section: RecordedConfig) -> tuple[dict[str, Array],
     return columns, np.arange(count)
 
 
+def _without_stand_ins(rows: Rows, table: Table) -> tuple[Rows, tuple[str, ...]]:
+    """The rows without numbers that stand for no reading, and what those are, in words.
+
+    Raises RecordingError where a column "valid" says that such a number counts.
+    """
+    columns = dict(rows.columns)
+    flags = columns.get("valid")
+    instead = []
+    for quantity in ("torque", "rate", "angle"):
+        values = columns.get(quantity)
+        if values is None or not (numbers := stand_ins(values)):
+            continue
+        columns[quantity] = without(values, numbers)
+        instead.append(f"{in_words(numbers)} as {quantity}")
+        counts = np.isin(values, list(numbers)) & (np.zeros(len(values)) if flags is None else flags).astype(bool)
+        if counts.any():
+            i, largest = int(np.argmax(counts)), float(np.nanmax(np.abs(columns[quantity])))
+            raise RecordingError(
+                f"{table.path}: {table.label(int(rows.at[i]))}: {quantity} is {values[i]:g} ({counts.sum()} such "
+                f"samples), which stands for no reading beside values of up to {largest:g}, but valid is 1: mark the "
+                "row valid = 0"
+            )
+    return dataclasses.replace(rows, columns=columns), tuple(instead)
+
+
 def _even(table: Table, count: int, sample_rate_hz: float) -> Array:
     """Times in s of rows that a clock took evenly, (count,)."""
     return (table.first_row + np.arange(count)) / sample_rate_hz
@@ -138,7 +167,9 @@ def channels_of(table: Table, section: RecordedConfig) -> dict[str, Array]:
         if column not in table.names:
             raise missing_column(table, f"channels.{name}", [column], mapped=True)
     values = table.read(list(named.values())) if named else {}
-    return {name: wanted[name].scale * values[column] for name, column in named.items()}
+    return {
+        name: wanted[name].scale * without(values[column], stand_ins(values[column])) for name, column in named.items()
+    }
 
 
 def _names(table: Table, section: RecordedConfig) -> dict[Quantity, str]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.errors import RecordingError
+from rig.recording.stand_ins import in_words, stand_ins, without
 from rig.recording.stated_units import stated_unit
 from rig.recording.table import SingleNumberError, Table
 from rig.units import Unit, name_and_unit, unit_of
@@ -35,6 +36,8 @@ class Column:
         Shape (n,); None where it cannot be a quantity, for the reason in ``why_not``.
     single
         Its number, where it has but one.
+    instead
+        Which numbers stood for no reading, in words; they are NaN in ``values``.
     """
 
     name: str
@@ -45,6 +48,7 @@ class Column:
     values: Array | None
     why_not: str = ""
     single: float | None = None
+    instead: str = ""
 
     @property
     def known_unit(self) -> Unit | None:
@@ -107,10 +111,16 @@ def _column(table: Table, name: str, values: Array | str, length: int) -> Column
     words = tuple(w.lower() for w in _WORD.findall(name_and_unit(name)[0]))
     suffix, count = (None, 0) if text else _suffix(words)
     why_not = values if isinstance(values, str) else _unusable(values, length)
-    kept = None if why_not or isinstance(values, str) else values
+    kept, instead = (None, "") if why_not or isinstance(values, str) else _readings(values)
     single = float(values[0]) if not isinstance(values, str) and len(values) == 1 else None
     unit = unit_of(text) if text else None
-    return Column(name, words[: len(words) - count], text, unit, suffix, kept, why_not, single)
+    return Column(name, words[: len(words) - count], text, unit, suffix, kept, why_not, single, instead)
+
+
+def _readings(values: Array) -> tuple[Array, str]:
+    """The numbers, NaN where one stands for no reading, and which those are, in words."""
+    numbers = {} if np.all(np.diff(values) > 0) else stand_ins(values)
+    return without(values, numbers), in_words(numbers)
 
 
 def _unusable(values: Array, length: int) -> str:
