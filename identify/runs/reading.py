@@ -11,7 +11,8 @@ from rig.recording.run import Missing, Run
 
 def describe_reading(runs: Sequence[Run], say: Callable[[str], None]) -> tuple[str, ...]:
     """All of it in words, and said; empty where the runs are used as they were recorded."""
-    return tuple(s for tell in (describe_excerpts, describe_turns, describe_missing) for s in tell(runs, say))
+    tellers = (describe_excerpts, describe_turns, describe_missing, describe_notes)
+    return tuple(s for tell in tellers for s in tell(runs, say))
 
 
 def describe_turns(runs: Sequence[Run], say: Callable[[str], None]) -> tuple[str, ...]:
@@ -42,6 +43,18 @@ def describe_missing(runs: Sequence[Run], say: Callable[[str], None]) -> tuple[s
     for sentence in said:
         say(sentence)
     return tuple(said)
+
+
+def describe_notes(runs: Sequence[Run], say: Callable[[str], None]) -> tuple[str, ...]:
+    """What the readers noted of their files, one sentence a note, and said; empty where they noted nothing."""
+    of: dict[str, list[str]] = {}
+    for run in runs:
+        for note in run.notes:
+            of.setdefault(note, []).append(run.name)
+    said = tuple(f"{joined(names)}: {note}" for note, names in of.items())
+    for sentence in said:
+        say(sentence)
+    return said
 
 
 def _times(count: int) -> str:

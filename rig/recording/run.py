@@ -116,6 +116,8 @@ class Run:
         How often the angle began anew after a whole turn in the file; in ``angle_rad`` it goes on.
     missing
         What was left out for want of a value; None where nothing was.
+    notes
+        What else a person has to know of how its file was read, in words.
     """
 
     name: str
@@ -137,6 +139,7 @@ class Run:
     excerpt: Excerpt | None = None
     wraps: int = 0
     missing: Missing | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def duration_s(self) -> float:

@@ -27,7 +27,8 @@ class Table:
 
     ``read`` gives the columns asked for, each float64 of shape (n,), and raises RecordingError for what is
     not a plain column of numbers. ``label`` says where a sample stands in the file, ``units`` what stood as the unit
-    of a column besides its name, ``first_row`` how many rows of the file stand before those of the table.
+    of a column besides its name, ``first_row`` how many rows of the file stand before those of the table. ``notes``
+    says what a person has to know of how the file was read, in words.
     """
 
     path: Path
@@ -36,6 +37,7 @@ class Table:
     label: Callable[[int], str] = index_label
     units: Mapping[str, str] = field(default_factory=dict)
     first_row: int = 0
+    notes: Callable[[], Sequence[str]] = tuple
 
 
 class SingleNumberError(RecordingError):

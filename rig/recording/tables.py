@@ -92,6 +92,7 @@ def run_of_table(table: Table, factors: Mapping[str, float], entry: RecordedRun,
         channels={name: values[keep] for name, values in channels.items()},
         causes={name: config.channel(name) for name, config in section.columns.channels.items()},
         missing=rows.missing and dataclasses.replace(rows.missing, instead=instead),
+        notes=(*table.notes(), *_counted(section)),
     )
 
 
@@ -149,6 +150,11 @@ def _without_stand_ins(rows: Rows, table: Table) -> tuple[Rows, tuple[str, ...]]
 def _even(table: Table, count: int, sample_rate_hz: float) -> Array:
     """Times in s of rows that a clock took evenly, (count,)."""
     return (table.first_row + np.arange(count)) / sample_rate_hz
+
+
+def _counted(section: RecordedConfig) -> tuple[str, ...]:
+    rate_hz = section.sample_rate_hz
+    return () if rate_hz is None else (f"its rows are taken to be evenly spaced, {rate_hz:g} a second",)
 
 
 def _checked(table: Table, rows: Rows, factors: Mapping[str, float]) -> dict[str, Array]:

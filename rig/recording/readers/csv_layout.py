@@ -16,6 +16,8 @@ from typing import IO, cast
 from rig.errors import RecordingError
 from rig.recording.readers.preamble import is_labelled, stated_separator, stated_units
 from rig.recording.readers.timestamps import is_stamp
+from rig.recording.readers.words import EMPTY, NO_READING, is_number
+from rig.recording.readers.words import number as number_of
 from rig.recording.table import MAX_SAMPLES
 from rig.units import bare, unit_of
 
@@ -25,8 +27,6 @@ MAX_CHARACTERS = 2 * 1024**3  # a packed file of a few megabytes may unpack to t
 LOOKED_AT = 400  # lines, comments and empty ones not counted, in which the data have to begin
 DATA_LINES = 50  # of which the decimal sign is read
 SURE = 3  # lines in a row that look like data before a preamble is believed
-_EMPTY = ("", "na", "n/a", "null", "none", "-")
-_TRUTH = {"true": 1.0, "false": 0.0}
 _SEPARATOR_LINE = re.compile(r'^"?sep=.?"?$', re.IGNORECASE)  # as spreadsheets write it
 
 
@@ -58,7 +58,7 @@ class Layout:
 
     def number(self, text: str) -> float:
         """A field as a number, empty ones as NaN. Raises ValueError for anything else."""
-        return _number(text, self.decimal_comma)
+        return number_of(text, self.decimal_comma)
 
 
 def layout_of(path: Path) -> Layout:
@@ -74,7 +74,7 @@ def layout_of(path: Path) -> Layout:
     width = len(_trimmed(_split(lines[at][1], delimiter))) if at < len(lines) else 0
     names = _names(lines[names_at][1], delimiter, width)
     # Below a row of units a name may be a number: of an oscilloscope's channels.
-    is_header = units_at is not None or not any(_is_number(name) for name in names)
+    is_header = units_at is not None or not any(is_number(name) for name in names)
     if at > 1 and (len(names) != width or not is_header):
         raise RecordingError(
             f"{path}: the data begin in line {lines[at][0]}, and no line above names their {width} columns: add one, "
@@ -154,7 +154,7 @@ def _first_data(lines: Sequence[tuple[int, str]]) -> tuple[int, str | None]:
     for at in (1, 2):
         if at >= len(lines) or len(_split(lines[at][1], plain)) < first:
             continue
-        has_numbers = any(_is_number(f) for f in _split(lines[at][1], plain) if f.lower() not in _EMPTY)
+        has_numbers = any(is_number(f) for f in _split(lines[at][1], plain))
         if (at == 1 and _is_data(lines[1][1], plain)) or (at == 2 and has_numbers and _units_below(lines, 2)):
             return at, plain
     stated = stated_separator(lines)
@@ -207,7 +207,7 @@ def _without_header(
 
 def _units_of(names: Sequence[str], row: Sequence[str]) -> dict[str, str]:
     """Name -> unit of those that have one in the row of units."""
-    return {name: bare(unit) for name, unit in zip(names, row, strict=False) if bare(unit).lower() not in _EMPTY}
+    return {name: bare(unit) for name, unit in zip(names, row, strict=False) if bare(unit).lower() not in EMPTY}
 
 
 def _names(line: str, delimiter: str | None, width: int) -> list[str]:
@@ -238,36 +238,17 @@ def _split(line: str, delimiter: str | None) -> list[str]:
     return [part.strip() for part in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
 
 
-def _number(text: str, decimal_comma: bool) -> float:
-    text = text.strip()
-    if text.lower() in _EMPTY:
-        return float("nan")
-    if "_" in text:
-        raise ValueError(text)
-    if text.lower() in _TRUTH:
-        return _TRUTH[text.lower()]
-    return float(text.replace(",", ".") if decimal_comma else text)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        _number(text, "," in text)
-    except ValueError:
-        return False
-    return True
-
-
 def _is_data(line: str, delimiter: str | None) -> bool:
     """Whether a line is one of numbers, empty fields and time stamps, with at least one number."""
     fields = _split(line, delimiter)
-    known = [f for f in fields if f.lower() not in _EMPTY]
-    return any(_is_number(f) for f in known) and all(_is_number(f) or is_stamp(f) for f in known)
+    known = [f for f in fields if f.lower() not in NO_READING]
+    return any(is_number(f) for f in known) and all(is_number(f) or is_stamp(f) for f in known)
 
 
 def _is_units(fields: Sequence[str]) -> bool:
     """Whether these stand below the names to say their units: no number among them, and one at least a known unit."""
-    known = [f for f in fields if f.lower() not in _EMPTY]
-    if is_labelled(fields) or any(_is_number(f) for f in known):
+    known = [f for f in fields if f.lower() not in EMPTY]
+    if is_labelled(fields) or any(is_number(f) for f in known):
         return False
     return any(unit_of(f) is not None for f in known)
 

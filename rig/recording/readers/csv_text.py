@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import zlib
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +15,16 @@ import numpy as np
 from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.recording.readers.csv_layout import Layout, all_lines, layout_of
+from rig.recording.readers.cut_end import cut_end
+from rig.recording.readers.status import told_of
 from rig.recording.readers.thousands import first_grouped, may_be_grouped
-from rig.recording.readers.timestamps import Stamps
+from rig.recording.readers.timestamps import Stamps, is_stamp
 from rig.recording.readers.unreadable import unreadable
+from rig.recording.readers.words import NO_READING, is_number
 from rig.recording.table import MAX_SAMPLES, Table, too_long
 
+LOOKED_AT = 50  # rows in which a column of words shows
+_WORD = re.compile(r"[^\W\d_]")  # begins with a letter
 _DAMAGE = (OSError, EOFError, zlib.error, UnicodeError)
 
 
@@ -24,13 +32,51 @@ def read(path: Path) -> Sequence[Table]:
     """One table. Raises RecordingError where there is no header, no text or no data."""
     try:
         layout = layout_of(path)
+        cut = cut_end(path, layout.encoding, layout.fields, len(layout.names))
     except _DAMAGE as error:
         raise RecordingError(f"{path}: cannot be read ({error}): export the file again") from error
+    text = _Text(layout, bool(cut))
 
-    def columns(names: Sequence[str]) -> Mapping[str, Array]:
-        return _columns(layout, names)
+    def notes() -> Sequence[str]:
+        return [f"the last line {cut}, as of a file that was cut, and is left out"] * bool(cut) + _told(text)
 
-    return [Table(path, layout.names, columns, lambda index: f"line {_line_of(layout, index)}", layout.units)]
+    return [
+        Table(
+            path,
+            layout.names,
+            lambda names: _columns(text, names),
+            lambda index: f"line {_line_of(text, index)}",
+            layout.units,
+            notes=notes,
+        )
+    ]
+
+
+def _is_word(field: str) -> bool:
+    """Whether a field is neither a number, nor a word in its place, nor a time."""
+    is_one = bool(_WORD.match(field)) and field.lower() not in NO_READING
+    return is_one and not is_number(field) and not is_stamp(field)
+
+
+@dataclass(frozen=True)
+class _Text:
+    """The text of a table, and whether its last line is no row."""
+
+    layout: Layout
+    is_cut: bool
+
+
+def _told(text: _Text) -> list[str]:
+    """What columns of words say of the rows."""
+    layout = text.layout
+    words: set[int] = set()
+    for _, line in islice(_data_lines(text), LOOKED_AT):
+        fields = layout.fields(line)[: len(layout.names)]
+        words |= {i for i, f in enumerate(fields) if _is_word(f)}
+    if not words:
+        return []
+    rows = ((f"line {number}", layout.fields(line)) for number, line in _data_lines(text))
+    return told_of({i: layout.names[i] for i in sorted(words)}, rows)
 
 
 def _lines(path: Path, encoding: str) -> Iterator[tuple[int, str]]:
@@ -40,55 +86,63 @@ def _lines(path: Path, encoding: str) -> Iterator[tuple[int, str]]:
             yield number, text
 
 
-def _data_lines(layout: Layout) -> Iterator[tuple[int, str]]:
-    count = 0
-    for number, text in _lines(layout.path, layout.encoding):
+def _data_lines(text: _Text) -> Iterator[tuple[int, str]]:
+    """Number and text of every row; the last line is held back until it is known to be one."""
+    layout, count = text.layout, 0
+    held: tuple[int, str] | None = None
+    for number, line in _lines(layout.path, layout.encoding):
         if number > layout.header_line:
             count += 1
             if count > MAX_SAMPLES:
                 raise too_long(layout.path, count)
-            yield number, text
+            if held is not None:
+                yield held
+            held = number, line
+    if held is not None and not text.is_cut:
+        yield held
 
 
-def _columns(layout: Layout, names: Sequence[str]) -> Mapping[str, Array]:
+def _columns(text: _Text, names: Sequence[str]) -> Mapping[str, Array]:
+    layout = text.layout
     for name in names:
         if layout.names.count(name) > 1:
             raise RecordingError(f"{layout.path}: the header names {name!r} twice: rename one of them")
     positions = [layout.names.index(name) for name in names]
     try:
-        values = _fast(layout, positions)
+        values = _fast(text, positions)
         if values is None:
-            values = _careful(layout, positions)
+            values = _careful(text, positions)
     except _DAMAGE as error:
         raise RecordingError(f"{layout.path}: is damaged ({error}): export the file again") from error
     if not len(values):
         raise RecordingError(f"{layout.path}: only a header, no data: export the recording again")
     for i, name in enumerate(names):
         if may_be_grouped(values[:, i]):
-            _check_thousands(layout, name, positions[i])
+            _check_thousands(text, name, positions[i])
     return {name: np.ascontiguousarray(values[:, i]) for i, name in enumerate(names)}
 
 
-def _check_thousands(layout: Layout, name: str, position: int) -> None:
+def _check_thousands(text: _Text, name: str, position: int) -> None:
     """Raise RecordingError where a sign between thousands was read as a decimal sign."""
-    lines = list(_data_lines(layout))
-    found = first_grouped(layout.fields(text)[position] for _, text in lines)
+    layout, lines = text.layout, list(_data_lines(text))
+    found = first_grouped(layout.fields(line)[position] for _, line in lines)
     if found is not None:
-        row, text, small = found
+        row, grouped, small = found
         raise RecordingError(
-            f"{layout.path}: line {lines[row][0]}, column {name!r}: {text!r} beside whole numbers such as {small!r}: "
-            f"the {'comma' if ',' in text else 'point'} stands between thousands, and would be read as a decimal sign: "
-            "export the numbers without a sign between thousands"
+            f"{layout.path}: line {lines[row][0]}, column {name!r}: {grouped!r} beside whole numbers such as "
+            f"{small!r}: the {'comma' if ',' in grouped else 'point'} stands between thousands, and would be read as a "
+            "decimal sign: export the numbers without a sign between thousands"
         )
 
 
-def _fast(layout: Layout, positions: Sequence[int]) -> Array | None:
+def _fast(text: _Text, positions: Sequence[int]) -> Array | None:
     """All rows by NumPy's parser, or None where it stumbles: over empty fields, text, or ragged rows."""
-    lines = (text for _, text in _data_lines(layout))
+    layout = text.layout
+    lines = (line for _, line in _data_lines(text))
     if layout.decimal_comma and layout.delimiter == ",":
         return None
     if layout.decimal_comma:
-        lines = (text.replace(",", ".") for text in lines)
+        lines = (line.replace(",", ".") for line in lines)
     first = next(lines, None)
     if first is None:
         return np.empty((0, len(positions)))
@@ -113,14 +167,15 @@ def _fast(layout: Layout, positions: Sequence[int]) -> Array | None:
     return picked
 
 
-def _careful(layout: Layout, positions: Sequence[int]) -> Array:
+def _careful(text: _Text, positions: Sequence[int]) -> Array:
     """All rows one by one: slower, but it can say which line is wrong."""
+    layout = text.layout
     width = len(layout.names)
     values = array("d")
     count = 0
     stamps: dict[int, Stamps] = {}
-    for number, text in _data_lines(layout):
-        fields = layout.fields(text)
+    for number, line in _data_lines(text):
+        fields = layout.fields(line)
         while len(fields) > width and not fields[-1]:
             fields.pop()
         if len(fields) != width:
@@ -158,8 +213,8 @@ def _ragged(layout: Layout, number: int, count: int) -> str:
     return text + "complete or delete the line (the last one may be cut)"
 
 
-def _line_of(layout: Layout, index: int) -> int:
-    for count, (number, _) in enumerate(_data_lines(layout)):
+def _line_of(text: _Text, index: int) -> int:
+    for count, (number, _) in enumerate(_data_lines(text)):
         if count == index:
             return number
     return -1

@@ -51,7 +51,7 @@ TEXTS = {
     ),
     "underscore": (line_replaced(7, "0.005,1_000,2,0"), "line 7, column 'torque_nm': '1_000'", "correct it"),
     "empty time": (line_replaced(7, ",1,2,0"), "line 7: time is nan", "mark the row valid = 0"),
-    "cut row": (GOOD[: GOOD.rindex(",")], "line 501 has 3 fields where the header names 4", "may be cut"),
+    "cut row": (line_replaced(7, "0.005,1,2"), "line 7 has 3 fields where the header names 4", "complete or delete"),
     "row too long": (line_replaced(7, "0.005,1,2,0,9"), "line 7 has 5 fields", "complete or delete"),
     "decimal commas between commas": (
         GOOD.replace(",", ";").replace(".", ",").replace(";", ",").replace("time_s;", "time_s,"),

@@ -1,0 +1,36 @@
+"""Words that stand in the place of a number: those for no reading, and those for yes and no."""
+
+from __future__ import annotations
+
+EMPTY = frozenset(("", "na", "n/a", "null", "none", "-"))
+# What devices and spreadsheets write where there is no reading, an overflow or a failure among them.
+NO_READING = EMPTY.union(
+    ("nan", "-nan", "+nan", "nan(ind)", "-nan(ind)", "1.#ind", "-1.#ind", "1.#qnan", "-1.#qnan", "1.#inf", "-1.#inf"),
+    ("#n/a", "#na", "#nv", "#num!", "#zahl!", "#value!", "#wert!", "#div/0!", "#ref!", "n.a.", "n.d.", "nd", "nil"),
+    ("--", "---", "----", "*", "**", "***", "?", "∞", "-∞", "+∞", "ol", "-ol", "+ol", "o.l.", "over", "under"),
+    ("overflow", "overrange", "over-range", "over range", "overload", "ovld", "ovfl", "underrange", "off-scale"),
+    ("err", "error", "fault", "fail", "failed", "timeout", "invalid", "bad", "lost", "missing", "open", "no signal"),
+    ("nodata", "no_data", "no data", "off scale", "not a number", "out of range"),
+)
+TRUTH = {"true": 1.0, "false": 0.0}
+
+
+def number(text: str, decimal_comma: bool) -> float:
+    """A field as a number, NaN where it says that there is none. Raises ValueError for anything else."""
+    text = text.strip()
+    if text.lower() in NO_READING:
+        return float("nan")
+    if "_" in text:
+        raise ValueError(text)
+    if text.lower() in TRUTH:
+        return TRUTH[text.lower()]
+    return float(text.replace(",", ".") if decimal_comma else text)
+
+
+def is_number(text: str) -> bool:
+    """Whether a field is a number with a point or a comma, and no word in its place."""
+    try:
+        number(text, "," in text)
+    except ValueError:
+        return False
+    return text.strip().lower() not in NO_READING
