@@ -72,7 +72,8 @@ def plain_column(path: Path, name: str, values: Any) -> Array:
         raise SingleNumberError(f"{where} is a single number: it needs one value per sample", float(array))
     if array.size != max(array.shape):
         raise RecordingError(
-            f"{where} has shape {array.shape}: save each quantity as an array of its own, of shape (n,)"
+            f"{where} has shape {array.shape}: save each quantity as an array of its own, of shape (n,), or name one "
+            "of its columns, as `rig init` lists them"
         )
     if array.size > MAX_SAMPLES:
         raise too_long(path, array.size)

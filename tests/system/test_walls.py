@@ -51,7 +51,7 @@ def test_a_recording_has_room_for_samples_and_not_for_a_platform() -> None:
     assert {f.name for f in fields(Run)} == {
         "name", "time_s", "valid", "rate_rad_s", "angle_rad", "torque_time_s", "torque_nm", "torque_hold", "use",
         "min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "channels", "causes", "rate_corner_hz", "rate_delay_s",
-        "excerpt", "wraps", "missing",
+        "excerpt", "wraps", "missing", "notes",
     }  # fmt: skip
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.errors import RecordingError
-from rig.recording.extra_readers.rasters import require
+from rig.recording.extra_readers.packages import require
 from rig.recording.table import MAX_SAMPLES, Table, read_each, too_long
 
 UNIT_KEYS = (b"unit", b"units", b"Unit")

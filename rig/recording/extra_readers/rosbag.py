@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.recording.extra_readers.rasters import Group, one_table, require
+from rig.recording.extra_readers.packages import require
+from rig.recording.rasters import Group, one_table
 from rig.recording.readers.folder import ROS_METADATA
 from rig.recording.table import MAX_SAMPLES, Table, too_long
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.recording.extra_readers.rasters import Group, one_table, require
+from rig.recording.extra_readers.packages import require
+from rig.recording.rasters import Group, one_table
 from rig.recording.table import Table
 
 NS = 1e-9

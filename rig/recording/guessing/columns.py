@@ -58,7 +58,7 @@ class Column:
     @property
     def increases(self) -> bool:
         """Whether every number is greater than the one before."""
-        return self.values is not None and bool(np.all(np.diff(self.values) > 0))
+        return self.values is not None and _increases(self.values)
 
     @property
     def moves(self) -> bool:
@@ -119,8 +119,12 @@ def _column(table: Table, name: str, values: Array | str, length: int) -> Column
 
 def _readings(values: Array) -> tuple[Array, str]:
     """The numbers, NaN where one stands for no reading, and which those are, in words."""
-    numbers = {} if np.all(np.diff(values) > 0) else stand_ins(values)
+    numbers = {} if _increases(values) else stand_ins(values)
     return without(values, numbers), in_words(numbers)
+
+
+def _increases(values: Array) -> bool:
+    return bool(np.all(values[1:] > values[:-1]))
 
 
 def _unusable(values: Array, length: int) -> str:

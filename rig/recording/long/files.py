@@ -98,6 +98,7 @@ def long_files(section: RecordedConfig, folder: Path) -> dict[int, LongFile]:
         try:
             table = block_table(folder / Path(entry.file).expanduser())
             if table is not None:
+                factors_of(table.rows(), section)  # a column of a matrix, which only the whole file has, is no row's
                 spans[i] = (table, *_window(table, entry, section))
         except (RecordingError, RuntimeError):
             continue

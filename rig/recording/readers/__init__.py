@@ -25,6 +25,7 @@ _BY_SUFFIX = {
     ".txt": "readers.csv_text",
     ".lvm": "readers.csv_text",
     ".npz": "readers.npz",
+    ".npy": "readers.npz",
     ".mat": "readers.mat",
     ".hdf5": "readers.h5",
     ".h5": "readers.h5",

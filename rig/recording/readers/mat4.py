@@ -37,4 +37,12 @@ def variables(data: bytes) -> Iterator[tuple[str, Any]]:
             raise ValueError(f"it ends {position - len(view)} bytes too early")
         values = np.frombuffer(view[start:position], dtype=dtype).reshape(parts, columns, rows)
         matrix = values[0].T + 1j * values[1].T if imaginary else values[0].T
-        yield name, matrix if kind == 0 else np.empty(0, dtype=object)  # text and sparse are no columns
+        yield name, matrix if kind == 0 else _text(matrix) if kind == 1 else np.empty(0, dtype=object)  # sparse
+
+
+def _text(codes: Any) -> Any:
+    """The rows of a text, one alone as it is."""
+    if not codes.size:
+        return ""  # whatever number of rows without a character it claims
+    rows = ["".join(chr(int(c)) if 0 <= c < 0x110000 else "?" for c in row.real).rstrip() for row in codes]
+    return rows if len(rows) > 1 else rows[0] if rows else ""

@@ -10,14 +10,15 @@ import pytest
 
 from commands.rig.app import app
 from rig.config.load import load_config
-from rig.recording.extra_readers import rasters
+from rig.recording.extra_readers import packages
 from rig.recording.load import read_recording
 from rig.recording.readers import read_file, suffixes
 from rig.recording.run import Run
-from tests.commands.rig import exported
-from tests.commands.rig.exported import READ
+from tests.commands.rig import exported, exported_matlab
 from tests.commands.rig.exported_text import ANGLE, RATE, TIME, TORQUE
 from tests.commands.support import command
+
+READ = {**exported.READ, **exported_matlab.READ}
 
 
 def read(folder: Path, file: str) -> Run:
@@ -74,7 +75,7 @@ def test_a_damaged_file_is_refused_without_a_traceback(file: str, tmp_path: Path
 def test_where_a_format_needs_a_package_its_extra_is_named(
     file: str, extra: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(rasters, "find_spec", lambda name: None)
+    monkeypatch.setattr(packages, "find_spec", lambda name: None)
     (tmp_path / file).write_bytes(b"x")
     done = command(app, "init", tmp_path / file, "--out", tmp_path / "rig.yaml")
     assert done.exit_code == 2
@@ -89,6 +90,22 @@ def test_channels_of_a_faster_group_lose_readings_and_none_are_made_up(tmp_path:
     values = table.read(table.names)
     assert {len(v) for v in values.values()} == {len(TIME)}
     np.testing.assert_allclose(values["T_winding"][:50], 20.0 + TIME[:50], atol=1e-9)
+
+
+def test_of_two_rates_the_one_that_is_neither_torque_nor_motion_is_joined(tmp_path: Path) -> None:
+    exported_matlab.control_desk(tmp_path / "r.mat")
+    (table,) = read_file(tmp_path / "r.mat")
+    assert not isinstance(table, Run) and table.names == ("time", "Torque_act", "Gyro_rate", "T_motor")
+    values = table.read(table.names)
+    assert {len(v) for v in values.values()} == {len(TIME)}
+    np.testing.assert_allclose(values["T_motor"][:390], 20.0 + TIME[:390], atol=1e-9)
+
+
+def test_an_object_of_matlab_is_refused_with_what_saves_it(tmp_path: Path) -> None:
+    exported_matlab.with_an_object(tmp_path / "r.mat")
+    done = command(app, "init", tmp_path / "r.mat", "--out", tmp_path / "rig.yaml")
+    assert done.exit_code == 2
+    assert "'T' is an object of MATLAB" in done.stderr and "w = T.w" in done.stderr
 
 
 def test_every_suffix_that_is_read_is_in_the_docs() -> None:

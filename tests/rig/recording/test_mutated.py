@@ -5,6 +5,7 @@ The seeds are fixed, so that what was found once stays found: SciPy's .mat reade
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import h5py
@@ -14,7 +15,10 @@ import scipy.io
 
 from rig.errors import RecordingError
 from rig.recording import Journal, Recording, Run
+from rig.recording.guessing.columns import columns_of
 from rig.recording.hdf5 import write_recording_h5
+from rig.recording.readers import read_file
+from tests.commands.rig import exported_matlab
 from tests.rig.recording.support import csv_of, motion, read
 
 UNITS = {"time_s": "s", "torque_nm": "N m", "rate_rad_s": "rad/s", "angle_rad": "rad"}
@@ -95,3 +99,31 @@ def test_a_mutated_recording_is_read_or_refused(tmp_path: Path, name: str) -> No
             assert all(np.isfinite(run.time_s).all() and len(run.time_s) >= 20 for run in runs)
             outcomes["read"] += 1
     assert outcomes["refused"] > 10
+
+
+@pytest.mark.parametrize("name", exported_matlab.READ)
+def test_mutated_structures_are_columns_or_refused(tmp_path: Path, name: str) -> None:
+    random = np.random.default_rng(2024)
+    exported_matlab.READ[name][0](tmp_path / name)
+    original = (tmp_path / name).read_bytes()
+    for _ in range(60):
+        (tmp_path / name).write_bytes(mutated(original, random))
+        try:
+            for table in read_file(tmp_path / name):
+                assert not isinstance(table, Run)
+                columns_of(table)
+        except RecordingError as error:
+            assert str(error).startswith(str(tmp_path / name)), "the message begins with the file"
+
+
+def test_a_text_that_claims_rows_without_end_is_read_at_once(tmp_path: Path) -> None:
+    """A changed shape, 600 000 000 x 0, of a text had been walked through row by row."""
+    scipy.io.savemat(tmp_path / "r.mat", motion(60) | {"note": "abcd"})
+    data = (tmp_path / "r.mat").read_bytes()
+    shape, text = struct.pack("<IIii", 5, 8, 1, 4), data.index(b"abcd")
+    changed = bytearray(data.replace(shape, struct.pack("<IIii", 5, 8, 600_000_000, 0)))
+    changed[text - 2 : text] = b"\0\0"
+    changed[text : text + 4] = bytes(4)
+    (tmp_path / "r.mat").write_bytes(bytes(changed))
+    (run,) = read(tmp_path, "r.mat").runs
+    assert len(run.time_s) == 60
