@@ -24,6 +24,10 @@ _BY_SUFFIX = {
     ".tsv": "readers.csv_text",
     ".txt": "readers.csv_text",
     ".lvm": "readers.csv_text",
+    ".asc": "readers.csv_text",
+    ".dat": "readers.csv_text",
+    ".log": "readers.csv_text",
+    ".prn": "readers.csv_text",
     ".npz": "readers.npz",
     ".npy": "readers.npz",
     ".mat": "readers.mat",
@@ -58,7 +62,17 @@ def read_file(path: Path) -> Sequence[Table | Run]:
         raise RecordingError(
             f"{path}: the suffix {path.suffix!r} is not a known format: export it as one of {', '.join(suffixes())}"
         )
+    if suffix == ".dat" and _begins_with(path, b"MDF "):  # INCA's
+        suffix = ".mdf"
     return _read_with(_BY_SUFFIX[suffix], path)
+
+
+def _begins_with(path: Path, head: bytes) -> bool:
+    try:
+        with path.open("rb") as file:
+            return file.read(len(head)) == head
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be opened: {error.strerror}; check path and permissions") from error
 
 
 def _read_with(module: str, path: Path) -> Sequence[Table | Run]:

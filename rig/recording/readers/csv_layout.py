@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import IO, cast
 
 from rig.errors import RecordingError
+from rig.recording.readers.headings import known_heading
 from rig.recording.readers.preamble import is_labelled, stated_separator, stated_units
 from rig.recording.readers.timestamps import is_stamp
-from rig.recording.readers.words import EMPTY, NO_READING, is_number
+from rig.recording.readers.words import EMPTY, NO_READING, has_points_between, is_number
 from rig.recording.readers.words import number as number_of
 from rig.recording.table import MAX_SAMPLES
 from rig.units import bare, unit_of
@@ -25,8 +26,10 @@ MAX_LINE_CHARACTERS = 65_536
 MAX_LINES = MAX_SAMPLES + 1_000_000
 MAX_CHARACTERS = 2 * 1024**3  # a packed file of a few megabytes may unpack to terabytes
 LOOKED_AT = 400  # lines, comments and empty ones not counted, in which the data have to begin
+COMMENT = ("#", "%", "//")
 DATA_LINES = 50  # of which the decimal sign is read
 SURE = 3  # lines in a row that look like data before a preamble is believed
+_TYPE = re.compile(r"[fiu][1248]$|(l?real|double|float|single|u?s?d?l?int)\d*$", re.IGNORECASE)  # of a column's numbers
 _SEPARATOR_LINE = re.compile(r'^"?sep=.?"?$', re.IGNORECASE)  # as spreadsheets write it
 
 
@@ -42,6 +45,8 @@ class Layout:
         The last line before the data: that of the names, or of the units below them.
     units
         Column -> unit, where a row of units stands below the names, or above them in a preamble.
+    counted
+        First time and step in s, where the heading says them and the rows have no time.
     """
 
     path: Path
@@ -51,6 +56,7 @@ class Layout:
     decimal_comma: bool
     header_line: int
     units: Mapping[str, str] = field(default_factory=dict)
+    counted: tuple[float, float] | None = None
 
     def fields(self, text: str) -> list[str]:
         """The fields of a line."""
@@ -67,6 +73,10 @@ def layout_of(path: Path) -> Layout:
     comments, lines = _first_lines(path, encoding)
     if not lines:
         raise RecordingError(f"{path}: holds no data: a header line and one line a sample are needed")
+    if (known := known_heading(lines, _split)) is not None:
+        comma = _decimal_comma([text for _, text in lines[known.at : known.at + DATA_LINES]], known.delimiter)
+        header = lines[known.at - 1][0]
+        return Layout(path, encoding, known.names, known.delimiter, comma, header, known.units, known.counted)
     at, delimiter = _first_data(lines)
     if at == 0:
         return _without_header(path, encoding, comments, lines, delimiter)
@@ -136,8 +146,8 @@ def _first_lines(path: Path, encoding: str) -> tuple[list[str], list[tuple[int, 
     for number, text in all_lines(path, encoding):
         if not text.strip() or _SEPARATOR_LINE.match(text.strip()):
             continue
-        if text.lstrip().startswith("#"):
-            comments += [] if lines else [text.lstrip().lstrip("#").strip()]
+        if text.lstrip().startswith(COMMENT):
+            comments += [] if lines else [text.lstrip().lstrip("#%/").strip()]
             continue
         lines.append((number, text))
         if len(lines) == LOOKED_AT:
@@ -171,6 +181,10 @@ def _first_data(lines: Sequence[tuple[int, str]]) -> tuple[int, str | None]:
     return (1, plain) if is_damaged else (at, delimiter)
 
 
+def _are_types(fields: Sequence[str]) -> bool:
+    return bool(fields) and all(_TYPE.match(field) for field in fields)
+
+
 def _units_below(lines: Sequence[tuple[int, str]], at: int) -> bool:
     return at >= 2 and _is_units(_split(lines[at - 1][1], _delimiter(lines[at][1])))
 
@@ -179,6 +193,8 @@ def _header(lines: Sequence[tuple[int, str]], at: int, delimiter: str | None) ->
     """Which line before the data has the names, and which below it the units."""
     if at >= len(lines):
         return 0, None
+    if at >= 3 and _are_types(_split(lines[at - 2][1], delimiter)):  # between names and units: of INCA
+        return at - 3, at - 1
     if at >= 2 and _is_units(last := _split(lines[at - 1][1], delimiter)):
         # A column may be called M; then the line before it is no row of names.
         above = _split(lines[at - 2][1], delimiter)
@@ -254,6 +270,6 @@ def _is_units(fields: Sequence[str]) -> bool:
 
 
 def _decimal_comma(data: Sequence[str], delimiter: str | None) -> bool:
-    """Whether numbers have a decimal comma: some fields hold one (in quotes, between commas), and none a point."""
+    """Whether numbers have a decimal comma: some fields hold one (in quotes, between commas), none a decimal point."""
     fields = [f for line in data for f in _split(line, delimiter) if not is_stamp(f)]
-    return any("," in f for f in fields) and not any("." in f for f in fields)
+    return any("," in f for f in fields) and not any("." in f and not has_points_between(f) for f in fields)

@@ -6,16 +6,18 @@ import re
 import zlib
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import islice
+from dataclasses import dataclass, field
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
 
 from rig.arrays import Array
 from rig.errors import RecordingError
-from rig.recording.readers.csv_layout import Layout, all_lines, layout_of
+from rig.recording.readers.csv_layout import COMMENT, Layout, all_lines, layout_of
 from rig.recording.readers.cut_end import cut_end
+from rig.recording.readers.headings import COUNTED
+from rig.recording.readers.lvm_segments import TIME, Segments
 from rig.recording.readers.status import told_of
 from rig.recording.readers.thousands import first_grouped, may_be_grouped
 from rig.recording.readers.timestamps import Stamps, is_stamp
@@ -38,12 +40,19 @@ def read(path: Path) -> Sequence[Table]:
     text = _Text(layout, bool(cut))
 
     def notes() -> Sequence[str]:
-        return [f"the last line {cut}, as of a file that was cut, and is left out"] * bool(cut) + _told(text)
+        said = [f"the last line {cut}, as of a file that was cut, and is left out"] * bool(cut)
+        if layout.counted is not None:
+            begin_s, step_s = layout.counted
+            said.append(f"its rows have no time: by its heading they begin at {begin_s:g} s and are {step_s:g} s apart")
+        return said + _told(text)
 
+    names = tuple(name for name in layout.names if name)
+    if layout.counted is not None:
+        names = (COUNTED, *(name for name in names if name != COUNTED))
     return [
         Table(
             path,
-            layout.names,
+            names,
             lambda names: _columns(text, names),
             lambda index: f"line {_line_of(text, index)}",
             layout.units,
@@ -64,6 +73,7 @@ class _Text:
 
     layout: Layout
     is_cut: bool
+    segments: Segments = field(default_factory=Segments)
 
 
 def _told(text: _Text) -> list[str]:
@@ -82,22 +92,25 @@ def _told(text: _Text) -> list[str]:
 def _lines(path: Path, encoding: str) -> Iterator[tuple[int, str]]:
     """Number and text of every line that is neither empty nor a comment."""
     for number, text in all_lines(path, encoding):
-        if text and not text.isspace() and not text.lstrip().startswith("#"):
+        if text and not text.isspace() and not text.lstrip().startswith(COMMENT):
             yield number, text
 
 
 def _data_lines(text: _Text) -> Iterator[tuple[int, str]]:
     """Number and text of every row; the last line is held back until it is known to be one."""
-    layout, count = text.layout, 0
+    layout = text.layout
     held: tuple[int, str] | None = None
-    for number, line in _lines(layout.path, layout.encoding):
-        if number > layout.header_line:
-            count += 1
-            if count > MAX_SAMPLES:
-                raise too_long(layout.path, count)
-            if held is not None:
-                yield held
-            held = number, line
+    lines = _lines(layout.path, layout.encoding)
+    if layout.path.name.lower().endswith(".lvm"):
+        rows = text.segments.data_of(lines, layout.header_line)
+    else:
+        rows = (line for line in lines if line[0] > layout.header_line)
+    for count, row in enumerate(rows, start=1):
+        if count > MAX_SAMPLES:
+            raise too_long(layout.path, count)
+        if held is not None:
+            yield held
+        held = row
     if held is not None and not text.is_cut:
         yield held
 
@@ -107,7 +120,9 @@ def _columns(text: _Text, names: Sequence[str]) -> Mapping[str, Array]:
     for name in names:
         if layout.names.count(name) > 1:
             raise RecordingError(f"{layout.path}: the header names {name!r} twice: rename one of them")
-    positions = [layout.names.index(name) for name in names]
+    written = [name for name in names if layout.counted is None or name != COUNTED]
+    # A row is counted by its first column, whichever is wanted.
+    positions = [layout.names.index(name) for name in written] or [len(layout.names) - 1]
     try:
         values = _fast(text, positions)
         if values is None:
@@ -116,10 +131,15 @@ def _columns(text: _Text, names: Sequence[str]) -> Mapping[str, Array]:
         raise RecordingError(f"{layout.path}: is damaged ({error}): export the file again") from error
     if not len(values):
         raise RecordingError(f"{layout.path}: only a header, no data: export the recording again")
-    for i, name in enumerate(names):
+    for i, name in enumerate(written):
         if may_be_grouped(values[:, i]):
             _check_thousands(text, name, positions[i])
-    return {name: np.ascontiguousarray(values[:, i]) for i, name in enumerate(names)}
+    found = {name: np.ascontiguousarray(values[:, i]) for i, name in enumerate(written)}
+    if layout.counted is not None and COUNTED in names:
+        found[COUNTED] = layout.counted[0] + layout.counted[1] * np.arange(len(values))
+    if text.segments.rows and TIME in found:
+        found[TIME] = text.segments.laid(found[TIME])
+    return found
 
 
 def _check_thousands(text: _Text, name: str, position: int) -> None:
@@ -138,33 +158,36 @@ def _check_thousands(text: _Text, name: str, position: int) -> None:
 def _fast(text: _Text, positions: Sequence[int]) -> Array | None:
     """All rows by NumPy's parser, or None where it stumbles: over empty fields, text, or ragged rows."""
     layout = text.layout
-    lines = (line for _, line in _data_lines(text))
     if layout.decimal_comma and layout.delimiter == ",":
         return None
-    if layout.decimal_comma:
-        lines = (line.replace(",", ".") for line in lines)
+    lines = (line for _, line in _data_lines(text))
     first = next(lines, None)
     if first is None:
         return np.empty((0, len(positions)))
     width = len(layout.fields(first))
     if width < len(layout.names):
         return None
-
-    def rows() -> Iterator[str]:
-        yield first
-        yield from lines
-
+    rows: Iterator[str] = chain([first], lines)
+    if layout.decimal_comma:
+        rows = map(_with_points, rows)
     try:
         # Without usecols NumPy also holds every row to the same number of fields.
         whole = width <= len(positions) + 4
         columns = None if whole else positions
-        table = np.loadtxt(rows(), delimiter=layout.delimiter, comments=None, quotechar='"', ndmin=2, usecols=columns)
+        table = np.loadtxt(rows, delimiter=layout.delimiter, comments=None, quotechar='"', ndmin=2, usecols=columns)
     except ValueError:
         return None
     if whole and table.shape[1] != len(layout.names):
         return None
     picked: Array = table[:, positions] if whole else table
     return picked
+
+
+def _with_points(line: str) -> str:
+    """A line with decimal points in the place of commas. Raises ValueError where it has points already."""
+    if "." in line:
+        raise ValueError(line)
+    return line.replace(",", ".")
 
 
 def _careful(text: _Text, positions: Sequence[int]) -> Array:

@@ -27,7 +27,7 @@ def cut_end(path: Path, encoding: str, fields: Callable[[str], list[str]], width
         How many fields a line of the data has.
     """
     text = _tail(path, encoding)
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith(("#", "%", "//"))]
     rows = [fields(line) for line in lines[-COMPARED - 1 :]]
     if len(rows) <= MIN_LINES or any(len(row) < width for row in rows[-MIN_LINES - 1 : -1]):
         return ""

@@ -14,6 +14,10 @@ _COMPACT = re.compile(r"(\d{4})(\d{2})(\d{2})$")
 _DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})$")
 _MONTH_BY_NAME = re.compile(r"(\d{1,2})-([A-Za-z]{3})-(\d{4})$")
 _SLASHES = re.compile(r"(\d{1,2})/(\d{1,2})/(\d{4})$")
+# A duration with its unit, as MATLAB writes those of a timetable: 0.002 sec.
+_WITH_UNIT = re.compile(r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?) (sec|s|ms|min|hr|h|days|day|d)$")
+_UNIT_S = {"sec": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0, "hr": _HOUR_S, "h": _HOUR_S, "d": _DAY_S}
+_UNIT_S |= {"day": _DAY_S, "days": _DAY_S}
 _DAYS = re.compile(r"(\d+) days?,?$")  # of a duration
 _FRACTION = r"(?:[.,](\d+))?"
 _CLOCK = re.compile(rf"(\d{{1,4}}):(\d{{2}})(?::(\d{{2}}){_FRACTION})?$")
@@ -46,7 +50,9 @@ class Stamps:
 
     def seconds(self, text: str) -> float:
         """Seconds of one stamp. Raises ValueError where the text is none, AmbiguousDateError for such a date."""
-        text = text.strip()
+        text = text.strip().removeprefix("[").removesuffix("]")
+        if found := _WITH_UNIT.match(text):
+            return float(found[1].replace(",", ".")) * _UNIT_S[found[2]]
         day, clock = _parted(text)
         if not day:
             now, round_s = _of_clock(clock)

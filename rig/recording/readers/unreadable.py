@@ -10,6 +10,7 @@ from rig.recording.readers.timestamps import AmbiguousDateError
 _HAS_NUMBER = re.compile(r"[-+]?[.,]?\d")
 _DATE = re.compile(r"\d{1,4}([-/.])\d{1,2}\1\d{1,4}$|\d{1,2}-[A-Za-z]{3}-\d{4}$")
 _WITH_UNIT = re.compile(r"[-+]?\d+([.,]\d+)?\s*[^\W\d_]\D*$|[-+]?\d+([.,]\d+)?\s*[°%]\D*$")
+_SIGNS = re.compile(r"[-+]?\d[\d.,]*$")  # a point where the file has decimal commas
 _LOST = "correct it, or leave it empty and add a column valid that is 0 there"
 
 _AMBIGUOUS = (
@@ -34,7 +35,10 @@ def unreadable(fields: Sequence[str], at: int, *, first: bool, error: ValueError
         (":" in field, _STAMP),
         (bool(_DATE.match(field)), _DAY),
         (is_alone, _ROW_OF_UNITS),
-        ("," in field, "is not a number: use one decimal sign in the whole file, and no sign between thousands"),
+        (
+            "," in field or bool(_SIGNS.match(field)),
+            "is not a number: use one decimal sign in the whole file, and no sign between thousands",
+        ),
         (
             bool(_WITH_UNIT.match(field)),
             "is a number with a unit: export numbers alone, the unit in the header: M (N m)",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 EMPTY = frozenset(("", "na", "n/a", "null", "none", "-"))
 # What devices and spreadsheets write where there is no reading, an overflow or a failure among them.
 NO_READING = EMPTY.union(
@@ -12,6 +14,9 @@ NO_READING = EMPTY.union(
     ("err", "error", "fault", "fail", "failed", "timeout", "invalid", "bad", "lost", "missing", "open", "no signal"),
     ("nodata", "no_data", "no data", "off scale", "not a number", "out of range"),
 )
+# Thousands that are told by the decimal sign behind them; without one, 1,234 may be either.
+_COMMAS = re.compile(r"[-+]?\d{1,3}(,\d{3})+\.\d*$")
+_POINTS = re.compile(r"[-+]?\d{1,3}(\.\d{3})+,\d*$")
 TRUTH = {"true": 1.0, "false": 0.0}
 
 
@@ -24,13 +29,23 @@ def number(text: str, decimal_comma: bool) -> float:
         raise ValueError(text)
     if text.lower() in TRUTH:
         return TRUTH[text.lower()]
-    return float(text.replace(",", ".") if decimal_comma else text)
+    if decimal_comma:
+        text = text.replace(".", "") if _POINTS.match(text) else text
+        if "." in text:
+            raise ValueError(text)  # 1.234 beside decimal commas: nobody knows what the point is
+        return float(text.replace(",", "."))
+    return float(text.replace(",", "") if _COMMAS.match(text) else text)
+
+
+def has_points_between(text: str) -> bool:
+    """Whether points stand between the thousands of a number with a decimal comma: 1.234,5."""
+    return bool(_POINTS.match(text))
 
 
 def is_number(text: str) -> bool:
     """Whether a field is a number with a point or a comma, and no word in its place."""
     try:
-        number(text, "," in text)
+        number(text, "," in text and not _COMMAS.match(text.strip()))
     except ValueError:
         return False
     return text.strip().lower() not in NO_READING

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +15,17 @@ from rig.recording.extra_readers import packages
 from rig.recording.load import read_recording
 from rig.recording.readers import read_file, suffixes
 from rig.recording.run import Run
-from tests.commands.rig import exported, exported_matlab
+from tests.commands.rig import exported, exported_matlab, exported_more, exported_more_text
 from tests.commands.rig.exported_text import ANGLE, RATE, TIME, TORQUE
 from tests.commands.support import command
 
-READ = {**exported.READ, **exported_matlab.READ}
+
+def writer(text: str) -> Callable[[Path], None]:
+    return lambda path: (None, path.write_text(text, encoding="utf-8"))[0]
+
+
+TEXTS = {file: (writer(text), options) for file, (text, options) in exported_more_text.FILES.items()}
+READ = {**exported.READ, **exported_matlab.READ, **exported_more.READ, **TEXTS}
 
 
 def read(folder: Path, file: str) -> Run:
@@ -90,6 +97,12 @@ def test_channels_of_a_faster_group_lose_readings_and_none_are_made_up(tmp_path:
     values = table.read(table.names)
     assert {len(v) for v in values.values()} == {len(TIME)}
     np.testing.assert_allclose(values["T_winding"][:50], 20.0 + TIME[:50], atol=1e-9)
+
+
+def test_a_time_that_follows_from_the_heading_is_told(tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text(exported_more_text.FILES["yokogawa.csv"][0], encoding="utf-8")
+    done = command(app, "init", tmp_path / "r.csv", "--out", tmp_path / "rig.yaml")
+    assert "its rows have no time: by its heading they begin at 0 s and are 0.002 s apart" in done.stdout
 
 
 def test_of_two_rates_the_one_that_is_neither_torque_nor_motion_is_joined(tmp_path: Path) -> None:

@@ -119,8 +119,27 @@ def test_what_cannot_be_converted_is_refused_with_the_cure(head: str, tmp_path: 
 def test_decimal_commas_between_commas_and_thousands_are_refused_with_the_cure(tmp_path: Path) -> None:
     (tmp_path / "r.csv").write_text("time_s,torque_nm,rate_rad_s\n" + comma(SI))
     assert "separate the columns by semicolons" in refusal(tmp_path, "r.csv")
-    (tmp_path / "r.csv").write_text("time_s;torque_nm;rate_rad_s\n" + "0,001;1.234,5;2,0\n" * 3)
-    assert "use one decimal sign in the whole file" in refusal(tmp_path, "r.csv")
+    for at in (3, 70):  # among the lines by which the decimal sign is known, and behind them
+        lines = comma(rows(T, TORQUE, RATE, delimiter=";")).splitlines()
+        lines[at] = "0,001;1.234;2,0"
+        (tmp_path / "r.csv").write_text("time_s;torque_nm;rate_rad_s\n" + "\n".join(lines) + "\n")
+        assert "use one decimal sign in the whole file" in refusal(tmp_path, "r.csv")
+
+
+@pytest.mark.parametrize("signs", [(",", "."), (".", ",")])
+def test_signs_between_thousands_are_read_where_a_decimal_sign_stands_behind_them(
+    signs: tuple[str, str], tmp_path: Path
+) -> None:
+    between, decimal = signs
+
+    def written(value: float) -> str:
+        return f"{value:,.9f}".translate(str.maketrans({",": between, ".": decimal}))
+
+    columns = (1e3 * T, 1e3 * TORQUE, RATE)
+    body = "".join(";".join(f'"{written(float(v))}"' for v in row) + "\n" for row in zip(*columns, strict=True))
+    run = as_read(tmp_path, "time (ms);torque (mN m);rate (rad/s)\n" + body)
+    assert run.torque_nm is not None
+    np.testing.assert_allclose(run.torque_nm, TORQUE, atol=1e-9)
 
 
 def test_a_factor_that_is_advised_takes_the_place_of_the_one_that_was_applied(tmp_path: Path) -> None:
