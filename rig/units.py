@@ -27,6 +27,7 @@ _FACTORS: Mapping[str, Mapping[str, float]] = {
         "rad/s": 1.0, "mrad/s": 1e-3, "urad/s": 1e-6, "deg/s": DEG, "dps": DEG, "mdeg/s": 1e-3 * DEG,
         "mdps": 1e-3 * DEG, "deg/h": DEG / 3600, "deg/min": DEG / 60, "rpm": TURN / 60, "rev/min": TURN / 60,
         "r/min": TURN / 60, "1/min": TURN / 60, "u/min": TURN / 60, "rev/s": TURN, "rps": TURN,
+        "krpm": 1e3 * TURN / 60,
     },
     "speed": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "um/s": 1e-6, "in/s": INCH, "km/h": 1 / 3.6},
     "angle": {
@@ -106,5 +107,9 @@ def name_and_unit(header: str) -> tuple[str, str]:
         return header, ""
     found = _SLASH.match(header)
     if found and unit_of(found["unit"]) is not None and unit_of(header) is None:
+        name, _, last = found["name"].rpartition(" ")
+        whole = f"{last}/{found['unit'].strip()}"
+        if name and unit_of(whole) is not None:
+            return name.rstrip(), whole  # "rate deg/s" is no "rate deg" in seconds
         return found["name"], found["unit"].strip()
     return header, ""

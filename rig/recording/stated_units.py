@@ -22,12 +22,15 @@ _PLAIN_NAMES = {
 }
 
 
+# How a time of day is written, and no unit: its stamps are seconds once they are read.
+_CLOCK = re.compile(r"([dDmMyY]+[-./ ]){0,3}T?[hH]{1,2}:[mM]{1,2}(:[sS]{1,2}([.,:][sSfFzZ0m]+)?)?$")
 _CURE = re.compile(r"(recorded\.scale\.(time|torque|rate|angle): )([-\d.e]+)")
 
 
 def stated_unit(table: Table, column: str) -> str:
     """What stands as the unit of a column, in its name or below it, or is all of its name; empty where nothing does."""
-    return table.units.get(column) or name_and_unit(column)[1] or (bare(column) if _is_bare_unit(column) else "")
+    found = table.units.get(column) or name_and_unit(column)[1] or (bare(column) if _is_bare_unit(column) else "")
+    return "" if _CLOCK.match(found) else found
 
 
 def _is_bare_unit(column: str) -> bool:

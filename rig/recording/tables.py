@@ -92,7 +92,7 @@ def run_of_table(table: Table, factors: Mapping[str, float], entry: RecordedRun,
         channels={name: values[keep] for name, values in channels.items()},
         causes={name: config.channel(name) for name, config in section.columns.channels.items()},
         missing=rows.missing and dataclasses.replace(rows.missing, instead=instead),
-        notes=(*table.notes(), *_counted(section)),
+        notes=(*table.notes(), *_told_of_channels(table, section), *_counted(section)),
     )
 
 
@@ -176,6 +176,14 @@ def channels_of(table: Table, section: RecordedConfig) -> dict[str, Array]:
     return {
         name: wanted[name].scale * without(values[column], stand_ins(values[column])) for name, column in named.items()
     }
+
+
+def _told_of_channels(table: Table, section: RecordedConfig) -> list[str]:
+    """Which numbers of further columns stand for no reading, in words."""
+    named = {name: config.column or name for name, config in section.columns.channels.items()}
+    values = table.read(list(named.values())) if named else {}
+    found = {name: stand_ins(values[column]) for name, column in named.items()}
+    return [f"channel {n} has {in_words(x)} for no reading, {sum(x.values())} times" for n, x in found.items() if x]
 
 
 def _names(table: Table, section: RecordedConfig) -> dict[Quantity, str]:

@@ -47,6 +47,8 @@ class Layout:
         Column -> unit, where a row of units stands below the names, or above them in a preamble.
     counted
         First time and step in s, where the heading says them and the rows have no time.
+    header
+        The line of the names: logs that were put one behind the other repeat it.
     """
 
     path: Path
@@ -57,6 +59,7 @@ class Layout:
     header_line: int
     units: Mapping[str, str] = field(default_factory=dict)
     counted: tuple[float, float] | None = None
+    header: str = ""
 
     def fields(self, text: str) -> list[str]:
         """The fields of a line."""
@@ -94,7 +97,7 @@ def layout_of(path: Path) -> Layout:
     above = stated_units([text for _, text in lines[:names_at]], names, lambda text: _split(text, delimiter))
     units = above | _units_of(names, [] if units_at is None else _names(lines[units_at][1], delimiter, width))
     comma = _decimal_comma([text for _, text in lines[at : at + DATA_LINES]], delimiter)
-    return Layout(path, encoding, tuple(names), delimiter, comma, lines[at - 1][0], units)
+    return Layout(path, encoding, tuple(names), delimiter, comma, lines[at - 1][0], units, header=lines[names_at][1])
 
 
 def all_lines(path: Path, encoding: str) -> Iterator[tuple[int, str]]:
@@ -243,7 +246,7 @@ def _trimmed(fields: list[str]) -> list[str]:
 
 
 def _delimiter(line: str) -> str | None:
-    return next((mark for mark in (";", "\t", ",") if mark in line), None)
+    return next((mark for mark in (";", "\t", ",", "|") if mark in line), None)
 
 
 def _split(line: str, delimiter: str | None) -> list[str]:

@@ -104,7 +104,7 @@ def _data_lines(text: _Text) -> Iterator[tuple[int, str]]:
     if layout.path.name.lower().endswith(".lvm"):
         rows = text.segments.data_of(lines, layout.header_line)
     else:
-        rows = (line for line in lines if line[0] > layout.header_line)
+        rows = (line for line in lines if line[0] > layout.header_line and line[1] != layout.header)
     for count, row in enumerate(rows, start=1):
         if count > MAX_SAMPLES:
             raise too_long(layout.path, count)

@@ -17,12 +17,18 @@ NO_READING = EMPTY.union(
 # Thousands that are told by the decimal sign behind them; without one, 1,234 may be either.
 _COMMAS = re.compile(r"[-+]?\d{1,3}(,\d{3})+\.\d*$")
 _POINTS = re.compile(r"[-+]?\d{1,3}(\.\d{3})+,\d*$")
+# Spaces that do not break a line, and the apostrophe, between thousands as spreadsheets write them in some countries.
+_BETWEEN = re.compile(
+    "(?<=\\d)[\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{THIN SPACE}'\N{RIGHT SINGLE QUOTATION MARK}](?=\\d{3})"
+)
 TRUTH = {"true": 1.0, "false": 0.0}
 
 
 def number(text: str, decimal_comma: bool) -> float:
     """A field as a number, NaN where it says that there is none. Raises ValueError for anything else."""
     text = text.strip()
+    if not text.isascii() or "'" in text:
+        text = _BETWEEN.sub("", text.replace("\N{MINUS SIGN}", "-"))
     if text.lower() in NO_READING:
         return float("nan")
     if "_" in text:

@@ -210,6 +210,11 @@ FILES: dict[str, tuple[str, Sequence[str]]] = {
         + german(rows(np.arange(400.0), MS, TORQUE, RATE * 30 / np.pi, by=";")),
         (),
     ),
+    "clock.csv": (
+        "Time [hh:mm:ss.fff];Torque [Nm];Rate [deg/s]\n" + stamped("%H:%M:%S.%f", rows(TORQUE, DEG_S, by=";"), ";"),
+        (),
+    ),
+    "unit_behind_a_space.csv": ("Time s,Torque Nm,Speed krpm\n" + rows(TIME, TORQUE, RATE * 0.03 / np.pi), ()),
     "description_row.csv": (
         "Time,Trq,Gyro\nsystem time,motor shaft torque,z axis\ns,N·m,deg/s\n" + rows(TIME, TORQUE, DEG_S),
         (),

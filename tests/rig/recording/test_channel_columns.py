@@ -128,3 +128,12 @@ def test_an_effect_of_a_declared_channel_is_a_candidate_like_any_other(tmp_path:
     )
     assert load_config(path).config.identify.candidates == ("stiffness_drift", "winding_stiffness")
     assert effects.get("winding_stiffness").parameters[0].key == "slope_nm_rad_per_k"
+
+
+def test_a_number_for_no_reading_of_a_channel_is_missing_and_told(tmp_path: Path) -> None:
+    values = columns()
+    values["T1"] = np.where(np.arange(500) % 50, values["T1"], -9999.0)
+    write(tmp_path / "a.csv", values)
+    run = read(tmp_path, "a.csv", DECLARED).runs[0]
+    assert np.isnan(run.channels["winding"][::50]).all() and run.valid.all()
+    assert run.notes == ("channel winding has -9999 for no reading, 10 times",)

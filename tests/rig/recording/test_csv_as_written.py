@@ -61,6 +61,14 @@ WRITTEN = {
     + comma(rows(T[1:], TORQUE[1:], RATE[1:], delimiter=";")),
     "decimal commas in quotes": "time_s,torque_nm,rate_rad_s\n" + quoted(comma(rows(T, TORQUE, RATE, delimiter=";"))),
     "decimal commas and tabs": "time_s\ttorque_nm\trate_rad_s\n" + comma(rows(T, TORQUE, RATE, delimiter="\t")),
+    "bars": "time_s|torque_nm|rate_rad_s\n" + rows(T, TORQUE, RATE, delimiter="|"),
+    "a minus sign of its own": "time_s;torque_nm;rate_rad_s\n"
+    + rows(T, TORQUE, RATE, delimiter=";").replace("-", "\N{MINUS SIGN}").replace("e\N{MINUS SIGN}", "e-"),
+    "a header that is repeated": "time_s,torque_nm,rate_rad_s\n"
+    + rows(T[:60], TORQUE[:60], RATE[:60]) + "time_s,torque_nm,rate_rad_s\n" + rows(T[60:], TORQUE[60:], RATE[60:]),
+    "spaces between thousands": "time (us);torque (N m);rate (rad/s)\n"
+    + "".join(f"{1e6 * t:,.1f};{m!r};{w!r}\n".replace(",", "\N{NARROW NO-BREAK SPACE}")
+              for t, m, w in zip(T.tolist(), TORQUE.tolist(), RATE.tolist(), strict=True)),
     "spaces in units between spaces": "time (s)   torque (N m)   rate (rad/s)\n"
     + rows(T, TORQUE, RATE, delimiter="   "),
 }  # fmt: skip

@@ -67,7 +67,7 @@ TEXTS = {
         "rename one",
     ),
     "endless line": ("time_s," + "x" * 100_000, "longer than 65536 characters", "one sample a line"),
-    "wrong delimiter": (GOOD.replace(",", "|"), "has no column 'time_s'", "recorded.columns.time"),
+    "wrong delimiter": (GOOD.replace(",", "~"), "has no column 'time_s'", "recorded.columns.time"),
 }
 
 
