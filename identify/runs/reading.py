@@ -51,7 +51,7 @@ def describe_notes(runs: Sequence[Run], say: Callable[[str], None]) -> tuple[str
     for run in runs:
         for note in run.notes:
             of.setdefault(note, []).append(run.name)
-    said = tuple(f"{joined(names)}: {note}" for note, names in of.items())
+    said = tuple(f"Of {joined(names)}, {note}" for note, names in of.items())
     for sentence in said:
         say(sentence)
     return said

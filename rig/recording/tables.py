@@ -154,7 +154,7 @@ def _even(table: Table, count: int, sample_rate_hz: float) -> Array:
 
 def _counted(section: RecordedConfig) -> tuple[str, ...]:
     rate_hz = section.sample_rate_hz
-    return () if rate_hz is None else (f"its rows are taken to be evenly spaced, {rate_hz:g} a second",)
+    return () if rate_hz is None else (f"the rows are taken to be evenly spaced, {rate_hz:g} a second",)
 
 
 def _checked(table: Table, rows: Rows, factors: Mapping[str, float]) -> dict[str, Array]:

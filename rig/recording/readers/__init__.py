@@ -39,6 +39,9 @@ _BY_SUFFIX = {
     ".mdf": "extra_readers.mf4",
     ".tdms": "extra_readers.tdms",
     ".bag": "extra_readers.rosbag",
+    ".xlsx": "extra_readers.spreadsheet",
+    ".xls": "extra_readers.spreadsheet",
+    ".ods": "extra_readers.spreadsheet",
     ".mcap": "extra_readers.rosbag",
     ".db3": "extra_readers.rosbag",
 }

@@ -43,7 +43,7 @@ def read(path: Path) -> Sequence[Table]:
         said = [f"the last line {cut}, as of a file that was cut, and is left out"] * bool(cut)
         if layout.counted is not None:
             begin_s, step_s = layout.counted
-            said.append(f"its rows have no time: by its heading they begin at {begin_s:g} s and are {step_s:g} s apart")
+            said.append(f"the rows have no time: by the heading they begin at {begin_s:g} s and are {step_s:g} s apart")
         return said + _told(text)
 
     names = tuple(name for name in layout.names if name)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import openpyxl
 import pyarrow as pa
 import pyarrow.parquet as pq
 from asammdf import MDF, Signal
@@ -110,6 +112,29 @@ def ros2_three_topics(path: Path) -> None:
             write(types["sensor_msgs/msg/Imu"](head(i), turned, none, rate, none, zero, none), i)
 
 
+def workbook(path: Path) -> None:
+    """A measurement in Excel: notes on a sheet of their own, a title, names, units, and times as dates."""
+    book = openpyxl.Workbook()
+    book.active.append(["Bench 3", "operator: lab"])
+    sheet = book.create_sheet("Data")
+    for row in (["Run 1"], [], ["Time", "Torque", "Rate"], ["", "N m", "deg/s"]):
+        sheet.append(row)
+    begin = datetime(2024, 5, 1, 12)
+    for at, torque, rate in zip(TIME, TORQUE, DEG_S, strict=True):
+        sheet.append([begin + timedelta(seconds=float(at)), float(torque), float(rate)])
+    book.save(path)
+
+
+def workbook_of_numbers(path: Path) -> None:
+    """A table of numbers with units behind the names, a remark in one row, behind it a chart's sheet."""
+    book = openpyxl.Workbook()
+    book.active.append(["t (ms)", "M (mN m)", "phi (deg)", "remark"])
+    for i, row in enumerate(zip(1e3 * TIME, 1e3 * TORQUE, np.degrees(ANGLE), strict=True)):
+        book.active.append([*map(float, row), "begun" if i == 3 else None])
+    book.create_sheet("Chart")
+    book.save(path)
+
+
 READ: dict[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "duration.parquet": (pandas_duration, ()),
     "nullable.parquet": (pandas_nullable, ()),
@@ -117,5 +142,7 @@ READ: dict[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "inca.dat": (mdf3, ()),
     "flexlogger.tdms": (tdms_groups, ()),
     "untitled.tdms": (tdms_untitled, ()),
+    "bench.xlsx": (workbook, ()),
+    "numbers.xlsx": (workbook_of_numbers, ()),
     "ros2_three": (ros2_three_topics, ("--yes",)),
 }

@@ -67,7 +67,7 @@ def test_a_log_of_raw_can_frames_is_refused_with_what_decodes_it(tmp_path: Path)
     assert "raw CAN frames" in done.stderr and "extract_bus_logging" in done.stderr
 
 
-@pytest.mark.parametrize("file", ["x.parquet", "x.mf4", "x.tdms", "x.bag"])
+@pytest.mark.parametrize("file", ["x.parquet", "x.mf4", "x.tdms", "x.bag", "x.xlsx", "x.ods"])
 def test_a_damaged_file_is_refused_without_a_traceback(file: str, tmp_path: Path) -> None:
     (tmp_path / file).write_bytes(b"\x00not what it says" * 40)
     done = command(app, "init", tmp_path / file, "--out", tmp_path / "rig.yaml")
@@ -77,7 +77,8 @@ def test_a_damaged_file_is_refused_without_a_traceback(file: str, tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    ("file", "extra"), [("x.parquet", "parquet"), ("x.mf4", "mf4"), ("x.tdms", "tdms"), ("x.bag", "rosbag")]
+    ("file", "extra"),
+    [("x.parquet", "parquet"), ("x.mf4", "mf4"), ("x.tdms", "tdms"), ("x.bag", "rosbag"), ("x.xlsx", "xlsx")],
 )
 def test_where_a_format_needs_a_package_its_extra_is_named(
     file: str, extra: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -102,7 +103,7 @@ def test_channels_of_a_faster_group_lose_readings_and_none_are_made_up(tmp_path:
 def test_a_time_that_follows_from_the_heading_is_told(tmp_path: Path) -> None:
     (tmp_path / "r.csv").write_text(exported_more_text.FILES["yokogawa.csv"][0], encoding="utf-8")
     done = command(app, "init", tmp_path / "r.csv", "--out", tmp_path / "rig.yaml")
-    assert "its rows have no time: by its heading they begin at 0 s and are 0.002 s apart" in done.stdout
+    assert "Of r.csv, the rows have no time: by the heading they begin at 0 s and are 0.002 s apart" in done.stdout
 
 
 def test_of_two_rates_the_one_that_is_neither_torque_nor_motion_is_joined(tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ def test_a_last_line_that_is_cut_is_left_out_and_told(case: str, tmp_path: Path)
     assert len(run.time_s) == 399 and run.valid.all()
     assert run.rate_rad_s is not None
     np.testing.assert_allclose(run.rate_rad_s, motion(399)["rate_rad_s"], atol=1e-4)
-    assert f"run.csv: the last line {how}" in said and "as of a file that was cut, and is left out" in said
+    assert f"Of run.csv, the last line {how}" in said and "as of a file that was cut, and is left out" in said
 
 
 @pytest.mark.parametrize(

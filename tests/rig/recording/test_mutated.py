@@ -18,7 +18,7 @@ from rig.recording import Journal, Recording, Run
 from rig.recording.guessing.columns import columns_of
 from rig.recording.hdf5 import write_recording_h5
 from rig.recording.readers import read_file
-from tests.commands.rig import exported_matlab
+from tests.commands.rig import exported_matlab, exported_more
 from tests.rig.recording.support import csv_of, motion, read
 
 UNITS = {"time_s": "s", "torque_nm": "N m", "rate_rad_s": "rad/s", "angle_rad": "rad"}
@@ -101,10 +101,13 @@ def test_a_mutated_recording_is_read_or_refused(tmp_path: Path, name: str) -> No
     assert outcomes["refused"] > 10
 
 
-@pytest.mark.parametrize("name", exported_matlab.READ)
+MADE = {**exported_matlab.READ, **{name: exported_more.READ[name] for name in ("bench.xlsx", "numbers.xlsx")}}
+
+
+@pytest.mark.parametrize("name", MADE)
 def test_mutated_structures_are_columns_or_refused(tmp_path: Path, name: str) -> None:
     random = np.random.default_rng(2024)
-    exported_matlab.READ[name][0](tmp_path / name)
+    MADE[name][0](tmp_path / name)
     original = (tmp_path / name).read_bytes()
     for _ in range(60):
         (tmp_path / name).write_bytes(mutated(original, random))
