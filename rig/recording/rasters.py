@@ -21,7 +21,9 @@ from rig.recording.table import MAX_SAMPLES, Table, read_each, too_long
 from rig.units import unit_of
 
 MIN_RATE_RATIO = 0.1  # of the fastest group's samples: below, a group is a thermometer or a state
-MOTION = frozenset({"torque", "force", "rate", "speed", "angle", "length", "current", "time"})  # a drive's current, too
+MOTION = frozenset(
+    {"torque", "force", "rate", "speed", "angle", "length", "current", "voltage"}
+)  # a drive's, a sensor's
 MIN_GROUP_SAMPLES = 10  # samples that make a group
 
 

@@ -49,6 +49,8 @@ class Layout:
         First time and step in s, where the heading says them and the rows have no time.
     header
         The line of the names: logs that were put one behind the other repeat it.
+    pairs
+        The columns of time and channel, where each channel has a time before it.
     """
 
     path: Path
@@ -60,6 +62,7 @@ class Layout:
     units: Mapping[str, str] = field(default_factory=dict)
     counted: tuple[float, float] | None = None
     header: str = ""
+    pairs: tuple[tuple[str, str], ...] = ()
 
     def fields(self, text: str) -> list[str]:
         """The fields of a line."""
@@ -79,7 +82,9 @@ def layout_of(path: Path) -> Layout:
     if (known := known_heading(lines, _split)) is not None:
         comma = _decimal_comma([text for _, text in lines[known.at : known.at + DATA_LINES]], known.delimiter)
         header = lines[known.at - 1][0]
-        return Layout(path, encoding, known.names, known.delimiter, comma, header, known.units, known.counted)
+        return Layout(
+            path, encoding, known.names, known.delimiter, comma, header, known.units, known.counted, pairs=known.pairs
+        )
     at, delimiter = _first_data(lines)
     if at == 0:
         return _without_header(path, encoding, comments, lines, delimiter)

@@ -6,7 +6,7 @@ import re
 import zlib
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from rig.recording.readers.csv_layout import COMMENT, Layout, all_lines, layout_
 from rig.recording.readers.cut_end import cut_end
 from rig.recording.readers.headings import COUNTED
 from rig.recording.readers.lvm_segments import TIME, Segments
+from rig.recording.readers.paired_times import laid
 from rig.recording.readers.status import told_of
 from rig.recording.readers.thousands import first_grouped, may_be_grouped
 from rig.recording.readers.timestamps import Stamps, is_stamp
@@ -46,6 +47,8 @@ def read(path: Path) -> Sequence[Table]:
             said.append(f"the rows have no time: by the heading they begin at {begin_s:g} s and are {step_s:g} s apart")
         return said + _told(text)
 
+    if layout.pairs and (table := laid(path, layout.pairs, _columns(text, layout.names), layout.units)) is not None:
+        return [replace(table, notes=notes)]
     names = tuple(name for name in layout.names if name)
     if layout.counted is not None:
         names = (COUNTED, *(name for name in names if name != COUNTED))

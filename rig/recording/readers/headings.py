@@ -29,6 +29,8 @@ class Heading:
         Of the lines that were given, the first that is data.
     counted
         First time and step in s, where the rows have no time of their own.
+    pairs
+        The columns of time and channel, where each channel has a time before it.
     """
 
     delimiter: str
@@ -36,6 +38,7 @@ class Heading:
     units: Mapping[str, str]
     at: int
     counted: tuple[float, float] | None = None
+    pairs: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass
@@ -80,7 +83,8 @@ def _twincat(rows: _Rows) -> Heading | None:
     for channel, unit in zip(named, stated, strict=False):
         if unit.lower() not in _NO_UNIT:
             units[channel] = _BEHIND_UNIT.sub("", unit)
-    return Heading(rows.delimiter, tuple(names), units, end) if end < len(rows.rows) else None
+    pairs = tuple((f"{channel} time", channel) for channel in named)
+    return Heading(rows.delimiter, tuple(names), units, end, pairs=pairs) if end < len(rows.rows) else None
 
 
 def _control_desk(rows: _Rows) -> Heading | None:
@@ -138,9 +142,9 @@ def _labview(rows: _Rows) -> Heading | None:
             return None
         names = ["", *names[1:]] if not names[0] or names[0] == "X_Value" else names
         return Heading(rows.delimiter, tuple(names), _stated(names[1:], units), ends[1] + 2, (begin or 0.0, step))
-    times = [f"{name} time (s)" for name in names[1::2]]
-    paired = [name for pair in zip(times, names[1::2], strict=False) for name in pair]
-    return Heading(rows.delimiter, tuple(paired), _stated(names[1::2], units), ends[1] + 2)
+    pairs = tuple((f"{name} time (s)", name) for name in names[1::2])
+    columns = tuple(name for pair in pairs for name in pair)
+    return Heading(rows.delimiter, columns, _stated(names[1::2], units), ends[1] + 2, pairs=pairs)
 
 
 def _stated(names: Sequence[str], units: Sequence[str]) -> dict[str, str]:

@@ -44,6 +44,17 @@ def twincat(separator: str = "\t", decimal: str = ",") -> str:
     return (head + "\n" + body.replace(".", decimal)).replace("\t", separator)
 
 
+def of_two_rates(text: str, decimal: str = ".") -> str:
+    """The file with a second channel that is sampled twice as fast as the first, which ends earlier."""
+    at = text.rindex("\n", 0, text.index("\n0\t0\t0\t0\n") + 1) + 1
+    fine = np.arange(2 * len(TIME) - 1) / 2.0
+    unit = MS[1] if decimal == "," else TIME[1]
+    torque = [f"{unit * i:.9g}\t{v:.12g}" for i, v in enumerate(TORQUE)] + ["\t"] * (len(TIME) - 1)
+    rate = [f"{unit * i:.9g}\t{v:.12g}" for i, v in zip(fine, np.interp(fine, np.arange(400.0), DEG_S), strict=True)]
+    body = "".join(f"{a}\t{b}\n" for a, b in zip(torque, rate, strict=True))
+    return text[:at] + body.replace(".", decimal)
+
+
 def lvm_head(x_columns: str, multi: str = "No", decimal: str = ".") -> str:
     text = LVM.replace("X_Columns\tOne", f"X_Columns\t{x_columns}").replace(
         "Multi_Headings\tNo", f"Multi_Headings\t{multi}"
@@ -141,15 +152,17 @@ def mixed_stamps() -> str:
     )
 
 
+MULTI_X = (
+    lvm_head("Multi")
+    + "X_Value\tTorque (N m)\tX_Value\tGyro (deg/s)\tComment\n"
+    + rows(TIME, TORQUE, TIME, DEG_S, by="\t")
+)
 FILES: dict[str, tuple[str, Sequence[str]]] = {
     "twincat.csv": (twincat(), ()),
     "twincat_semicolon.csv": (twincat(";"), ()),
-    "multi_x.lvm": (
-        lvm_head("Multi")
-        + "X_Value\tTorque (N m)\tX_Value\tGyro (deg/s)\tComment\n"
-        + rows(TIME, TORQUE, TIME, DEG_S, by="\t"),
-        (),
-    ),
+    "multi_x.lvm": (MULTI_X, ()),
+    "multi_rates.lvm": (of_two_rates(MULTI_X), ()),
+    "twincat_rates.csv": (of_two_rates(twincat(), ","), ()),
     "segments.lvm": (segments(100), ()),
     "segments_anew.lvm": (segments(50, anew=True), ()),
     "no_x.lvm": (lvm_head("No") + "\tTorque\tGyro\tComment\n" + each_line(rows(TORQUE, DEG_S, by="\t"), "\t{}"), ()),

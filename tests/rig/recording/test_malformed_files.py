@@ -152,7 +152,12 @@ def foreign_journal(path: Path) -> None:
 FILES: dict[str, tuple[str, Callable[[Path], Any], str, str]] = {
     "empty": ("run.csv", lambda p: p.write_bytes(b""), "the file is empty", "export the recording again"),
     "folder": ("run.csv", lambda p: p.mkdir(), "is a folder", "name one file of it"),
-    "unknown suffix": ("run.feather", lambda p: p.write_bytes(b"PK"), "'.feather' is not a known format", ".csv, .csv.gz"),
+    "unknown suffix": (
+        "run.feather",
+        lambda p: p.write_bytes(b"PK"),
+        "'.feather' is not a known format",
+        ".csv, .csv.gz",
+    ),
     "binary in a csv": ("run.csv", lambda p: p.write_bytes(bytes(range(256))), "is not a text file", "as CSV"),
     "no gzip": ("run.csv.gz", lambda p: p.write_text(GOOD), "cannot be read", "export the file again"),
     "cut gzip": ("run.csv.gz", gzip_cut, "ended before the end-of-stream", "export the file again"),
