@@ -22,7 +22,8 @@ MIN_OTHERS = 10  # of which that is known
 def stand_ins(values: Array) -> Mapping[float, int]:
     """Which numbers of a column, shape (n,), stand for no reading, and how often; empty for nearly all columns.
 
-    A number counts as one if it is known as such and lies far beyond all that are not, and if most are not.
+    A number counts as one if it is known as such and lies far beyond all that are not. Where most are known, one alone
+    may be: a torque that is switched between two values has two.
     """
     size = np.abs(values)
     large = np.flatnonzero(np.isfinite(values) & (size >= (1.0 - SAME) * KNOWN[0]))
@@ -34,7 +35,8 @@ def stand_ins(values: Array) -> Mapping[float, int]:
         known |= np.isclose(size[large] / KNOWN[at], 1.0, rtol=0.0, atol=SAME)
     others = np.isfinite(values)
     others[large[known]] = False
-    if np.sum(others) < max(MIN_OTHERS, np.sum(known)):
+    is_most = np.sum(known) > np.sum(others)
+    if np.sum(others) < MIN_OTHERS or (is_most and len(np.unique(values[large[known]])) > 1):
         return {}
     found = large[known][size[large[known]] / BEYOND > np.max(size[others])]
     return {

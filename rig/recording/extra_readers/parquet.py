@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.recording.extra_readers.packages import require
+from rig.recording.readers.status import MOST_WORDS, Status
 from rig.recording.table import MAX_SAMPLES, Table, read_each, too_long
 
 UNIT_KEYS = (b"unit", b"units", b"Unit")
@@ -36,8 +38,32 @@ def read(path: Path) -> Sequence[Table]:
 
     names = [name for name in table.column_names if name]
     return [
-        Table(path, tuple(names), read_each(path, column), lambda index: f"row {index + 1}", units_of(table.schema))
+        Table(
+            path,
+            tuple(names),
+            read_each(path, column),
+            lambda index: f"row {index + 1}",
+            units_of(table.schema),
+            notes=lambda: _told(table),
+        )
     ]
+
+
+def _told(table: Any) -> list[str]:
+    """What columns of words say of the rows."""
+    import pyarrow as pa  # noqa: PLC0415  an extra, and slow to import
+    import pyarrow.compute as pc  # noqa: PLC0415
+
+    found = []
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        kind = column.type.value_type if pa.types.is_dictionary(column.type) else column.type
+        if not (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
+            continue
+        words = column.cast(pa.large_string()).fill_null("")
+        counts = {str(one["values"]): int(one["counts"]) for one in words.value_counts().to_pylist()[: MOST_WORDS + 1]}
+        first = {word: f"row {pc.index(words, word).as_py() + 1}" for word in counts}
+        found.append(Status(name, Counter(counts), first).told())
+    return [text for text in found if text]
 
 
 def opened(path: Path) -> Any:

@@ -6,6 +6,8 @@ import gzip
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from commands.rig.app import app
@@ -83,6 +85,17 @@ def test_a_column_that_says_how_it_went_is_told(tmp_path: Path) -> None:
     assert done.exit_code == 0
     said = "column 'status' is 'OK' in 397 rows and 'TIMEOUT' in 2 (first in line 42), 'FAULT' in 1 (first in line 18)"
     assert said in done.stdout and "add a column valid that is 0 there" in done.stdout
+
+
+@pytest.mark.parametrize("as_categories", [False, True])
+def test_a_column_of_a_parquet_file_that_says_how_it_went_is_told(as_categories: bool, tmp_path: Path) -> None:
+    words = pa.array(["OK"] * 16 + ["FAULT", None] + ["OK"] * 382)
+    columns = {name: motion(400)[name] for name in NAMES}
+    table = pa.table({**columns, "state": words.dictionary_encode() if as_categories else words})
+    pq.write_table(table, tmp_path / "run.parquet")
+    (run,) = read(tmp_path, "run.parquet").runs
+    (said,) = describe_reading([run], lambda _: None)
+    assert "'state' is 'OK' in 398 rows and 'FAULT' in 1 (first in row 17), '' in 1 (first in row 18)" in said
 
 
 @pytest.mark.parametrize("words", [["OK"], [""] * 40 + ["begun"], [f"row {i}" for i in range(30)]])

@@ -68,4 +68,9 @@ def test_readings_that_are_large_themselves_stand_for_nothing_else() -> None:
     pulse = np.zeros(500)
     pulse[250] = 1234.5
     assert stand_ins(pulse) == {}
+    assert stand_ins(np.where(np.arange(500) % 3, 0.1 * np.arange(500), -9999.0)) == {-9999.0: 167}
+    assert stand_ins(np.where(np.arange(500) % 3, -9999.0, 0.1 * np.arange(500))) == {-9999.0: 333}
+    switched = np.where(np.arange(500) // 50 % 2, -9999.0, 9999.0)
+    switched[::20] = 0.0
+    assert stand_ins(switched) == {}
     assert stand_ins(np.where(np.arange(500) % 2, -9999.0, 0.1 * np.arange(500))) == {-9999.0: 250}
