@@ -7,6 +7,7 @@ thread writes, and the loop only hands over short lines. A terminal that is gone
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -18,7 +19,8 @@ from rig.excitation import PlannedSet
 from rig.sequencer import Observer, Progress
 from rig.sequencer.recorder import SetStatistics
 
-BAR_WIDTH = 24  # characters
+BAR_WIDTH, MIN_BAR_WIDTH = 24, 6  # characters; a narrow terminal gets a shorter bar, or none
+NO_TERMINAL_COLUMNS = 120  # of a line where there is no terminal
 MAX_WAITING = 50  # lines; a terminal that takes none loses bars, not memory
 DRAIN_TIMEOUT_S = 1.0  # how long a slow terminal is waited for at the end
 LOST = "Stopped because the terminal was closed"
@@ -67,6 +69,12 @@ class Terminal:
         self._lines: SimpleQueue[str | threading.Event | None] = SimpleQueue()
         self._is_open_line = False
 
+    def columns(self) -> int:
+        """Characters that fit into a line; asked anew each time, because windows are resized."""
+        with contextlib.suppress(OSError, ValueError):
+            return os.get_terminal_size(self._stream.fileno()).columns or NO_TERMINAL_COLUMNS
+        return NO_TERMINAL_COLUMNS
+
     @contextmanager
     def writing(self) -> Iterator[None]:
         """While this holds, lines are written; what still waits is written at the end, if it can be."""
@@ -111,10 +119,10 @@ class Terminal:
             self.show(text)
 
     def overwrite(self, text: str) -> None:
-        """Put ``text`` in the place of the line that was put here last."""
+        """Put ``text`` in the place of the line that was put here last, cut to one line: only that can be replaced."""
         if self.has_bars and self._lines.qsize() < MAX_WAITING:
             self._is_open_line = True
-            self._lines.put(f"\r\x1b[K{text}")
+            self._lines.put(f"\r\x1b[K{text[: self.columns() - 1]}")
 
     def _end_line(self) -> None:
         if self._is_open_line:
@@ -154,20 +162,26 @@ class SetBars(Observer):
         """Where it stands."""
         p = progress
         figures = _figures(p.late_max_s, p.missed_ticks, p.drops, p.peak_torque_nm)
-        bar = _bar(p.time_s / p.duration_s)
-        self._terminal.overwrite(f"{self._head} {bar} {p.time_s:5.1f}/{p.duration_s:g} s  {figures}")
+        rest = f"{p.time_s:5.1f}/{p.duration_s:g} s  {figures}"
+        self._terminal.overwrite(self._line(p.time_s / p.duration_s, rest))
 
     def set_ends(self, statistics: SetStatistics) -> None:
         """How it went."""
         s = statistics
         figures = _figures(s.late.max_s, s.missed_ticks, s.drops, s.peak_torque_nm)
         self._terminal.clear_line()
-        self._terminal.show(f"{self._head} {_bar(1.0) if s.complete else 'CUT SHORT'} {figures}")
+        self._terminal.show(self._line(1.0, figures) if s.complete else f"{self._head} CUT SHORT {figures}")
+
+    def _line(self, part: float, rest: str) -> str:
+        """The set, a bar as long as there is room for, and ``rest``."""
+        room = self._terminal.columns() - len(f"{self._head} [] {rest}") - 1
+        bar = _bar(part, min(BAR_WIDTH, room)) if room >= MIN_BAR_WIDTH else ""
+        return " ".join(piece for piece in (self._head, bar, rest) if piece)
 
 
-def _bar(part: float) -> str:
-    full = round(BAR_WIDTH * min(1.0, max(0.0, part)))
-    return f"[{'#' * full}{'-' * (BAR_WIDTH - full)}]"
+def _bar(part: float, width: int) -> str:
+    full = round(width * min(1.0, max(0.0, part)))
+    return f"[{'#' * full}{'-' * (width - full)}]"
 
 
 def _figures(late_s: float, missed: int, drops: int, peak_nm: float) -> str:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import io
+import os
 import threading
 import time
+
+import pytest
 
 from commands.terminal.display import LOST, SetBars, Terminal, plain
 from rig.excitation import Sine, planned
@@ -54,6 +57,26 @@ def test_a_set_has_a_bar_with_lateness_missed_ticks_drops_and_peak_torque() -> N
     assert (
         "set 1/5  5 Hz [############------------]   0.2/0.5 s  late 0.20 ms  missed 1  drops 3  peak 9.5 N m" in shown
     )
+
+
+@pytest.mark.parametrize("columns", [60, 80, 132])
+def test_what_is_replaced_fits_into_one_line_of_the_terminal(columns: int) -> None:
+    termios = pytest.importorskip("termios")
+    far, near = os.openpty()
+    termios.tcsetwinsize(near, (24, columns))
+    with os.fdopen(near, "w") as stream:
+        terminal = Terminal(stream)
+        bars = SetBars(terminal)
+        with terminal.writing():
+            bars.set_begins(SET, 1, 5)
+            bars.progress(PROGRESS)
+            bars.set_ends(DONE)
+            terminal.note("looking at a residual " * 10)
+        shown = os.read(far, 10_000).decode()
+    os.close(far)
+    replaced = [line.split("\r")[0].rstrip("\n") for line in shown.split("\r\x1b[K")[1:]]
+    assert max(len(line) for line in replaced if "peak 10.0 N m" not in line) < columns  # that one stays
+    assert "peak 9.5 N m" in shown or columns < 80
 
 
 def test_without_a_terminal_there_is_one_line_a_set() -> None:
