@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -19,12 +20,18 @@ SYMBOLS = {
 MAX_DIGITS = 7  # significant digits: torque and gyro scales are never calibrated better than 1e-6
 TWO_DIGITS_UP_TO = 3.55  # leading digits of an uncertainty, rule of the Particle Data Group: 1.0 to 3.5 get two digits
 MANY_TIMES = 3.0  # from here on a factor reads better than a percentage
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|us|ms|s|Hz|kg·m²|N·m[·/²a-z]*|N|rad/s|rad|deg|m/s|kg|m)(?![\w·/]))")
 _TITLES = {"rotary": "rotary inertia", "linear": "mass"}
 
 
 def unit(text: str) -> str:
     """``N*m*s/rad`` as N·m·s/rad, ``kg*m^2`` as kg·m²."""
     return text.replace("*", "·").replace("^2", "²").replace("^3", "³")
+
+
+def unbroken(text: str) -> str:
+    """With its numbers and their units on one line: no line ends between them."""
+    return _BEFORE_UNIT.sub("\u00a0", text)
 
 
 def title(name: str, axis: str) -> str:

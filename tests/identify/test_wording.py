@@ -17,6 +17,7 @@ from identify.wording import (
     sentence,
     signed,
     title,
+    unbroken,
     unit,
     value_of,
     with_interval,
@@ -136,3 +137,7 @@ def test_an_effect_without_which_nothing_is_worse_is_not_said_to_make_it_a_fract
     assert "no larger" in without(1.004)
     assert "unbounded" in without(math.inf)
     assert "478 times larger" in without(478.0)
+
+
+def test_a_number_and_its_unit_stay_on_one_line() -> None:
+    assert unbroken("1.2 N·m and 0.6 ms, 1.3 % at 5 sets") == "1.2\u00a0N·m and 0.6\u00a0ms, 1.3\u00a0% at 5 sets"

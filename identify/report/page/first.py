@@ -12,7 +12,18 @@ from identify.report.page.markup import Markup, element, paragraph, section
 from identify.report.page.plots.figure import AFTER, BEFORE, FLOOR, MEASURED, Figure, Panel, grid, level, lines
 from identify.report.page.quantities import QUANTITIES, axis
 from identify.results import Identification, RunTraces
-from identify.wording import SYMBOLS, bias_percent, half_interval, half_of, number, percent, plain, unit, value_of
+from identify.wording import (
+    SYMBOLS,
+    bias_percent,
+    half_interval,
+    half_of,
+    number,
+    percent,
+    plain,
+    unbroken,
+    unit,
+    value_of,
+)
 from rig.arrays import Array
 
 SHOWN_PERIODS = 3.0  # of the excitation that are shown
@@ -25,7 +36,7 @@ def first_screen(found: Identification, gallery: Gallery) -> Markup:
     return section(
         "found",
         "What was found",
-        element("div", *[paragraph(text) for text in headline(found)], class_="sentences"),
+        element("div", *[paragraph(unbroken(text)) for text in headline(found)], class_="sentences"),
         element("div", *_error_tile(found), *_parameter_tiles(found), class_="tiles"),
         gallery.place(convincing_figure(found)),
     )
@@ -59,7 +70,7 @@ def _parameter_tiles(found: Identification) -> list[Markup]:
                 element("span", SYMBOLS.get(name, plain(name)), class_="symbol"),
                 element("span", value_of(estimate), element("small", f" {unit(estimate.unit)}"), class_="value"),
                 element("span", f"± {half_of(estimate)} (95 %)" if math.isfinite(half) else "", class_="half"),
-                element("span", before, class_="bent"),
+                element("span", unbroken(before), class_="bent"),
                 class_="tile",
             )
         )

@@ -11,6 +11,7 @@ from identify.diagnose.wording import diagnosis_sentences
 from identify.follow_up.wording import lines as follow_up_lines
 from identify.report.page.determined import determined_table
 from identify.report.page.document import Gallery, document
+from identify.report.page.findings import further_findings
 from identify.report.page.first import first_screen
 from identify.report.page.markup import Markup, Piece, bullets, element, folded, join, paragraph, section
 from identify.report.page.origin import origin
@@ -74,7 +75,7 @@ def _header(identification: Identification, name: str) -> Markup:
 
 
 def _verdict(identification: Identification, recording: Recording, gallery: Gallery) -> Markup:
-    verdict, final = identification.verdict, identification.final
+    final = identification.final
     steps, why = next_steps(identification), [capital(reason) for reason in identification.reasons]
     reasons = [
         element(
@@ -87,7 +88,7 @@ def _verdict(identification: Identification, recording: Recording, gallery: Gall
     return section(
         "verdict",
         "Findings and parameters",
-        element("div", *[paragraph(sentence) for sentence in verdict.sentences], class_="sentences"),
+        element("div", *[paragraph(sentence) for sentence in further_findings(identification)], class_="sentences"),
         *(reasons if why or steps else []),
         parameter_table(identification),
         _titled("Torque delay", delay_lines(identification, recording.info)),

@@ -21,7 +21,6 @@ from identify.wording import (
     percent,
     plain,
     readable,
-    signed,
     title,
     unit,
     value_of,
@@ -29,8 +28,8 @@ from identify.wording import (
 from rig import effects
 
 ROWS = 60  # of the candidates, best first
-BIC_DIGITS = 4  # significant digits: tells candidates of one round apart
 SCREENED = "screened out"
+NO_BETTER, SIMPLER_ADDED = "no better", "a simpler effect was added instead"
 
 
 def parameter_table(identification: Identification) -> Markup:
@@ -127,14 +126,15 @@ def candidate_table(candidates: Sequence[Candidate], floor: float) -> Markup:
         return paragraph("No effect was tried.")
     fitted = [c for c in candidates if c.status != SCREENED]
     order = sorted(fitted, key=lambda c: (c.round, c.delta_bic))
+    added = {c.round: c.delta_bic for c in reversed(order) if c.status.startswith("added")}  # the best of each round
     rows: list[list[Piece]] = [
         [
             plain(c.effect),
             str(c.round),
-            signed(c.delta_bic, BIC_DIGITS),
+            f"{c.delta_bic:+.0f}",
             number(c.holdout_rate_rms),
             _times(c.holdout_rate_rms, floor),
-            element("span", c.status, class_="added") if c.status == "added" else c.status,
+            element("span", c.status, class_="added") if c.status == "added" else _outcome(c, added),
         ]
         for c in order[:ROWS]
     ]
@@ -148,6 +148,13 @@ def candidate_table(candidates: Sequence[Candidate], floor: float) -> Markup:
         caption += f" Held-out error in units of the measured channel; the noise floor is {number(floor)}."
         tried = table(head, rows, f"{caption}{more}", words=(4, 5))
     return join([tried, _screened_out([c for c in candidates if c.status == SCREENED])])
+
+
+def _outcome(candidate: Candidate, added: Mapping[int, float]) -> str:
+    """What became of it; a lower BIC than that of the effect that was added asks for the reason."""
+    if candidate.status == NO_BETTER and candidate.delta_bic < added.get(candidate.round, -math.inf):
+        return SIMPLER_ADDED
+    return candidate.status
 
 
 def _screened_out(several: Sequence[Candidate]) -> Markup:
@@ -222,25 +229,20 @@ def _pair(names: str) -> str:
 
 
 def effect_cards(identification: Identification) -> Markup:
-    """What each effect that was added is, with its equation, sign and source."""
+    """What each effect that was added is, with its equation, sign and source; its numbers stand in the table."""
     known = set(effects.known())
     return join(_card(identification, name) for name in identification.verdict.effects if name in known)
 
 
 def _card(identification: Identification, name: str) -> Markup:
     effect = effects.get(name)
-    numbers = [
-        f"{parameter.name.replace('_', ' ')} = {value_of(shown)} {unit(shown.unit)} "
-        f"(95 %: {interval_of(shown)}), {parameter.meaning}"
-        for parameter in effect.parameters
-        if (found := identification.final.effect_parameters.get(name, {}).get(parameter.name)) is not None
-        for shown in [readable(found)]
-    ]
+    given = identification.final.effect_parameters.get(name, {})
+    meanings = [f"{p.name.replace('_', ' ')}: {p.meaning}" for p in effect.parameters if p.name in given]
     return element(
         "article",
         element("h3", capital(plain(name))),
         paragraph(effect.meaning),
         element("pre", effect.equation, tabindex="0", role="region", aria_label=f"Equation of {plain(name)}"),
-        bullets([*numbers, effect.sign, f"Source: {effect.source}."]),
+        bullets([*meanings, effect.sign, f"Source: {effect.source}."]),
         class_="card",
     )

@@ -20,9 +20,9 @@ from identify.report.page.plots.estimates import estimates_figure
 from identify.report.page.plots.motion import RUNS, motion_figures, stretches
 from identify.report.page.plots.residual import residual_figures
 from identify.report.page.plots.spectrum import spectrum, spectrum_figures
-from identify.report.page.tables import parameter_table
+from identify.report.page.tables import candidate_table, parameter_table
 from identify.residual import FreeLine
-from identify.results import Identification
+from identify.results import Candidate, Identification
 from identify.wording import MAX_DIGITS
 from rig.recording.run import Array
 from tests.identify.sample import SIGMA, sample, unhappy
@@ -214,3 +214,16 @@ def test_it_is_written_whatever_is_missing(found: Identification, change: dict[s
 
 def test_an_effect_is_explained_with_its_equation_and_source(page: str) -> None:
     assert "T = level * sgn(w)" in page
+
+
+def test_a_candidate_that_explains_more_than_the_effect_that_was_added_says_why_it_was_not() -> None:
+    tried = (
+        Candidate("stribeck_friction", 1, -16222.04, None, "no better"),
+        Candidate("coulomb_friction", 1, -13075.2, None, "added"),
+        Candidate("sensor_lag", 1, -246.1, None, "no better"),
+    )
+    rows = candidate_table(tried, 1.0).html.split("<tr>")
+    said = {name: row for row in rows for name in ("Stribeck", "Coulomb", "sensor lag") if name in row}
+    assert "a simpler effect was added instead" in said["Stribeck"]
+    assert "-16222<" in said["Stribeck"]
+    assert "no better" in said["sensor lag"]
