@@ -81,7 +81,9 @@ def run(context: CommandContext) -> int:
         return _run_played(context, loaded, folder)
     with live_view(context.stops.request, context.terminal.show_always) as context.live:
         code = _run_played(context, loaded, folder)
-        context.live.finished(RESULTS.get(code, f"Ended with exit code {code}: see the terminal"))
+        report = folder.path / "report.html"
+        ended = RESULTS.get(code, f"Ended with exit code {code}: see the terminal")
+        context.live.finished(ended, report if report.exists() else None)
         return code
 
 

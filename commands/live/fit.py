@@ -60,9 +60,9 @@ def fit_of(complete: Sequence[PlayedSet], terms: Sequence[str]) -> Mapping[str, 
     from identify.estimate.final_fit import by_regression
     from identify.estimate.initial_guess import first_guess
     from identify.model.structure import Structure
-    from identify.results import NORMAL_95
+    from identify.results import ParameterEstimate
     from identify.signals.prepare import prepare
-    from identify.wording import number
+    from identify.wording import half_of, value_of
 
     runs = [run_from_journal(_as_journal_run(one)) for one in complete]
     structure = Structure(tuple(terms))
@@ -72,10 +72,10 @@ def fit_of(complete: Sequence[PlayedSet], terms: Sequence[str]) -> Mapping[str, 
         found = by_regression(traces, structure, {}, first_guess(traces, structure), use, use, {})
     rows = {}
     for term in terms:
-        half = NORMAL_95 * found.std_error((term,))
+        shown = ParameterEstimate.normal(found.values[term,], found.std_error((term,)), UNITS[term])
         rows[term] = {
-            "symbol": SYMBOLS[term], "unit": UNITS[term], "value": number(found.values[term,], 4),
-            "half": number(half, 2) if np.isfinite(half) else "-",
+            "symbol": SYMBOLS[term], "unit": UNITS[term], "value": value_of(shown),
+            "half": half_of(shown) if np.isfinite(shown.std_error) else "-",
         }  # fmt: skip
     return {"sets": len(complete), "name": complete[-1].name, "terms": rows}
 

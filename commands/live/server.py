@@ -96,6 +96,8 @@ def handler_of(process: LiveProcess, token: str) -> type[BaseHTTPRequestHandler]
 
     class Handler(BaseHTTPRequestHandler):
         server: ThreadingHTTPServer
+        protocol_version = "HTTP/1.1"  # the stop button finds a connection open
+        disable_nagle_algorithm = True
 
         def do_GET(self) -> None:
             if not self._is_ours():

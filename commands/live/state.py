@@ -97,7 +97,7 @@ class LiveState:
         self.complete: list[PlayedSet] = []
         self.fits: list[Mapping[str, Any]] = []
         self.notes: list[str] = []
-        self.result = ""
+        self.result = self.report = ""
         self.stop_asked = False
 
     def take(self, kind: int, payload: bytes) -> None:
@@ -122,13 +122,14 @@ class LiveState:
             self.phase = "identifying"
             self.notes = [*self.notes, str(said["note"])][-NOTES:]
         if "result" in said:
-            self.phase, self.result = "done", str(said["result"])
+            self.phase, self.result, self.report = "done", str(said["result"]), str(said.get("report", ""))
 
     def snapshot(self) -> dict[str, Any]:
         """Everything as JSON values."""
         out: dict[str, Any] = {
             "phase": self.phase, "limits": dict(self.limits), "count": len(self.planned), "number": self.number,
-            "fits": self.fits, "notes": self.notes, "result": self.result, "stop_asked": self.stop_asked, "set": None,
+            "fits": self.fits, "notes": self.notes, "result": self.result, "report": self.report,
+            "stop_asked": self.stop_asked, "set": None,
         }  # fmt: skip
         p = self.played
         if p is not None:

@@ -30,8 +30,8 @@ class NoLiveView:
     def note(self, text: str) -> None:
         """What the identification is doing."""
 
-    def finished(self, text: str) -> None:
-        """How it ended."""
+    def finished(self, text: str, report: Path | None = None) -> None:
+        """How it ended, and where the report is, if there is one."""
 
 
 class LiveView(NoLiveView):
@@ -66,9 +66,9 @@ class LiveView(NoLiveView):
         """As above."""
         self._tell({"note": text})
 
-    def finished(self, text: str) -> None:
+    def finished(self, text: str, report: Path | None = None) -> None:
         """As above."""
-        self._tell({"result": text})
+        self._tell({"result": text, "report": "" if report is None else str(report)})
 
     def close(self) -> None:
         """Write what waits and let the page's process end by itself."""

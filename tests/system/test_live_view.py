@@ -79,7 +79,7 @@ def live(tmp_path: Path) -> Iterator[LiveRun]:
         run = LiveRun(folder)
         try:
             fitted = "document.querySelectorAll('#fit tbody tr').length === 1"
-            playing = "document.getElementById('set').textContent.startsWith('2/2')"
+            playing = "document.getElementById('set').textContent.startsWith('2 of 2')"
             run.browser.wait_for(f"({fitted} && {playing}) || document.documentElement.dataset.phase === 'done'")
             if run.browser.evaluate("document.documentElement.dataset.phase") == "playing":
                 yield run
@@ -108,6 +108,9 @@ def test_the_stop_button_takes_the_torque_off_as_the_drive_saw_it(live: LiveRun,
     assert live.process.wait(240) == 130  # what was recorded is identified first, however long that takes
     assert "torque is off" in page.wait_for("/^Stopped/.test(document.getElementById('title').textContent)"
                                             " && document.getElementById('title').textContent")  # fmt: skip
+    assert page.evaluate("document.getElementById('report').textContent") == f"The report: {live.out / 'report.html'}"
+    page.call("Emulation.setDeviceMetricsOverride", width=390, height=844, deviceScaleFactor=1, mobile=True)
+    page.wait_for("[...document.querySelectorAll('canvas')].every(c => c.width === c.clientWidth && c.width < 390)")
     drive = read_recording_h5(live.out / "recording.h5").info["emulated_drive"]
     zero_s = [e["time_s"] for e in drive if e["event"] in ("torque_zero", "disabled") and e["time_s"] > clicked_s]
     assert zero_s and zero_s[0] - clicked_s < within_s

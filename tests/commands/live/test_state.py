@@ -67,8 +67,9 @@ def test_the_phase_goes_from_playing_to_rest_to_identifying_to_the_result() -> N
     assert shown(state)["phase"] == "rest" and len(state.complete) == 1
     state.tell({"note": "fitting the declared model"})
     assert (shown(state)["phase"], shown(state)["notes"]) == ("identifying", ["fitting the declared model"])
-    state.tell({"result": "Finished: accepted"})
+    state.tell({"result": "Finished: accepted", "report": "runs/a/report.html"})
     assert (shown(state)["phase"], shown(state)["result"]) == ("done", "Finished: accepted")
+    assert shown(state)["report"] == "runs/a/report.html"
 
 
 def test_a_set_that_was_cut_short_is_not_fitted() -> None:
@@ -99,3 +100,6 @@ def test_the_fit_of_complete_sets_is_near_the_platform() -> None:
     assert found["sets"] == 1
     assert float(found["terms"]["stiffness"]["value"]) == pytest.approx(681.2, rel=0.02)
     assert float(found["terms"]["stiffness"]["half"]) > 0.0
+    for term in found["terms"].values():
+        decimals = [len(term[key].partition(".")[2]) for key in ("value", "half")]
+        assert decimals[0] == decimals[1], "as many digits as the interval supports"
