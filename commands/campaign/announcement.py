@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from commands.terminal.display import plain
+from commands.terminal.display import counted, plain
 from rig.config.root import Config
 from rig.excitation import PlannedSet
 from rig.interface import Statement, Torque
@@ -34,7 +34,7 @@ def announcement(statement: Statement, config: Config, sets: Sequence[PlannedSet
 
 def recorded_announcement(files: int, runs: int, folder: Path) -> str:
     """The opening statement where nothing is played."""
-    summary = f"Torque is RECORDED: nothing moves; {runs} run(s) read from {files} file(s)"
+    summary = f"Torque is RECORDED: nothing moves; {counted(runs, 'run')} read from {counted(files, 'file')}"
     return "\n".join([RULE, f"  {summary}", RULE, f"results   {plain(str(folder))}"])
 
 

@@ -14,7 +14,7 @@ from commands.campaign.context import CommandContext
 from commands.campaign.playing import play
 from commands.campaign.results_folder import JOURNAL_FILE, ResultsFolder
 from commands.campaign.saving import export_earlier
-from commands.terminal.display import plain
+from commands.terminal.display import counted, plain
 from rig.config.load import LoadedConfig
 from rig.errors import RecordingError, UsageError
 from rig.recording.run import Recording, Run
@@ -69,7 +69,9 @@ def play_campaign(context: CommandContext, loaded: LoadedConfig, folder: Results
         raise UsageError("--resume: recordings are read, not played: there is nothing to resume.")
     before = read_unfinished(context.options.resume)
     refuse_differences(before, loaded, backend)
-    summary = f"Resuming {plain(str(before.folder))}: {len(before.done)} of {len(before.planned)} set(s) are finished"
+    summary = (
+        f"Resuming {plain(str(before.folder))}: {len(before.done)} of {counted(len(before.planned), 'set')} finished"
+    )
     names = tuple(f"earlier_{number}.journal" for number in range(1, len(before.journals) + 1))
     earlier = PlayedCampaign(Recording(before.runs), before.done, None, names)
     copies = tuple(zip(before.journals, names, strict=True))

@@ -8,6 +8,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from commands.campaign.context import CommandContext
+from commands.terminal.display import counted
 
 if TYPE_CHECKING:
     from commands.campaign.campaign_part import PlayedCampaign
@@ -70,7 +71,9 @@ def conclude_aborted(
         where = describe_location(played, folder.path)
         context.terminal.show_always(f"No set was completed, so nothing was identified. {where}")
         return
-    context.terminal.show(f"Identifying from the {len(whole.runs)} complete set(s); the results are marked aborted.")
+    context.terminal.show(
+        f"Identifying from {counted(len(whole.runs), 'complete set')}; the results are marked aborted."
+    )
     found = dataclasses.replace(identified(context, loaded, whole), aborted=True)
     conclude(context, loaded, folder, whole, found)
 

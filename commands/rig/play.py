@@ -7,7 +7,7 @@ import sys
 from commands.campaign.context import CommandContext
 from commands.campaign.resume import play_campaign
 from commands.campaign.saving import describe_location
-from commands.terminal.display import plain
+from commands.terminal.display import counted, plain
 from commands.terminal.exit_codes import exit_code_of
 from rig.config.load import LoadedConfig
 
@@ -23,5 +23,5 @@ def play_only(context: CommandContext, loaded: LoadedConfig) -> int:
             if played.recording.runs
             else f". {describe_location(played, folder.path)}"
         )
-        sys.stdout.write(f"{len(played.completed)} complete set(s){plain(where)}\n")
+        sys.stdout.write(f"{counted(len(played.completed), 'complete set')}{plain(where)}\n")
     return 0 if played.cause is None else exit_code_of(played.cause)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from commands.terminal.display import plain
+from commands.terminal.display import counted, plain
 from commands.terminal.exit_codes import OK
 from rig.errors import Aborted, RecordingError, RigError
 
@@ -97,7 +97,9 @@ def _out_of_captures(folder: Path, without: RecordingError) -> Recovery:
     there = (folder / RECORDING_FILE).exists()
     path = free_name(folder, RECOVERED_FILE if there else RECORDING_FILE)
     write_recording_h5(path, recording)
-    lines.append(f"{path.name}: written, {len(runs)} run(s); the names of the sets were in the journal and are lost")
+    lines.append(
+        f"{path.name}: written, {counted(len(runs), 'run')}; the names of the sets were in the journal and are lost"
+    )
     return Recovery(tuple(lines), recording, path, is_new=True)
 
 

@@ -31,6 +31,11 @@ def plain(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text)
 
 
+def counted(count: int, thing: str) -> str:
+    """ "1 run", "2 runs"."""
+    return f"{count} {thing}{'' if count == 1 else 's'}"
+
+
 def discard_typed_ahead(stream: TextIO) -> None:
     """Drop what was typed on a terminal and not read yet: it answers no question that was asked later.
 

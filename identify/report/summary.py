@@ -63,20 +63,20 @@ def summary(
         legacy_windows=False,
     )
     with console.capture() as captured:
-        console.print(_whole(identification, info))
+        console.print(_whole(identification, info, narrow=width < PLAIN_WIDTH))
     return "\n".join(line.rstrip() for line in captured.get().splitlines()) + "\n"
 
 
 NONE_DETERMINED = "These runs determine none of the parameters."
 
 
-def _whole(identification: Identification, info: Mapping[str, Any]) -> Group:
+def _whole(identification: Identification, info: Mapping[str, Any], narrow: bool) -> Group:
     final, verdict, floor = identification.final, identification.verdict, identification.noise_floor
     note = printable(sentence(identification.holdout_note))
     parts: list[RenderableType] = [
         *_listed("Verdict", verdict.sentences, bullet=""),
         Text(),
-        table if (table := _parameters(identification)).row_count else Text(NONE_DETERMINED),
+        table if (table := _parameters(identification, narrow)).row_count else Text(NONE_DETERMINED),
         Text(),
         _errors(identification),
         Padding(Text(f"The noise floor is {floor.source}. {note}"), (0, 0, 0, 2)),
@@ -126,7 +126,8 @@ def _table(heading: str, columns: Sequence[str], words: Sequence[int] = (0,)) ->
     return made
 
 
-def _parameters(identification: Identification) -> Table:
+def _parameters(identification: Identification, narrow: bool) -> Table:
+    """The declared and the final model; on a narrow terminal the intervals of the final one stand below its values."""
     before, after, bent = identification.before, identification.after, bias_percent(identification)
     names = list(dict.fromkeys([*before.parameters, *(after.parameters if after else ())]))
     given = ["declared"] if identification.declared else []
@@ -134,7 +135,7 @@ def _parameters(identification: Identification) -> Table:
     table = _table("Parameters, with 95 % intervals", head, words=(0, len(head) - 1))
     for name in names:
         first, last = before.parameters.get(name), (after or before).parameters.get(name)
-        more = [percent(bent.get(name)), _estimate(last)] if after else []
+        more = [percent(bent.get(name)), _estimate(last, narrow)] if after else []
         shown = last or first
         number_given = [declared_number(identification, name, None) for _ in given]
         name_of_row, unit_of_row = title(name, identification.axis), unit(shown.unit) if shown else ""
@@ -144,15 +145,18 @@ def _parameters(identification: Identification) -> Table:
             earlier = before.effect_parameters.get(effect, {}).get(name)
             shown = found if earlier is not None and readable(earlier).unit != readable(found).unit else readable(found)
             first = earlier if earlier is None or shown is found else readable(earlier)
-            more = ["", _estimate(shown)] if after else []
+            more = ["", _estimate(shown, narrow)] if after else []
             number_given = [declared_number(identification, f"{effect}.{name}", found) for _ in given]
             name_of_row = f"{plain(effect)}, {name.replace('_', ' ')}"
             table.add_row(name_of_row, *number_given, _estimate(first), *more, unit(shown.unit))
     return table
 
 
-def _estimate(estimate: ParameterEstimate | None) -> str:
-    return "-" if estimate is None else with_interval(estimate)
+def _estimate(estimate: ParameterEstimate | None, below: bool = False) -> str:
+    if estimate is None:
+        return "-"
+    value, sign, interval = with_interval(estimate).partition(" ")
+    return f"{value}{chr(10) if below else sign}{interval}"
 
 
 def _errors(identification: Identification) -> Table:

@@ -40,7 +40,7 @@ def is_part_of(name: str, curve: str) -> bool:
 def against_curves(search: Stepwise, now: Fit) -> Fit:
     """A model without names that a curve in their place beats; what else is there is judged beside that curve next."""
     if search.trials.added(now):
-        search.say("comparing what was found with curves in its place")
+        search.say("checking whether a free-form curve explains it better than what was added")
     found = _beaten(search, now)
     if found is None:
         return now

@@ -54,14 +54,14 @@ def add_effects(search: Stepwise) -> None:
         if chosen and _is_series(search, now, chosen) and is_beaten(search, now):
             break
         new = tried[chosen] if chosen else _pair(search, now, scores)
-        how = f"{100.0 * new.weight:.0f} % of the disturbance" if new else "on trial"
+        how = f"explains {100.0 * new.weight:.0f} % of the disturbance" if new else "on trial"
         if new is None and trial is None and (new := _on_trial(tried)):
             trial = (new.effect, now)
         added = tuple(e for e in new.fit.structure.effects if e not in now.structure.effects) if new else ()
         search.rounds.append(Round(number, now, tuple(scores), tried, added))
         if new is None:
             break
-        search.say(f"added {' and '.join(added)}: log-likelihood +{0.5 * new.gain:.3g}, {how}")
+        search.say(f"added {' and '.join(added)}: {how}")
         if trial and trial[1] is now:
             search.best = new.fit
             continue

@@ -106,7 +106,7 @@ class Stepwise:
 
     def compare_with_free_form(self, now: Fit) -> Fit:
         """Without names that explain nothing beside a curve over what is left."""
-        self.say("looking at what is left")
+        self.say("checking the residual for what no effect describes")
         while True:
             left, self.doubtful = fit_free_forms(self, now)
             self.left = left

@@ -53,7 +53,7 @@ def test_a_simulated_campaign_is_recorded_whole(tmp_path: Path) -> None:
     done = command(app, "play", write_config(tmp_path), "--out", out)
     assert done.exit_code == 0, done.output
     assert "Torque is SIMULATED" in done.stderr
-    assert "2 complete set(s)" in done.stdout
+    assert "2 complete sets" in done.stdout
     recording = read_recording_h5(out / "recording.h5")
     assert [r.name for r in recording.runs] == ["5 Hz", "7 Hz"]
     assert recording.info["config_text"] == TWO_SETS
@@ -166,7 +166,7 @@ def test_a_signal_just_after_the_last_set_ends_in_130_with_everything_kept(
     put_on_stage(monkeypatch, rig)
     done = command(app, "play", write_config(tmp_path), "--out", tmp_path / "out")
     assert done.exit_code == 130
-    assert "Stopped by" in done.stderr and "2 complete set(s)" in done.stdout
+    assert "Stopped by" in done.stderr and "2 complete sets" in done.stdout
     assert run_names(tmp_path / "out") == ["5 Hz", "7 Hz"]
     assert "Stopped by" in read_recording_h5(tmp_path / "out" / "recording.h5").info["aborted"]
 

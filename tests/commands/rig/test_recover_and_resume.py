@@ -134,7 +134,7 @@ def test_only_the_sets_that_are_missing_are_played_and_all_are_joined(played: Pa
     before = contents(folder)
     done = command(app, "play", write_config(tmp_path), "--resume", folder, "--out", out)
     assert done.exit_code == 0, done.output
-    assert "1 of 2 set(s) are finished; to play: 7 Hz" in done.stderr
+    assert "1 of 2 sets finished; to play: 7 Hz" in done.stderr
     assert "5 Hz:" not in done.stderr  # the opening lists what will move
     assert contents(folder) == before
     runs = read_recording_h5(out / "recording.h5").runs
@@ -172,7 +172,7 @@ def test_a_resumed_campaign_that_is_cut_again_is_resumed_again(tmp_path: Path, m
     put_on_stage(monkeypatch, ScriptedRig())
     done = command(app, "play", config, "--resume", tmp_path / "b", "--out", tmp_path / "c")
     assert done.exit_code == 0, done.output
-    assert "2 of 3 set(s) are finished; to play: 9 Hz" in done.stderr
+    assert "2 of 3 sets finished; to play: 9 Hz" in done.stderr
     recording = read_recording_h5(tmp_path / "c" / "recording.h5")
     assert [run.name for run in recording.runs] == ["5 Hz", "7 Hz", "9 Hz"]
     assert recording.info["resumed_from"] == str(tmp_path / "b")

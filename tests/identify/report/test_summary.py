@@ -93,3 +93,10 @@ def test_declared_numbers_stand_beside_the_fitted_ones_where_somebody_declared_t
     assert next(r for r in rows if "rotary inertia J  " in r).split()[3] == "0.02"
     assert next(r for r in rows if "torque delay, delay" in r).split()[3] == "0.5"  # ms, as the row
     assert next(r for r in rows if r.startswith("damping C")).split()[2] == "0.412"  # declared by nobody
+
+
+def test_on_a_narrow_terminal_an_interval_stands_below_its_value_and_not_in_two() -> None:
+    lines = summary(sample(1.0)[0], width=80).splitlines()
+    (inertia,) = [i for i, line in enumerate(lines) if line.startswith("rotary inertia J")]
+    assert lines[inertia + 1].split()[0] == "±" and len(lines[inertia + 1].split()) == 2
+    assert max(len(line) for line in lines) <= 80
