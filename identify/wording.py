@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from identify.residual import Dependence, Disturbance
@@ -22,6 +22,12 @@ TWO_DIGITS_UP_TO = 3.55  # leading digits of an uncertainty, rule of the Particl
 MANY_TIMES = 3.0  # from here on a factor reads better than a percentage
 _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|us|ms|s|Hz|kg·m²|N·m[·/²a-z]*|N|rad/s|rad|deg|m/s|kg|m)(?![\w·/]))")
 _TITLES = {"rotary": "rotary inertia", "linear": "mass"}
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """Each once, J, C and K in this order, then whatever else there is."""
+    first = list(SYMBOLS)
+    return sorted(dict.fromkeys(names), key=lambda name: first.index(name) if name in first else len(first))
 
 
 def unit(text: str) -> str:
@@ -154,10 +160,16 @@ def signed(value: float, digits: int = 4) -> str:
 
 
 def percent(value: float | None) -> str:
-    """With a sign and two or three digits that matter: "+412 %", "-0.013 %"."""
+    """With a sign and two or three digits that matter: "+412 %", "-0.013 %", "+21200 %"."""
     if value is None or not math.isfinite(value):
         return "-"
-    return f"{signed(value, 3 if abs(value) >= 10 else 2)} %"
+    digits = 3 if abs(value) >= 10 else 2
+    return f"{signed(_rounded(value, digits), digits)} %"
+
+
+def _rounded(value: float, digits: int) -> float:
+    """To significant digits also ahead of the point: 21206 to 21200."""
+    return float(f"{value:.{digits - 1}e}")
 
 
 def off_by(ratio: float) -> str:
@@ -165,7 +177,7 @@ def off_by(ratio: float) -> str:
     if ratio < 0.0:
         return "of the wrong sign"
     if ratio >= MANY_TIMES:
-        return f"about {number(ratio, 2)} times too high"
+        return f"about {number(_rounded(ratio, 2), 2)} times too high"
     off = 100.0 * (ratio - 1.0)
     return f"{percent(abs(off)).lstrip('+')} too {'high' if off > 0 else 'low'}"
 

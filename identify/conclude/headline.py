@@ -118,6 +118,8 @@ def _left(found: Identification) -> str:
     left, torque = found.disturbance, "force" if found.axis == "linear" else "torque"
     if left is None:
         return "what is left is at the noise floor"
+    if left.relative == 0.0:
+        return f"no {torque} is left above the sensor's noise"
     if not left.depends_on:
         share = number(100.0 * left.relative, 2)
         return f"the {torque} that is left ({share} % of the {torque}) depends on nothing that was tested"

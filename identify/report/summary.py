@@ -24,6 +24,7 @@ from identify.wording import (
     capital,
     declared_number,
     errors_by_model,
+    in_order,
     not_said_yet,
     number,
     percent,
@@ -187,7 +188,7 @@ def _errors(identification: Identification) -> Table:
 def _sets(identification: Identification) -> Table:
     """Each set fitted separately; Max_Error (Eq. 15) below where the truth was given."""
     sets = identification.per_set
-    names = list(dict.fromkeys(name for one in sets for name in one.parameters))
+    names = in_order(name for one in sets for name in one.parameters)
     table = _table(
         "Each set fitted separately", ["set", *[SYMBOLS.get(n, plain(n)) for n in names], "J < J_dec", "repeats"]
     )

@@ -7,6 +7,7 @@ import math
 import pytest
 
 from identify.wording import (
+    in_order,
     interval_of,
     joined,
     number,
@@ -90,7 +91,9 @@ def test_what_is_negative_or_positive_by_nature_carries_its_sign() -> None:
     assert [signed(x) for x in (-7936814889.9, 4.2, 0.0)] == ["-7.937e+09", "+4.200", "0"]
 
 
-@pytest.mark.parametrize(("value", "shown"), [(822.1, "+822 %"), (-0.0987, "-0.099 %"), (0.0, "0 %"), (None, "-")])
+@pytest.mark.parametrize(
+    ("value", "shown"), [(822.1, "+822 %"), (21206.4, "+21200 %"), (-0.0987, "-0.099 %"), (0.0, "0 %"), (None, "-")]
+)
 def test_percentages_carry_their_sign(value: float | None, shown: str) -> None:
     assert percent(value) == shown
 
@@ -126,6 +129,7 @@ def test_a_sentence_begins_with_a_capital_and_ends_with_one_full_stop(words: str
 @pytest.mark.parametrize(
     ("ratio", "words"),
     [(1.098, "9.8 % too high"), (0.9, "10 % too low"), (2.9, "190 % too high"), (16.43, "about 16 times too high"),
+     (212.6, "about 210 times too high"),
      (-0.5, "of the wrong sign")],
 )  # fmt: skip
 def test_a_large_error_is_a_factor_and_a_small_one_a_percentage(ratio: float, words: str) -> None:
@@ -137,6 +141,12 @@ def test_an_effect_without_which_nothing_is_worse_is_not_said_to_make_it_a_fract
     assert "no larger" in without(1.004)
     assert "unbounded" in without(math.inf)
     assert "478 times larger" in without(478.0)
+
+
+def test_j_c_and_k_stand_in_this_order_whatever_is_determined_first() -> None:
+    assert in_order(["stiffness", "creep", "inertia", "stiffness", "damping"]) == [
+        "inertia", "damping", "stiffness", "creep",
+    ]  # fmt: skip
 
 
 def test_a_number_and_its_unit_stay_on_one_line() -> None:

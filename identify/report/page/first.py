@@ -8,7 +8,7 @@ import numpy as np
 
 from identify.conclude.headline import error_before_and_after, headline
 from identify.report.page.document import Gallery
-from identify.report.page.markup import Markup, element, paragraph, section
+from identify.report.page.markup import Markup, element, paragraph, section, words
 from identify.report.page.plots.figure import AFTER, BEFORE, FLOOR, MEASURED, Figure, Panel, grid, level, lines
 from identify.report.page.quantities import QUANTITIES, axis
 from identify.results import Identification, RunTraces
@@ -36,7 +36,7 @@ def first_screen(found: Identification, gallery: Gallery) -> Markup:
     return section(
         "found",
         "What was found",
-        element("div", *[paragraph(unbroken(text)) for text in headline(found)], class_="sentences"),
+        element("div", *[paragraph(words(text)) for text in headline(found)], class_="sentences"),
         element("div", *_error_tile(found), *_parameter_tiles(found), class_="tiles"),
         gallery.place(convincing_figure(found)),
     )

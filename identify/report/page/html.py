@@ -13,7 +13,7 @@ from identify.report.page.determined import determined_table
 from identify.report.page.document import Gallery, document
 from identify.report.page.findings import further_findings
 from identify.report.page.first import first_screen
-from identify.report.page.markup import Markup, Piece, bullets, element, folded, join, paragraph, section
+from identify.report.page.markup import Markup, Piece, bullets, element, folded, join, paragraph, section, words
 from identify.report.page.origin import origin
 from identify.report.page.plots.convergence import convergence_figure, convergence_table
 from identify.report.page.plots.disturbance import disturbance_table, shape_figure
@@ -76,7 +76,8 @@ def _header(identification: Identification, name: str) -> Markup:
 
 def _verdict(identification: Identification, recording: Recording, gallery: Gallery) -> Markup:
     final = identification.final
-    steps, why = next_steps(identification), [capital(reason) for reason in identification.reasons]
+    steps = [words(step) for step in next_steps(identification)]
+    why: list[Piece] = [words(capital(reason)) for reason in identification.reasons]
     reasons = [
         element(
             "div",
@@ -88,7 +89,9 @@ def _verdict(identification: Identification, recording: Recording, gallery: Gall
     return section(
         "verdict",
         "Findings and parameters",
-        element("div", *[paragraph(sentence) for sentence in further_findings(identification)], class_="sentences"),
+        element(
+            "div", *[paragraph(words(sentence)) for sentence in further_findings(identification)], class_="sentences"
+        ),
         *(reasons if why or steps else []),
         parameter_table(identification),
         _titled("Torque delay", delay_lines(identification, recording.info)),

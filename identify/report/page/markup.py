@@ -6,6 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 
+from identify.wording import unbroken
+
 
 @dataclass(frozen=True)
 class Markup:
@@ -43,6 +45,14 @@ def paragraph(*content: Piece, class_: str = "") -> Markup:
 def bullets(lines: Sequence[Piece]) -> Markup:
     """A list, or nothing where there is nothing to list."""
     return element("ul", *[element("li", line) for line in lines]) if lines else Markup("")
+
+
+def words(sentence: str) -> Markup:
+    """A sentence with its numbers beside their units, and what stands between backticks as code."""
+    parts = unbroken(sentence).split("`")
+    if len(parts) % 2 == 0:  # a backtick that is never closed
+        return join(["`".join(parts)])
+    return join(element("code", part) if i % 2 else part for i, part in enumerate(parts))
 
 
 def section(anchor: str, heading: str, *content: Piece) -> Markup:

@@ -16,6 +16,7 @@ from identify.wording import (
     errors_by_model,
     frequency,
     half_of,
+    in_order,
     interval_of,
     number,
     percent,
@@ -36,7 +37,8 @@ def parameter_table(identification: Identification) -> Markup:
     """Before and after with intervals, and how far the declared model bends each parameter."""
     before, after = identification.before, identification.after
     bent = bias_percent(identification)
-    names = list(dict.fromkeys([*before.parameters, *(after.parameters if after else ())]))
+    lost = [item.name for item in (after or before).not_determined if item.name in SYMBOLS]
+    names = list(dict.fromkeys([*before.parameters, *(after.parameters if after else ()), *lost]))
     given = ["declared"] if identification.declared else []
     rows: list[list[Piece]] = []
     for name in names:
@@ -180,7 +182,7 @@ def _times(value: float | None, floor: float) -> Piece:
 def set_table(identification: Identification) -> Markup:
     """Each set fitted for itself with the effects of the final model."""
     sets = identification.per_set
-    names = list(dict.fromkeys(name for one in sets for name in one.parameters))
+    names = in_order(name for one in sets for name in one.parameters)
     units = {n: next(unit(one.parameters[n].unit) for one in sets if n in one.parameters) for n in names}
     head: list[Piece] = ["set", "frequency"]
     head += [join([SYMBOLS.get(n, plain(n)), element("small", f" ({units[n]})")]) for n in names]

@@ -65,3 +65,8 @@ def test_where_the_torque_decided_the_error_is_a_share_of_the_torque() -> None:
     before = replace(FOUND.before.error, holdout_torque_relative=0.4)
     by_torque = replace(FOUND, after=replace(FOUND.after, error=error), before=replace(FOUND.before, error=before))
     assert "from 40.0 to 2.10 % of the torque" in headline(by_torque)[1]
+
+
+def test_a_torque_of_which_nothing_is_left_is_not_told_as_zero_percent() -> None:
+    none_left = replace(FOUND, disturbance=Disturbance(0.0, "N*m", 0.0))
+    assert accepted_or_not(none_left).endswith("and no torque is left above the sensor's noise.")

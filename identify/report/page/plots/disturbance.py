@@ -12,6 +12,7 @@ from identify.results import Identification
 from identify.wording import depends_on, number
 
 DIRECTIONS = {"tickvals": [-1, 1], "ticktext": ["backward", "forward"], "range": [-1.5, 1.5]}
+LEAST_RATE = 1e-6  # below it how small a false-alarm rate is tells nothing: the test is not exact that far out
 MIN_FOR_A_CURVE = 3  # points: fewer are drawn as points
 
 
@@ -24,7 +25,7 @@ def disturbance_table(identification: Identification) -> Markup:
     rows += [
         [
             f"depends on the {depends_on(d.on, identification.axis)}", number(d.torque_rms, 2),
-            number(100.0 * d.relative, 2), number(d.false_alarm, 1),
+            number(100.0 * d.relative, 2), _rate(d.false_alarm),
         ]
         for d in left.depends_on
     ]  # fmt: skip
@@ -34,6 +35,10 @@ def disturbance_table(identification: Identification) -> Markup:
         f"The residual {q.torque} of the final model, without the sensor's noise. A part that depends on a quantity "
         "is missing from the model; the rest is noise and is included in the intervals.",
     )
+
+
+def _rate(false_alarm: float) -> str:
+    return f"< {LEAST_RATE:g}" if false_alarm < LEAST_RATE else number(false_alarm, 1)
 
 
 def shape_figure(identification: Identification) -> Figure | None:

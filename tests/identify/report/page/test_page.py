@@ -14,7 +14,7 @@ from plotly.offline import get_plotlyjs
 
 from identify.report.page import report_html
 from identify.report.page.document import embedded
-from identify.report.page.markup import Markup, element, table
+from identify.report.page.markup import Markup, element, table, words
 from identify.report.page.plots.convergence import convergence_figure
 from identify.report.page.plots.estimates import estimates_figure
 from identify.report.page.plots.motion import RUNS, motion_figures, stretches
@@ -22,7 +22,7 @@ from identify.report.page.plots.residual import residual_figures
 from identify.report.page.plots.spectrum import spectrum, spectrum_figures
 from identify.report.page.tables import candidate_table, parameter_table
 from identify.residual import FreeLine
-from identify.results import Candidate, Identification
+from identify.results import Candidate, Identification, NotReported
 from identify.wording import MAX_DIGITS
 from rig.recording.run import Array
 from tests.identify.sample import SIGMA, sample, unhappy
@@ -59,7 +59,7 @@ def test_its_own_data_stay_small(page: str) -> None:
 
 
 def test_the_verdict_in_words_stands_before_everything_else(page: str) -> None:
-    assert page.index("Coulomb friction is missing: 1.1998 N·m") < page.index("<table")
+    assert page.index("Coulomb friction is missing: 1.1998\u00a0N·m") < page.index("<table")
     assert "ACCEPTED" in page
 
 
@@ -227,3 +227,18 @@ def test_a_candidate_that_explains_more_than_the_effect_that_was_added_says_why_
     assert "a simpler effect was added instead" in said["Stribeck"]
     assert "-16222<" in said["Stribeck"]
     assert "no better" in said["sensor lag"]
+
+
+def test_what_stands_between_backticks_is_code_and_nothing_else_is() -> None:
+    assert words("Run `rig check` for <b>2 ms</b>.").html == (
+        "Run <code>rig check</code> for &lt;b&gt;2\u00a0ms&lt;/b&gt;."
+    )
+    assert words("an odd ` one").html == "an odd ` one"
+
+
+def test_a_parameter_that_is_not_determined_has_its_row(found: Identification) -> None:
+    lost = NotReported("damping", "its standard error is too large")
+    kept = {k: v for k, v in found.before.parameters.items() if k != "damping"}
+    one = replace(found, after=None, before=replace(found.before, parameters=kept, not_determined=(lost,)))
+    row = next(row for row in parameter_table(one).html.split("<tr>") if "damping C" in row)
+    assert "not determined" in row
