@@ -31,7 +31,8 @@ def origin(recording: Recording) -> Markup:
     """Origin of the data."""
     info = recording.info
     short, long = _values({k: v for k, v in info.items() if k not in OWN_PLACE})
-    lengths = f"{len(recording.runs)} runs, {sum(len(run.time_s) for run in recording.runs)} samples"
+    runs = f"{len(recording.runs)} run{'' if len(recording.runs) == 1 else 's'}"
+    lengths = f"{runs}, {sum(len(run.time_s) for run in recording.runs)} samples"
     return section(
         "origin",
         "Origin of the data",

@@ -46,6 +46,11 @@ def test_times_numbers_and_yes_or_no_are_those_of_a_person() -> None:
     assert "True" not in shown
 
 
+def test_one_run_is_no_runs() -> None:
+    _, recording = sample(1.0)
+    assert "<td>1 run, " in origin(replace(recording, runs=recording.runs[:1], info={})).html
+
+
 def test_files_that_the_configuration_reads_stand_under_their_names() -> None:
     shown = page(config_file="rig.yaml", config_text="name: a\n", config_included={"model.yaml": "inertia_kg_m2: 1\n"})
     assert "<summary>rig.yaml as written</summary>" in shown
