@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from identify.report.comparison.saved import SavedNumber
-from identify.results import ParameterEstimate
-from identify.wording import number, percent, readable, signed, unit, with_interval
+from identify.results import NORMAL_95, ParameterEstimate
+from identify.wording import half_interval, number, percent, readable, signed, unit, value_of, with_interval
 
 ABSENT = "-"
 IN_MS_BELOW_S = 0.1  # as for a single number: ``readable``; here a zero beside it is in ms too
@@ -55,9 +55,22 @@ def change_of(a: SavedNumber, b: SavedNumber) -> Change:
         relation = "no interval"
     else:
         relation = "yes" if is_beyond_both(a, b) else "no"
-    relative = 100.0 * difference / abs(first.value) if first.value else math.nan
-    shown = ABSENT if math.isnan(difference) else signed(difference, 3)
+    shown = ABSENT if math.isnan(difference) else _difference(first, last)
+    is_shown = shown != ABSENT and float(shown) != 0.0
+    relative = 100.0 * difference * is_shown / abs(first.value) if first.value else math.nan
     return Change(_text(a, first), _text(b, last), shown, percent(relative), relation, unit(first.unit))
+
+
+def _difference(first: ParameterEstimate, last: ParameterEstimate) -> str:
+    """B - A, with as many digits as the wider interval of the two supports; three where neither has one."""
+    value = last.value - first.value
+    half = max((x for x in map(half_interval, (first, last)) if math.isfinite(x)), default=0.0)
+    if half <= 0.0 or not value:
+        return signed(value, 3)
+    shown = value_of(ParameterEstimate(value, half / NORMAL_95, (value - half, value + half), first.unit))
+    if not float(shown):
+        return shown.removeprefix("-")
+    return f"+{shown}" if value > 0.0 else shown
 
 
 def one_sided(a: SavedNumber | None, b: SavedNumber | None, absent: str, relation: str) -> Change:

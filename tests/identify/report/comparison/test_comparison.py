@@ -340,3 +340,14 @@ def test_whatever_stands_in_the_place_of_a_value_is_compared_or_refused(tmp_path
                 assert comparison_html(sections, ("a", "b")).startswith("<!DOCTYPE html>")
             outcomes["compared"] += 1
     assert outcomes["refused"] > 200 and outcomes["compared"] > 50, outcomes
+
+
+@pytest.mark.parametrize(("half_widths", "shown"), [(0.01, "0"), (3.0, "+"), (-3.0, "-")])
+def test_a_difference_has_the_digits_that_the_intervals_support(
+    compared: Callable[..., tuple[Section, ...]], half_widths: float, shown: str
+) -> None:
+    _, first, _, difference, relative, *_ = row(compared(shifted("stiffness", half_widths)), "stiffness K")
+    decimals = len(first.split(" ")[0].partition(".")[2])
+    assert difference.startswith(shown)
+    assert len(difference.partition(".")[2]) <= decimals
+    assert (float(difference) == 0.0) is (relative == "0 %")
