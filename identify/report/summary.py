@@ -172,7 +172,7 @@ def _errors(identification: Identification) -> Table:
         (f"held-out {channel}, free run", "holdout_rate_rms", floor.holdout_rate_rms, channel_unit),
         ("held-out fit", "holdout_fit_percent", None, "%"),
         (f"{torque} residual", "residual_rms_torque", floor.residual_rms_torque, torque_unit),
-        (f"{torque} residual / {torque}, held out", "holdout_torque_relative", None, "%"),
+        (f"residual / {torque}, held out", "holdout_torque_relative", None, "%"),
     ]
     head = ["", *models, "noise floor", "unit"]
     table = _table("Error", head, words=(0, len(head) - 1))

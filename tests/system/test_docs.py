@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import re
@@ -244,3 +245,12 @@ def test_all_programs_and_the_benchmarks_are_documented_and_benchmarks_as_module
     assert not any(command.startswith("python benchmarks/") for command in commands)
     own = [name_of(p) for p in (ROOT / "benchmarks").rglob("*.py") if "python benchmarks/" in text_of(p)]
     assert not own, f"write `python -m benchmarks.NAME` in {', '.join(own)}"
+
+
+@pytest.mark.parametrize("package", ["identify", "rig"])
+def test_every_public_name_is_explained_in_the_docs_and_where_it_is_defined(package: str) -> None:
+    table = text_of(ROOT / "docs" / "from-python.md").partition("## All public names")[2]
+    module = importlib.import_module(package)
+    listed = set(re.findall(r"`(?:identify|rig)\.(\w+)", table))
+    assert set(module.__all__) <= listed
+    assert [name for name in module.__all__ if not (getattr(module, name).__doc__ or "").strip()] == []
