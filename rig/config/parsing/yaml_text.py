@@ -18,6 +18,26 @@ from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from rig.errors import ConfigError
 
+# Endings of recordings: whoever gives one wants it identified, and no key of it will be right.
+RECORDINGS = frozenset(
+    (
+        ".csv",
+        ".tsv",
+        ".gz",
+        ".lvm",
+        ".npz",
+        ".mat",
+        ".h5",
+        ".hdf5",
+        ".parquet",
+        ".mf4",
+        ".mdf",
+        ".tdms",
+        ".bag",
+        ".mcap",
+        ".db3",
+    )
+)
 MAX_FILE_BYTES = 256 * 1024
 MAX_NODES = 20_000
 MAX_CHARACTERS = 2_000_000
@@ -95,6 +115,10 @@ def read_text(path: Path) -> str:
             raise ConfigError(f"{path}: no such file: check the name and the folder you are in ({Path.cwd()})")
         if not path.is_file():
             raise ConfigError(f"{path}: is not a regular file (a device or pipe): give a yaml file")
+        if path.suffix.lower() in RECORDINGS:
+            raise ConfigError(
+                f"{path}: is a recording, not a configuration: `rig init {path}` writes one that reads it"
+            )
         with path.open("rb") as file:
             raw = file.read(MAX_FILE_BYTES + 1)
     except (OSError, ValueError) as error:

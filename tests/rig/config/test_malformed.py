@@ -253,3 +253,10 @@ def test_a_wrong_run_is_not_also_reported_as_a_list_that_is_too_short(tmp_path: 
     with pytest.raises(ConfigError) as error:
         load_config(path)
     assert len(str(error.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.CSV", "run.npz", "recording.h5"])
+def test_a_recording_in_the_place_of_a_configuration_is_told_how_to_get_one(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("time_s,torque_nm\n0,1\n")
+    with pytest.raises(ConfigError, match=rf"is a recording.*`rig init .*{name}` writes one that reads it"):
+        load_config(tmp_path / name)
