@@ -97,7 +97,7 @@ CASES: Mapping[str, Case] = {
         "emps", ("emps_train.npz",), ("coulomb_friction", "torque_offset", "directional_damping"), (),
         "  axis: linear\n  columns: {time: t_s, angle: q_m, torque: force_N}\n",
         "model: {inertia_kg_m2: 30.0, damping_nm_s_rad: 50.0, stiffness_nm_rad: 10.0}\n", None,
-        {"inertia": (95.1089, 3.0)},
+        {"inertia": (95.1089, 3.0), "coulomb_friction.level": (20.3935, 5.0)},
     ),
     "pendulum": Case(
         "pendulum_decay", ("pendulum_b.npz",), ("unbalance", DRY, "quadratic_damping"), (),

@@ -14,8 +14,9 @@ from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.covariance import covariance_of
 from identify.estimate.final_fit import FinalFit, free_run_of
 from identify.estimate.initial_guess import Start, scale_of
-from identify.likelihood.by_prediction_error import as_final, by_prediction_error, fitted_on_all
+from identify.likelihood.by_prediction_error import as_final, fitted_on_all
 from identify.likelihood.fit import Fit
+from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameter_fit import ParameterFit
 from identify.model.structure import Structure
 from identify.results import Dependence, Disturbance
@@ -36,6 +37,7 @@ MUCH_LEFT = 0.05  # of the torque: where nothing explains that, a wider band is 
 WIDER = {"angle": 10.0**0.4, "rate": 10.0 ** (2.0 / 3.0)}
 UNFOLLOWED = 0.5  # of the residual in torque, that the likelihood takes the disturbance for
 NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
+A_MULTIPLE = 2.0  # of the residual in torque: four times its power is no disturbance, whatever the likelihood says
 ANOTHER = 0.5  # of the inertia, by which the likeliest platform is another than the one that is reported
 
 
@@ -180,16 +182,14 @@ def search_in_torque(
     regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
     final = by_likelihood.fit.structure if by_likelihood else best.structure
     say(f"final fit with {', '.join(final.effects) or 'fewer terms'}")
-    before = _final(regression, base, traces, split)
+    before = _final(regression, base, fitted_on_all(traces, structure, base.values, split.final), traces, split)
 
     def fitted(final: Structure) -> FinalFit:
         if final == structure:
             return before
-        if by_likelihood:
-            return by_prediction_error(
-                traces, final, by_likelihood.fit.values, split.final, split.everything, like=by_likelihood.fit
-            )  # fmt: skip
-        return _final(regression, best, traces, split)
+        known = by_likelihood.fit if by_likelihood else None
+        likely = fitted_on_all(traces, final, (known or best).values, split.final, known)
+        return _final(regression, best, likely, traces, split, trusted=bool(known))
 
     after, found_so_far = fitted(final), final
     while name := _unsupported(after, structure, bool(by_likelihood)):
@@ -215,7 +215,8 @@ def search_in_torque(
         fitted, values = before, {k: v for k, v in after.values.items() if k[0] not in several}
         if less.effects != structure.effects:
             like = after.fit if isinstance(after.fit, Fit) else None
-            fitted = by_prediction_error(traces, less, values, split.final, split.everything, like)
+            likely = fitted_on_all(traces, less, values, split.final, like)
+            fitted = _final(regression, there, likely, traces, split, trusted=like is not None)
         return fitted, errors(there), disturbance_of(regression, there, floor, unit)
 
     reported = search.as_search(best)
@@ -261,19 +262,29 @@ def with_free_form(left: Disturbance, curve: Dependence, moves: Mapping[str, flo
     )  # fmt: skip
 
 
-def _final(regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split) -> FinalFit:
+def _final(
+    regression: TorqueRegression, fit: TorqueFit, likely: tuple[PredictionError, Fit], traces: Sequence[Trace],
+    split: Split, trusted: bool = False,
+) -> FinalFit:  # fmt: skip
     """The final fit by prediction error, or in torque where that leaves less and the likelihood is not to be believed.
 
     Prediction error is the better estimate as long as what is left is a disturbance: in a closed loop that goes with
     the motion, and least squares takes it for inertia. Where the scores of the parameters scatter by more than the
     likelihood takes them to, what is left is none. Prediction error then weighs the frequencies at which the model
-    happens to be right and gives the rest away; least squares in torque does the least harm to the parameters.
+    happens to be right and gives the rest away; least squares in torque does the least harm to the parameters. The same
+    where it leaves a multiple: a handful of parameters takes nothing of that kind away from a disturbance that is one.
+    (A friction that is no step at a reversal has a small level there, and the rest of it passes for a slow torque.)
+    ``trusted``: the likelihood found the model.
     """
-    problem, likely = fitted_on_all(traces, fit.structure, fit.values, split.final)
-    fitted = as_final(problem, likely, traces, split.everything)
+    problem, found = likely
+    fitted = as_final(problem, found, traces, split.everything)
+    if found.structure != fit.structure:  # a filter of the sensor, for which a delay of the drive stands in torque
+        return fitted
     left = regression.left_by(fit.structure, fitted.values)
-    believed = inflation(problem.columns_at(likely, with_variance=True), likely, likely.names) < MAX_TRUSTED_INFLATION
-    if left <= NO_WORSE * fit.sigma or believed:
+    trusted = trusted or inflation(problem.columns_at(found, with_variance=True), found, found.names) < (
+        MAX_TRUSTED_INFLATION
+    )
+    if left <= (A_MULTIPLE if trusted else NO_WORSE) * fit.sigma:
         return fitted
     columns, residuals, names = regression.linear_parts(fit.structure, fit.values)
     covariance, determined = covariance_of(list(zip(columns, residuals, strict=True)), len(names))

@@ -161,11 +161,13 @@ def test_the_linear_axis_is_predicted_to_a_few_percent_of_the_force() -> None:
 
 @needs("emps")
 @pytest.mark.slow
-def test_the_mass_of_the_linear_axis_is_the_published_one() -> None:
+def test_mass_and_friction_of_the_linear_axis_are_the_published_ones() -> None:
+    """Its friction is no step at a reversal: the likelihood's own level is 8.6 N, beside a slow force for the rest."""
     _, found = emps()
     mass = found.final.parameters["inertia"]
     assert mass.unit == "kg"
     assert mass.value == pytest.approx(95.1089, rel=0.03)
+    assert found.final.effect_parameters["coulomb_friction"]["level"].value == pytest.approx(20.3935, rel=0.05)
 
 
 @needs("emps")

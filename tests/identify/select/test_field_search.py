@@ -6,12 +6,18 @@ from functools import cache
 
 import pytest
 
+from identify.diagnose.torque_regression import TorqueRegression
+from identify.estimate.initial_guess import scale_of
+from identify.likelihood.by_prediction_error import fitted_on_all
+from identify.model.structure import Structure
 from identify.pipeline import identify
 from identify.results import Dependence, Disturbance, Identification
-from identify.select.field_search import with_free_form
+from identify.runs.holdout import split
+from identify.select.field_search import _final, with_free_form
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
 from tests.identify.servo import Servo
+from tests.identify.simulated import traces_of
 
 DECLARED = Platform(1e-3, 1e-3, 1.0)
 
@@ -76,3 +82,18 @@ def test_friction_and_a_constant_torque_are_both_named() -> None:
     assert set(found.verdict.effects) == {"coulomb_friction", "torque_offset"}
     assert found.verdict.explained_fraction > 0.9
     right(found, TILTED)
+
+
+def test_where_the_likelihood_leaves_a_multiple_the_numbers_of_least_squares_are_reported() -> None:
+    traces = traces_of(RUBBING.recording(2))
+    parts, structure = split(traces, "auto"), Structure(("inertia", "damping")).plus("coulomb_friction")
+    regression = TorqueRegression(traces, parts, 20.0, scale_of(traces, (RUBBING.inertia, 1e-3, 0.0), ()))
+    least = regression.solve(structure, {})
+    problem, right_one = fitted_on_all(traces, structure, least.values, parts.final)
+    level = ("coulomb_friction", "level")
+    wrong = {**right_one.values, level: 0.4 * right_one.values[level]}
+    held = problem.fit(structure, wrong, right_one.noise, fixed=tuple(wrong))
+    for fit, by in ((right_one, "prediction error"), (held, "least squares in torque")):
+        final = _final(regression, least, (problem, fit), traces, parts, trusted=True)
+        assert final.method == by
+        assert final.values[level] == pytest.approx(0.02, rel=0.05)
