@@ -12,7 +12,7 @@ import numpy as np
 
 from rig.errors import RecordingError
 from rig.recording.extra_readers.packages import require
-from rig.recording.readers.words import EMPTY, is_number, number
+from rig.recording.readers.text.words import EMPTY, is_number, number
 from rig.recording.table import Table, read_each
 from rig.units import bare, unit_of
 

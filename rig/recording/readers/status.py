@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from rig.recording.readers.words import NO_READING
+from rig.recording.readers.text.words import NO_READING
 
 MOST_WORDS = 12  # different ones: more are a comment or a name
 USUAL = 0.5  # of the rows have the usual word

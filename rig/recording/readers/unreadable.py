@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from rig.recording.readers.timestamps import AmbiguousDateError
+from rig.recording.readers.text.timestamps import AmbiguousDateError
 
 _HAS_NUMBER = re.compile(r"[-+]?[.,]?\d")
 _DATE = re.compile(r"\d{1,4}([-/.])\d{1,2}\1\d{1,4}$|\d{1,2}-[A-Za-z]{3}-\d{4}$")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rig.recording.readers import read_file
-from rig.recording.readers.timestamps import Stamps
+from rig.recording.readers.text.timestamps import Stamps
 from rig.recording.run import Run
 from rig.recording.table import Table
 from tests.rig.recording.support import motion, read, refusal

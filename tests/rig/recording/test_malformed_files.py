@@ -18,7 +18,7 @@ import pytest
 import scipy.io
 
 from rig.recording.journal import HEADER, RUN, Journal, frame
-from rig.recording.readers import mat
+from rig.recording.readers.matlab import mat
 from tests.rig.recording.support import csv_of, motion, refusal
 
 Columns = dict[str, Any]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rig.arrays import Array
-from rig.recording.readers.timestamps import Stamps
+from rig.recording.readers.text.timestamps import Stamps
 
 BEGIN, END = "Channels", "***End_of_Header***"
 TIME = "X_Value"

@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import IO, cast
 
 from rig.errors import RecordingError
-from rig.recording.readers.headings import known_heading
-from rig.recording.readers.preamble import is_labelled, stated_separator, stated_units
-from rig.recording.readers.timestamps import is_stamp
-from rig.recording.readers.words import EMPTY, NO_READING, has_points_between, is_number
-from rig.recording.readers.words import number as number_of
+from rig.recording.readers.text.headings import known_heading
+from rig.recording.readers.text.preamble import is_labelled, stated_separator, stated_units
+from rig.recording.readers.text.timestamps import is_stamp
+from rig.recording.readers.text.words import EMPTY, NO_READING, has_points_between, is_number
+from rig.recording.readers.text.words import number as number_of
 from rig.recording.table import MAX_SAMPLES
 from rig.units import bare, unit_of
 

@@ -15,7 +15,7 @@ from rig.recording import hdf5
 from rig.recording.h5_heaps import check_heaps
 from rig.recording.memory import at_most
 from rig.recording.readers.h5 import text_of
-from rig.recording.readers.mat5 import MAX_DEPTH, OBJECT
+from rig.recording.readers.matlab.mat5 import MAX_DEPTH, OBJECT
 from rig.recording.readers.structures import Struct, Unknown
 from rig.recording.table import MAX_SAMPLES
 

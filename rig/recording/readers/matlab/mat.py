@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.errors import RecordingError
-from rig.recording.readers import mat4, mat5
+from rig.recording.readers.matlab import mat4, mat5
 from rig.recording.readers.structures import Unknown, columns_of
 from rig.recording.table import MAX_SAMPLES, Table, read_each
 
@@ -21,7 +21,8 @@ def read(path: Path) -> Sequence[Any]:
     with path.open("rb") as file:
         head = file.read(128)
     if head[:4] == b"\x89HDF" or head.startswith(b"MATLAB 7.3"):
-        from rig.recording.readers import h5, mat73  # noqa: PLC0415  slow to import
+        from rig.recording.readers import h5  # noqa: PLC0415  slow to import
+        from rig.recording.readers.matlab import mat73  # noqa: PLC0415
 
         if path.stat().st_size > MAX_UNPACKED_BYTES:
             return h5.read(path)  # which reads no more than it is asked for

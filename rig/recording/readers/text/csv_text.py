@@ -14,16 +14,16 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.errors import RecordingError
-from rig.recording.readers.csv_layout import COMMENT, Layout, all_lines, layout_of
-from rig.recording.readers.cut_end import cut_end
-from rig.recording.readers.headings import COUNTED
-from rig.recording.readers.lvm_segments import TIME, Segments
 from rig.recording.readers.paired_times import laid
 from rig.recording.readers.status import told_of
-from rig.recording.readers.thousands import first_grouped, may_be_grouped
-from rig.recording.readers.timestamps import Stamps, is_stamp
+from rig.recording.readers.text.csv_layout import COMMENT, Layout, all_lines, layout_of
+from rig.recording.readers.text.cut_end import cut_end
+from rig.recording.readers.text.headings import COUNTED
+from rig.recording.readers.text.lvm_segments import TIME, Segments
+from rig.recording.readers.text.thousands import first_grouped, may_be_grouped
+from rig.recording.readers.text.timestamps import Stamps, is_stamp
+from rig.recording.readers.text.words import NO_READING, is_number
 from rig.recording.readers.unreadable import unreadable
-from rig.recording.readers.words import NO_READING, is_number
 from rig.recording.table import MAX_SAMPLES, Table, too_long
 
 LOOKED_AT = 50  # rows in which a column of words shows

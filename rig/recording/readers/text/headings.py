@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rig.recording.readers.words import EMPTY
+from rig.recording.readers.text.words import EMPTY
 
 SEARCHED = 60  # lines in which a heading has to be known
 COUNTED = "time_s"  # the column of times that follow from the heading

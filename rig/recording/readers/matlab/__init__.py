@@ -1,0 +1,1 @@
+"""MATLAB: .mat files of the versions 4, 5 and 7.3."""
