@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.signals.filtered_noise import filtered_density
-from identify.signals.trace import MAX_BIAS_WALK
+from identify.signals.trace import MOST_WALK
 from rig.arrays import Array
 from rig.dynamics.gains import Noise
 
@@ -18,7 +18,7 @@ MIN_DISTURBANCE, MAX_DISTURBANCE = 1e-7, 10.0  # of the torque: how large a dist
 # Of the torque, how large a smooth disturbance may be: a larger one follows the motion wherever it goes, whatever the
 # recorded torque says, and a noisy record of the torque would then be taken for no record at all.
 MAX_SMOOTH = 0.1
-MIN_BIAS_WALK = 1e-7  # of the rate, that a gyro's bias walks over a run
+MIN_BIAS_WALK, MAX_BIAS_WALK = 1e-7, MOST_WALK  # of the rate, that a gyro's bias walks over a run
 MAX_ENCODER_ERROR = 1.0  # of the angle, that an encoder's slow error takes over a run
 # Times the variance of one reading, of what a gyro's low-pass lets through of the noise ahead of it.
 MIN_PREFILTER_NOISE, MAX_PREFILTER_NOISE = 1e-4, 1e8

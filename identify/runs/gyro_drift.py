@@ -18,7 +18,7 @@ from numpy.polynomial import legendre
 
 from identify.runs.reduced import thinned
 from identify.signals.low_pass import low_pass, settled
-from identify.signals.trace import MAX_BIAS_WALK, UPSAMPLING, Trace
+from identify.signals.trace import MOST_WALK, UPSAMPLING, Trace
 from rig.arrays import Array
 
 SAMPLES = 40_000  # of all runs together, that the drift is looked for in
@@ -69,7 +69,7 @@ def _may_be_bias(run: _Run) -> bool:
     for (first, last), drift in zip(run.spans, run.drifts, strict=True):
         bias = legendre.legval(np.linspace(-1.0, 1.0, BLOCKS)[1:-1], legendre.legder(drift)) * 2.0 / (last - first)
         walks = max(walks, float(np.ptp(bias)) / run.step_s)
-    return walks <= MAX_BIAS_WALK * float(np.sqrt(np.mean(run.rate**2)))
+    return walks <= MOST_WALK * float(np.sqrt(np.mean(run.rate**2)))
 
 
 class _Run:

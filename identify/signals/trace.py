@@ -27,7 +27,7 @@ UPSAMPLING = 4  # nonlinear torques have corners between samples
 SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than it tells
 LEAD_S = 0.1  # of torque ahead of a piece of a run, for a drive with memory
 RUNAWAY_TORQUE = 1e100  # torque of an effect along a noisy motion, in any unit: it was integrated beyond all bounds
-MAX_BIAS_WALK = 0.01  # of the rate, that a gyro's bias walks over a run
+MOST_WALK = 0.01  # of the rate, that a gyro's bias walks over a run
 MOST_BIAS_RAD_S = 0.05  # of a gyro: what its integral runs away faster with is the motion itself
 STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
 

@@ -198,6 +198,7 @@ def test_a_run_has_no_place_where_truth_could_hide() -> None:
             "rate_corner_hz", "rate_delay_s",  # of the gyro's data sheet
             "excerpt",  # of a long recording
             "wraps",  # of an angle within one turn
+            "notes",  # of its reading: rows left out, numbers that stood for none
             "missing",  # of rows without a value
     }  # fmt: skip
     assert not played(config()).recording.runs[0].channels
