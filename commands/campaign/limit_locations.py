@@ -1,10 +1,11 @@
-"""The places (file, line) of the limits that a campaign would break."""
+"""The places (file, line) of the limits that a campaign would break, and where its sets come from."""
 
 from __future__ import annotations
 
 import contextlib
 from typing import Any
 
+from commands.campaign.backends import RECORDED
 from commands.terminal.display import plain
 from rig.config.load import LoadedConfig
 from rig.config.parsing.messages import place_of
@@ -31,6 +32,12 @@ def with_locations(error: PreflightRefusal, loaded: LoadedConfig) -> PreflightRe
         where = str(place_of(document, path)) if written else f"{loaded.path} (not in the file: the default)"
         shown = f"{value:g}" if isinstance(value, float) else plain(str(value))
         lines.append(f"  {plain(where)}: {key} is {shown}")
+    if loaded.config.backend == RECORDED and ("excitation",) not in document.places:
+        lines.append(
+            f"  {plain(str(loaded.path))} reads recordings (backend: recorded) and has no excitation, so these are the "
+            "sets of the default campaign. Without --dry-run and --emulate its recordings are identified; to rehearse "
+            "a campaign on this platform, give it an excitation"
+        )
     placed = PreflightRefusal("\n".join([str(error), *lines]))
     placed.keys = error.keys
     return placed
