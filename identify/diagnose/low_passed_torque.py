@@ -27,7 +27,7 @@ from rig.platform import TERMS
 SAMPLES_A_PERIOD = 4.0  # of the cut-off: what the low-pass passed needs no more
 FOLDS, FOLD_BLOCKS = 3, 9  # a third of the runs, or of the blocks of each run, is held out in turn
 STILL_SIGMAS, STILL_PERIODS = 5.0, 0.5  # standard deviations of the smoothed rate, for so many periods of the cut-off
-DRAWS = 3  # of the sensor's noise
+NOISE_DRAWS = 3  # of the sensor's noise
 AROUND_REVERSAL, MAX_REVERSAL_SHARE = 0.6, 0.35  # periods of the cut-off left out either side, up to a share of samples
 
 _QUANTITIES = {"angle": 0, "rate": 1, "torque": 3}  # of a trace's fine motion
@@ -176,7 +176,7 @@ class LowPassedTorque:
     def made_by_noise_nm(self, values: Mapping[Name, float], columns: Array) -> float:
         """What columns, (n, k), explain of the sensor's noise alone, root mean square, from simulated noise."""
         squares = []
-        for seed in range(1, 1 + DRAWS):
+        for seed in range(1, 1 + NOISE_DRAWS):
             noise = self._kept(("noise", seed, tuple(values.items())), partial(self._of_noise, values, seed))
             squares.append(np.mean((columns @ np.linalg.lstsq(columns, noise, rcond=None)[0]) ** 2))
         return float(np.sqrt(np.mean(squares)))

@@ -21,16 +21,16 @@ from identify.signals.low_pass import low_pass, settled
 from identify.signals.trace import MOST_WALK, UPSAMPLING, Trace
 from rig.arrays import Array
 
-SAMPLES = 40_000  # of all runs together, that the drift is looked for in
-DEGREES = (1, 2, 3, 5, 8, 12, 18)  # of the polynomial: a bias that stays makes a line, its walk bends that
+DRIFT_SAMPLES = 40_000  # of all runs together, that the drift is looked for in
+DRIFT_DEGREES = (1, 2, 3, 5, 8, 12, 18)  # of the polynomial: a bias that stays makes a line, its walk bends that
 PERIODS_A_DEGREE = 8.0  # of the platform's own swing, that a stretch lasts at least for each degree
 SPRING_POWERS = 3  # of the angle, by which a spring is followed
-ROUNDS = (1, 1, *4 * (SPRING_POWERS,))  # the powers, of the angle that the round before has found
-KNOWN = 10.0  # standard errors of the spring's stiffness: one that is known worse holds nothing
-BLOCKS = 20  # of each stretch; every other one is held out where degrees are compared
+DRIFT_ROUNDS = (1, 1, *4 * (SPRING_POWERS,))  # the powers, of the angle that the round before has found
+KNOWN_SIGMAS = 10.0  # standard errors of the spring's stiffness: one that is known worse holds nothing
+DRIFT_BLOCKS = 20  # of each stretch; every other one is held out where degrees are compared
 WORTH_IT = 0.9  # of the power on held-out samples, that a higher degree leaves at most: a slow torque is no drift
-SAMPLES_A_PERIOD = 4.0  # of the low-pass
-SLOW = 0.02  # of the largest rate: below, static friction may hold the platform
+ROWS_A_PERIOD = 4.0  # of the low-pass
+SLOW_SHARE = 0.02  # of the largest rate: below, static friction may hold the platform
 
 
 def without_drift(traces: Sequence[Trace], cutoff_hz: float) -> list[Trace]:
@@ -45,14 +45,14 @@ def without_drift(traces: Sequence[Trace], cutoff_hz: float) -> list[Trace]:
     """
     if not all(t.biased and t.torque is not None for t in traces):
         return list(traces)
-    few, _ = thinned(traces, [t.keep for t in traces], SAMPLES)
+    few, _ = thinned(traces, [t.keep for t in traces], DRIFT_SAMPLES)
     runs = [_Run(t, min(cutoff_hz, t.cutoff_hz)) for t in few]
     own_hz = _own_hz(runs) if all(r.stretches for r in runs) else None
     if own_hz is None:
         return list(traces)
     least = np.inf
     best: list[Array] = []
-    for degree in DEGREES:
+    for degree in DRIFT_DEGREES:
         for r in runs:
             r.begin([min(degree, int((b - a) * r.step_s * own_hz / PERIODS_A_DEGREE)) for a, b in r.spans])
         held = _follow(runs)
@@ -67,7 +67,9 @@ def _may_be_bias(run: _Run) -> bool:
     """Whether what bends a run's drift may be the walk of a gyro's bias; if not, it is a torque."""
     walks = 0.0
     for (first, last), drift in zip(run.spans, run.drifts, strict=True):
-        bias = legendre.legval(np.linspace(-1.0, 1.0, BLOCKS)[1:-1], legendre.legder(drift)) * 2.0 / (last - first)
+        bias = (
+            legendre.legval(np.linspace(-1.0, 1.0, DRIFT_BLOCKS)[1:-1], legendre.legder(drift)) * 2.0 / (last - first)
+        )
         walks = max(walks, float(np.ptp(bias)) / run.step_s)
     return walks <= MOST_WALK * float(np.sqrt(np.mean(run.rate**2)))
 
@@ -86,14 +88,14 @@ class _Run:
         self.step_s, self.cutoff_hz = trace.step_s, cutoff_hz
         self.angle, self.rate, _, torque = (np.asarray(x)[::UPSAMPLING] for x in trace.fine[:4])
         acceleration = self._passed(np.gradient(self.rate, trace.step_s))
-        slow = SLOW * float(np.max(np.abs(self.rate))) + 1e-300
+        slow = SLOW_SHARE * float(np.max(np.abs(self.rate))) + 1e-300
         counts = settled(trace.keep, trace.step_s, cutoff_hz) & (np.abs(self.rate) > slow)
-        every = max(1, int(1.0 / (SAMPLES_A_PERIOD * cutoff_hz * trace.step_s)))
+        every = max(1, int(1.0 / (ROWS_A_PERIOD * cutoff_hz * trace.step_s)))
         self.stretches, self.spans, rows = [], [], []
         for first, last in trace.stretches:
             here = np.arange(first, last + 1, every)
             here = here[counts[here]]
-            if len(here) >= 4 * BLOCKS:
+            if len(here) >= 4 * DRIFT_BLOCKS:
                 self.stretches.append((first, last))
                 self.spans.append((int(here[0]), int(here[-1])))
                 rows.append(here)
@@ -160,7 +162,7 @@ def _own_hz(runs: Sequence[_Run]) -> float | None:
     """The platform's own frequency by a linear model, the low-pass's at most; None where no spring is seen."""
     a, y = _projected(runs, [r.columns(1)[0] for r in runs])
     x, error = _least_squares(np.concatenate(a), np.concatenate(y))
-    if x[3] < KNOWN * error[3]:
+    if x[3] < KNOWN_SIGMAS * error[3]:
         return None
     cutoff_hz = runs[0].cutoff_hz
     return min(float(np.sqrt(x[3] / x[0]) / (2.0 * np.pi)), cutoff_hz) if x[0] > 0.0 else cutoff_hz
@@ -168,13 +170,13 @@ def _own_hz(runs: Sequence[_Run]) -> float | None:
 
 def _follow(runs: Sequence[_Run]) -> float:
     """Find the drift of every run, and what is left on samples held out; infinite where no spring holds."""
-    for powers in ROUNDS:
+    for powers in DRIFT_ROUNDS:
         columns, angles = zip(*(r.columns(powers) for r in runs), strict=True)
         a, y = _projected(runs, columns)
         x, error = _least_squares(np.concatenate(a), np.concatenate(y))
         angle = np.concatenate(angles)
         pull = float(np.mean(sum(k * x[2 + k] * angle ** (k - 1) for k in range(1, powers + 1))))
-        if not pull > KNOWN * error[3]:
+        if not pull > KNOWN_SIGMAS * error[3]:
             return np.inf
         for r, own in zip(runs, columns, strict=True):
             left = r.by_stretch(r.torque - own @ x)
@@ -191,9 +193,9 @@ def _held_out(runs: Sequence[_Run]) -> float:
         fold = []
         for r in runs:
             places = zip(r.spans, r.by_stretch(r.rows), strict=True)
-            at = [((1.0 + through(*place)) / 2.0 * BLOCKS).astype(int) for place in places]
+            at = [((1.0 + through(*place)) / 2.0 * DRIFT_BLOCKS).astype(int) for place in places]
             # At the ends of a stretch no polynomial is extrapolated.
-            fold.append([(b % 2 == k) & (b > 0) & (b < BLOCKS - 1) for b in at])
+            fold.append([(b % 2 == k) & (b > 0) & (b < DRIFT_BLOCKS - 1) for b in at])
         a, y = _projected(runs, columns, fold)
         x, _ = _least_squares(np.concatenate(a), np.concatenate(y))
         for r, own, folds in zip(runs, columns, fold, strict=True):
