@@ -28,7 +28,7 @@ from rig.dynamics.torque import TorqueSignal
 if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
 
-MAX_SAMPLES = 120_000  # that are looked at
+MAX_DELAY_SAMPLES = 120_000  # that are looked at
 ROUNDS, FIT_STEPS = 4, 3  # of moving them, and of the model in each
 SURE_RATIO = 10.0  # times what clocks bring: no name that brings more is theirs
 MAX_SHIFT_S = 50e-6  # of a run: two clocks that disagree by more show something else
@@ -69,7 +69,7 @@ def aligned(traces: Sequence[Trace], use: Sequence[Any], best: Fit) -> Aligned |
     moved: Aligned | None = None
     for _ in range(ROUNDS):
         runs = moved.traces if moved else traces
-        few, masks = thinned(runs, use, MAX_SAMPLES)
+        few, masks = thinned(runs, use, MAX_DELAY_SAMPLES)
         problem = PredictionError(few, masks)
         best = problem.fit(best.structure, best.values, problem.noise_of(best), FIT_STEPS, thorough=False)
         if not np.isfinite(best.cost):

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from identify.signals.noise import UPPER
 
-POINTS = 24  # of the band: the density is smooth
+NOISE_POINTS = 24  # of the band: the density is smooth
 
 
 @lru_cache(maxsize=256)
@@ -32,6 +32,6 @@ def filtered_density(lag: tuple[float, float], step_s: float) -> float:
     else:
         phi, p = np.exp(np.array([[-step_s / first]])), np.eye(1)
     driven, one = p - phi @ p @ phi.T, np.eye(len(p))
-    middles = UPPER[0] + (UPPER[1] - UPPER[0]) * (np.arange(POINTS) + 0.5) / POINTS
+    middles = UPPER[0] + (UPPER[1] - UPPER[0]) * (np.arange(NOISE_POINTS) + 0.5) / NOISE_POINTS
     rows = [np.linalg.inv(one - np.exp(-1j * np.pi * f) * phi)[0] for f in middles]
     return float(np.mean([np.real(row @ driven @ row.conj()) for row in rows]))

@@ -40,7 +40,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "propose/starts.py": "OTHER_START",
     "propose/torque_looks.py": "EVALUATIONS",
     "rivals/own_low_pass.py": "BEGUN_SAMPLES",
-    "rivals/run_delays.py": "FIT_STEPS MAX_SAMPLES MAX_SHIFT_S RCOND ROUNDS SURE_RATIO",
+    "rivals/run_delays.py": "FIT_STEPS MAX_DELAY_SAMPLES MAX_SHIFT_S RCOND ROUNDS SURE_RATIO",
     "rivals/run_heterogeneity.py": "RUN_CHANGE_ROUNDS",
     "rivals/whole_runs.py": "WHOLE_RUN_STEPS TOLERANCE",
     "select/curve_rivals.py": "NEAR",

@@ -24,7 +24,7 @@ from identify.report.page.quantities import QUANTITIES, axis
 from identify.results import Identification, RunTraces
 from rig.recording.run import Array
 
-POINTS = 3000  # of one line
+DRAWN_POINTS = 3000  # of one line
 RUNS = 12  # drawn at most; result.json and recording.h5 have all
 
 
@@ -55,18 +55,25 @@ def run_figure(identification: Identification, trace: RunTraces) -> Figure:
     name, unit = QUANTITIES[identification.axis].measured(trace)
     time, two = trace.time_s - trace.time_s[0], identification.after is not None
     drawn = [
-        lines(*line(time, trace.measured, POINTS), "measured", MEASURED, width=3.5, opacity=0.6),
+        lines(*line(time, trace.measured, DRAWN_POINTS), "measured", MEASURED, width=3.5, opacity=0.6),
         lines(
-            *line(time, trace.simulated_before, POINTS), "declared model", BEFORE, visible="legendonly" if two else True
+            *line(time, trace.simulated_before, DRAWN_POINTS),
+            "declared model",
+            BEFORE,
+            visible="legendonly" if two else True,
         ),
     ]
     panels = [Panel("", axis(name, unit)), Panel("", axis("error", unit), "measured minus the declared model")]
     before = motion_error(trace, trace.simulated_before)
-    drawn.append(lines(*line(time, before, POINTS), "error, declared model", BEFORE, 2, width=0.9, showlegend=False))
+    drawn.append(
+        lines(*line(time, before, DRAWN_POINTS), "error, declared model", BEFORE, 2, width=0.9, showlegend=False)
+    )
     if two:
         after = motion_error(trace, trace.simulated_after)
-        drawn.append(lines(*line(time, trace.simulated_after, POINTS), "final model", AFTER, width=1.0))
-        drawn.append(lines(*line(time, after, POINTS), "error, final model", AFTER, 3, width=0.9, showlegend=False))
+        drawn.append(lines(*line(time, trace.simulated_after, DRAWN_POINTS), "final model", AFTER, width=1.0))
+        drawn.append(
+            lines(*line(time, after, DRAWN_POINTS), "error, final model", AFTER, 3, width=0.9, showlegend=False)
+        )
         panels.append(Panel("", axis("error", unit), "measured minus the final model"))
     last = len(panels)
     panels[-1] = Panel("time since the start of the run (s)", panels[-1].y_title, panels[-1].title)
