@@ -136,6 +136,7 @@ def test_what_a_clean_torque_leaves_is_not_blamed_on_its_noise(filtered: bool) -
     assert torque_sensor_noise.describe(found) == ""
 
 
+@pytest.mark.slow
 def test_two_runs_of_different_noise_have_no_colour_in_common() -> None:
     runs = recorded(passed(2, 100.0)).runs
     other = recorded(passed(2, 50.0), seed=1).runs[4]

@@ -55,7 +55,7 @@ def found_in(runs: list[Run], settings: IdentifyConfig = SETTINGS, model: Platfo
 
 
 def test_a_torque_that_begins_with_the_runs_is_named() -> None:
-    found = found_in([shaken(*one, seed=k, stands=False) for k, one in enumerate(SETS)])
+    found = found_in([shaken(*one, seed=k, stands=False, lasts_s=4.0) for k, one in enumerate(SETS)])
     assert found.verdict.effects == ("periodic_disturbance",)
     assert found.accepted, found.reasons
     assert not found.verdict.left_open
