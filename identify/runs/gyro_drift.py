@@ -21,6 +21,7 @@ from identify.signals.low_pass import low_pass, settled
 from identify.signals.trace import MOST_WALK, UPSAMPLING, Trace
 from rig.arrays import Array
 
+# All set by hand, on one recording with three gaps and on simulated ones; ``MOST_WALK`` is the likelihood's own bound.
 DRIFT_SAMPLES = 40_000  # of all runs together, that the drift is looked for in
 DRIFT_DEGREES = (1, 2, 3, 5, 8, 12, 18)  # of the polynomial: a bias that stays makes a line, its walk bends that
 PERIODS_A_DEGREE = 8.0  # of the platform's own swing, that a stretch lasts at least for each degree
