@@ -59,6 +59,9 @@ class ResidualDiagnosis:
     moments: tuple[Moment, ...] = ()  # that hold most of it, the loudest first; empty where it is spread
 
 
+FROM_RUN_TO_RUN = "from run to run"
+
+
 @dataclass(frozen=True)
 class Dependence:
     """What the torque that is left depends on, as a free-form term beside the model shows it.
@@ -82,7 +85,7 @@ class Dependence:
         Of what is "angle", "rate" or "torque" times a wave over the time: which, and the wave's frequency.
     changes
         "inertia", "stiffness", "damping", "friction" or "torque of the drive" where one of these, changing with what
-        it depends on, gives this torque.
+        it depends on, gives this torque; "from run to run" where J, C and K fitted to every run by itself give it.
     """
 
     on: str

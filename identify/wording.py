@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from identify.residual import Dependence, Disturbance
+from identify.residual import FROM_RUN_TO_RUN, Dependence, Disturbance
 from identify.results import NORMAL_95, Errors, Identification, NotReported, ParameterEstimate
 
 SYMBOLS = {
@@ -241,15 +241,17 @@ def residual_torque_sentence(left: Disturbance, axis: str) -> str:
             "counts as noise and is included in the intervals."
         )
     each = joined(
-        [f"{number(100.0 * d.relative, 2)} % depends on the {depends_on(d.on, axis)}{_how(d)}" for d in left.depends_on]
+        [f"{number(100.0 * d.relative, 2)} % depends on the {quantity_of(d, axis)}{_how(d)}" for d in left.depends_on]
     )
-    moved = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in left.moves_percent.items()])
+    moved = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in left.moves_percent.items() if v > 0.0])
     change = f" Fitting this part too changes {moved}." if moved else ""
     return f"The final model leaves a residual {torque} of {size}. Of the {torque}, {each}.{change}"
 
 
 def _how(part: Dependence) -> str:
     """Of what changes as a wave: what, and how fast; of what changes with a quantity: what."""
+    if part.changes == FROM_RUN_TO_RUN:
+        return " (J, C and K fitted to each run by itself differ)"
     if part.changes:
         return f" (as if the {part.changes} changed with it)"
     if part.wave_hz is None:
@@ -265,6 +267,16 @@ def depends_on(quantity: str, axis: str) -> str:
     words = {"history": "past motion", "frequency": "frequency (spectral lines)"}
     words |= {"angle": "position", "rate": "speed", "torque": "force"} if axis == "linear" else {}
     return words.get(quantity, quantity)
+
+
+def quantity_of(part: Dependence, axis: str) -> str:
+    """The same of a part of the residual; what changes from run to run depends on the run."""
+    return "run" if part.changes == FROM_RUN_TO_RUN else depends_on(part.on, axis)
+
+
+def quantities_of(parts: Sequence[Dependence], axis: str) -> str:
+    """The quantities that parts of the residual depend on, each once: "angle and direction"."""
+    return joined(list(dict.fromkeys(quantity_of(d, axis) for d in parts)))
 
 
 def without(times: float) -> str:

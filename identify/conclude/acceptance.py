@@ -10,7 +10,7 @@ from identify.residual import Disturbance
 from identify.results import GeneticRun, Identification, ModelResult
 from identify.runs.sign_convention import signs
 from identify.select.lags import PASSIVE_SIGMAS
-from identify.wording import SYMBOLS, depends_on, joined, number, percent, plain
+from identify.wording import SYMBOLS, joined, number, percent, plain, quantities_of
 from rig.config.identify import AcceptConfig
 from rig.platform import TERMS
 
@@ -74,7 +74,7 @@ def reasons_against_disturbance(left: Disturbance, accept: AcceptConfig, axis: s
             "where it shows"
             for effect, changes, keys in _beyond(left, accept)
         ]
-    on = joined(list(dict.fromkeys(depends_on(d.on, axis) for d in left.depends_on)))
+    on = quantities_of(left.depends_on, axis)
     out = []
     if left.material_percent > accept.torque_percent:
         out.append(

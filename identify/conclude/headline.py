@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from identify.conclude.acceptance import opposite_signs
 from identify.model.parameter_fit import reduced_chi_square
+from identify.residual import FROM_RUN_TO_RUN
 from identify.results import Identification
 from identify.runs.sign_convention import SENTENCE
 from identify.wording import (
     SYMBOLS,
     bias_percent,
     capital,
-    depends_on,
     joined,
     number,
     off_by,
     plain,
+    quantities_of,
+    quantity_of,
     readable,
     sentence,
     unit,
@@ -57,7 +59,9 @@ def _changing(found: Identification) -> str:
     most = max(parts, key=lambda d: d.relative, default=None)
     if most is None or not most.changes:
         return ""
-    quantity = depends_on(most.on, found.axis)
+    if most.changes == FROM_RUN_TO_RUN:
+        return "The declared model does not hold for all runs: J, C and K fitted to each run by itself differ."
+    quantity = quantity_of(most, found.axis)
     return f"The declared model takes the {most.changes} for constant, and it changes with the {quantity}."
 
 
@@ -123,7 +127,7 @@ def _left(found: Identification) -> str:
     if not left.depends_on:
         share = number(100.0 * left.relative, 2)
         return f"the {torque} that is left ({share} % of the {torque}) depends on nothing that was tested"
-    on = joined(list(dict.fromkeys(depends_on(d.on, found.axis) for d in left.depends_on)))
-    moved = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in left.moves_percent.items()])
+    on = quantities_of(left.depends_on, found.axis)
+    moved = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in left.moves_percent.items() if v > 0.0])
     size = f"what is left and depends on the {on} is {number(left.material_percent, 2)} % of the {torque}"
     return f"{size} and moves {moved}, which is allowed" if moved else f"{size}, which is allowed"

@@ -12,6 +12,7 @@ from identify.diagnose import torque_sensor_noise
 from identify.diagnose.torque_residual import dependence
 from identify.diagnose.wording import is_significant
 from identify.model.parameter_fit import reduced_chi_square
+from identify.residual import FROM_RUN_TO_RUN
 from identify.results import GeneticRun, Identification, ResidualDiagnosis, RunTraces, follow_up_file_name
 from identify.runs.sign_convention import SENTENCE
 from identify.wording import PULSATING, capital, joined, number, plain
@@ -45,6 +46,11 @@ RUN = {
     ),
 }
 RUN["direction"] = RUN["rate"]
+BETWEEN_RUNS = (
+    "J, C and K of the runs differ, and no effect here explains why: play the same frequency at half and at twice the "
+    "torque, and then once more as before. Where the numbers follow the travel, something is nonlinear (also a sensor "
+    "may be: compare its scale at small and large rates); where they do not return, the rig changes between runs."
+)
 CHANGING = {
     "inertia": "a crank, a linkage, a load that shifts or a second axis that stands elsewhere",
     "damping": "a magnet or a brake that is not centred, or a gap that changes",
@@ -219,9 +225,11 @@ def _pulsating(found: Identification) -> str:
 
 
 def _changing(found: Identification) -> str:
-    """Where to look for an inertia, a damping or a friction that changes with the angle; empty where none does."""
+    """Where to look for what changes with the angle or from run to run; empty where nothing does."""
     parts = () if found.disturbance is None else found.disturbance.depends_on
     most = max(parts, key=lambda d: d.relative, default=None)
+    if most is not None and most.changes == FROM_RUN_TO_RUN:
+        return BETWEEN_RUNS
     if most is None or most.changes not in CHANGING or most.on == "time":
         return ""
     position = "position" if found.axis == "linear" else "angle"

@@ -11,13 +11,13 @@ from identify.runs.sign_convention import SENTENCE
 from identify.select.evidence import WEIGHT
 from identify.wording import (
     capital,
-    depends_on,
     half_interval,
     how_to_separate,
     joined,
     number,
     off_by,
     plain,
+    quantities_of,
     readable,
     residual_torque_sentence,
     title,
@@ -88,7 +88,7 @@ def _what_it_depends_on(found: Identification) -> str:
     left = found.disturbance
     if not found.accepted or left is None:
         return "the plots show what it depends on"
-    on = joined(list(dict.fromkeys(depends_on(d.on, found.axis) for d in left.depends_on)))
+    on = quantities_of(left.depends_on, found.axis)
     return f"it depends on the {on}" if on else "it depends on no quantity that was tested"
 
 

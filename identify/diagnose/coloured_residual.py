@@ -6,11 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.signal import find_peaks
+from scipy.stats import chi2, norm
+from scipy.stats import t as student
 
 from rig.arrays import Array
 
 AUTOREGRESSION_ORDER = 24  # of the autoregression: six periods of the cut-off, at four samples each
 AUTOREGRESSION_ROUNDS = 3  # of fitting the autoregression and the parameters in turn
+LEAST_RATE = 1e-12  # below it a rate of error tells nothing: neither test is exact that far out
 LINES = 4  # that are looked for in a run
 
 
@@ -29,8 +32,17 @@ def strongest(found: list[tuple[float, float]]) -> tuple[float, ...]:
     return tuple(f for _, f in sorted(found, reverse=True)[: 2 * LINES])
 
 
-def standard_errors(values: Sequence[float]) -> float:
+def standard_errors(values: Sequence[float] | Array) -> float:
+    """By how many of its standard errors an average lies above zero."""
     return float(np.mean(values) / max(float(np.std(values, ddof=1)), 1e-300) * np.sqrt(len(values)))
+
+
+def combined(groups: Sequence[Array]) -> float:
+    """The same of several groups of values of which only some may lie above zero, in standard errors."""
+    enough = [g for g in groups if len(g) > 1]
+    rates = [float(student.sf(standard_errors(g), len(g) - 1)) for g in enough]
+    rate = float(chi2.sf(-2.0 * np.sum(np.log(np.maximum(rates, LEAST_RATE))), 2 * len(rates))) if rates else 1.0
+    return float(norm.isf(max(rate, LEAST_RATE)))
 
 
 def rms(values: Array) -> float:

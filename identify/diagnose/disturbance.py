@@ -7,13 +7,15 @@ free-form term (a spline) beside the model takes it up, and how far J, C and K m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.interpolate import BSpline
 from scipy.stats import norm
 
+from identify.diagnose.terms.changing import along_angle, pulsating
+from identify.diagnose.terms.curves import curves
+from identify.diagnose.terms.free_form import FreeForm
+from identify.diagnose.terms.from_run_to_run import FROM_RUN_TO_RUN, between_runs, moved_on_average
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.model.parameters import Name
@@ -21,29 +23,10 @@ from identify.results import Dependence, Disturbance
 from rig.arrays import Array
 from rig.platform import TERMS
 
-SPLINE_KNOTS = 7  # inner knots of a spline, at even shares of the samples
 DEPENDENCE_SIGMAS = 4.0  # standard errors over blocks of held-out samples; by chance once in 30,000
 MIN_POWER_SHARE = 0.02  # of the power that is left: less is not worth a word
 MIN_OVER_NOISE = 2.0  # times what the term makes of the sensor's noise alone: an integrated rate wanders with that
-SHAPE_POINTS = 25  # places at which a curve's shape is given
-OUTER = (0.8, 0.95)  # shares of the samples inside of which nothing is touched
 MISSING_IN_RUNS, MISSING_SHARE = 0.25, 0.25  # runs in which a wave may be missing: with less of its share in all
-MIN_PERIODS = 3.0  # in the longest run, of what changes as a wave: a slower change is one over the time itself
-PAST_RUN_SHARES = (0.05, 0.5)  # of the run: time constants with which a rate is remembered
-
-
-@dataclass(frozen=True)
-class FreeForm:
-    """A free-form term: its columns at every sample, and where its shape is shown."""
-
-    on: str
-    columns: Array  # (n, k)
-    at: Array
-    shape: Array  # (SHAPE_POINTS, k)
-    of_each_run: bool = False  # columns that belong to one run each
-    wave_on: str = ""
-    wave_hz: float | None = None
-    changes: str = ""
 
 
 def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float, unit: str) -> Disturbance:
@@ -58,17 +41,24 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
     """
     left = float(np.sqrt(max(fit.held_nm**2 - floor_nm**2, 0.0)))
     relative = left / max(regression.torque_nm, 1e-300)
-    found = [f for term in free_forms(regression) if (f := _dependence(regression, fit, term)) is not None]
+    found = _depends(regression, fit, curves(regression))
     # Where a trajectory repeats, these follow what anything else explains: they count where they explain more.
     most = max((f[0].torque_rms for f in found), default=0.0)
-    along = [f for term in _along_angle(regression) if (f := _dependence(regression, fit, term)) is not None]
-    found += [f for f in along if f[0].torque_rms > most]
+    follow = [*along_angle(regression), *between_runs(regression, fit)]
+    found += [f for f in _depends(regression, fit, follow) if f[0].torque_rms > most]
     if not found:  # asked last: it may follow, as a change over time, what an angle or a rate explains by itself
-        found = [f for term in _pulsating(regression, fit) if (f := _dependence(regression, fit, term)) is not None]
+        found = _depends(regression, fit, pulsating(regression, fit))
     found.sort(key=lambda f: -f[0].torque_rms)
     found = [f for i, f in enumerate(found) if f[0].on not in [g[0].on for g in found[:i]]]
     moves = _moves(fit, [moved for _, moved in found])
     return Disturbance(left, unit, relative, tuple(d for d, _ in found), moves)
+
+
+def _depends(
+    regression: TorqueRegression, fit: TorqueFit, terms: Sequence[FreeForm]
+) -> list[tuple[Dependence, Mapping[Name, float]]]:  # fmt: skip
+    """Those of several terms that the residual goes with."""
+    return [found for term in terms if (found := _dependence(regression, fit, term)) is not None]
 
 
 def _dependence(
@@ -79,14 +69,15 @@ def _dependence(
         richer, gains = regression.following(fit, term.columns)
     else:
         richer, gains = regression.beside(fit, term.columns, term.of_each_run)
-    by_size, by_ratio = regression.fall_in_sigmas(fit, richer)
-    sure = max(by_size, by_ratio)
-    share = 1.0 - richer.held_nm**2 / max(fit.held_nm**2, 1e-300)
+    # What is fitted to each run is held out by blocks, and so is what it stands beside.
+    alone = regression.beside(fit, term.columns[:, :0], True)[0] if term.of_each_run else fit
+    sure = max(regression.fall_in_sigmas(alone, richer, of_each_run=term.changes == FROM_RUN_TO_RUN))
+    share = 1.0 - richer.held_nm**2 / max(alone.held_nm**2, 1e-300)
     if share < MIN_POWER_SHARE or sure < DEPENDENCE_SIGMAS:
         return None
-    if term.of_each_run and not _in_most_runs(fit, richer, share):
+    if term.wave_on and not _in_most_runs(alone, richer, share):
         return None
-    size = float(np.sqrt(share)) * fit.held_nm
+    size = float(np.sqrt(share)) * alone.held_nm
     if size < MIN_OVER_NOISE * regression.made_by_noise_nm(fit.values, term.columns):
         return None
     at, shape_nm = tuple(term.at.tolist()), tuple((term.shape @ gains).tolist())
@@ -114,6 +105,8 @@ def _moved(
     """
     if term.on == "torque":
         return regression.moved_by(fit, term.columns @ gains)
+    if term.changes == FROM_RUN_TO_RUN:
+        return moved_on_average(regression, fit, richer, term.columns, gains)
     moved = {n: v - fit.values[n] for n, v in richer.values.items() if n in fit.values}
     if term.on == "angle" and term.at.size and ("stiffness",) in moved:
         slope = np.gradient(term.shape @ gains, term.at)
@@ -131,164 +124,3 @@ def _moves(fit: TorqueFit, moved: Sequence[Mapping[Name, float]]) -> Mapping[str
             if here:
                 out[name] = max(out.get(name, 0.0), 100.0 * abs(by.get((name,), 0.0) / here))
     return out
-
-
-def free_forms(regression: TorqueRegression) -> list[FreeForm]:
-    """The terms that are tried, without what the linear model has of the same quantity."""
-    _, rate, _, torque, time, run = regression.series()
-    slow = 0.05 * float(np.sqrt(np.mean(rate**2))) + 1e-300
-    driven = [] if regression.torque_free else [_spline("torque", regression)]
-    ends = np.array([-1.0, 1.0])
-    out = [
-        _spline("angle", regression), _beyond("angle", regression), _spline("rate", regression), *driven,
-        FreeForm(
-            "direction", regression.along("rate", lambda v: np.tanh(v / slow)[:, None]), ends, ends[:, None]
-        ),
-    ]  # fmt: skip
-    if float(np.max(time)) > 0.0:
-        angle = regression.series()[0]
-        out += [_over_time(time), *_changing(time, {"stiffness": angle, "damping": rate})]
-        out += [] if regression.torque_free else _changing(time, {"torque of the drive": torque})
-    out.append(_history(rate, run, regression))
-    return [f for f in out if f.columns.shape[1] > 0 and np.all(np.isfinite(f.columns))]
-
-
-def _spline(on: str, regression: TorqueRegression) -> FreeForm:
-    """Cubic splines of a quantity with what is constant and linear in it taken out."""
-    x = regression.values_of(on)
-    free, at = _free_splines(x)
-    if free is None:
-        return FreeForm(on, np.zeros((len(regression.series()[0]), 0)), np.zeros(0), np.zeros((0, 0)))
-    return FreeForm(on, regression.along(on, free), at, free(at))
-
-
-def _over_time(time: Array) -> FreeForm:
-    """The same of the time in a run."""
-    free, at = _free_splines(time)
-    return FreeForm("time", np.zeros((len(time), 0)) if free is None else free(time), at, free(at) if free else at)
-
-
-def _free_splines(x: Array) -> tuple[Callable[[Array], Array] | None, Array]:
-    """Splines with knots at even shares of the values, and places at which to show them; None of too few values."""
-    inner = np.unique(np.quantile(x, np.linspace(0.0, 1.0, SPLINE_KNOTS + 2)))
-    if len(inner) < 4:
-        return None, np.zeros(0)
-    knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
-
-    def basis(values: Array) -> Array:
-        return np.asarray(BSpline.design_matrix(np.clip(values, inner[0], inner[-1]), knots, 3).toarray())
-
-    def straight(values: Array) -> Array:
-        return np.column_stack([np.ones(len(values)), values])
-
-    columns = basis(x)
-    line = np.linalg.lstsq(straight(x), columns, rcond=None)[0]
-    _, s, v = np.linalg.svd(columns - straight(x) @ line, full_matrices=False)
-    kept = v[s > 1e-6 * s[0]].T
-    at = np.linspace(inner[0], inner[-1], SHAPE_POINTS)
-    return lambda values: (basis(values) - straight(values) @ line) @ kept, at
-
-
-def _beyond(on: str, regression: TorqueRegression) -> FreeForm:
-    """What begins at the ends of a quantity's range, as a stop does: straight from the outer shares of samples on."""
-    x = regression.values_of(on)
-    middle = float(np.median(x))
-    starts = [(s, float(np.quantile(s * (x - middle), share))) for s in (-1.0, 1.0) for share in OUTER]
-
-    def hinges(values: Array) -> Array:
-        return np.stack([s * np.maximum(s * (values - middle) - b, 0.0) for s, b in starts], axis=1)
-
-    at = np.linspace(float(np.min(x)), float(np.max(x)), SHAPE_POINTS)
-    return FreeForm(on, regression.along(on, hinges), at, hinges(at))
-
-
-def _changing(time: Array, series: Mapping[str, Array]) -> list[FreeForm]:
-    """What angle, rate and torque pass on, changing with time: a spring that sets, grease or a drive that warms up."""
-    along = (time - np.mean(time)) / max(float(np.ptp(time)), 1e-300)
-    shape = np.stack([along, along**2 - np.mean(along**2)], axis=1)
-    none = np.zeros((0, 2))
-    return [FreeForm("time", shape * x[:, None], np.zeros(0), none, changes=what) for what, x in series.items()]
-
-
-def _along_angle(regression: TorqueRegression) -> list[FreeForm]:
-    """Inertia, damping and dry friction that change with the angle: a crank, an eccentric magnet, a seal.
-
-    A turning inertia that changes with the angle gives the square of the rate besides, by half its slope (Lagrange).
-    Each changes about what it is on average where it shows, which is the number that the model has.
-    """
-    angle, rate, acceleration = regression.series()[:3]
-    free, _ = _free_splines(angle)
-    if free is None:
-        return []
-
-    def shape(at: Array) -> Array:
-        return np.column_stack([at, free(at)])
-
-    beside = 1e-4 * float(np.ptp(angle))
-    slope = (shape(angle + beside) - shape(angle - beside)) / (2.0 * beside)
-    here = shape(angle)
-
-    def about(x: Array) -> Array:
-        return here - (x**2 @ here) / max(float(x @ x), 1e-300)
-
-    slow = 0.05 * float(np.sqrt(np.mean(rate**2))) + 1e-300
-    direction = np.tanh(rate / slow)
-    terms = {
-        "inertia": about(acceleration) * acceleration[:, None] + 0.5 * slope * rate[:, None] ** 2,
-        "damping": about(rate) * rate[:, None],
-        "friction": about(direction) * direction[:, None],
-    }
-    none = np.zeros((0, here.shape[1]))
-    return [FreeForm("angle", columns, np.zeros(0), none, changes=what) for what, columns in terms.items()]
-
-
-def _pulsating(regression: TorqueRegression, fit: TorqueFit) -> list[FreeForm]:
-    """Angle, rate and torque times a wave over the time: a spring, a damping or a gain that something outside changes.
-
-    The frequency is where the residual times the quantity has its highest line; the phase is another in every run.
-    """
-    angle, rate, _, torque, time, run = regression.series()
-    residual = np.concatenate(fit.residuals)
-    out = []
-    driven = [] if regression.torque_free else [("torque", torque)]
-    for on, series in (("angle", angle), ("rate", rate), *driven):
-        frequency_hz = _strongest_line_hz(residual * series, time, run, regression.cutoff_hz)
-        if frequency_hz is None:
-            continue
-        wave = np.exp(2j * np.pi * frequency_hz * time) * series
-        columns = [part * (run == k) for k in np.unique(run) for part in (wave.real, wave.imag)]
-        none = np.zeros((0, len(columns)))
-        out.append(FreeForm("time", np.stack(columns, axis=1), np.zeros(0), none, True, on, frequency_hz))
-    return out
-
-
-def _strongest_line_hz(values: Array, time: Array, run: Array, highest_hz: float) -> float | None:
-    """The frequency at which the power of all runs' lines is highest; None where no run is long enough for one."""
-    step_s = float(np.min(np.diff(time)[np.diff(time) > 0.0], initial=np.inf))
-    longest_s = float(np.max(time))
-    lowest_hz = MIN_PERIODS / max(longest_s, 1e-300)
-    if not np.isfinite(step_s) or lowest_hz >= min(highest_hz, 0.5 / step_s):
-        return None
-    size = 2 ** int(np.ceil(np.log2(2.0 * longest_s / step_s + 2.0)))  # half a line's width between two frequencies
-    power = np.zeros(size // 2 + 1)
-    for k in np.unique(run):
-        here = run == k
-        on_grid = np.bincount(np.rint(time[here] / step_s).astype(int), values[here] - np.mean(values[here]), size)
-        power += np.abs(np.fft.rfft(on_grid)) ** 2
-    hz = np.fft.rfftfreq(size, step_s)
-    power[(hz < lowest_hz) | (hz > highest_hz)] = 0.0
-    return float(hz[np.argmax(power)])
-
-
-def _history(rate: Array, run: Array, regression: TorqueRegression) -> FreeForm:
-    """The direction of the motion as it was a while ago, with two lengths of memory."""
-    direction = np.tanh(rate / (0.05 * float(np.sqrt(np.mean(rate**2))) + 1e-300))
-    out = np.zeros((len(rate), len(PAST_RUN_SHARES)))
-    for k in np.unique(run):
-        here = np.nonzero(run == k)[0]
-        for j, share in enumerate(PAST_RUN_SHARES):
-            memory, decay = 0.0, float(np.exp(-1.0 / max(share * 0.1 * len(here), 1.0)))
-            for i in here:
-                memory = decay * memory + (1.0 - decay) * direction[i]
-                out[i, j] = memory
-    return FreeForm("history", out, np.zeros(0), np.zeros((0, len(PAST_RUN_SHARES))))

@@ -17,7 +17,7 @@ from identify.diagnose.torque_residual import at_samples, motion
 from identify.model.parameters import Name
 from identify.model.structure import UNIT, Shapes, Structure
 from identify.runs.holdout import Split
-from identify.signals.low_pass import EDGE_PERIODS, low_pass
+from identify.signals.low_pass import low_pass, settled
 from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace
 from rig import effects
 from rig.arrays import Array
@@ -78,12 +78,8 @@ class LowPassedTorque:
         return np.minimum(self._rows[i] * FOLD_BLOCKS // max(len(self.traces[i].measured), 1), FOLD_BLOCKS - 1)
 
     def _rows_of(self, t: Trace, step: int, counts: Any) -> Any:
-        """Every ``step``-th sample of a run that ``counts``, (m,), clear of what the low-pass does at its ends."""
-        edge = int(np.ceil(EDGE_PERIODS / (self.cutoff_hz * t.step_s)))
-        n = len(t.measured)
-        rows = np.arange(0, n, step)
-        inside = (rows >= edge) & (rows < n - edge) if n > 20 * edge else np.ones(len(rows), dtype=bool)
-        return rows[inside & counts[rows]]
+        """Every ``step``-th sample of a run that ``counts``, (m,), and at which the low-pass has settled."""
+        return np.arange(0, len(t.measured), step)[(settled(t.keep, t.step_s, self.cutoff_hz) & counts)[::step]]
 
     def _standing(self, t: Trace) -> Any:
         """Samples at which the platform stands or turns back, (n,).
@@ -223,5 +219,9 @@ class LowPassedTorque:
         motions = [np.concatenate([m[k] for m in self._motion]) for k in range(3)]
         torque = np.concatenate([self._target(i, ()) for i in range(len(self.traces))])
         time = np.concatenate([r * t.step_s for r, t in zip(self._rows, self.traces, strict=True)])
-        run = np.concatenate([np.full(len(r), i) for i, r in enumerate(self._rows)])
-        return motions[0], motions[1], motions[2], torque, time, run
+        return motions[0], motions[1], motions[2], torque, time, self.run_of_each
+
+    @property
+    def run_of_each(self) -> Any:
+        """Number of the run at every sample behind the low-pass, (n,)."""
+        return np.concatenate([np.full(len(r), i) for i, r in enumerate(self._rows)])

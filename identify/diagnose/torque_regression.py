@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
-from identify.diagnose.coloured_residual import bounded, coloured_cost, lines, rms, standard_errors, strongest
+from identify.diagnose.coloured_residual import bounded, coloured_cost, combined, lines, rms, standard_errors, strongest
 from identify.diagnose.low_passed_torque import LowPassedTorque
 from identify.diagnose.torque_fit import TorqueFit
 from identify.model.effect_torque import feeds_on_torque
@@ -84,7 +84,7 @@ class TorqueRegression(LowPassedTorque):
         wide = np.column_stack([a, columns])
         low = np.array([self._low(n) for n in names] + [-np.inf] * (extra + columns.shape[1]))
         ridge = np.zeros(wide.shape[1])
-        ridge[a.shape[1] :] = CURVE_RIDGE * float(np.mean(np.sum(columns * columns, axis=0)))
+        ridge[a.shape[1] :] = CURVE_RIDGE * float(np.mean(np.sum(columns * columns, axis=0))) if columns.size else 0.0
         own = np.arange(wide.shape[1])
         free = (own >= len(names)) & (own < a.shape[1])
         folds = self._by_block if of_each_run else self._folds(names, extra)
@@ -97,6 +97,20 @@ class TorqueRegression(LowPassedTorque):
             fit, vector=np.array([values[n] for n in fit.names]), variance=rms(r[self._fitted]) ** 2,
             held_nm=rms(held[self._judged]), residuals=np.split(r, ends), held=np.split(held, ends),
         ), x[a.shape[1] :]  # fmt: skip
+
+    def columns_of(self, fit: TorqueFit) -> dict[Name, Array]:
+        """The column of every linear parameter of a model over all runs, (n,) each."""
+        a, _, names, _ = self._over_all_runs(fit.structure, fit.shapes)
+        return {name: a[:, k] for k, name in enumerate(names)}
+
+    def covariance_beside(self, richer: TorqueFit, columns: Array) -> tuple[list[Name], Array]:
+        """Names of a model's linear parameters, and the covariance of these and of the gains of further columns."""
+        a, _, names, _ = self._over_all_runs(richer.structure, richer.shapes)
+        wide = np.column_stack([a, columns])[self._fitted]
+        size = np.sqrt(np.maximum(np.sum(wide * wide, axis=0), 1e-300))
+        inverse = np.linalg.pinv((wide / size).T @ (wide / size)) / np.outer(size, size)
+        kept = np.r_[: len(names), a.shape[1] : wide.shape[1]]
+        return names, richer.variance * inverse[np.ix_(kept, kept)]
 
     def _folds(self, names: Sequence[Name], extra: int) -> list[Any]:
         """Samples held out in turn: whole runs, unless something is fitted for every run."""
@@ -250,25 +264,35 @@ class TorqueRegression(LowPassedTorque):
                 ]
         return strongest(hz), strongest(orders)
 
-    def fall_in_sigmas(self, base: TorqueFit, richer: TorqueFit) -> tuple[float, float]:
+    def fall_in_sigmas(self, base: TorqueFit, richer: TorqueFit, of_each_run: bool = False) -> tuple[float, float]:
         """Standard errors by which the squared residual on held-out samples is lower, block by block.
 
         Of the falls, and of the falls of their logarithms: a few blocks with all of the torque must not hide that all
-        others gain.
+        others gain. Of what is fitted to each run by itself, a run that knows little of it must not hide that others
+        do: the error rates of all runs are combined (Fisher 1925).
         """
-        fall, ratio = [], []
+        by_run = [falls for falls in self._falls(base, richer) if len(falls[0])]
+        if sum(len(fall) for fall, _ in by_run) < MIN_BLOCKS:
+            return 0.0, 0.0
+        fall, ratio = zip(*by_run, strict=True)
+        if np.mean(np.concatenate(fall)) <= 0.0:
+            return 0.0, 0.0
+        if of_each_run:
+            return combined(fall), combined(ratio)
+        return standard_errors(np.concatenate(fall)), standard_errors(np.concatenate(ratio))
+
+    def _falls(self, base: TorqueFit, richer: TorqueFit) -> list[tuple[Array, Array]]:
+        """Falls of the squared residual on held-out samples and of its logarithm in the blocks of every run."""
+        out = []
         ends = np.cumsum([len(r) for r in self._rows])[:-1]
         for old, new, judged in zip(base.held, richer.held, np.split(self._judged, ends), strict=True):
             before, after = old[judged] ** 2, new[judged] ** 2
-            if len(before):
-                count = max(1, min(BLOCKS_A_RUN, len(before) // BLOCK_SAMPLES))
-                pairs = zip(np.array_split(before, count), np.array_split(after, count), strict=True)
-                powers = np.array([(np.mean(x), np.mean(y)) for x, y in pairs])
-                fall += (powers[:, 0] - powers[:, 1]).tolist()
-                ratio += np.log(np.maximum(powers[:, 0], 1e-300) / np.maximum(powers[:, 1], 1e-300)).tolist()
-        if len(fall) < MIN_BLOCKS or np.mean(fall) <= 0.0:
-            return 0.0, 0.0
-        return standard_errors(fall), standard_errors(ratio)
+            count = max(1, min(BLOCKS_A_RUN, len(before) // BLOCK_SAMPLES)) if len(before) else 0
+            pairs = zip(np.array_split(before, count), np.array_split(after, count), strict=True) if count else ()
+            powers = np.array([(np.mean(x), np.mean(y)) for x, y in pairs]).reshape(-1, 2)
+            logs = np.log(np.maximum(powers, 1e-300))
+            out.append((powers[:, 0] - powers[:, 1], logs[:, 0] - logs[:, 1]))
+        return out
 
     def evidence(self, base: TorqueFit, richer: TorqueFit) -> float:
         """Fall of the penalised cost, the residual's colour taken from either model, whichever does better."""

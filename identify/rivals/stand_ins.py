@@ -20,7 +20,7 @@ from identify.select.evidence import WEIGHT
 from identify.select.field_search import Found, with_free_form
 from identify.select.free_form_residual import MOVED_SIGMAS
 from identify.signals.trace import Trace
-from identify.wording import depends_on, joined, plain
+from identify.wording import joined, plain, quantity_of
 from rig import effects
 from rig.platform import TERMS
 
@@ -90,7 +90,7 @@ def _taken_back(found: Found, names: Sequence[str], axis: str, less: Found | Non
     search = less.search
     words = (
         f"Not named: {_listed(names)}. This would explain part of what is missing, but can follow almost any torque, "
-        f"and with it the residual still depends on the {depends_on(depends[0].on, axis)}."
+        f"and with it the residual still depends on the {quantity_of(depends[0], axis)}."
     )
     search.drop(less.kept, "left open")
     search.left_open = f"{search.left_open} {words}".strip()

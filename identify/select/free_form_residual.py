@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2
 
-from identify.diagnose.disturbance import SHAPE_POINTS
+from identify.diagnose.terms.free_form import SHAPE_POINTS
 from identify.likelihood.fit import Fit
 from identify.model.parameters import Name
 from identify.propose.free_forms import fitted, scores, states_of, torque_of

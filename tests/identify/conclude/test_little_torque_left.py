@@ -63,3 +63,5 @@ def test_what_depends_on_nothing_and_is_a_thousandth_of_the_torque_refuses_no_mo
     assert found.verdict.effects == ("flexible_mode",)
     assert found.final.parameters["inertia"].value == pytest.approx(0.01, rel=2e-3)
     assert found.accepted, found.reasons
+    assert found.disturbance is not None
+    assert found.disturbance.relative < 0.005  # runs of five seconds have ends, too, where the low-pass has not settled

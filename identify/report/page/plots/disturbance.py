@@ -9,7 +9,7 @@ from identify.report.page.plots.figure import AFTER, Figure, Panel, grid, lines,
 from identify.report.page.quantities import QUANTITIES, axis
 from identify.residual import Dependence
 from identify.results import Identification
-from identify.wording import depends_on, number
+from identify.wording import depends_on, number, quantities_of, quantity_of
 
 DIRECTIONS = {"tickvals": [-1, 1], "ticktext": ["backward", "forward"], "range": [-1.5, 1.5]}
 LEAST_RATE = 1e-6  # below it how small a false-alarm rate is tells nothing: the test is not exact that far out
@@ -24,7 +24,7 @@ def disturbance_table(identification: Identification) -> Markup:
     rows: list[list[Piece]] = [["total", number(left.torque_rms, 2), number(100.0 * left.relative, 2), ""]]
     rows += [
         [
-            f"depends on the {depends_on(d.on, identification.axis)}", number(d.torque_rms, 2),
+            f"depends on the {quantity_of(d, identification.axis)}", number(d.torque_rms, 2),
             number(100.0 * d.relative, 2), _rate(d.false_alarm),
         ]
         for d in left.depends_on
@@ -52,11 +52,11 @@ def shape_figure(identification: Identification) -> Figure | None:
         x, y = np.array(term.at), np.array(term.shape_nm)
         draw = lines if len(x) >= MIN_FOR_A_CURVE else points
         size = {"width": 2.2} if draw is lines else {"size": 10, "opacity": 1.0}
-        drawn.append(draw(x, y, f"depends on the {depends_on(term.on, identification.axis)}", AFTER, panel, **size))
+        drawn.append(draw(x, y, f"depends on the {quantity_of(term, identification.axis)}", AFTER, panel, **size))
         ticks = {"zeroline": True} | (DIRECTIONS if term.on == "direction" else {})
         titles = _x_title(term, identification.axis), axis(q.torque, q.torque_unit)
         panels.append(Panel(*titles, extra_x=ticks, extra_y={"zeroline": True}))
-    names = ", ".join(depends_on(d.on, identification.axis) for d in shown)
+    names = quantities_of(shown, identification.axis)
     columns = min(2, len(panels))
     return Figure(
         label=f"Residual {q.torque} against {names}: fitted shape",

@@ -1,0 +1,73 @@
+"""Free-form curves over angle, rate, direction, torque, time and past motion, beside a model in torque."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identify.diagnose.terms.changing import with_time
+from identify.diagnose.terms.free_form import SHAPE_POINTS, FreeForm, free_splines
+from identify.diagnose.torque_regression import TorqueRegression
+from rig.arrays import Array
+
+OUTER = (0.8, 0.95)  # shares of the samples inside of which nothing is touched
+PAST_RUN_SHARES = (0.05, 0.5)  # of the run: time constants with which a rate is remembered
+
+
+def curves(regression: TorqueRegression) -> list[FreeForm]:
+    """The terms that are tried, without what the linear model has of the same quantity."""
+    _, rate, _, _, time, run = regression.series()
+    slow = 0.05 * float(np.sqrt(np.mean(rate**2))) + 1e-300
+    driven = [] if regression.torque_free else [_spline("torque", regression)]
+    ends = np.array([-1.0, 1.0])
+    out = [
+        _spline("angle", regression), _beyond("angle", regression), _spline("rate", regression), *driven,
+        FreeForm(
+            "direction", regression.along("rate", lambda v: np.tanh(v / slow)[:, None]), ends, ends[:, None]
+        ),
+    ]  # fmt: skip
+    if float(np.max(time)) > 0.0:
+        out += [_over_time(time), *with_time(regression)]
+    out.append(_history(rate, run, regression))
+    return [f for f in out if f.columns.shape[1] > 0 and np.all(np.isfinite(f.columns))]
+
+
+def _spline(on: str, regression: TorqueRegression) -> FreeForm:
+    """Cubic splines of a quantity with what is constant and linear in it taken out."""
+    x = regression.values_of(on)
+    free, at = free_splines(x)
+    if free is None:
+        return FreeForm(on, np.zeros((len(regression.series()[0]), 0)), np.zeros(0), np.zeros((0, 0)))
+    return FreeForm(on, regression.along(on, free), at, free(at))
+
+
+def _over_time(time: Array) -> FreeForm:
+    """The same of the time in a run."""
+    free, at = free_splines(time)
+    return FreeForm("time", np.zeros((len(time), 0)) if free is None else free(time), at, free(at) if free else at)
+
+
+def _beyond(on: str, regression: TorqueRegression) -> FreeForm:
+    """What begins at the ends of a quantity's range, as a stop does: straight from the outer shares of samples on."""
+    x = regression.values_of(on)
+    middle = float(np.median(x))
+    starts = [(s, float(np.quantile(s * (x - middle), share))) for s in (-1.0, 1.0) for share in OUTER]
+
+    def hinges(values: Array) -> Array:
+        return np.stack([s * np.maximum(s * (values - middle) - b, 0.0) for s, b in starts], axis=1)
+
+    at = np.linspace(float(np.min(x)), float(np.max(x)), SHAPE_POINTS)
+    return FreeForm(on, regression.along(on, hinges), at, hinges(at))
+
+
+def _history(rate: Array, run: Array, regression: TorqueRegression) -> FreeForm:
+    """The direction of the motion as it was a while ago, with two lengths of memory."""
+    direction = np.tanh(rate / (0.05 * float(np.sqrt(np.mean(rate**2))) + 1e-300))
+    out = np.zeros((len(rate), len(PAST_RUN_SHARES)))
+    for k in np.unique(run):
+        here = np.nonzero(run == k)[0]
+        for j, share in enumerate(PAST_RUN_SHARES):
+            memory, decay = 0.0, float(np.exp(-1.0 / max(share * 0.1 * len(here), 1.0)))
+            for i in here:
+                memory = decay * memory + (1.0 - decay) * direction[i]
+                out[i, j] = memory
+    return FreeForm("history", out, np.zeros(0), np.zeros((0, len(PAST_RUN_SHARES))))

@@ -1,0 +1,63 @@
+"""J, C and K fitted to every run by itself: a model that holds gives the same numbers in all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from identify.diagnose.terms.free_form import FreeForm
+from identify.diagnose.torque_fit import TorqueFit
+from identify.diagnose.torque_regression import TorqueRegression
+from identify.model.parameters import Name
+from identify.residual import FROM_RUN_TO_RUN
+from rig.arrays import Array
+
+MOVED_SIGMAS = 2.0  # standard errors of the difference: a move inside a 95 % interval is none
+
+
+def between_runs(regression: TorqueRegression, fit: TorqueFit) -> list[FreeForm]:
+    """J, C and K of every run but the first, as differences from the first run's; nothing of a single run."""
+    run, count = regression.run_of_each, len(regression.traces)
+    columns = [column * (run == k) for k in range(1, count) for column in _own(regression, fit).values()]
+    if not columns:
+        return []
+    none = np.zeros((0, len(columns)))
+    return [FreeForm("time", np.stack(columns, axis=1), np.zeros(0), none, True, changes=FROM_RUN_TO_RUN)]
+
+
+def moved_on_average(
+    regression: TorqueRegression, fit: TorqueFit, richer: TorqueFit, columns: Array, gains: Array
+) -> Mapping[Name, float]:  # fmt: skip
+    """By how much the average over the runs is another than the number of all runs together.
+
+    A number of all runs together compares runs with each other: where one frequency tells K and another K - J w^2, a
+    difference between them is J. The average takes what each run says by itself, weighted by how sure it is. Where the
+    model holds both agree within their errors (Hausman, Econometrica 46, 1978); a smaller difference is none.
+    """
+    own = list(_own(regression, fit))
+    names, covariance = regression.covariance_beside(richer, columns)
+    first = np.array([richer.values[n] for n in own])
+    differences = gains.reshape(-1, len(own))
+    out: dict[Name, float] = {}
+    for j, name in enumerate(own):
+        here, values, variances = names.index(name), [], []
+        for k in range(len(differences) + 1):
+            row = np.zeros(len(covariance))
+            row[here] = 1.0
+            if k:
+                row[len(names) + (k - 1) * len(own) + j] = 1.0
+            values.append(first[j] + (differences[k - 1, j] if k else 0.0))
+            variances.append(float(row @ covariance @ row))
+        weights = np.array([1.0 / v if v > 0.0 else 0.0 for v in variances])
+        if not np.sum(weights) > 0.0:
+            continue
+        moved = float(weights @ np.array(values) / np.sum(weights)) - fit.values[name]
+        if abs(moved) > MOVED_SIGMAS / np.sqrt(np.sum(weights)):
+            out[name] = moved
+    return out
+
+
+def _own(regression: TorqueRegression, fit: TorqueFit) -> dict[Name, Array]:
+    """The columns of J, C and K over all runs, (n,) each."""
+    return {name: column for name, column in regression.columns_of(fit).items() if len(name) == 1}
