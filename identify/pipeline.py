@@ -40,7 +40,7 @@ from identify.runs.reading import describe_reading
 from identify.runs.reduced import reduced
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_without_motion
 from identify.runs.usable import runs_used
-from identify.select.field_search import Found, Judged, search_in_torque, with_free_form
+from identify.select.field_search import Found, Judged, search_in_torque
 from identify.select.free_form_residual import curves_left, dependence_on
 from identify.select.likelihood_search import LikelihoodSearch, filtered_above, start_search
 from identify.select.search_state import Search
@@ -290,7 +290,7 @@ class _Identifier:
         if self.torque_free:
             left = left_of_a_decay(self.traces, self.split, after, self.start, self.recording.axis)
             if self.curve is not None and after.structure != self.structure:
-                left = with_free_form(left, *self.curve)
+                left = left.with_free_form(*self.curve)
         case = Case(
             self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
             self.declared, self.left_out, self.colour, left,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 
@@ -130,3 +130,17 @@ class Disturbance:
     def material_percent(self) -> float:
         """The part that goes with something, in percent of the torque."""
         return 100.0 * sum(d.relative**2 for d in self.depends_on) ** 0.5
+
+    def with_free_form(self, curve: Dependence, moves: Mapping[str, float]) -> Disturbance:
+        """The same with a curve that the likelihood asks for; of two that go with the same, the larger."""
+        same = [d for d in self.depends_on if d.on == curve.on and d.torque_rms > curve.torque_rms]
+        terms = dict.fromkeys((*self.moves_percent, *moves))  # in an order: a sentence lists them
+        most = {t: max(self.moves_percent.get(t, 0.0), moves.get(t, 0.0)) for t in terms}
+        depends = (*(d for d in self.depends_on if d.on != curve.on), *(same or [curve]))
+        size = max(self.torque_rms, curve.torque_rms)
+        relative = self.relative * size / self.torque_rms if self.torque_rms else curve.relative
+        return replace(
+            self, torque_rms=size, relative=relative,
+            depends_on=tuple(sorted(depends, key=lambda d: -d.torque_rms)),
+            moves_percent=most,
+        )  # fmt: skip

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identify.diagnose.torque_fit import TorqueErrors
 from identify.diagnose.torque_residual import TorqueResidual, relative, torque_noise_floor, torque_residual
 from identify.estimate.final_fit import FinalFit
 from identify.genetic.linear_traces import linear_traces
 from identify.model.structure import Structure
 from identify.results import Errors, ModelResult, NoiseFloor
 from identify.runs.holdout import Split
-from identify.select.field_search import TorqueErrors
 from identify.signals.low_pass import settled
 from identify.signals.trace import Trace, pooled_noise
 from rig.recording.run import Array

@@ -45,3 +45,14 @@ class TorqueFit(ParameterFit):
     def shapes(self) -> dict[str, tuple[float, ...]]:
         """Shape parameters of every effect."""
         return self.structure.shapes_of(self.values)
+
+
+@dataclass(frozen=True)
+class TorqueErrors:
+    """How far a model is from the torque, behind the low-pass, where the platform moves and does not turn back."""
+
+    residual_nm: float
+    relative: float
+    held_relative: float  # by fits that did not see the samples
+    floor_nm: float
+    cutoff_hz: float

@@ -22,9 +22,11 @@ from identify.estimate.starting_point import start_values
 from identify.model.parameter_fit import ParameterFit, std_error_of
 from identify.model.parameters import Name, is_gain
 from identify.model.structure import Structure
+from identify.results import NORMAL_95
 from identify.signals.trace import Trace
 from identify.simulate.sensitivities import INFORMATION_RCOND, jacobian
 from identify.simulate.shots import Shots
+from rig import effects
 from rig.recording.run import Array
 
 NEAR_FLOOR = 1.3**2  # reduced chi-square: close enough for a free run over the whole set
@@ -89,6 +91,13 @@ class FinalFit:
         scaled = np.linalg.pinv(covariance / np.outer(size, size), rcond=INFORMATION_RCOND, hermitian=True)
         wald = float((gains / size) @ scaled @ (gains / size))
         return wald - len(own) * float(np.log(max(self.fit.count, 2)))
+
+    def is_significant(self, effect: str) -> bool:
+        """Whether the 95 % interval of one of an effect's gains (of its parameters, if it has none) excludes none."""
+        own = [n for n in self.names if n[0] == effect]
+        neutral = {p.name: p.neutral for p in effects.get(effect).parameters}
+        asked = [n for n in own if is_gain(n)] or own
+        return any(abs(self.values[n] - neutral[str(n[1])]) > NORMAL_95 * self.std_error(n) for n in asked)
 
     def as_uncertain_as(self, fuller: FinalFit) -> FinalFit:
         """The same where a term was left out that may be there: as uncertain as the fit that has it, if that is more.

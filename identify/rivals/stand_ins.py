@@ -17,7 +17,7 @@ import numpy as np
 from identify.estimate.final_fit import FinalFit
 from identify.runs.observability import is_seen_to_repeat
 from identify.select.evidence import WEIGHT
-from identify.select.field_search import Found, with_free_form
+from identify.select.field_search import Found
 from identify.select.free_form_residual import MOVED_SIGMAS
 from identify.signals.trace import Trace
 from identify.wording import joined, plain, quantity_of
@@ -45,7 +45,7 @@ def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callab
     }
     stand_ins = [name for name in flexible if depends[0].on not in effects.get(name).goes_with or not waves[name]]
     if stand_ins:
-        found = _taken_back(found, stand_ins, axis, apart[stand_ins[0]] if len(stand_ins) == 1 else None)
+        found = _taken_back(found, stand_ins, axis)
         say(f"not named: {_listed(stand_ins)}; what is left then still depends on the {depends[0].on}")
         flexible = [name for name in flexible if name not in stand_ins]
     if not flexible:
@@ -77,16 +77,18 @@ def _is_in_doubt(found: Found, less: Found) -> bool:
     return bool(found.disturbance.depends_on[0].relative ** 2 > WEIGHT * (without**2 - with_it**2))
 
 
-def _taken_back(found: Found, names: Sequence[str], axis: str, less: Found | None) -> Found:
-    """The same without effects that may only stand in; what was left beside them is left without them, too.
+def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
+    """The same without effects that may only stand in.
 
-    One of them may be real all the same: J, C and K are no surer than they differ with and without.
+    What they had taken up may be torque of an effect that does not follow almost anything: that is added. Where there
+    is none, what was left beside them is left without them, too. One of them may be real all the same: J, C and K are
+    no surer than they differ with and without.
     """
     depends = found.disturbance.depends_on
-    less = less or found.without(*names)
+    less = found.without(*names, others=True)
     left = less.disturbance
-    for dependence in depends:
-        left = with_free_form(left, dependence, {})
+    for dependence in depends if set(less.named) < set(found.named) else ():
+        left = left.with_free_form(dependence, {})
     search = less.search
     words = (
         f"Not named: {_listed(names)}. This would explain part of what is missing, but can follow almost any torque, "

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from identify.diagnose.disturbance import disturbance_of
-from identify.diagnose.torque_fit import TorqueFit
+from identify.diagnose.torque_fit import TorqueErrors, TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.covariance import covariance_of
 from identify.estimate.final_fit import FinalFit, free_run_of
@@ -82,10 +82,13 @@ class Found:
     lacking: Callable[..., tuple[FinalFit, TorqueErrors, Disturbance]]  # the final model without some effects
     taken_back: tuple[str, ...] = ()
 
-    def without(self, *several: str) -> Found:
-        """The same with effects taken back; what was found beside them stays, fitted anew."""
+    def without(self, *several: str, others: bool = False) -> Found:
+        """The same with effects taken back; what was found beside them stays, fitted anew.
+
+        With ``others`` in their place that carry weight without them, but do not follow almost anything.
+        """
         gone = (*self.taken_back, *several)
-        after, errors, disturbance = self.lacking(*gone)
+        after, errors, disturbance = self.lacking(*gone, others=others)
         return replace(
             self, taken_back=gone, after=after, in_torque=(self.in_torque[0], errors), disturbance=disturbance
         )
@@ -94,7 +97,7 @@ class Found:
         """The same with the spectral lines of what the likeliest model leaves, where that is the final one."""
         final = _describes(likeliest, self.after) and not self.disturbance.depends_on
         lines = lines_left(likeliest, torque_nm) if final else None
-        return self if lines is None else replace(self, disturbance=with_free_form(self.disturbance, lines, {}))
+        return self if lines is None else replace(self, disturbance=self.disturbance.with_free_form(lines, {}))
 
     @property
     def kept(self) -> ParameterFit:
@@ -105,17 +108,6 @@ class Found:
     def named(self) -> list[str]:
         """Effects that the declared model lacked."""
         return [e for e in self.after.structure.effects if e not in self.before.structure.effects]
-
-
-@dataclass(frozen=True)
-class TorqueErrors:
-    """How far a model is from the torque, behind the low-pass, where the platform moves and does not turn back."""
-
-    residual_nm: float
-    relative: float
-    held_relative: float  # by fits that did not see the samples
-    floor_nm: float
-    cutoff_hz: float
 
 
 def search_in_torque(
@@ -169,9 +161,15 @@ def search_in_torque(
     if not unfollowed and not filtered:
         say("looking at what is left as a torque")
         depends = bool(known.curves or disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on)
-        proposed = search.run()
-        better = leaves_less(search, proposed, trial, depends) and not (trusted and is_more_flexible(proposed, trial))
-        if better and not refutes(proposed):
+        search.run()
+
+        def is_better(proposed: TorqueFit) -> bool:
+            flexible = trusted and is_more_flexible(proposed, trial)
+            return leaves_less(search, proposed, trial, depends) and not flexible and not refutes(proposed)
+
+        # A lag at the end of the way is no reason to give away what was found before it.
+        proposed = next(filter(is_better, reversed(search.path)), None)
+        if proposed is not None:
             by_likelihood, best = None, proposed
     left = best.held_nm / search.regression.torque_nm
     if by_likelihood is None and best.structure.effects == structure.effects and left > MUCH_LEFT:
@@ -202,21 +200,31 @@ def search_in_torque(
         disturbance = Disturbance(size_nm, unit, size_nm / regression.torque_nm, (), {})
     if _describes(known.fit, after):
         for curve in known.curves:
-            disturbance = with_free_form(disturbance, *curve)
+            disturbance = disturbance.with_free_form(*curve)
 
     def errors(fit: TorqueFit) -> TorqueErrors:
         size = regression.torque_nm
         return TorqueErrors(fit.sigma, fit.sigma / size, fit.held_nm / size, floor, cutoff)
 
-    def lacking(*several: str) -> tuple[FinalFit, TorqueErrors, Disturbance]:
+    def lacking(*several: str, others: bool = False) -> tuple[FinalFit, TorqueErrors, Disturbance]:
         less, there = final, best  # without a low-pass of the gyro, which no torque shows
         for name in several:
             less, there = less.minus(name), search.without(there, name)
-        fitted, values = before, {k: v for k, v in after.values.items() if k[0] not in several}
-        if less.effects != structure.effects:
-            like = after.fit if isinstance(after.fit, Fit) else None
-            likely = fitted_on_all(traces, less, values, split.final, like)
-            fitted = _final(regression, there, likely, traces, split, trusted=like is not None)
+        values = {k: v for k, v in after.values.items() if k[0] not in several}
+        there, added = search.with_others(there) if others else (there, [])
+        while True:
+            model = replace(less, terms=there.structure.terms).plus(*(c.effect for c in added)) if added else less
+            fitted = before
+            if model.effects != structure.effects:
+                like = after.fit if isinstance(after.fit, Fit) else None
+                likely = fitted_on_all(traces, model, {**there.values, **values}, split.final, like)
+                fitted = _final(regression, there, likely, traces, split, trusted=like is not None)
+            none = next((c for c in added if not fitted.is_significant(c.effect)), None)
+            if none is None:
+                break
+            added, there = [c for c in added if c is not none], search.without(there, none.effect)
+        reported.candidates += added
+        reported.contribution |= {c.effect: search.without(there, c.effect).held_nm / there.held_nm for c in added}
         return fitted, errors(there), disturbance_of(regression, there, floor, unit)
 
     reported = search.as_search(best)
@@ -246,20 +254,6 @@ def _describes(likeliest: Fit, final: FinalFit) -> bool:
     ours, theirs = (f.values.get(("inertia",), 0.0) for f in (final, likeliest))
     same = abs(theirs - ours) <= ANOTHER * abs(ours)
     return same and set(final.structure.effects) <= set(likeliest.structure.effects)
-
-
-def with_free_form(left: Disturbance, curve: Dependence, moves: Mapping[str, float]) -> Disturbance:
-    """The same with a curve that the likelihood asks for; of two that go with the same, the larger."""
-    same = [d for d in left.depends_on if d.on == curve.on and d.torque_rms > curve.torque_rms]
-    terms = dict.fromkeys((*left.moves_percent, *moves))  # in an order: a sentence lists them
-    most = {t: max(left.moves_percent.get(t, 0.0), moves.get(t, 0.0)) for t in terms}
-    depends = (*(d for d in left.depends_on if d.on != curve.on), *(same or [curve]))
-    size = max(left.torque_rms, curve.torque_rms)
-    return replace(
-        left, torque_rms=size, relative=left.relative * size / left.torque_rms if left.torque_rms else curve.relative,
-        depends_on=tuple(sorted(depends, key=lambda d: -d.torque_rms)),
-        moves_percent=most,
-    )  # fmt: skip
 
 
 def _final(

@@ -8,7 +8,7 @@ candidates that carry nearly as much the simplest is taken, of these the likelie
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
@@ -83,13 +83,15 @@ class TorqueSearch:
     allowed: Sequence[str]
     say: Callable[[str], None] = lambda text: None
     rounds: list[tuple[TorqueCandidate, ...]] = field(default_factory=list)
+    path: list[TorqueFit] = field(default_factory=list)  # models on the way, the last one the result
 
-    def run(self) -> TorqueFit:
+    def run(self, begin: TorqueFit | None = None) -> TorqueFit:
         """Add effects as long as one carries weight, then drop what no longer does.
 
         What falls back to a model that was there before would go round for ever: it ends with that.
+        ``begin`` is where to begin; at the declared model where None.
         """
-        now = self.without_absorbing_stiffness(self.base)
+        now = self.without_absorbing_stiffness(begin or self.base)
         before = {now.structure.parts}
         while len(now.structure.effects) < MAX_EFFECTS + len(self.base.structure.effects):
             looks = self.candidates(now)
@@ -102,6 +104,7 @@ class TorqueSearch:
             if now.structure.parts in before:
                 break
             before.add(now.structure.parts)
+            self.path.append(now)
         return now
 
     def left(self, fit: TorqueFit) -> float:
@@ -188,6 +191,19 @@ class TorqueSearch:
                 self.say(f"dropped {name}: the others carry its torque")
                 return self.backward_elimination(without)
         return now
+
+    def with_others(self, now: TorqueFit) -> tuple[TorqueFit, list[Candidate]]:
+        """The same with what else carries weight but does not follow almost anything, and what that is.
+
+        What is there already stays: unchanged where something of it would be dropped for the others.
+        """
+        bound = [name for name in self.allowed if not effects.get(name).is_flexible]
+        further = replace(self, allowed=bound, rounds=[], path=[])
+        found = further.run(now)
+        new = [e for e in found.structure.effects if e not in now.structure.effects]
+        if not new or not set(now.structure.effects) <= set(found.structure.effects):
+            return now, []
+        return found, [c for c in further.as_search(found).candidates if c.effect in new and c.status == "added"]
 
     def as_search(self, best: TorqueFit) -> Search:
         """What was looked at, as the report tells it."""

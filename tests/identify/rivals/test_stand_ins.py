@@ -30,18 +30,20 @@ def final(inertia: float, error: float, *effects: str) -> Any:
 
 
 def found(
-    effects: tuple[str, ...], *depends: Dependence, without: float = 0.0505
+    effects: tuple[str, ...], *depends: Dependence, without: float = 0.0505, in_place: tuple[str, ...] = ()
 ) -> tuple[Found, list[tuple[str, ...]]]:
     """A final model whose inertia is 6 % larger without any of its effects, and which were taken out together.
 
-    It leaves 5 % of the torque, and ``without`` any of them so much of it.
+    It leaves 5 % of the torque, and ``without`` any of them so much of it. Of a model ``in_place`` of one that is taken
+    back, nothing of what is left depends on something.
     """
     asked: list[tuple[str, ...]] = []
 
-    def lacking(*several: str) -> Any:
-        asked.append(several)
+    def lacking(*several: str, others: bool = False) -> Any:
+        asked.append((*several, "and others") if others else several)
         left = cast(Any, SimpleNamespace(held_relative=without))
-        return final(1.06, 1e-3, *(e for e in effects if e not in several)), left, Disturbance(0.05, "N*m", 0.05)
+        kept = [e for e in effects if e not in several] + list(in_place if others else ())
+        return final(1.06, 1e-3, *kept), left, Disturbance(0.05, "N*m", 0.05)
 
     left, errors = Disturbance(0.01, "N*m", 0.01, depends), cast(Any, SimpleNamespace(held_relative=0.05))
     search = Search(final(1.06, 1e-3).fit, final(1.0, 1e-3, *effects).fit, 0.0, 0.0)
@@ -57,7 +59,7 @@ def test_a_flexible_effect_beside_which_something_else_is_left_is_not_named() ->
     begun, asked = found(("flexible_mode", "coulomb_friction"), LINES)
     less = looked_at(begun)
     assert less.named == ["coulomb_friction"]
-    assert asked == [("flexible_mode",)]
+    assert asked == [("flexible_mode",), ("flexible_mode", "and others")]
     assert less.after.values["inertia",] == 1.06
     assert [d.on for d in less.disturbance.depends_on] == ["frequency"]  # not forgotten, though it is not seen any more
     assert "Not named: flexible mode." in less.search.left_open
@@ -65,6 +67,15 @@ def test_a_flexible_effect_beside_which_something_else_is_left_is_not_named() ->
     assert {c.effect: c.status for c in less.search.candidates}["flexible_mode"] == "left open"
     # It may be real all the same: what is reported is no surer than that.
     assert less.disturbance.moves_without_percent == {"flexible_mode": {"inertia": pytest.approx(100.0 * 0.06 / 1.06)}}
+
+
+def test_what_a_stand_in_had_taken_up_may_be_that_of_another_effect_which_is_named_in_its_place() -> None:
+    begun, asked = found(("cogging", "coulomb_friction"), PAST, in_place=("torque_offset",))
+    less = looked_at(begun)
+    assert asked == [("cogging",), ("cogging", "and others")]
+    assert less.named == ["coulomb_friction", "torque_offset"]
+    assert less.disturbance.depends_on == ()  # what was left beside cogging is not left beside the other
+    assert less.disturbance.moves_without_percent == {"cogging": {"inertia": pytest.approx(100.0 * 0.06 / 1.06)}}
 
 
 def test_more_of_its_own_kind_does_not_speak_against_a_name_but_how_far_j_hangs_on_it_is_noted() -> None:
@@ -84,7 +95,7 @@ def test_what_was_taken_back_is_not_in_the_model_that_the_others_are_judged_besi
     begun, asked = found(("creep", "cogging"), PAST)
     kept = looked_at(begun)
     assert kept.named == ["creep"]
-    assert asked == [("creep",), ("cogging",), ("cogging", "creep")]
+    assert asked == [("creep",), ("cogging",), ("cogging", "and others"), ("cogging", "creep")]
     assert set(kept.disturbance.moves_without_percent) == {"cogging", "creep"}
 
 

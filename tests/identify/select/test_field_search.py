@@ -13,7 +13,7 @@ from identify.model.structure import Structure
 from identify.pipeline import identify
 from identify.results import Dependence, Disturbance, Identification
 from identify.runs.holdout import split
-from identify.select.field_search import _final, with_free_form
+from identify.select.field_search import _final
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
 from tests.identify.servo import Servo
@@ -29,7 +29,7 @@ OFFERED = pytest.mark.parametrize("offered", [FEW, pytest.param(None, marks=pyte
 def test_terms_that_two_curves_move_keep_their_order_from_run_to_run() -> None:
     first = Dependence("angle", 1.0, 0.1, 0.0, (0.0,), (1.0,))
     left = Disturbance(2.0, "N m", 0.2, (first,), {"damping": 1.0, "inertia": 2.0})
-    both = with_free_form(left, Dependence("rate", 1.5, 0.1, 0.0, (0.0,), (1.0,)), {"stiffness": 4.0, "inertia": 3.0})
+    both = left.with_free_form(Dependence("rate", 1.5, 0.1, 0.0, (0.0,), (1.0,)), {"stiffness": 4.0, "inertia": 3.0})
     assert list(both.moves_percent.items()) == [("damping", 1.0), ("inertia", 3.0), ("stiffness", 4.0)]
 
 
