@@ -26,7 +26,7 @@ from identify.results import UNITS, Dependence, Identification, SetResult
 from identify.rivals.alternative_causes import AlternativeCauses
 from identify.rivals.coloured_noise import Colour, with_noise_known
 from identify.rivals.open_line import with_line_left_open
-from identify.rivals.own_low_pass import with_own_low_pass
+from identify.rivals.own_low_pass import beside_own_low_pass, with_own_low_pass
 from identify.rivals.run_delays import aligned, told
 from identify.rivals.stand_ins import with_stand_ins
 from identify.rivals.whiteness_test import fails_whiteness_test, leaves_more_than_noise
@@ -121,8 +121,7 @@ class _Identifier:
         offer = offer_of(self.traces, declared, settings.channels)
         unseen = tuple((n, why) for n in declared.effects if (why := why_unseen(n, self.traces)))
         self.offer = replace(offer, idle=(*offer.idle, *unseen))
-        still = {name for name, _ in self.offer.idle}
-        self.structure = Structure(declared.terms, tuple(n for n in declared.effects if n not in still))
+        self.structure = Structure(declared.terms, tuple(n for n in declared.effects if n not in dict(self.offer.idle)))
         self.start: Start = first_guess(self.traces, Structure(declared.terms))
         refuse_lowpass(self.traces, settings.lowpass_hz)
         if settings.lowpass_hz is not None:
@@ -191,8 +190,7 @@ class _Identifier:
             return search
         self.traces, self.torque_noise_above_hz = list(search.traces), cutoff_hz
         self.start = replace(first_guess(self.traces, Structure(self.declared.terms)), cutoff_hz=self.start.cutoff_hz)
-        note = filtered_above(cutoff_hz, self.recording.axis)
-        self.left_out = (*self.left_out, note)
+        self.left_out = (*self.left_out, note := filtered_above(cutoff_hz, self.recording.axis))
         self.say(note)
         return search
 
@@ -212,8 +210,10 @@ class _Identifier:
             taken_back = True
         if taken_back:
             after = models.after(search) if search.best.structure != self.structure else before
-        named = [e for e in after.structure.effects if e not in self.structure.effects]
-        base = search.base.values
+        elif changed and self.search is not None:
+            after, note = beside_own_low_pass(after, self.search.stepwise, self.traces, self.split, self.say)
+            self.left_out = (*self.left_out, note) if note else self.left_out
+        base, named = search.base.values, [e for e in after.structure.effects if e not in self.structure.effects]
         search.contribution = contributions(causes.fits, after.structure, after.values, named, base, search.horizon)
         found = self._report(search, before, after)
         if taken_back and self.torque_free:  # how little torque is left says nothing about a swing that goes astray

@@ -12,13 +12,14 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from identify.diagnose.torque_residual import at_samples, motion
 from identify.model.parameters import Name
 from identify.model.structure import UNIT, Shapes, Structure
 from identify.runs.holdout import Split
 from identify.signals.low_pass import low_pass, settled
-from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace
+from identify.signals.trace import MOST_BIAS_RAD_S, SHORTEST_STRETCH, UPSAMPLING, Trace
 from rig import effects
 from rig.arrays import Array
 from rig.effects.base import Effect, Place, Scale
@@ -27,6 +28,8 @@ from rig.platform import TERMS
 SAMPLES_A_PERIOD = 4.0  # of the cut-off: what the low-pass passed needs no more
 FOLDS, FOLD_BLOCKS = 3, 9  # a third of the runs, or of the blocks of each run, is held out in turn
 STILL_SIGMAS, STILL_PERIODS = 5.0, 0.5  # standard deviations of the smoothed rate, for so many periods of the cut-off
+MOST_BIAS_SHARE = 0.25  # of a run's rate: what stays and is more is a steady motion
+STANDS_OUT = 3.0  # times as often as if all small rates that stay were read alike
 NOISE_DRAWS = 3  # of the sensor's noise
 AROUND_REVERSAL, MAX_REVERSAL_SHARE = 0.6, 0.35  # periods of the cut-off left out either side, up to a share of samples
 
@@ -88,9 +91,9 @@ class LowPassedTorque:
         the low-pass, decides over more torque there than all that one wants to see. Where it turns back so often that
         little else is left, those moments stay.
         """
-        rate, left = t.fine[1][::UPSAMPLING], t.fine[4]
+        rate, left = t.fine[1][::UPSAMPLING] - _read_at_rest(t, self.cutoff_hz), t.fine[4]
         slow = np.abs(rate) < STILL_SIGMAS * left
-        shortest = max(3, int(STILL_PERIODS / (self.cutoff_hz * t.step_s)))
+        shortest = _shortest_rest(t, self.cutoff_hz)
         out = np.zeros(len(slow), dtype=bool)
         edges = np.diff(np.concatenate([[0], slow.astype(np.int8), [0]]))
         for a, b in zip(np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0], strict=True):
@@ -225,3 +228,28 @@ class LowPassedTorque:
     def run_of_each(self) -> Any:
         """Number of the run at every sample behind the low-pass, (n,)."""
         return np.concatenate([np.full(len(r), i) for i, r in enumerate(self._rows)])
+
+
+def _read_at_rest(t: Trace, cutoff_hz: float) -> float:
+    """What a gyro reads while the platform stands, rad/s: what it reads most often of what stays, if a bias.
+
+    Zero where nothing stands out: a slow motion reads no small rate more often than another one.
+    """
+    rate, width = t.fine[1][::UPSAMPLING], 2.0 * STILL_SIGMAS * t.fine[4]
+    most = min(MOST_BIAS_RAD_S, MOST_BIAS_SHARE * float(np.sqrt(np.mean(rate**2))))
+    if not t.biased or width > most:
+        return 0.0
+    window = _shortest_rest(t, cutoff_hz)
+    stays = maximum_filter1d(rate, window) - minimum_filter1d(rate, window) < width
+    slow = np.sort(rate[stays & (np.abs(rate) < most)])
+    if len(slow) < window:
+        return 0.0
+    ends = np.searchsorted(slow, slow + width)
+    first = int(np.argmax(ends - np.arange(len(slow))))
+    alike = slow[first : ends[first]]
+    return float(np.median(alike)) if len(alike) > STANDS_OUT * len(slow) * width / (2.0 * most) else 0.0
+
+
+def _shortest_rest(t: Trace, cutoff_hz: float) -> int:
+    """Samples that the platform has to stand for: half a period of the low-pass."""
+    return max(3, int(STILL_PERIODS / (cutoff_hz * t.step_s)))

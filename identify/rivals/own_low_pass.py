@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from identify.estimate.final_fit import FinalFit
 from identify.likelihood.by_prediction_error import as_final, fitted_on_all
 from identify.likelihood.fit import Fit
@@ -23,7 +25,7 @@ from identify.select.trial_fits import FULL_ITERATIONS
 from identify.signals.trace import Trace
 from identify.wording import number
 
-FORMS = ("sensor_lag_second_order", "sensor_lag")  # as data sheets have it; behind one of these, the other
+FORMS = ("sensor_lag_second_order", "sensor_lag")  # as data sheets have it; the likelier of the two
 BEGUN_SAMPLES = 0.2  # length of the low-pass that a fit begins from
 
 
@@ -34,29 +36,52 @@ def with_own_low_pass(
 
     Where something is left over, a low-pass smooths that away and proves nothing.
     """
+    if found.disturbance.depends_on or not isinstance(found.after.fit, Fit):
+        return found, ""
+    after, note = beside_own_low_pass(found.after, search, traces, split, say, scored=False)
+    return replace(found, after=after), note
+
+
+def beside_own_low_pass(
+    after: FinalFit, search: Stepwise, traces: Sequence[Trace], split: Split, say: Callable[[str], None],
+    scored: bool = True,
+) -> tuple[FinalFit, str]:  # fmt: skip
+    """A final model with the numbers that it has beside the gyro's low-pass, and a note; unchanged where none shows.
+
+    ``scored``: only a low-pass that its score promises is fitted. Where a large disturbance follows the readings, the
+    score of one that is there may be small.
+    """
     gyro = all(t.channel == "rate" and t.beside is None and t.torque is not None for t in traces)
-    structure = found.after.structure
-    form = next((f for f in FORMS if f not in structure.effects), None)
-    if not gyro or form is None or found.disturbance.depends_on or structure != search.best.structure:
-        return found, ""
-    if not isinstance(found.after.fit, Fit) or not _shows(search, form):
-        return found, ""
+    structure = after.structure
+    form = _likeliest_form(search, scored) if gyro and structure == search.best.structure else None
+    if form is None:
+        return after, ""
     say("the rate sensor's own low-pass shows: fitting it beside what was found")
-    start = {**found.after.values, (form, "time"): BEGUN_SAMPLES * search.problem.step_s}
-    problem, richer = fitted_on_all(traces, structure.plus(form), start, split.final, found.after.fit)
+    start = {**after.values, (form, "time"): BEGUN_SAMPLES * search.problem.step_s}
+    known = after.fit if isinstance(after.fit, Fit) else search.best
+    problem, richer = fitted_on_all(traces, structure.plus(form), start, split.final, known)
+    less = after.fit
+    if not isinstance(less, Fit):  # fitted by its free run
+        less = problem.fit(structure, after.values, richer.noise)
     inflated = inflation(problem.columns_at(richer, with_variance=True), richer, [(form, "time")])
-    if not (found.after.fit.cost - richer.cost) / inflated > _price(richer, found.after.fit):
-        return found, ""
+    if not (less.cost - richer.cost) / inflated > _price(richer, less):
+        return after, ""
     beside = as_final(problem, richer, traces, split.everything)
-    after = with_numbers_of(beside, found.after, traces, split.everything)
-    return replace(found, after=after), _note(beside, (form, "time"))
+    return with_numbers_of(beside, after, traces, split.everything), _note(beside, (form, "time"))
 
 
-def _shows(search: Stepwise, form: str) -> bool:
-    """Whether all samples may show the low-pass, by what those tell that the search looked at."""
-    now, seen = search.best, _evidence(search, form)
+def _likeliest_form(search: Stepwise, scored: bool) -> str | None:
+    """The likeliest low-pass that all samples may show, by what those tell that the search looked at; or None."""
+    now, last = search.best, search.rounds[-1] if search.rounds else None
     more = max(1.0, search.samples / max(now.count, 1))
-    return more * seen.gain / seen.inflation > _price(seen.fit, now)
+    least = np.log(max(search.samples, 2))
+    forms = [form for form in FORMS if form not in now.structure.effects]
+    if scored and last is not None and last.now is now:
+        forms = [s.effect for s in last.scores if s.effect in forms and more * s.gain > least]
+    seen = {form: _evidence(search, form) for form in forms}
+    gains = {form: more * e.gain / e.inflation - _price(e.fit, now) for form, e in seen.items()}
+    form = max(gains, key=gains.__getitem__, default=None)
+    return form if form is not None and gains[form] > 0.0 else None
 
 
 def _evidence(search: Stepwise, form: str) -> Evidence:

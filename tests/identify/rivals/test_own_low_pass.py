@@ -50,7 +50,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     def evidence(search: Any, form: str) -> Evidence:
         best = search.best
         richer = fit_with((*best.structure.effects, form), best.cost - seen["few"], 1.0)
-        return Evidence(form, richer, seen["few"], 2.0, 0.0, 0.01)
+        gain = seen["few"] if form == seen.get("likelier", form) else 0.0
+        return Evidence(form, richer, gain, 2.0, 0.0, 0.01)
 
     def on_all(traces: Any, structure: Structure, start: Any, use: Any, like: Fit) -> Any:
         seen["form"] = structure.effects[-1]
@@ -66,8 +67,14 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     return seen
 
 
+def search_with(best: Fit, samples: int = 10_000, **scores: float) -> Any:
+    """A search through whose last round looked at the best model, and what that scored."""
+    last = SimpleNamespace(now=best, tried={}, scores=[SimpleNamespace(effect=e, gain=g) for e, g in scores.items()])
+    return SimpleNamespace(best=best, samples=samples, problem=SimpleNamespace(step_s=1e-3), rounds=[last])
+
+
 def asked_of(found: Found, traces: Any = GYRO, samples: int = 10_000) -> tuple[Found, str]:
-    search: Any = SimpleNamespace(best=found.after.fit, samples=samples, problem=SimpleNamespace(step_s=1e-3))
+    search = search_with(cast(Fit, found.after.fit), samples)
     split: Any = SimpleNamespace(final=[], everything=[])
     return with_own_low_pass(found, search, traces, split, lambda text: None)
 
@@ -110,3 +117,21 @@ def test_beside_an_encoder_and_where_something_is_left_over_it_is_not_asked(aske
     assert asked_of(found, ENCODER) == (found, "")
     assert asked_of(over) == (over, "")
     assert asked["form"] is None
+
+
+def test_of_two_forms_the_likelier_is_fitted(asked: dict[str, Any]) -> None:
+    asked["likelier"] = FIRST
+    _, note = asked_of(found_with(("torque_delay",)))
+    assert note and asked["form"] == FIRST
+
+
+@pytest.mark.parametrize(("score", "fitted"), [(100.0, FIRST), (1.0, None)])
+def test_where_the_noise_limits_a_low_pass_without_a_score_is_not_fitted(
+    asked: dict[str, Any], score: float, fitted: str | None
+) -> None:
+    after = found_with(("torque_delay",)).after
+    search = search_with(cast(Fit, after.fit), **{FIRST: score, SECOND: 0.5})
+    split: Any = SimpleNamespace(final=[], everything=[])
+    beside, note = own_low_pass.beside_own_low_pass(after, search, cast(Any, GYRO), split, lambda text: None)
+    assert asked["form"] == fitted
+    assert (beside.values["inertia",], bool(note)) == ((0.9, True) if fitted else (1.0, False))
