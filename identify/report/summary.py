@@ -17,6 +17,19 @@ from identify.conclude.headline import accepted_or_not
 from identify.conclude.next_steps import next_steps
 from identify.follow_up.wording import lines as follow_up_lines
 from identify.proof.wording import lines as proof_lines
+from identify.report.captions import (
+    BELOW_J_DEC,
+    DECLARED_FIT,
+    DECLARED_VALUE,
+    FINAL_FIT,
+    J_DEC,
+    OVER_THE_SETS,
+    REPRODUCED,
+    SEARCH_REPEATS,
+    SIMULATED,
+    noise_floor_sentence,
+    simulation_error,
+)
 from identify.results import Identification, ParameterEstimate
 from identify.wording import (
     SYMBOLS,
@@ -43,6 +56,7 @@ PLAIN_WIDTH = 96  # characters, where no terminal says how wide it is
 RULES = box.Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
 
 
+ON_ONE_LINE = 12  # characters of a heading, as long as "undetermined": longer ones are stacked
 NO_INFO: Mapping[str, Any] = {}
 
 
@@ -80,7 +94,7 @@ def _whole(identification: Identification, info: Mapping[str, Any], narrow: bool
         table if (table := _parameters(identification, narrow)).row_count else Text(NONE_DETERMINED),
         Text(),
         _errors(identification),
-        Padding(Text(f"The noise floor is {floor.source}. {note}"), (0, 0, 0, 2)),
+        Padding(Text(f"{SIMULATED} {noise_floor_sentence(floor, info)} {note}"), (0, 0, 0, 2)),
         *_listed("Torque delay", delay_lines(identification, info), bullet=""),
         *_listed("Dropped: not supported by the data", not_said_yet(final.dropped, identification)),
         *_listed("Not determined by these data", not_said_yet(final.not_determined, identification)),
@@ -88,7 +102,7 @@ def _whole(identification: Identification, info: Mapping[str, Any], narrow: bool
         *_listed("Proof", proof_lines(identification.proof) if identification.proof else ()),
     ]
     if identification.per_set:
-        parts += [Text(), _sets(identification)]
+        parts += [Text(), _sets(identification), Padding(Text(J_DEC), (0, 0, 0, 2))]
     return Group(*parts, Text(), *_outcome(identification))
 
 
@@ -123,16 +137,24 @@ def _table(heading: str, columns: Sequence[str], words: Sequence[int] = (0,)) ->
         padding=(0, 1, 0, 0),
     )
     for i, column in enumerate(columns):
-        made.add_column(column, justify="left" if i in words else "right", overflow="fold")
+        made.add_column(_stacked(column), justify="left" if i in words else "right", overflow="fold")
     return made
+
+
+def _stacked(words: str) -> str:
+    """Long words on two lines, as evenly as they go."""
+    if len(words) <= ON_ONE_LINE:
+        return words
+    at = min((i for i, c in enumerate(words) if c == " "), key=lambda i: abs(2 * i - len(words)), default=None)
+    return words if at is None else f"{words[:at]}\n{words[at + 1 :]}"
 
 
 def _parameters(identification: Identification, narrow: bool) -> Table:
     """The declared and the final model; on a narrow terminal the intervals of the final one stand below its values."""
     before, after, bent = identification.before, identification.after, bias_percent(identification)
     names = list(dict.fromkeys([*before.parameters, *(after.parameters if after else ())]))
-    given = ["declared"] if identification.declared else []
-    head = ["", *given, "declared model", *(["off by", "final model"] if after else []), "unit"]
+    given = [DECLARED_VALUE] if identification.declared else []
+    head = ["", *given, DECLARED_FIT, *(["off by", FINAL_FIT] if after else []), "unit"]
     table = _table("Parameters, with 95 % intervals", head, words=(0, len(head) - 1))
     for name in names:
         first, last = before.parameters.get(name), (after or before).parameters.get(name)
@@ -169,8 +191,8 @@ def _errors(identification: Identification) -> Table:
     channel_unit = {"rate": "rad/s", "angle": "rad", "speed": "m/s", "position": "m"}[channel]
     torque, torque_unit = ("force", "N") if linear else ("torque", "N·m")
     kinds: list[tuple[str, str, float | None, str]] = [
-        (f"held-out {channel}, free run", "holdout_rate_rms", floor.holdout_rate_rms, channel_unit),
-        ("held-out fit", "holdout_fit_percent", None, "%"),
+        (simulation_error(channel), "holdout_rate_rms", floor.holdout_rate_rms, channel_unit),
+        (REPRODUCED, "holdout_fit_percent", None, "%"),
         (f"{torque} residual", "residual_rms_torque", floor.residual_rms_torque, torque_unit),
         (f"residual / {torque}, held out", "holdout_torque_relative", None, "%"),
     ]
@@ -190,14 +212,14 @@ def _sets(identification: Identification) -> Table:
     sets = identification.per_set
     names = in_order(name for one in sets for name in one.parameters)
     table = _table(
-        "Each set fitted separately", ["set", *[SYMBOLS.get(n, plain(n)) for n in names], "J < J_dec", "repeats"]
+        "Each set fitted separately", ["set", *[SYMBOLS.get(n, plain(n)) for n in names], BELOW_J_DEC, SEARCH_REPEATS]
     )
     for one in sets:
         values = [value_of(one.parameters[n]) if n in one.parameters else "undetermined" for n in names]
         table.add_row(printable(one.name), *values, "yes" if one.accepted else "NO", str(one.restarts))
     scatter = identification.set_scatter
     if scatter:
-        table.add_row("set to set", *[number(scatter[n], 2) if n in scatter else "-" for n in names], "", "")
+        table.add_row(_stacked(OVER_THE_SETS), *[number(scatter[n], 2) if n in scatter else "-" for n in names], "", "")
     totals = identification.max_error_percent
     if totals:
         table.add_row("Max_Error", *[f"{number(totals[n], 2)} %" if n in totals else "-" for n in names], "", "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from identify.report.captions import REPRODUCED
 from identify.report.comparison.numbers import ABSENT, factor
 from identify.report.comparison.saved import SavedDisturbance, SavedModel, SavedResult
 from identify.report.comparison.section import Section
@@ -21,7 +22,7 @@ def error_section(a: SavedResult, b: SavedResult) -> Section:
     comparable = a.axis == b.axis
     kinds = (
         ("held-out error of the measured channel", "holdout_rate_rms", ""),
-        ("held-out fit", "holdout_fit_percent", "%"),
+        (REPRODUCED, "holdout_fit_percent", "%"),
         (f"{torque} residual", "residual_rms_torque", torque_unit if comparable else ""),
         (f"{torque} residual / {torque}", "residual_torque_relative", "%"),
         ("the same, held out", "holdout_torque_relative", "%"),

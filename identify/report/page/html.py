@@ -35,7 +35,7 @@ from identify.results import Identification
 from identify.wording import capital, not_said_yet, sentence
 from rig.recording.run import Recording
 
-KICKER = {"rotary": "Identification of an inertial stability platform", "linear": "Identification of a linear axis"}
+KICKER = {"rotary": "Identification of an inertially stabilised platform", "linear": "Identification of a linear axis"}
 
 
 def report_html(identification: Identification, recording: Recording, name: str) -> str:
@@ -49,7 +49,7 @@ def report_html(identification: Identification, recording: Recording, name: str)
             _header(identification, name),
             first_screen(identification, gallery),
             _verdict(identification, recording, gallery),
-            _errors(identification, gallery),
+            _errors(identification, recording, gallery),
             _candidates(identification),
             proof_section(identification, gallery),
             _response(identification, recording, gallery),
@@ -107,7 +107,7 @@ def _titled(heading: str, lines: Sequence[Piece]) -> Markup:
     return join([element("h3", heading), bullets(lines)]) if lines else Markup("")
 
 
-def _errors(identification: Identification, gallery: Gallery) -> Markup:
+def _errors(identification: Identification, recording: Recording, gallery: Gallery) -> Markup:
     drawn = [*residual_figures(identification), *spectrum_figures(identification)]
     figures = [gallery.place(figure) for figure in drawn]
     return section(
@@ -116,7 +116,7 @@ def _errors(identification: Identification, gallery: Gallery) -> Markup:
         *_at_the_noise_floor(identification),
         disturbance_table(identification),
         gallery.place(shape_figure(identification)),
-        error_table(identification),
+        error_table(identification, recording.info),
         paragraph(sentence(identification.holdout_note), class_="note"),
         *_residual_contents(identification),
         *figures,

@@ -4,7 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
+from identify.report.captions import (
+    BELOW_J_DEC,
+    DECLARED_FIT,
+    DECLARED_VALUE,
+    FINAL_FIT,
+    J_DEC,
+    OVER_THE_SETS,
+    REPRODUCED,
+    SEARCH_REPEATS,
+    SIMULATED,
+    noise_floor_sentence,
+    simulation_error,
+)
 from identify.report.page.markup import Markup, Piece, bullets, element, join, paragraph, table
 from identify.report.page.quantities import QUANTITIES
 from identify.results import Candidate, Identification, ModelResult, ParameterEstimate
@@ -30,6 +44,7 @@ from rig import effects
 
 ROWS = 60  # of the candidates, best first
 SCREENED = "screened out"
+NO_INFO: Mapping[str, Any] = {}
 NO_BETTER, SIMPLER_ADDED = "no better", "a simpler effect was added instead"
 
 
@@ -39,7 +54,7 @@ def parameter_table(identification: Identification) -> Markup:
     bent = bias_percent(identification)
     lost = [item.name for item in (after or before).not_determined if item.name in SYMBOLS]
     names = list(dict.fromkeys([*before.parameters, *(after.parameters if after else ()), *lost]))
-    given = ["declared"] if identification.declared else []
+    given = [DECLARED_VALUE] if identification.declared else []
     rows: list[list[Piece]] = []
     for name in names:
         row: list[Piece] = [title(name, identification.axis)]
@@ -48,13 +63,13 @@ def parameter_table(identification: Identification) -> Markup:
         row += [*_estimate(after, name), percent(bent.get(name))] if after else []
         rows.append([*row, _unit_of(name, before, after)])
     rows += _effect_rows(identification)
-    head = ["", *given, "declared model", "95 % interval"]
-    head += ["final model", "95 % interval", "declared model: off by"] if after else []
+    head = ["", *given, DECLARED_FIT, "95 % interval"]
+    head += [FINAL_FIT, "95 % interval", f"{DECLARED_FIT} off by"] if after else []
     return table(
         [*head, "unit"],
         rows,
         "Fitted to all samples not declared held out. Declared model: only its own terms, without the added effects."
-        + (" Declared: the values under model: in the configuration, which the fit does not use." if given else ""),
+        + (" Declared value: the number under model: in the configuration, not used by the fit." if given else ""),
     )
 
 
@@ -95,14 +110,14 @@ def _unit_of(name: str, *models: ModelResult | None) -> str:
     return next((unit(m.parameters[name].unit) for m in models if m and name in m.parameters), "")
 
 
-def error_table(identification: Identification) -> Markup:
-    """Each measure of error before, after, and at the noise floor."""
+def error_table(identification: Identification, info: Mapping[str, Any] = NO_INFO) -> Markup:
+    """Each measure of error before, after, and at the noise floor; ``info`` is what the recording says of itself."""
     q, floor = QUANTITIES[identification.axis], identification.noise_floor
     channel = identification.traces[0] if identification.traces else None
     name, channel_unit = q.measured(channel) if channel else (q.rate, q.rate_unit)
     kinds: list[tuple[str, str, str, float | None]] = [
-        (f"held-out {name} error, free run", "holdout_rate_rms", channel_unit, floor.holdout_rate_rms),
-        ("held-out fit", "holdout_fit_percent", "%", None),
+        (simulation_error(name), "holdout_rate_rms", channel_unit, floor.holdout_rate_rms),
+        (REPRODUCED, "holdout_fit_percent", "%", None),
         (f"{q.torque} residual, rms", "residual_rms_torque", q.torque_unit, floor.residual_rms_torque),
         (f"{q.torque} residual over {q.torque}", "residual_torque_relative", "%", None),
         ("the same, held-out samples", "holdout_torque_relative", "%", None),
@@ -118,8 +133,8 @@ def error_table(identification: Identification) -> Markup:
         rows.append([words, *shown, number(least), its_unit])
     head = ["", *models, "noise floor", "unit"]
     cutoff = identification.final.error.lowpass_hz
-    note = f" Torque figures behind a zero-phase low-pass at {cutoff:g} Hz." if cutoff else ""
-    return table(head, rows, f"Error before and after. The noise floor is {floor.source}.{note}")
+    note = f" {capital(q.torque)} residuals after a zero-phase low-pass at {cutoff:g} Hz." if cutoff else ""
+    return table(head, rows, f"Error before and after. {SIMULATED} {noise_floor_sentence(floor, info)}{note}")
 
 
 def candidate_table(candidates: Sequence[Candidate], floor: float) -> Markup:
@@ -186,7 +201,7 @@ def set_table(identification: Identification) -> Markup:
     units = {n: next(unit(one.parameters[n].unit) for one in sets if n in one.parameters) for n in names}
     head: list[Piece] = ["set", "frequency"]
     head += [join([SYMBOLS.get(n, plain(n)), element("small", f" ({units[n]})")]) for n in names]
-    head += ["objective", "repeats", "J < J_dec", "remark"]
+    head += ["objective", SEARCH_REPEATS, BELOW_J_DEC, "remark"]
     rows: list[list[Piece]] = []
     for one in sets:
         values = [_with_half(one.parameters.get(n)) for n in names]
@@ -196,12 +211,15 @@ def set_table(identification: Identification) -> Markup:
     scatter = identification.set_scatter
     if scatter:
         spread: list[Piece] = [number(scatter[n], 2) if n in scatter else "-" for n in names]
-        rows.append(["from set to set", "", *spread, "", "", "", "one standard deviation"])
+        rows.append([OVER_THE_SETS, "", *spread, "", "", "", ""])
     totals = identification.max_error_percent
     if totals:
         shown: list[Piece] = [f"{number(totals[n], 2)} %" if n in totals else "-" for n in names]
         rows.append(["Max_Error (Eq. 15)", "", *shown, "", "", "", "against identify.reference"])
-    caption = "Each set fitted separately, with the effects of the final model. Plus or minus: half the 95 % interval."
+    caption = (
+        "Each set fitted separately, with the effects of the final model. Plus or minus: half the 95 % interval. "
+        + J_DEC
+    )
     if not any(one.frequency_hz is not None and frequency(one.frequency_hz) != one.name for one in sets):
         head.pop(1)  # the name says it already
         for row in rows:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from identify.report.captions import BELOW_J_DEC, SEARCH_REPEATS
 from identify.report.page.markup import Markup, table
 from identify.report.page.plots.figure import (
     AFTER,
@@ -46,8 +47,8 @@ def convergence_figure(identification: Identification) -> Figure | None:
             excess = np.maximum(run.history / run.closed_form_objective - 1.0, ROUNDING_FLOOR)
             drawn.append(lines(generation, excess, run.name, color, 2, width=width))
     panels = [
-        Panel("generation", "J / J_dec", "objective against J_dec (Eq. 14)", y_log=True, extra_y={"dtick": 1}),
-        Panel("generation", "J / J_closed - 1", "excess over the closed-form optimum", y_log=True),
+        Panel("generation", "objective / J_dec", "objective against J_dec (Eq. 14)", y_log=True, extra_y={"dtick": 1}),
+        Panel("generation", "objective / optimum - 1", "excess over the closed-form optimum", y_log=True),
     ]
     known = any(trace["yaxis"] == "y2" for trace in drawn)
     layout = grid(panels if known else panels[:1], columns=2 if known else 1, gap=0.12)
@@ -74,7 +75,7 @@ def convergence_table(identification: Identification) -> Markup:
         return Markup("")
     names = list(runs[0].closed_form)
     symbols = ", ".join(SYMBOLS.get(name, plain(name)) for name in names)
-    head = ["search", "objective", "J_dec", "repeats", "J < J_dec"]
+    head = ["search", "objective", "J_dec", SEARCH_REPEATS, BELOW_J_DEC]
     head += [f"{which}: {symbols} (%)" for which in ("gap", "Eq. 13 alone", "plain error")]
     rows = []
     for run in runs:

@@ -77,7 +77,7 @@ def _titled(identification: Identification) -> tuple[str, bool]:
 
 def _lowpass_note(identification: Identification, torque: bool) -> str:
     cutoff = identification.final.error.lowpass_hz
-    return f" Behind a zero-phase low-pass at {cutoff:g} Hz." if torque and cutoff else ""
+    return f" After a zero-phase low-pass at {cutoff:g} Hz." if torque and cutoff else ""
 
 
 def _against_time(identification: Identification) -> Figure:

@@ -146,10 +146,10 @@ def test_the_spectrum_makes_up_for_samples_that_do_not_count(found: Identificati
 
 def test_declared_numbers_stand_in_a_column_of_their_own(found: Identification) -> None:
     beside = parameter_table(replace(found, declared={"stiffness": 677.3, "coulomb_friction.level": 1.5})).html
-    assert ">declared</th>" in beside
+    assert ">declared value</th>" in beside
     assert ">677.3<" in beside
     assert ">1.5<" in beside
-    assert ">declared</th>" not in parameter_table(found).html
+    assert ">declared value</th>" not in parameter_table(found).html
 
 
 def test_residuals_are_drawn_against_time_angle_rate_and_frequency(found: Identification) -> None:
