@@ -19,6 +19,7 @@ SYMBOLS = {
 }
 MAX_DIGITS = 7  # significant digits: torque and gyro scales are never calibrated better than 1e-6
 TWO_DIGITS_UP_TO = 3.55  # leading digits of an uncertainty, rule of the Particle Data Group: 1.0 to 3.5 get two digits
+SENTENCE_DIGITS = 4  # significant digits at most in a sentence; a table has all
 MANY_TIMES = 3.0  # from here on a factor reads better than a percentage
 _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|us|ms|s|Hz|kg·m²|N·m[·/²a-z]*|N|rad/s|rad|deg|m/s|kg|m)(?![\w·/]))")
 _TITLES = {"rotary": "rotary inertia", "linear": "mass"}
@@ -82,14 +83,8 @@ def readable(estimate: ParameterEstimate) -> ParameterEstimate:
     """A time below a tenth of a second in ms; all else as it is."""
     if estimate.unit != "s" or not 0.0 < abs(estimate.value) < 0.1:
         return estimate
-    low, high = estimate.ci95
-    return replace(
-        estimate,
-        value=1e3 * estimate.value,
-        std_error=1e3 * estimate.std_error,
-        ci95=(1e3 * low, 1e3 * high),
-        unit="ms",
-    )
+    value, error, low, high = (1e3 * x for x in (estimate.value, estimate.std_error, *estimate.ci95))
+    return replace(estimate, value=value, std_error=error, ci95=(low, high), unit="ms")
 
 
 def _last_place(estimate: ParameterEstimate) -> int | None:
@@ -121,6 +116,13 @@ def _as_value(x: float, estimate: ParameterEstimate) -> str:
 def value_of(estimate: ParameterEstimate) -> str:
     """The value, with its last digit where the 95 % interval has its first or second."""
     return _as_value(estimate.value, estimate)
+
+
+def value_in_sentence(estimate: ParameterEstimate) -> str:
+    """The value as ``value_of`` has it, but with four digits at most."""
+    shown = value_of(estimate)
+    brief = number(_rounded(float(shown), SENTENCE_DIGITS), SENTENCE_DIGITS) if math.isfinite(estimate.value) else shown
+    return min(brief, shown, key=len)
 
 
 def half_of(estimate: ParameterEstimate) -> str:
@@ -190,9 +192,7 @@ def errors_by_model(identification: Identification) -> dict[str, Errors]:
     follow_up = identification.follow_up
     out = {"declared model": identification.before.error}
     if follow_up is not None and follow_up.error_without is not None:
-        return out | {
-            "without follow-up": follow_up.error_without, "after follow-up": identification.final.error
-        }  # fmt: skip
+        return out | {"without follow-up": follow_up.error_without, "after follow-up": identification.final.error}
     return out | ({"final model": identification.after.error} if identification.after else {})
 
 
@@ -234,7 +234,8 @@ def not_reported(several: Sequence[NotReported]) -> list[str]:
 def residual_torque_sentence(left: Disturbance, axis: str) -> str:
     """What is left after the final model, in one sentence: how large a torque, and what it goes with."""
     torque = "force" if axis == "linear" else "torque"
-    size = f"{number(left.torque_rms, 2)} {unit(left.unit)} rms ({number(100.0 * left.relative, 2)} % of the {torque})"
+    share = f"{number(100.0 * left.relative, 2)} % of the {torque}"
+    size = f"{number(left.torque_rms, 2)} {unit(left.unit)} rms, sensor noise removed ({share})"
     if not left.depends_on:
         return (
             f"The final model leaves a residual {torque} of {size}. It depends on no quantity that was tested, so it "
@@ -283,8 +284,9 @@ def without(times: float) -> str:
     """What an effect contributes: the held-out error without it over the one with it."""
     if round(times, 2) <= 1.0:
         return "Without it, after refitting, the error on held-out data is no larger."
-    more = f"{number(100.0 * (times - 1.0), 2)} %" if times < MANY_TIMES else f"{number(times, 3)} times"
-    return f"Without it, even after refitting, the error on held-out data is {more} larger."
+    percentage = f"{number(100.0 * (times - 1.0), 2)} % larger"
+    more = percentage if times < MANY_TIMES else f"{number(times, 3)} times as large"
+    return f"Without it, even after refitting, the error on held-out data is {more}."
 
 
 def how_to_separate(how: str) -> str:

@@ -63,7 +63,7 @@ def parameters(identification: Identification) -> MatplotlibFigure:
 
 def disturbance(identification: Identification) -> MatplotlibFigure:
     """The shape of what is left."""
-    why = "what is left depends on nothing that was tested, so there is no shape to draw: see .disturbance"
+    why = "the residual depends on no quantity that was tested, so there is no shape to draw: see .disturbance"
     return drawn(_known(shape_figure(identification), why))
 
 

@@ -137,7 +137,7 @@ def unexplained_reason(chi_square: float, found: Identification) -> str:
     elif error.holdout_fit_percent is not None and math.isfinite(error.holdout_fit_percent):
         share = f"{percent(100.0 - error.holdout_fit_percent).lstrip('+')} of the motion"
     size = f"{number(math.sqrt(chi_square), 3)} times the sensor's noise"
-    amount = f"{share} ({size})" if share else size
+    amount = f"{share} ({size}, which is included)" if share else size
     acts = "no effect that was tried describes it"
     if found.verdict.left_open:
         acts = "the cause of a part of it is not determined (see the verdict)"

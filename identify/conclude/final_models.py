@@ -102,7 +102,7 @@ class FinalModels:
         if not shows:
             return fitted.as_uncertain_as(fuller)
         search.dropped[:] = [d for d in search.dropped if d[0] != "damping"]
-        self.say(f"restored damping: {damping:.4g} +- {error:.2g} over whole runs")
+        self.say(f"restored damping: {damping:.4g} ± {error:.2g} over whole runs")
         return fuller
 
     def torque_scale(self, fitted: FinalFit) -> ParameterEstimate | None:

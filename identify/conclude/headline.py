@@ -20,7 +20,7 @@ from identify.wording import (
     readable,
     sentence,
     unit,
-    value_of,
+    value_in_sentence,
 )
 
 MAX_REASONS = 2  # of a result that is not accepted; the list below has all
@@ -48,7 +48,11 @@ def _found(found: Identification) -> str:
             return _changing(found) or "The declared model lacks something that no effect here describes."
         torque = "force" if found.axis == "linear" else "torque"
         left = found.disturbance
-        size = "" if left is None else f" but for {number(100.0 * left.relative, 2)} % of the {torque}"
+        size = (
+            ""
+            if left is None
+            else f" but for {number(100.0 * left.relative, 2)} % of the {torque} (sensor noise removed)"
+        )
         return f"The declared model describes these runs{size}: what is left is too little to matter."
     return "The declared model describes these runs: no effect is missing."
 
@@ -71,7 +75,7 @@ def _with_first_number(found: Identification, name: str) -> str:
         return plain(name)
     what, value = next(iter(values.items()))
     shown = readable(value)
-    return f"{plain(name)} ({what.replace('_', ' ')} {value_of(shown)} {unit(shown.unit)})".replace(" 1)", ")")
+    return f"{plain(name)} ({what.replace('_', ' ')} {value_in_sentence(shown)} {unit(shown.unit)})".replace(" 1)", ")")
 
 
 def error_before_and_after(found: Identification) -> tuple[float | None, float | None, float | None, str]:
@@ -125,9 +129,10 @@ def _left(found: Identification) -> str:
     if left.relative == 0.0:
         return f"no {torque} is left above the sensor's noise"
     if not left.depends_on:
-        share = number(100.0 * left.relative, 2)
-        return f"the {torque} that is left ({share} % of the {torque}) depends on nothing that was tested"
+        share = f"{number(100.0 * left.relative, 2)} % of the {torque}, sensor noise removed"
+        return f"the residual {torque} ({share}) depends on no quantity that was tested"
     on = quantities_of(left.depends_on, found.axis)
     moved = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in left.moves_percent.items() if v > 0.0])
-    size = f"what is left and depends on the {on} is {number(left.material_percent, 2)} % of the {torque}"
-    return f"{size} and moves {moved}, which is allowed" if moved else f"{size}, which is allowed"
+    part = f"the part of the residual {torque} that depends on the {on}"
+    size = f"{part} is {number(left.material_percent, 2)} % of the {torque}"
+    return f"{size} and changes {moved} when it is fitted, which is allowed" if moved else f"{size}, which is allowed"

@@ -22,7 +22,8 @@ from identify.wording import (
     residual_torque_sentence,
     title,
     unit,
-    value_of,
+    value_in_sentence,
+    with_interval,
     without,
 )  # fmt: skip
 from rig import effects
@@ -51,8 +52,8 @@ def sentences_of(found: Identification, damping_said: bool = False) -> tuple[str
         scale = found.torque_scale
         off = abs(scale.value - 1.0) > NORMAL_95 * scale.std_error
         out.append(
-            f"The known added inertia shows that the torque on the shaft is {number(scale.value, 5)} +- "
-            f"{number(NORMAL_95 * scale.std_error, 2)} times the recorded one"
+            f"The known added inertia shows that the torque on the shaft is {with_interval(scale)} times the recorded "
+            "torque"
             + ("; J, C and K are larger or smaller by the same factor." if off else ": the torque scale is right.")
         )
     out += _poorly_determined(found, damping_said)
@@ -60,8 +61,8 @@ def sentences_of(found: Identification, damping_said: bool = False) -> tuple[str
         out.append(residual_torque_sentence(of_reported(found.disturbance, found.final), found.axis))
     elif found.verdict.unexplained:
         out.append(
-            f"{number(100.0 * found.verdict.unexplained_fraction, 2)} % of the residual above the noise floor is "
-            f"unexplained; {_what_it_depends_on(found)}."
+            f"{number(100.0 * found.verdict.unexplained_fraction, 2)} % of the squared residual of the declared model, "
+            f"sensor noise removed, is unexplained; {_what_it_depends_on(found)}."
         )
     if found.after is not None:
         out += [f"{capital(plain(d.name))} was dropped: {d.reason}." for d in found.after.dropped]
@@ -114,7 +115,7 @@ def _poorly_determined(found: Identification, damping_said: bool) -> list[str]:
     if not wide or not found.accepted:
         return []  # what else is wrong comes first
     each = [
-        f"{title(n, found.axis)} +-{number(100.0 * half_interval(given[n]) / abs(given[n].value), 2)} %" for n in wide
+        f"{title(n, found.axis)} ± {number(100.0 * half_interval(given[n]) / abs(given[n].value), 2)} %" for n in wide
     ]
     return [f"Poorly determined: {joined(each)}. {to_determine(wide, torque_free(found))}"]
 
@@ -123,7 +124,7 @@ def _named(found: Identification, name: str) -> str:
     values = (found.after or found.before).effect_parameters.get(name, {})
     ordered = sorted(values.items(), key=lambda item: "_run_" in item[0])  # what every run has of its own comes last
     shown = {k.replace("_", " "): readable(v) for k, v in ordered[:MAX_SHOWN_PARAMETERS]}
-    numbers = ", ".join(f"{k} {value_of(v)} {unit(v.unit)}".removesuffix(" 1") for k, v in shown.items())
+    numbers = ", ".join(f"{k} {value_in_sentence(v)} {unit(v.unit)}".removesuffix(" 1") for k, v in shown.items())
     rivals = found.verdict.confusable_with.get(name, ())
     text = f"The model lacked {plain(name)} ({numbers})."
     if name in found.verdict.contribution:

@@ -20,6 +20,7 @@ from identify.wording import (
     title,
     unbroken,
     unit,
+    value_in_sentence,
     value_of,
     with_interval,
     without,
@@ -136,11 +137,21 @@ def test_a_large_error_is_a_factor_and_a_small_one_a_percentage(ratio: float, wo
     assert off_by(ratio) == words
 
 
+@pytest.mark.parametrize(
+    ("value", "std_error", "said"),
+    [(1.200004, 1e-6, "1.200"), (1.2, 0.05, "1.20"), (681234.0, 1.0, "681200"), (681234.0, 5000.0, "681000")],
+)
+def test_a_sentence_has_four_digits_at_most_and_no_more_than_the_interval(
+    value: float, std_error: float, said: str
+) -> None:
+    assert value_in_sentence(estimate(value, std_error)) == said
+
+
 def test_an_effect_without_which_nothing_is_worse_is_not_said_to_make_it_a_fraction_of_times_larger() -> None:
     assert "no larger" in without(0.31)
     assert "no larger" in without(1.004)
     assert "unbounded" in without(math.inf)
-    assert "478 times larger" in without(478.0)
+    assert "is 478 times as large." in without(478.0)
 
 
 def test_j_c_and_k_stand_in_this_order_whatever_is_determined_first() -> None:

@@ -153,7 +153,7 @@ def test_the_residual_is_drawn_against_what_was_asked_for() -> None:
 
 def test_the_shape_of_what_is_left_is_drawn_where_there_is_one() -> None:
     one = result()
-    with pytest.raises(InputError, match="depends on nothing that was tested"):
+    with pytest.raises(InputError, match="depends on no quantity that was tested"):
         Result(replace(one.identification, disturbance=None), one.recording, ModelConfig()).plot_disturbance()
     part = Dependence("angle", 0.1, 0.01, 1e-6, (-0.1, 0.0, 0.1), (-1.0, 0.0, 1.0))
     left = replace(one.identification, disturbance=Disturbance(0.1, "N*m", 0.01, (part,)))

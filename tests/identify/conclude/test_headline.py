@@ -45,9 +45,10 @@ def test_without_a_change_the_model_that_stands_is_spoken_of_alone() -> None:
 def test_what_is_left_is_said_with_its_size_and_what_it_moves() -> None:
     left = Disturbance(0.2, "N*m", 0.02, (Dependence("angle", 0.1, 0.015, 1e-6),), {"inertia": 0.4, "stiffness": 1.2})
     said = accepted_or_not(replace(FOUND, disturbance=left))
-    assert "depends on the angle is 1.5 % of the torque and moves J by 0.40 % and K by 1.2 %, which is allowed" in said
+    part = "the part of the residual torque that depends on the angle is 1.5 % of the torque"
+    assert f"{part} and changes J by 0.40 % and K by 1.2 % when it is fitted, which is allowed" in said
     noise = replace(left, depends_on=(), moves_percent={})
-    assert "(2.0 % of the torque) depends on nothing that was tested" in accepted_or_not(
+    assert "(2.0 % of the torque, sensor noise removed) depends on no quantity that was tested" in accepted_or_not(
         replace(FOUND, disturbance=noise)
     )
 

@@ -188,6 +188,6 @@ def test_what_is_left_is_said_in_percent_of_the_torque_as_well() -> None:
     assert FOUND.after is not None
     error = replace(FOUND.after.error, holdout_torque_relative=0.0327)
     told = unexplained_reason(909.2**2, replace(FOUND, after=replace(FOUND.after, error=error)))
-    assert "3.3 % of the torque (909 times the sensor's noise)" in told
+    assert "3.3 % of the torque (909 times the sensor's noise, which is included)" in told
     linear = unexplained_reason(909.2**2, replace(FOUND, axis="linear", after=replace(FOUND.after, error=error)))
     assert "of the force" in linear

@@ -111,5 +111,5 @@ def test_a_parameter_that_is_known_badly_is_said_with_what_would_tell_it() -> No
     assert not any("Poorly determined" in s for s in sentences_of(FOUND))
     wide = replace(FOUND.after, parameters={**FOUND.after.parameters, "inertia": estimate(0.02, 0.002)})
     said = [s for s in sentences_of(replace(FOUND, after=wide)) if "Poorly determined" in s]
-    assert said[0].startswith("Poorly determined: rotary inertia J +-20 %. To determine inertia: add a set at another")
+    assert said[0].startswith("Poorly determined: rotary inertia J ± 20 %. To determine inertia: add a set at another")
     assert not any("Poorly determined" in s for s in sentences_of(replace(FOUND, after=wide, accepted=False)))

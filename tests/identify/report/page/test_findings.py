@@ -20,7 +20,7 @@ def with_sentences(found: Identification, *more: str) -> Identification:
 def test_names_numbers_and_errors_of_the_first_screen_are_not_said_again() -> None:
     found = with_sentences(FOUND)
     above, below = " ".join(headline(found)), " ".join(further_findings(found))
-    assert "Coulomb friction (level 1.1998 N·m)" in above
+    assert "Coulomb friction (level 1.200 N·m)" in above
     assert "; without it, " in above
     assert "1.1998" not in below
     assert "too high" not in below
