@@ -16,6 +16,7 @@ from identify.results import ParameterEstimate
 from identify.runs.holdout import Split
 from identify.select.search_state import Search
 from identify.signals.trace import Trace, loads_differ
+from identify.wording import joined, plain
 from rig import effects
 from rig.effects.base import Place
 from rig.platform import TERMS, Platform
@@ -57,7 +58,7 @@ class FinalModels:
         A decay is told by how it swings on, whatever disturbs it.
         """
         structure = search.best.structure
-        self.say(f"final fit with {', '.join(structure.effects) or 'fewer terms'}")
+        self.say(f"final fit with {joined([plain(name) for name in structure.effects]) or 'fewer terms'}")
         fitted = by_output_error(
             self.traces, structure, search.best.values, search.horizon,
             self.split.final, self.split.everything,

@@ -19,6 +19,7 @@ from identify.propose.innovation_score import InnovationScores
 from identify.select.evidence import STRONG_SUPPORT, support_difference
 from identify.select.free_form_residual import CURVE_STEPS, ON
 from identify.select.trial_fits import COMPARABLE, TRIAL_ITERATIONS
+from identify.wording import joined, plain
 from rig import effects
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def is_part_of(name: str, curve: str) -> bool:
 def against_curves(search: Stepwise, now: Fit) -> Fit:
     """A model without names that a curve in their place beats; what else is there is judged beside that curve next."""
     if search.trials.added(now):
-        search.say("checking whether a free-form curve explains it better than what was added")
+        search.say("checking whether an arbitrary curve explains the data better than the named effects")
     found = _beaten(search, now)
     if found is None:
         return now
@@ -49,7 +50,7 @@ def against_curves(search: Stepwise, now: Fit) -> Fit:
     search.stood_for_curves |= set(names)
     search.dropped = [d for d in search.dropped if d[0] not in rest.structure.terms]
     search.dropped += [(n, f"a curve over the {ON[curve]} explains clearly more in its place") for n in names]
-    search.say(f"took {' and '.join(names)} back: a curve over the {ON[curve]} explains clearly more")
+    search.say(f"took {joined([plain(n) for n in names])} back: a curve over the {ON[curve]} explains clearly more")
     return rest
 
 

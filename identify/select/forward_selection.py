@@ -17,6 +17,7 @@ from identify.propose.innovation_score import Score
 from identify.select.curve_rivals import is_beaten
 from identify.select.evidence import ADDED_SUPPORT, MAX_EFFECTS, STRONG_SUPPORT, WEIGHT, Evidence
 from identify.select.trial_fits import FULL_ITERATIONS
+from identify.wording import joined, plain
 from rig import effects
 
 if TYPE_CHECKING:
@@ -54,14 +55,14 @@ def add_effects(search: Stepwise) -> None:
         if chosen and _is_series(search, now, chosen) and is_beaten(search, now):
             break
         new = tried[chosen] if chosen else _pair(search, now, scores)
-        how = f"explains {100.0 * new.weight:.0f} % of the disturbance" if new else "on trial"
+        how = _share_of_disturbance(new, bool(search.trials.added(now))) if new else "on trial"
         if new is None and trial is None and (new := _on_trial(tried)):
             trial = (new.effect, now)
         added = tuple(e for e in new.fit.structure.effects if e not in now.structure.effects) if new else ()
         search.rounds.append(Round(number, now, tuple(scores), tried, added))
         if new is None:
             break
-        search.say(f"added {' and '.join(added)}: {how}")
+        search.say(f"added {joined([plain(name) for name in added])}: {how}")
         if trial and trial[1] is now:
             search.best = new.fit
             continue
@@ -69,8 +70,13 @@ def add_effects(search: Stepwise) -> None:
         if trial and _carries_its_share(search, trial[0]):
             trial = None
     if trial:
-        search.say(f"took {trial[0]} back")
+        search.say(f"took {plain(trial[0])} back")
         search.best = _without_trial(search, *trial)
+
+
+def _share_of_disturbance(new: Evidence, beside_others: bool) -> str:
+    """How much of the disturbance an effect takes, of all of it or of what the effects before it have left."""
+    return f"explains {100.0 * new.weight:.0f} % of the torque that was {'still ' if beside_others else ''}unexplained"
 
 
 def _arrived(search: Stepwise, now: Fit, tried: dict[str, Evidence]) -> dict[str, Evidence]:

@@ -166,7 +166,7 @@ def _status(name: str, added: Sequence[str], named: Sequence[str], fit: Fit | No
         return "added" if name in named else "added, then no longer needed"
     if fit is None:
         return "screened out"
-    return "no better" if added else "not worth it"
+    return "no better" if added else "too little evidence"
 
 
 def _with_disturbance(fit: Fit, noise: float) -> Fit:

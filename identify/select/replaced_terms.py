@@ -8,6 +8,7 @@ from identify.likelihood.fit import Fit
 from identify.select.evidence import STRONG_SUPPORT, WEIGHT, support_difference
 from identify.select.preference import simplest
 from identify.select.trial_fits import TRIAL_ITERATIONS
+from identify.wording import plain
 
 if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
@@ -37,8 +38,8 @@ def replace_linear_terms(search: Stepwise, now: Fit) -> Fit:
         evidence = search.weigher.evidence(name, rest, fits[name])
         if evidence.support < STRONG_SUPPORT or evidence.weight < WEIGHT or _goes_with(search, term, now, fits[name]):
             continue
-        search.dropped.append((term, f"{name} explains more in its place"))
-        search.say(f"replaced {term} by {name}")
+        search.dropped.append((term, f"{plain(name)} explains more in its place"))
+        search.say(f"replaced {term} by {plain(name)}")
         now, search.inflation[name] = fits[name], evidence.inflation
     return now
 

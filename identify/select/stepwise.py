@@ -34,6 +34,7 @@ from identify.select.free_form_residual import FreeFormFit, fit_free_forms, redu
 from identify.select.preference import no_possible_gain, prefers_special_case, simplest
 from identify.select.replaced_terms import NEEDED_TERM_SIGMAS, replace_linear_terms
 from identify.select.trial_fits import FULL_ITERATIONS, TRIAL_ITERATIONS, TrialFits
+from identify.wording import plain
 from rig import effects
 from rig.arrays import Array
 from rig.platform import TERMS
@@ -106,7 +107,7 @@ class Stepwise:
 
     def compare_with_free_form(self, now: Fit) -> Fit:
         """Without names that explain nothing beside a curve over what is left."""
-        self.say("checking the residual for what no effect describes")
+        self.say("checking the residual for anything that no known effect explains")
         while True:
             left, self.doubtful = fit_free_forms(self, now)
             self.left = left
@@ -117,7 +118,7 @@ class Stepwise:
                 break
             self.dropped.append((name, "a free-form curve explains its share as well, so it is not needed"))
             self.stood_for_curves.add(name)
-            self.say(f"took {name} back: a curve over what is left explains it")
+            self.say(f"took {plain(name)} back: an arbitrary curve explains it as well")
             now = self.without(now, name, FULL_ITERATIONS)
         return now
 
@@ -163,7 +164,7 @@ class Stepwise:
             chosen, alike = self._best_of(name, seen)
             self.inflation[chosen] = seen[chosen].inflation
             if chosen != name:
-                self.say(f"replaced {name} by {chosen}: it fits better beside the other effects")
+                self.say(f"replaced {plain(name)} by {plain(chosen)}: it fits better beside the other effects")
                 now = fits[chosen]
             self.rivals.pop(name, None)
             self.rivals[chosen] = {n: fits[n] for n in alike if n != chosen}
@@ -267,7 +268,7 @@ class Stepwise:
             why = f"the log-likelihood changes by {-0.5 * evidence.gain:+.2g} without it"
             why = "the other terms already explain its torque" if light and name in TERMS else why
             self.dropped.append((name, why))
-            self.say(f"dropped {name}")
+            self.say(f"dropped {plain(name)}")
             now = without
         return now
 

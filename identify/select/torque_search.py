@@ -17,6 +17,7 @@ from identify.results import Candidate
 from identify.runs.observability import one_more
 from identify.select.evidence import MAX_EFFECTS, STRONG_SUPPORT, WEIGHT
 from identify.select.search_state import Search
+from identify.wording import plain
 from rig import effects
 from rig.effects.base import Place
 
@@ -99,7 +100,8 @@ class TorqueSearch:
             chosen = self.best_candidate(looks)
             if chosen is None:
                 break
-            self.say(f"added {chosen.effect}: {100.0 * chosen.weight:.0f} % of the residual torque on held-out data")
+            share = f"{100.0 * chosen.weight:.0f} % of the residual torque on held-out data"
+            self.say(f"added {plain(chosen.effect)}: explains {share}")
             now = self.backward_elimination(self.without_absorbing_stiffness(chosen.fit))
             if now.structure.parts in before:
                 break
@@ -188,7 +190,7 @@ class TorqueSearch:
                 continue
             without = self.without(now, name)
             if not self.candidate(name, without, now).is_significant:
-                self.say(f"dropped {name}: the others carry its torque")
+                self.say(f"dropped {plain(name)}: the others explain its torque as well")
                 return self.backward_elimination(without)
         return now
 

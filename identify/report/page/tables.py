@@ -45,7 +45,9 @@ from rig import effects
 ROWS = 60  # of the candidates, best first
 SCREENED = "screened out"
 NO_INFO: Mapping[str, Any] = {}
-NO_BETTER, SIMPLER_ADDED = "no better", "a simpler effect was added instead"
+# What result.json calls "no better", as the reason is.
+NO_BETTER, LESS_LIKELY = "no better", "less likely than the one added"
+SIMPLER_ADDED = "a simpler effect was added instead"
 
 
 def parameter_table(identification: Identification) -> Markup:
@@ -169,9 +171,9 @@ def candidate_table(candidates: Sequence[Candidate], floor: float) -> Markup:
 
 def _outcome(candidate: Candidate, added: Mapping[int, float]) -> str:
     """What became of it; a lower BIC than that of the effect that was added asks for the reason."""
-    if candidate.status == NO_BETTER and candidate.delta_bic < added.get(candidate.round, -math.inf):
-        return SIMPLER_ADDED
-    return candidate.status
+    if candidate.status != NO_BETTER or candidate.round not in added:
+        return candidate.status
+    return SIMPLER_ADDED if candidate.delta_bic < added[candidate.round] else LESS_LIKELY
 
 
 def _screened_out(several: Sequence[Candidate]) -> Markup:

@@ -226,7 +226,7 @@ def test_a_candidate_that_explains_more_than_the_effect_that_was_added_says_why_
     said = {name: row for row in rows for name in ("Stribeck", "Coulomb", "sensor lag") if name in row}
     assert "a simpler effect was added instead" in said["Stribeck"]
     assert "-16222<" in said["Stribeck"]
-    assert "no better" in said["sensor lag"]
+    assert "less likely than the one added" in said["sensor lag"]
 
 
 def test_what_stands_between_backticks_is_code_and_nothing_else_is() -> None:
