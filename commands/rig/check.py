@@ -23,7 +23,7 @@ from commands.terminal.exit_codes import OK
 from rig.config.load import LoadedConfig
 from rig.errors import Aborted, PreflightRefusal, RecordingError, RigError
 from rig.interface import Torque
-from rig.preflight import Prediction, playable_sets, predict_all
+from rig.preflight import Prediction, limits_broken, playable_sets, predict_all
 
 UNKNOWN_INERTIA_NOTE = (
     "forecast for a platform of unit inertia (model.inertia_unknown): declare the inertia to forecast the real travel"
@@ -65,7 +65,9 @@ def forecast(subject: CheckSubject) -> list[str]:
     except PreflightRefusal as error:
         raise with_locations(error, subject.loaded) from None
     doubt = [UNKNOWN_INERTIA_NOTE] if config.model.inertia_unknown else []
-    return doubt + [f"forecast {plain(p.describe_as_played())}" for p in subject.predictions]
+    origins = limits_broken(subject.predictions)
+    limits = [f"limits {plain(origins)}"] if origins else []
+    return doubt + limits + [f"forecast {plain(p.describe_as_played())}" for p in subject.predictions]
 
 
 def recordings(subject: CheckSubject) -> list[str]:

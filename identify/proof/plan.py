@@ -173,7 +173,8 @@ def _within(
     raise PreflightRefusal(
         f"{asked.name}: with compensation, even {100 * MIN_TORQUE_SHARE:g} % of this set's torque exceeds the limits "
         f"(travel {allowed.travel_deg:g} deg, rate {allowed.rate_deg_s:g} deg/s, torque "
-        f"{allowed.torque_nm:g} N m); nothing was moved. Raise the limit under limits: if the machine allows it."
+        f"{allowed.torque_nm:g} N m); nothing was moved. Raise the limit in the section `limits` if the machine allows "
+        "it."
     )
 
 

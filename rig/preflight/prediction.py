@@ -16,7 +16,15 @@ from rig.config.limits import LimitsConfig
 from rig.errors import PreflightRefusal
 from rig.excitation import PlannedSet, planned
 from rig.platform import Platform
-from rig.preflight.simulated_sets import Peaks, SetForecast, SetSequence, has_no_restoring_spring, largest_factor
+from rig.preflight.declared_model import model_hint, unstable_keys
+from rig.preflight.simulated_sets import (
+    Peaks,
+    SetForecast,
+    SetSequence,
+    has_no_restoring_spring,
+    largest_factor,
+    rounded_down,
+)
 
 MIN_REPORTED_DEG = 0.005  # half of the last digit shown
 LIMIT_KEYS = ("limits.travel_deg", "limits.rate_deg_s", "limits.torque_nm")
@@ -93,7 +101,7 @@ class Prediction:
 
     @property
     def _allowed_torque(self) -> str:
-        return f"{_rounded_down(self.largest_torque_nm)} N m"
+        return f"{rounded_down(self.largest_torque_nm)} N m"
 
     def _describe_motion(self) -> str:
         text = (
@@ -107,16 +115,27 @@ class Prediction:
     def _describe_broken(self) -> str:
         units = zip(_UNITS, self.allowed, self.keys, strict=True)
         broken = [
-            f"the {name} limit of {limit:g} {unit} ({self._describe_origin(name, limit, key)})"
+            f"the {name} limit of {limit:g} {unit}{' (travel_cap_deg of the set)' if self._is_own(name, limit) else ''}"
             for (name, unit), limit, key in units
             if key in self.broken
         ]
         return _joined(broken)
 
-    def _describe_origin(self, name: str, limit: float, key: str) -> str:
+    def _is_own(self, name: str, limit: float) -> bool:
+        """Whether a limit is the set's own."""
+        return name == "travel" and limit == self.planned.excitation.travel_cap_deg
+
+    def origins(self) -> dict[str, str]:
+        """The limits of the campaign that the set would break, with where they come from, by name."""
+        units = zip(_UNITS, self.allowed, self.keys, strict=True)
+        return {
+            name: f"{name} {limit:g} {unit} ({self._describe_origin(limit, key)})"
+            for (name, unit), limit, key in units
+            if key in self.broken and not self._is_own(name, limit)
+        }
+
+    def _describe_origin(self, limit: float, key: str) -> str:
         """Where a limit comes from, with the numbers that the file has: "10 by limits.travel_deg, times ..."."""
-        if name == "travel" and limit == self.planned.excitation.travel_cap_deg:
-            return "travel_cap_deg of the set"
         of_gyro = "" if key in LIMIT_KEYS else ", full scale of the gyro"
         if self.margin == 1.0:
             return f"{key}{of_gyro}"
@@ -131,10 +150,10 @@ def _joined(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
 
 
-def _rounded_down(value: float) -> str:
-    """Four digits that do not exceed the value: the printed torque must itself pass."""
-    digits = max(0, 3 - math.floor(math.log10(value)))
-    return f"{math.floor(value * 10**digits) / 10**digits:.{digits}f}"
+def limits_broken(predictions: Sequence[Prediction]) -> str:
+    """The limits that some set would break, each once, and where they come from; empty where there are none."""
+    origins = {name: said for p in predictions for name, said in p.origins().items()}
+    return ", ".join(origins.values())
 
 
 def peaks(platform: Platform, planned_set: PlannedSet, scale: float = 1.0) -> Peaks:
@@ -249,42 +268,15 @@ def refusal(predictions: Sequence[Prediction], platform: Platform, scaling: bool
     failing = [p for p in predictions if not p.passes]
     lines = [f"{len(failing)} of {len(predictions)} sets would break a limit; nothing was moved."]
     if not unstable_keys(platform):  # which runs away at any torque: figures of each set would say nothing
+        origins = limits_broken(predictions)
+        lines += [f"  limits: {origins}"] if origins else []
         lines += [f"  {p.describe()}" for p in predictions]
     hint = model_hint(platform)
     if hint:
         lines.append(hint)
     elif not scaling:
         lines.append(
-            "Lower torque_nm of these sets, or set excitation.scale_to_limits: true, or raise the limit by "
-            "name under limits: if the machine allows it."
+            "Lower torque_nm of these sets, or set excitation.scale_to_limits: true, or raise the limit in the "
+            "section `limits` if the machine allows it."
         )
     return "\n".join(lines)
-
-
-def unstable_keys(platform: Platform) -> tuple[str, ...]:
-    """The keys that make the declared model run away by itself: a negative stiffness, a negative damping."""
-    given = (
-        ("model.stiffness_nm_rad", platform.stiffness_nm_rad),
-        ("model.damping_nm_s_rad", platform.damping_nm_s_rad),
-    )
-    return tuple(key for key, value in given if value < 0)
-
-
-def model_hint(platform: Platform) -> str:
-    """What about the declared model makes it hard to stay within any travel; empty where nothing does."""
-    if wrong := unstable_keys(platform):
-        values = {
-            "model.stiffness_nm_rad": platform.stiffness_nm_rad,
-            "model.damping_nm_s_rad": platform.damping_nm_s_rad,
-        }
-        listed = " and ".join(f"{key} is {values[key]:g}" for key in wrong)
-        return (
-            f"The declared model is unstable ({listed}): any torque makes it diverge. Change the sign; both "
-            "must be 0 or more."
-        )
-    if platform.stiffness_nm_rad == 0:
-        return (
-            "The declared model has no stiffness, so a sine torque leaves the platform drifting. "
-            "Lower the torque, shorten duration_s, or declare model.stiffness_nm_rad if the platform has a spring."
-        )
-    return ""

@@ -49,8 +49,7 @@ class SetForecast:
 
     def __init__(self, platform: Platform, planned_set: PlannedSet) -> None:
         self._equations = Equations(platform)
-        time_s: Array = np.arange(math.ceil(planned_set.duration_s * PEAK_RATE_HZ) + 1) / PEAK_RATE_HZ
-        self._torque_nm: Array = np.asarray(planned_set.torque(time_s), dtype=float)
+        time_s, self._torque_nm = _sampled(planned_set)
         substeps = self._equations.substeps(1.0 / PEAK_RATE_HZ)
         self._grid = Grid(time_s, TorqueSignal(time_s, self._torque_nm), substeps)
 
@@ -63,6 +62,23 @@ class SetForecast:
             _peak(scale * self._torque_nm),
         )  # fmt: skip
         return SetMotion(math.degrees(start[0]), peaks, (float(motion.angle_rad[-1]), float(motion.rate_rad_s[-1])))
+
+
+def peak_torque_nm(planned_set: PlannedSet) -> float:
+    """Largest torque of a set, as its forecast has it."""
+    return _peak(_sampled(planned_set)[1])
+
+
+def _sampled(planned_set: PlannedSet) -> tuple[Array, Array]:
+    """Time and torque of a set, each (n,)."""
+    time_s: Array = np.arange(math.ceil(planned_set.duration_s * PEAK_RATE_HZ) + 1) / PEAK_RATE_HZ
+    return time_s, np.asarray(planned_set.torque(time_s), dtype=float)
+
+
+def rounded_down(value: float) -> str:
+    """Four digits that do not exceed a positive value: a printed torque must itself pass."""
+    digits = max(0, 3 - math.floor(math.log10(value)))
+    return f"{math.floor(value * 10**digits) / 10**digits:.{digits}f}"
 
 
 def _peak(x: Array) -> float:

@@ -12,7 +12,7 @@ from rig.config.limits import LimitsConfig
 from rig.errors import PreflightRefusal
 from rig.excitation import PlannedSet, Sine
 from rig.platform import Platform
-from rig.preflight import model_hint, peaks, plan, predict_all
+from rig.preflight import limits_broken, model_hint, peaks, plan, predict_all
 
 PAPER = Platform()
 WIDE = LimitsConfig(travel_deg=10, rate_deg_s=4000, torque_nm=350)
@@ -58,7 +58,7 @@ def test_the_gyros_full_scale_is_a_limit_too() -> None:
 def test_a_refusal_for_the_gyros_full_scale_says_that_it_is_the_gyros() -> None:
     with pytest.raises(PreflightRefusal) as refused:
         plan(PAPER, ExcitationConfig(), WIDE, math.radians(100), "simulated.gyro.full_scale_deg_s")
-    assert "rate limit of 100 deg/s (simulated.gyro.full_scale_deg_s, full scale of the gyro)" in str(refused.value)
+    assert "rate 100 deg/s (simulated.gyro.full_scale_deg_s, full scale of the gyro)" in str(refused.value)
     assert refused.value.keys == ("limits.travel_deg", "simulated.gyro.full_scale_deg_s")
 
 
@@ -79,16 +79,20 @@ def test_a_refusal_lists_every_set_with_its_travel_and_the_torque_that_passes() 
 
 def test_the_limit_that_is_said_has_the_number_of_the_file_and_its_margin_by_name() -> None:
     scaled = ExcitationConfig(scale_to_limits=True, margin=0.95)
-    text = predict_all(PAPER, scaled, LimitsConfig(travel_deg=10))[0].describe_as_played()
-    assert "travel limit of 9.5 deg (10 by limits.travel_deg, times excitation.margin 0.95)" in text
-    unscaled = predict_all(PAPER, ExcitationConfig(), LimitsConfig(travel_deg=10))[0].describe()
-    assert "travel limit of 10 deg (limits.travel_deg)" in unscaled
+    predictions = predict_all(PAPER, scaled, LimitsConfig(travel_deg=10))
+    assert "This exceeds the travel limit of 9.5 deg" in predictions[0].describe_as_played()
+    text = limits_broken(predictions)
+    assert text.count("travel 9.5 deg (10 by limits.travel_deg, times excitation.margin 0.95)") == 1
+    unscaled = limits_broken(predict_all(PAPER, ExcitationConfig(), LimitsConfig(travel_deg=10)))
+    assert "travel 10 deg (limits.travel_deg)" in unscaled
 
 
 def test_a_travel_cap_of_a_set_is_said_to_be_the_sets() -> None:
     sets = [{"torque_nm": 50, "frequency_hz": 1, "travel_cap_deg": 2}]
     capped = ExcitationConfig.model_validate({"sets": sets, "scale_to_limits": True})
-    assert "limit of 2 deg (travel_cap_deg of the set)" in predict_all(PAPER, capped, WIDE)[0].describe_as_played()
+    predictions = predict_all(PAPER, capped, WIDE)
+    assert "limit of 2 deg (travel_cap_deg of the set)" in predictions[0].describe_as_played()
+    assert limits_broken(predictions) == ""
 
 
 def test_what_is_said_to_pass_does_pass() -> None:

@@ -23,6 +23,7 @@ def test_a_sound_campaign_passes_and_leaves_nothing_behind(tmp_path: Path) -> No
     done = command(app, "check", ROOT / "rig.yaml")
     assert done.exit_code == 0, done.output
     assert "configuration" in done.stdout and done.stdout.count("forecast") == 5
+    assert done.stdout.count("times excitation.margin") == 2  # travel and rate, said once for all sets
     assert "All checks passed; nothing was moved." in done.stdout
     assert list(tmp_path.iterdir()) == []
 
