@@ -14,6 +14,7 @@ from rig import effects
 from rig.platform import TERMS
 
 DETERMINED_RELATIVE_ERROR = 0.05  # relative standard error up to which a parameter counts as determined
+POOR_CONDITION = 100.0  # condition number of the scaled sensitivities, 1 at best; set by hand
 AIM = 0.01  # relative standard error that advice on the torque aims at
 SEPARATE = 200.0  # amplification of the model's errors beyond which inertia and stiffness cannot be separated
 DELAY_NAME: Name = (DELAY, "delay")
@@ -41,7 +42,7 @@ def label(name: Name, torque_free: bool = False) -> str:
 
 
 def expected(information: Information) -> str:
-    """Expected standard errors: "J +-0.0024 %, C +-0.023 %, K +-0.0024 %"; one above the value determines nothing."""
+    """Expected standard errors: "J ± 0.0024 %, C ± 0.023 %, K ± 0.0024 %"; one above the value determines nothing."""
     each = []
     for name in information.names:
         value, error = abs(information.values[information.names.index(name)]), information.std_error(name)
@@ -49,9 +50,9 @@ def expected(information: Information) -> str:
         if not np.isfinite(error) or 0.0 < value < error:
             each.append(f"{words} not determined")
         elif value == 0.0:
-            each.append(f"{words} +-{_amount(error, _unit(name))} (declared as 0)")
+            each.append(f"{words} ± {_amount(error, _unit(name))} (declared as 0)")
         else:
-            each.append(f"{words} +-{number(100.0 * error / value, 2)} %")
+            each.append(f"{words} ± {number(100.0 * error / value, 2)} %")
     return ", ".join(each)
 
 
@@ -164,9 +165,13 @@ def of_campaign(each: Sequence[Information]) -> str:
 
 
 def _figures(total: Information) -> str:
-    """Rank, condition and the strongest correlation."""
+    """Whether all are determined, the condition and the strongest correlation."""
     p = len(total.names)
-    figures = f"rank {total.rank} of {p}, condition {number(total.condition, 2)}"
+    condition = f"condition number {number(total.condition, 2)}; above {POOR_CONDITION:g} is poor"
+    if weak(total):
+        figures = f"the data show {total.rank} of {p} combinations of the parameters ({condition})"
+    else:
+        figures = f"{f'all {p} parameters are' if p > 1 else 'the parameter is'} determined ({condition})"
     if p < 2:
         return figures
     size = np.abs(total.correlation - np.eye(p))
@@ -201,4 +206,4 @@ def of_delay(each: Sequence[Information]) -> str:
             "a torque delay cannot be separated from damping here, and an undeclared delay biases C: "
             "add sets at other frequencies, or one that starts abruptly"
         )
-    return f"if the delay is also fitted: delay +-{number(1e6 * error, 2)} us, C +-{number(100 * bent, 2)} %"
+    return f"if the delay is also fitted: delay ± {number(1e6 * error, 2)} us, C ± {number(100 * bent, 2)} %"

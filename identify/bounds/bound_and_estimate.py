@@ -115,10 +115,7 @@ def _sentence(
         return advice.cure(information) if whole else advice.of_weak_set(information, others)
     lost = [symbols[n] for n in expected if n not in achieved]
     if lost:
-        return (
-            f"the data would determine {joined(lost)} but for the unexplained residual: find the cause of the "
-            "residual first"
-        )
+        return f"the data would determine {joined(lost)} but for the unexplained residual: find its cause first"
     far = {
         n: achieved[n] / expected[n]
         for n in achieved
@@ -129,7 +126,7 @@ def _sentence(
         bounds = joined([f"{symbols[n]} {_percent(expected[n])}" for n in narrow])
         return f"the interval is narrower than the sensor's noise allows: use {bounds} as the standard error"
     if not far:
-        return "limited by the sensor's noise: to improve it, use more torque, a longer record or a quieter sensor"
+        return "limited by sensor noise"
     worst = max(far, key=lambda n: far[n])
     return (
         f"limited by the unexplained residual: {symbols[worst]} has a standard error of {_percent(achieved[worst])}, "

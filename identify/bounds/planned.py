@@ -31,8 +31,8 @@ def of_planned_campaign(
     late = of_planned(with_delay(platform), sets, sample_rate_hz, noise)
     assumed = "" if noise_rad_s else " (assumed: not declared)"
     basis = (
-        f"one standard error at the declared values; gyro noise {math.degrees(noise):.3g} deg/s per sample{assumed} at "
-        f"{sample_rate_hz:g} Hz"
+        "expected accuracy (± one standard error at the declared values); gyro noise "
+        f"{math.degrees(noise):.3g} deg/s per sample{assumed} at {sample_rate_hz:g} Hz"
     )
     return [basis, *lines_of(late, advice.DELAY_NAME[0] in platform.effects)]
 

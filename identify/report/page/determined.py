@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from identify.bounds.advice import POOR_CONDITION
 from identify.bounds.bound_and_estimate import BoundComparison
 from identify.report.page.markup import Markup, Piece, element, join, table
 from identify.wording import SYMBOLS, capital, number
@@ -23,7 +24,7 @@ def determined_table(comparisons: Sequence[BoundComparison], remarked: Collectio
     names = list(dict.fromkeys(n for one in comparisons for n in one.expected))
     ratios = "inertia" not in names
     symbols = [SYMBOLS[RATIOS[n]] if ratios else SYMBOLS[n] for n in names]
-    head: list[Piece] = ["set", "rank", "condition"]
+    head: list[Piece] = ["set", "rank", "condition number"]
     head += [join([symbol, element("small", " bound / reached (%)")]) for symbol in symbols]
     rows: list[list[Piece]] = []
     for one in comparisons:
@@ -34,7 +35,9 @@ def determined_table(comparisons: Sequence[BoundComparison], remarked: Collectio
         "One standard error, in percent of the value. Bound: the Cramer-Rao bound for the sensor's noise, the "
         "recorded samples and the identified values (initial state and bias unknown; for a single set, effects "
         "known). Reached: the reported standard error. Rank: number of parameter combinations that the data "
-        "determine. Condition: 1 is best; above 100, a small error of the model shifts one parameter against another."
+        "determine. Condition number: 1 is best; above "
+        f"{POOR_CONDITION:g}, a small error of the model shifts one parameter against another. Limited by sensor "
+        "noise: more torque, a longer record or a quieter sensor would narrow the interval."
     )
     return table([*head, "conclusion"], rows, caption, words=(len(head),))
 
