@@ -53,10 +53,10 @@ def identify_run(
     live: Live = False,
     version: Version = False,
 ) -> None:
-    """Play the campaign of CONFIG (or read its recordings), identify J, C and K, name what the model misses.
+    """Play the campaign of CONFIG (or read its recordings), identify J, C and K, name what the model lacks.
 
-    Exit codes: 0 identified and accepted, 1 not accepted (the results say why), 2 wrong usage, file or forecast,
-    3 device fault, 4 safety trip, 70 internal error, 130 Ctrl-C.
+    Exit codes: 0 identified and accepted, 1 not accepted (the results say why), 2 wrong usage, wrong file, or a set
+    that would exceed a limit, 3 device fault, 4 safety trip, 70 internal error, 130 Ctrl-C.
     """
     options = Options(config, out, dry_run, emulate, yes, tuple(overrides or ()), seed, quiet, resume, live)
     raise typer.Exit(run_command(options, run))

@@ -42,12 +42,12 @@ EffectFiles = Annotated[
     typer.Option("--effects", metavar="FILE", help="A file with effects of your own, whose code is run; repeatable."),
 ]
 
-app = new_app("Prepare, check and play a campaign on the rig. To identify from it: identify-run.")
+app = new_app("Prepare, check and play a campaign on the rig; identify-run identifies the parameters.")
 
 
 @app.callback()
 def rig(version: Version = False) -> None:
-    """Prepare, check and play a campaign on the rig. To identify from it: identify-run."""
+    """Prepare, check and play a campaign on the rig; identify-run identifies the parameters."""
 
 
 @app.command()
@@ -134,7 +134,7 @@ def prove(
 def recover(
     folder: ResultsDir,
 ) -> None:
-    """Recover a results folder after a kill or a power cut; files that are there are not changed."""
+    """Recover the results folder of a campaign that was killed or lost power; existing files are not changed."""
 
     def command() -> int:
         from commands.rig.recover import recover_folder
@@ -251,7 +251,7 @@ def init(
 def emulate(config: ConfigFile, overrides: Overrides = None) -> None:
     """Emulate the devices of CONFIG's `bench` section at wire level until Ctrl-C; JSON lines say what they do.
 
-    JSON lines on standard input let faults take hold: {"fault": "gyro_silent", "lasts_s": 0.2}.
+    A JSON line on standard input makes a fault occur: {"fault": "gyro_silent", "lasts_s": 0.2}.
     """
 
     def command() -> int:

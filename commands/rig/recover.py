@@ -43,7 +43,8 @@ def recover_folder(folder: Path) -> int:
         return OK
     config = _write_config(folder, recovery.export, recovery.recording.info)
     sys.stdout.write(
-        f"Recovered: {plain(str(recovery.export))}\nTo identify from it: identify-run {plain(str(config))}\n"
+        f"Recovered: {plain(str(recovery.export))}\n"
+        f"To identify the parameters from it, run: identify-run {plain(str(config))}\n"
     )
     return OK
 

@@ -167,7 +167,7 @@ class SetBars(Observer):
         """Where it stands."""
         p = progress
         figures = _figures(p.late_max_s, p.missed_ticks, p.drops, p.peak_torque_nm)
-        rest = f"{p.time_s:5.1f}/{p.duration_s:g} s  {figures}"
+        rest = f"{p.time_s:5.1f}/{p.duration_s:g} s  {figures}".replace("samples lost", "lost")  # room is short here
         self._terminal.overwrite(self._line(p.time_s / p.duration_s, rest))
 
     def set_ends(self, statistics: SetStatistics) -> None:
@@ -190,4 +190,4 @@ def _bar(part: float, width: int) -> str:
 
 
 def _figures(late_s: float, missed: int, drops: int, peak_nm: float) -> str:
-    return f"late {late_s * 1e3:.2f} ms  missed {missed}  drops {drops}  peak {peak_nm:.1f} N m"
+    return f"late {late_s * 1e3:.2f} ms  missed ticks {missed}  samples lost {drops}  peak {peak_nm:.1f} N m"

@@ -38,7 +38,7 @@ def split(traces: Sequence[Trace], share: float | Literal["auto"] = "auto") -> S
         none = [np.zeros(len(k), dtype=bool) for k in keep]
         fit = [n if d else k for k, n, d in zip(keep, none, declared, strict=True)]
         judge = [k if d else n for k, n, d in zip(keep, none, declared, strict=True)]
-        alone = "only start states, biases and the phase of disturbances are fitted there"
+        alone = "there only the state at the beginning, biases and the phase of disturbances are fitted"
         return Split(fit, judge, fit, f"Held out as declared: {names}; {alone}")
     fit, judge = [], []
     some_free = any(t.run.use == "auto" for t in traces)
@@ -55,7 +55,8 @@ def split(traces: Sequence[Trace], share: float | Literal["auto"] = "auto") -> S
     who = "" if share == "auto" else f" (identify.holdout: {share:g})"
     note = (
         f"Each run is split into {blocks} blocks; {_held_out(chosen)} held out{who} to compare candidates and to "
-        "measure the errors. Start states are fitted there; the final parameters are refitted on all samples"
+        "measure the errors. In the held-out blocks only the state at the beginning is fitted; the final parameters "
+        "use all samples"
     )
     return Split(fit, judge, [t.keep.copy() for t in traces], note)
 

@@ -42,14 +42,14 @@ EFFECT = Effect(
     place=Place.DRIVE,
     equation="M(t) = torque(t - delay)",
     source="transport delay of bus, amplifier and sensor: torque and rate show only their sum",
-    meaning="Time stamps of torque and rate disagree: bus, amplifier, filter of the gyro. If it is not modelled, 1 ms "
-    "adds K * 1 ms to C at frequencies well below the resonance.",
-    sign="Positive: the motion follows later than the time stamp of the torque says.",
+    meaning="The torque acts later than its time stamp says, or the rate is stamped late: the delays of bus, amplifier "
+    "and gyro add up. If it is not modelled, C is too large by K times the delay at frequencies well below resonance.",
+    sign="Positive: the motion follows the recorded torque later than the model without a delay says.",
     parameters=(
         Parameter(
             "delay",
             "s",
-            "by how much later the torque acts",
+            "time by which the torque acts later than recorded",
             low=0.0,
             high=0.2,
             suffix="s",

@@ -30,7 +30,12 @@ def missing_column(table: Table, quantity: str, names: Sequence[str], *, mapped:
     there = ", ".join(table.names[:20]) + (", ..." if len(table.names) > 20 else "")
     near = [n for name in names for n in difflib.get_close_matches(name, table.names, n=1, cutoff=0.6)]
     wanted = " or ".join(repr(name) for name in names)
-    cure = f"correct recorded.columns.{quantity}" if mapped else f"name it with recorded.columns.{quantity}"
+    cure = f"correct recorded.columns.{quantity}"
+    if not mapped:
+        cure = (
+            "columns called time, torque, rate, speed, angle or position are found if they state a unit; name others "
+            f"with recorded.columns.{quantity}, or run `rig init`"
+        )
     hint = f", did you mean {near[0]!r}?" if near else ""
     return RecordingError(f"{table.path}: has no column {wanted}{hint} (it has: {there}): {cure}")
 

@@ -22,7 +22,9 @@ HEADINGS = {
     "config_overrides": "overridden with --set",
     "system": "operating system",
     "backend": "devices",
+    "played_on": "played on",
 }
+PLAYED_ON = {"simulated": "simulated rig", "bench": "bench", "emulated": "emulated devices"}
 LATENESS = {"p50": "median", "p99": "99 %", "p99.9": "99.9 %", "p100": "largest"}
 OWN_PLACE = ("config", "config_text", "config_included", "versions", "sets")
 
@@ -30,7 +32,8 @@ OWN_PLACE = ("config", "config_text", "config_included", "versions", "sets")
 def origin(recording: Recording) -> Markup:
     """Origin of the data."""
     info = recording.info
-    short, long = _values({k: v for k, v in info.items() if k not in OWN_PLACE})
+    played = {"played_on": PLAYED_ON.get(info["played_on"], info["played_on"])} if "played_on" in info else {}
+    short, long = _values({k: v for k, v in {**info, **played}.items() if k not in OWN_PLACE})
     runs = f"{len(recording.runs)} run{'' if len(recording.runs) == 1 else 's'}"
     lengths = f"{runs}, {sum(len(run.time_s) for run in recording.runs)} samples"
     return section(

@@ -55,7 +55,8 @@ def show_a_set(stream: io.StringIO, quiet: bool = False) -> str:
 def test_a_set_has_a_bar_with_lateness_missed_ticks_drops_and_peak_torque() -> None:
     shown = show_a_set(Screen())
     assert (
-        "set 1/5  5 Hz [############------------]   0.2/0.5 s  late 0.20 ms  missed 1  drops 3  peak 9.5 N m" in shown
+        "set 1/5  5 Hz [############------------]   0.2/0.5 s  late 0.20 ms  missed ticks 1  lost 3  peak 9.5 N m"
+        in shown
     )
 
 
@@ -81,7 +82,7 @@ def test_what_is_replaced_fits_into_one_line_of_the_terminal(columns: int) -> No
 
 def test_without_a_terminal_there_is_one_line_a_set() -> None:
     assert show_a_set(io.StringIO()) == (
-        "set 1/5  5 Hz [########################] late 0.40 ms  missed 1  drops 3  peak 10.0 N m\n"
+        "set 1/5  5 Hz [########################] late 0.40 ms  missed ticks 1  samples lost 3  peak 10.0 N m\n"
     )
 
 
