@@ -22,9 +22,9 @@ DECLARED_TOLERANCE = math.log(1.15)  # of a factor, either way: what a declared 
 COMMON_FACTOR_TOLERANCE = math.log(1.02)
 MIN_SCALE, MAX_SCALE = math.log(1.05), math.log(2.0)  # a torque constant's tolerance; beyond, it is no calibration
 MAX_RELATIVE_INTERVAL = 0.1  # half the 95 % interval over the value: worse says nothing of a factor
-DEGREES, TURN, RPM = 180.0 / math.pi, 2.0 * math.pi, 30.0 / math.pi
+DEGREES, TURN, RPM = 180.0 / math.pi, 2.0 * math.pi, 30.0 / math.pi  # deg in a rad, rad in a turn, rpm in a rad/s
 GRAVITY, THOUSAND = 9.80665, 1e3  # newtons to a kgf; a prefix: milli, or kilo
-FREQUENCY = TURN**2
+FREQUENCY = TURN**2  # (rad/s)^2 in a Hz^2: of K/J, where a frequency in Hz was taken for rad/s
 Channel = Literal["rate", "angle"]
 
 
@@ -50,6 +50,7 @@ OF_RATE = (
     Cause(THOUSAND, "the torque were in mN m and read as N m"),
     Cause(1.0 / THOUSAND, "the rate were in mrad/s and read as rad/s"),
 )
+# The same where the angle is measured: factors of units, by definition.
 OF_ANGLE = (
     Cause(1.0 / DEGREES, "the angle were in degrees and read as rad"),
     Cause(DEGREES, "the angle were already in rad but converted from degrees"),
@@ -60,6 +61,7 @@ OF_ANGLE = (
     Cause(THOUSAND, "the torque were in mN m and read as N m"),
     Cause(1.0 / THOUSAND, "the angle were in mrad and read as rad"),
 )
+# Of force over position on a linear axis: factors of units, by definition.
 OF_POSITION = (
     Cause(1.0 / GRAVITY, "the force were in kgf and read as N"),
     Cause(GRAVITY, "the force were already in N but converted from kgf"),
@@ -80,6 +82,7 @@ OF_ONE = {
         Cause(FREQUENCY, "it were calculated from J with a frequency in Hz instead of rad/s"),
     ),
 }  # fmt: skip
+# The same on a linear axis.
 OF_ONE_LINEAR = {
     "inertia": (Cause(1e-3, "it were in g"), Cause(GRAVITY, "it were in kgf s^2/m")),
     "damping": (),
@@ -88,10 +91,12 @@ OF_ONE_LINEAR = {
         Cause(FREQUENCY, "it were calculated from the mass with a frequency in Hz instead of rad/s"),
     ),
 }  # fmt: skip
+# Of the time: factors of units, by definition.
 OF_TIME = (
     Cause(THOUSAND, "the time were in ms and read as s"),
     Cause(1e-3, "the time were already in s but converted from ms"),
 )
+# Of K/J of a free decay, a squared frequency: by definition.
 OF_SQUARED_FREQUENCY = (
     Cause(FREQUENCY, "it were calculated with a frequency in Hz instead of rad/s"),
     Cause(1e-6, "the time were in ms and read as s"),

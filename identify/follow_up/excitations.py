@@ -21,6 +21,7 @@ SHORTEST_S, LONGEST_S = 5.0, 15.0  # of a set
 SET_PERIODS = 100.0  # of the platform's own oscillation in a set
 DRIFT_SET_S = 40.0  # a set long enough for what drifts
 MAX_SINE_FREQUENCY_SHARE = 0.08  # of the sample rate: beyond, what happens between the samples is part of the answer
+# Frequency over the resonance, and what it is called; set by hand: slow enough for what creeps, up to the resonance.
 TONES = (
     (0.017, "a slow sine"),
     (0.1, "a slow sine"),
@@ -28,6 +29,7 @@ TONES = (
     (0.7, "a sine"),
     (0.95, "a sine near resonance"),
 )
+# The same above the resonance, where the inertia takes the torque; set by hand.
 HIGH_TONES = ((1.6, "a sine above resonance"), (2.5, "a sine above resonance"))
 FILL = 0.93  # of the limits that the largest amplitude is brought to
 FILL_TOLERANCE_RATIO = 1.02  # of it that still counts as there

@@ -11,6 +11,7 @@ from rig.platform import TERMS
 
 Shapes = Mapping[str, tuple[float, ...]]
 Label = tuple[str, ...]
+# Stands for a term where one parameter of an effect is set to 1; negative, so that it is no index of one of these.
 UNIT = {"inertia": -3, "damping": -2, "stiffness": -1}
 
 

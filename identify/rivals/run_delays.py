@@ -32,7 +32,7 @@ MAX_DELAY_SAMPLES = 120_000  # that are looked at
 ROUNDS, FIT_STEPS = 4, 3  # of moving them, and of the model in each
 SURE_RATIO = 10.0  # times what clocks bring: no name that brings more is theirs
 MAX_SHIFT_S = 50e-6  # of a run: two clocks that disagree by more show something else
-RCOND = 1e-12
+RCOND = 1e-12  # of the largest singular value, below which one is zero: what double precision leaves
 
 
 class Aligned(NamedTuple):

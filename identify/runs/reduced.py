@@ -18,9 +18,8 @@ HARMONICS = 5.0  # of a decay's swing: it moves no faster, whatever its noise do
 TURNS = 0.02  # of the largest rate, below which a turn may be noise
 SHORTEST_SPAN = 1_500  # samples: slow effects need a span to show in
 COLUMNS = 8  # acceleration, rate, angle, direction, constant; and where torque, rate and angle reach farthest
-OUTERMOST = (
-    5  # power that leaves of a quantity little but its peaks: what sets in there (a limit, a stop) shows nowhere else
-)
+# Power that leaves of a quantity little but its peaks: what sets in there (a limit, a stop) shows nowhere else.
+OUTERMOST = 5
 PLACES = 12  # where a span may begin
 LEAD = 0.25  # of a span, that is measured ahead of it: ``identify.likelihood.settling`` leaves it out again
 

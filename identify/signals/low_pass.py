@@ -11,6 +11,7 @@ from scipy import signal
 
 from rig.recording.run import Array
 
+LOW_PASS_ORDER = 2  # of the Butterworth filter; run forwards and backwards it is of the fourth order
 EDGE_PERIODS = 3.0  # of the cut-off: so much at either end of a run the filter has not settled
 GAP_PERIODS = 0.5  # of the cut-off: over a shorter gap what stands in for the motion is as good as it
 
@@ -18,7 +19,7 @@ GAP_PERIODS = 0.5  # of the cut-off: over a shorter gap what stands in for the m
 @lru_cache(maxsize=64)
 def _sections(wn: float) -> Array:
     """Of the filter, (1, 6), at a cut-off over Nyquist's: a search asks hundreds of times for a few of them."""
-    return np.asarray(signal.butter(2, wn, output="sos"))
+    return np.asarray(signal.butter(LOW_PASS_ORDER, wn, output="sos"))
 
 
 def settled(keep: NDArray[Any], step_s: float, cutoff_hz: float | None) -> NDArray[np.bool_]:
@@ -50,7 +51,7 @@ def settled(keep: NDArray[Any], step_s: float, cutoff_hz: float | None) -> NDArr
 
 
 def low_pass(values: Array, cutoff_hz: float, step_s: float) -> Array:
-    """Zero-phase fourth-order Butterworth (second order run forwards and backwards)."""
+    """Zero-phase Butterworth, run forwards and backwards, of twice ``LOW_PASS_ORDER``."""
     wn = 2.0 * cutoff_hz * step_s
     if wn >= 0.95:
         return values

@@ -29,6 +29,7 @@ MAX_MISSING_RATIO = 20  # times as many missing samples as there are
 RETIMING_PASSES = 4  # each along the motion that the one before made out
 MOTION_BAND = 0.5  # of the Nyquist frequency: motion above it is not followed when samples are moved
 LOWPASS_CUTOFF_RATIO = 2.0  # times the highest frequency above the noise: the low-pass must leave the motion as it is
+FOLLOWED_FILTER_ORDER = 3  # Butterworth, run forwards and backwards, as that of ``trace``
 MIN_BEAT_SAMPLES = 64  # samples that tell nothing about their noise
 
 
@@ -175,7 +176,7 @@ def torque_instants(torque_time_s: Array, time_s: Array, laid: Sampled) -> Array
 def _followed(values: Array, step_s: float, cutoff_hz: float) -> Any:
     """The motion in a channel, as a function of the time since its first instant."""
     wn = min(2.0 * LOWPASS_CUTOFF_RATIO * cutoff_hz * step_s, MOTION_BAND)
-    sos = signal.butter(3, wn, output="sos")
+    sos = signal.butter(FOLLOWED_FILTER_ORDER, wn, output="sos")
     slow = signal.sosfiltfilt(sos, values, padlen=min(len(values) - 1, int(10.0 / wn)))
     return make_interp_spline(step_s * np.arange(len(values)), slow, k=5)
 

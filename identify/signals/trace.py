@@ -23,6 +23,7 @@ from rig.dynamics.polynomials import Polynomials
 from rig.effects.base import Effect, Place
 from rig.recording.run import Array, Run
 
+MOTION_FILTER_ORDER = 3  # Butterworth, run forwards and backwards: of the sixth order in all; set by hand
 UPSAMPLING = 4  # nonlinear torques have corners between samples
 SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than it tells
 LEAD_S = 0.1  # of torque ahead of a piece of a run, for a drive with memory
@@ -156,7 +157,7 @@ class Trace:
         if wn < 0.8:
             from scipy import signal  # noqa: PLC0415  slow to load: a forecast knows its motion
 
-            sos = signal.butter(3, wn, output="sos")
+            sos = signal.butter(MOTION_FILTER_ORDER, wn, output="sos")
             y = signal.sosfiltfilt(sos, y, padlen=min(len(y) - 1, int(10.0 / wn)))
         t = self.step_s * np.arange(len(y))
         fine_t = self.step_s / UPSAMPLING * np.arange((len(y) - 1) * UPSAMPLING + 1)

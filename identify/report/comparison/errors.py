@@ -13,6 +13,7 @@ MEASURES = {
     "holdout_rate_rms": "the held-out error of the measured channel",
     "holdout_torque_relative": "the held-out torque residual",
 }
+# Percent in a share.
 PERCENT = {"residual_torque_relative": 100.0, "holdout_torque_relative": 100.0}
 
 

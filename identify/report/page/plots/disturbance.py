@@ -11,6 +11,7 @@ from identify.residual import Dependence
 from identify.results import Identification
 from identify.wording import depends_on, number, quantities_of, quantity_of
 
+# Sign of the rate, and half a step of room on either side of the axis.
 DIRECTIONS = {"tickvals": [-1, 1], "ticktext": ["backward", "forward"], "range": [-1.5, 1.5]}
 LEAST_RATE = 1e-6  # below it how small a false-alarm rate is tells nothing: the test is not exact that far out
 MIN_FOR_A_CURVE = 3  # points: fewer are drawn as points

@@ -34,7 +34,7 @@ REPEAT_TOLERANCE = 1e-3  # relative: torques closer than this are repeats of one
 SETTLING_TIME_CONSTANTS = 4.0  # time constants after which a start transient is taken to be over (2 % are left)
 FINE = 700  # frequencies of a drawn line
 LINE_SPAN_RATIO = 1.3  # the line goes on to this many times the highest and lowest measured frequency
-TICKS_HZ = [digit * 10.0**decade for decade in range(-3, 4) for digit in (1, 2, 5)]
+TICKS_HZ = [digit * 10.0**decade for decade in range(-3, 4) for digit in (1, 2, 5)]  # Hz, 1 mHz to 5 kHz
 HOW = {
     "whole periods": "over whole periods, without the first",
     "segments": "over half-overlapping segments",
