@@ -9,7 +9,8 @@ from commands.terminal.display import counted, plain
 from rig.config.root import Config
 from rig.excitation import PlannedSet
 from rig.interface import Statement, Torque
-from rig.preflight import peak_torque_nm, rounded_down
+from rig.preflight import peak_torque_nm
+from rig.rounding import rounded_down
 from rig.sequencer import SETTLE_S, TAIL_S
 from rig.sequencer.probe import Probe
 

@@ -16,6 +16,7 @@ from queue import SimpleQueue
 from typing import TextIO
 
 from rig.excitation import PlannedSet
+from rig.rounding import rounded_down
 from rig.sequencer import Observer, Progress
 from rig.sequencer.recorder import SetStatistics
 
@@ -190,4 +191,4 @@ def _bar(part: float, width: int) -> str:
 
 
 def _figures(late_s: float, missed: int, drops: int, peak_nm: float) -> str:
-    return f"late {late_s * 1e3:.2f} ms  missed ticks {missed}  samples lost {drops}  peak {peak_nm:.1f} N m"
+    return f"late {late_s * 1e3:.2f} ms  missed ticks {missed}  samples lost {drops}  peak {rounded_down(peak_nm)} N m"

@@ -11,7 +11,7 @@ from rig.preflight.prediction import (
     predict,
     predict_all,
 )
-from rig.preflight.simulated_sets import Peaks, peak_torque_nm, rounded_down
+from rig.preflight.simulated_sets import Peaks, peak_torque_nm
 
 __all__ = [
     "Peaks",
@@ -25,5 +25,4 @@ __all__ = [
     "playable_sets",
     "predict",
     "predict_all",
-    "rounded_down",
 ]

@@ -23,8 +23,8 @@ from rig.preflight.simulated_sets import (
     SetSequence,
     has_no_restoring_spring,
     largest_factor,
-    rounded_down,
 )
+from rig.rounding import rounded_down
 
 MIN_REPORTED_DEG = 0.005  # half of the last digit shown
 LIMIT_KEYS = ("limits.travel_deg", "limits.rate_deg_s", "limits.torque_nm")

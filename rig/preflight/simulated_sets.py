@@ -75,12 +75,6 @@ def _sampled(planned_set: PlannedSet) -> tuple[Array, Array]:
     return time_s, np.asarray(planned_set.torque(time_s), dtype=float)
 
 
-def rounded_down(value: float) -> str:
-    """Four digits that do not exceed a positive value: a printed torque must itself pass."""
-    digits = max(0, 3 - math.floor(math.log10(value)))
-    return f"{math.floor(value * 10**digits) / 10**digits:.{digits}f}"
-
-
 def _peak(x: Array) -> float:
     return float(np.max(np.abs(x))) if np.all(np.isfinite(x)) else math.inf
 

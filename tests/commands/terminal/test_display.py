@@ -55,7 +55,7 @@ def show_a_set(stream: io.StringIO, quiet: bool = False) -> str:
 def test_a_set_has_a_bar_with_lateness_missed_ticks_drops_and_peak_torque() -> None:
     shown = show_a_set(Screen())
     assert (
-        "set 1/5  5 Hz [############------------]   0.2/0.5 s  late 0.20 ms  missed ticks 1  lost 3  peak 9.5 N m"
+        "set 1/5  5 Hz [############------------]   0.2/0.5 s  late 0.20 ms  missed ticks 1  lost 3  peak 9.500 N m"
         in shown
     )
 
@@ -76,13 +76,13 @@ def test_what_is_replaced_fits_into_one_line_of_the_terminal(columns: int) -> No
         shown = os.read(far, 10_000).decode()
     os.close(far)
     replaced = [line.split("\r")[0].rstrip("\n") for line in shown.split("\r\x1b[K")[1:]]
-    assert max(len(line) for line in replaced if "peak 10.0 N m" not in line) < columns  # that one stays
-    assert "peak 9.5 N m" in shown or columns < 80
+    assert max(len(line) for line in replaced if "peak 10.00 N m" not in line) < columns  # that one stays
+    assert "peak 9.500 N m" in shown or columns < 80
 
 
 def test_without_a_terminal_there_is_one_line_a_set() -> None:
     assert show_a_set(io.StringIO()) == (
-        "set 1/5  5 Hz [########################] late 0.40 ms  missed ticks 1  samples lost 3  peak 10.0 N m\n"
+        "set 1/5  5 Hz [########################] late 0.40 ms  missed ticks 1  samples lost 3  peak 10.00 N m\n"
     )
 
 
