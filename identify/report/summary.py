@@ -137,7 +137,7 @@ def _table(heading: str, columns: Sequence[str], words: Sequence[int] = (0,)) ->
         padding=(0, 1, 0, 0),
     )
     for i, column in enumerate(columns):
-        made.add_column(_stacked(column), justify="left" if i in words else "right", overflow="fold")
+        made.add_column(column, justify="left" if i in words else "right", overflow="fold")
     return made
 
 
@@ -155,6 +155,7 @@ def _parameters(identification: Identification, narrow: bool) -> Table:
     names = list(dict.fromkeys([*before.parameters, *(after.parameters if after else ())]))
     given = [DECLARED_VALUE] if identification.declared else []
     head = ["", *given, DECLARED_FIT, *(["off by", FINAL_FIT] if after else []), "unit"]
+    head = [_stacked(column) for column in head]
     table = _table("Parameters, with 95 % intervals", head, words=(0, len(head) - 1))
     for name in names:
         first, last = before.parameters.get(name), (after or before).parameters.get(name)
@@ -212,7 +213,8 @@ def _sets(identification: Identification) -> Table:
     sets = identification.per_set
     names = in_order(name for one in sets for name in one.parameters)
     table = _table(
-        "Each set fitted separately", ["set", *[SYMBOLS.get(n, plain(n)) for n in names], BELOW_J_DEC, SEARCH_REPEATS]
+        "Each set fitted separately",
+        ["set", *[SYMBOLS.get(n, plain(n)) for n in names], *map(_stacked, (BELOW_J_DEC, SEARCH_REPEATS))],
     )
     for one in sets:
         values = [value_of(one.parameters[n]) if n in one.parameters else "undetermined" for n in names]

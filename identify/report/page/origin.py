@@ -11,6 +11,7 @@ import yaml
 from identify.report.page.markup import Markup, Piece, element, folded, join, section, table
 from identify.wording import number
 from rig.recording.run import Recording
+from rig.rounding import rounded_down
 
 LONG = 300  # characters of a value that gets a fold of its own
 DIGITS = 6  # significant digits of a measured number; a configuration is shown as it was written
@@ -108,12 +109,12 @@ def _sets(sets: Sequence[Mapping[str, Any]]) -> Markup:
             "yes" if one.get("complete") else "NO",
             str(one.get("missed_ticks", "-")),
             str(one.get("invalid_samples", "-")),
-            number(one.get("peak_torque_nm")),
+            "-" if (peak_nm := one.get("peak_torque_nm")) is None else rounded_down(peak_nm),
             *[number(one.get(key), 3) for key in late],
         ]
         for one in sets
     ]
-    head: list[Piece] = ["set", "complete", "missed ticks", "samples lost", "peak torque"]
+    head: list[Piece] = ["set", "complete", "missed ticks", "samples lost", "peak torque (N·m)"]
     head += [f"late (ms), {LATENESS.get(key.removeprefix('late_ms_'), key)}" for key in late]
     return table(head, rows, "Time base: how late the ticks of the control loop were, set by set.")
 
