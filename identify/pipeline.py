@@ -40,10 +40,10 @@ from identify.runs.reading import describe_reading
 from identify.runs.reduced import reduced
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_without_motion
 from identify.runs.usable import runs_used
-from identify.select.field_search import Found, Judged, search_in_torque
+from identify.select.field_search import Judged, search_in_torque
 from identify.select.free_form_residual import curves_left, dependence_on
 from identify.select.likelihood_search import LikelihoodSearch, filtered_above, start_search
-from identify.select.search_state import Search
+from identify.select.search_state import Found, Search
 from identify.signals.prepare import channels_of, prepare
 from identify.signals.trace import Trace, release
 from rig import effects

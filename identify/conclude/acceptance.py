@@ -91,8 +91,8 @@ def reasons_against_disturbance(left: Disturbance, accept: AcceptConfig, axis: s
                 f"{number(most, 2)} % is allowed (identify.accept.{name}_percent)"
             )
     out += [
-        f"{plain(effect)} would change {changes}, more than is allowed ({keys}), and can follow almost any "
-        f"{torque}: how much of what depends on the {on} belongs to that is not known"
+        f"{plain(effect)} would change {changes}, more than is allowed ({keys}), and how much of the {torque} that "
+        f"depends on the {on} belongs to that is not known"
         for effect, changes, keys in _beyond(left, accept)
     ]
     return out

@@ -16,6 +16,7 @@ from identify.diagnose.terms.changing import along_angle, pulsating
 from identify.diagnose.terms.curves import curves
 from identify.diagnose.terms.free_form import FreeForm
 from identify.diagnose.terms.from_run_to_run import FROM_RUN_TO_RUN, between_runs, moved_on_average
+from identify.diagnose.terms.repeating import repeating
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.model.parameters import Name
@@ -26,6 +27,7 @@ from rig.platform import TERMS
 DEPENDENCE_SIGMAS = 4.0  # standard errors over blocks of held-out samples; by chance once in 30,000
 MIN_POWER_SHARE = 0.02  # of the power that is left: less is not worth a word
 MIN_OVER_NOISE = 2.0  # times what the term makes of the sensor's noise alone: an integrated rate wanders with that
+MOST_OF_IT = 2.0**0.5  # times the largest other part: what repeats is told where no curve shows half of its power
 MISSING_IN_RUNS, MISSING_SHARE = 0.25, 0.25  # runs in which a wave may be missing: with less of its share in all
 
 
@@ -46,6 +48,7 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
     most = max((f[0].torque_rms for f in found), default=0.0)
     follow = [*along_angle(regression), *between_runs(regression, fit)]
     found += [f for f in _depends(regression, fit, follow) if f[0].torque_rms > most]
+    found += [f for f in _depends(regression, fit, repeating(regression)) if f[0].torque_rms > MOST_OF_IT * most]
     if not found:  # asked last: it may follow, as a change over time, what an angle or a rate explains by itself
         found = _depends(regression, fit, pulsating(regression, fit))
     found.sort(key=lambda f: -f[0].torque_rms)

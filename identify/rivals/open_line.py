@@ -15,7 +15,7 @@ import numpy as np
 
 from identify.estimate.final_fit import FinalFit, free_run_of
 from identify.rivals.tone_origin import TONE, describe, standing_line
-from identify.select.field_search import Found
+from identify.select.search_state import Found
 from identify.select.stepwise import Stepwise
 from identify.signals.trace import Trace
 

@@ -19,7 +19,7 @@ from identify.model.parameters import Name
 from identify.rivals.open_line import with_numbers_of
 from identify.runs.holdout import Split
 from identify.select.evidence import Evidence, inflation
-from identify.select.field_search import Found
+from identify.select.search_state import Found
 from identify.select.stepwise import Stepwise
 from identify.select.trial_fits import FULL_ITERATIONS
 from identify.signals.trace import Trace

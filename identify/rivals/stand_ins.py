@@ -1,10 +1,10 @@
 """Named effects that may only take up what something else leaves, and how far J, C and K hang on them.
 
-A few effects follow almost anything: a second mass on a spring answers an amplifier's coarse steps, a torque that
-repeats over the angle a cable that pulls at one place. As long as nothing is left over, the evidence speaks for them,
-unless samples that were held out are explained as well without. Where something is left that no effect describes,
-nobody knows how much of it they have taken up, nor what they did to J, C and K in its place. Where that is little
-beside what an effect takes, the effect is no stand-in for it.
+Any effect takes a part of what another one leaves: a spring that stiffens of a drive that sags, a second mass on a
+spring of an amplifier's coarse steps. As long as nothing is left over, the evidence speaks for it, unless it follows
+almost anything and samples that were held out are explained as well without. Where something is left that no effect
+describes, nobody knows how much of it a name has taken up, nor what that did to J, C and K. Where that is little beside
+what an effect takes, the effect is no stand-in for it.
 """
 
 from __future__ import annotations
@@ -17,45 +17,54 @@ import numpy as np
 from identify.estimate.final_fit import FinalFit
 from identify.runs.observability import is_seen_to_repeat
 from identify.select.evidence import WEIGHT
-from identify.select.field_search import Found
 from identify.select.free_form_residual import MOVED_SIGMAS
+from identify.select.search_state import Found
 from identify.signals.trace import Trace
-from identify.wording import joined, plain, quantity_of
+from identify.wording import joined, number, plain, quantity_of
 from rig import effects
+from rig.effects.base import Place
 from rig.platform import TERMS
 
 
 def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callable[[str], None]) -> Found:
-    """The same without the flexible effects that something else is left beside; unchanged where nothing is left over.
+    """The same without the effects that too much else is left beside; unchanged where nothing is left over.
 
-    A residual that depends on what more of the same kind would depend on (other orders of cogging: the angle) does not
-    speak against the name, unless it is a wave that is not seen to repeat. Then only how far J, C and K move without
-    the effect is noted.
+    Of flexible ones, a residual that depends on what more of the same kind would depend on (other orders of cogging:
+    the angle) does not speak against the name, unless it is a wave that is not seen to repeat. Then only how far J, C
+    and K move without the effect is noted.
     """
-    depends = found.disturbance.depends_on  # the largest first
-    if not depends:
+    if not found.disturbance.depends_on:
         return _with_unproven(found)
-    flexible = [name for name in found.named if effects.get(name).is_flexible]
-    apart = {name: found.without(name) for name in flexible}
-    flexible = [name for name in flexible if _is_in_doubt(found, apart[name])]
-    if not flexible:
-        return found
-    waves = {
-        name: is_seen_to_repeat(effects.first_of(name), found.named, found.after.values, traces) for name in flexible
-    }
-    stand_ins = [name for name in flexible if depends[0].on not in effects.get(name).goes_with or not waves[name]]
-    if stand_ins:
+    while stand_ins := [name for name in _in_doubt(found) if _may_stand_in(name, found, traces)]:
+        on = quantity_of(found.disturbance.depends_on[0], axis)
         found = _taken_back(found, stand_ins, axis)
-        say(f"not named: {_listed(stand_ins)}; what is left then still depends on the {depends[0].on}")
-        flexible = [name for name in flexible if name not in stand_ins]
+        say(f"not named: {_listed(stand_ins)}; what is left then still depends on the {on}")
+    flexible = _in_doubt(found)
     if not flexible:
         return found
     say(f"something is left over: checking how far the parameters depend on {_listed(flexible)}")
     moves = dict(found.disturbance.moves_without_percent)
     for name in flexible:
-        less = found.without(name) if stand_ins else apart[name]
-        moves[effects.first_of(name)] = moved(found.after, less.after)
+        moves[effects.first_of(name)] = moved(found.after, found.without(name).after)
     return replace(found, disturbance=replace(found.disturbance, moves_without_percent=moves))
+
+
+def _in_doubt(found: Found) -> list[str]:
+    """Effects beside which so much is left over as a share of what they take that it would be a name of its own.
+
+    A lag is not asked: it takes little torque and is known all the same, by when the platform answers.
+    """
+    depends = found.disturbance.depends_on  # the largest first
+    asked = [n for n in found.named if effects.get(n).place not in (Place.DRIVE, Place.SENSOR)] if depends else []
+    return [name for name in asked if depends[0].relative ** 2 > WEIGHT * found.taken_by(name)]
+
+
+def _may_stand_in(name: str, found: Found, traces: Sequence[Trace]) -> bool:
+    """Whether what is left over speaks against the name of an effect that is in doubt."""
+    effect = effects.get(name)
+    if not effect.is_flexible or found.disturbance.depends_on[0].on not in effect.goes_with:
+        return True
+    return not is_seen_to_repeat(effects.first_of(name), found.named, found.after.values, traces)
 
 
 def _with_unproven(found: Found) -> Found:
@@ -71,34 +80,32 @@ def _with_unproven(found: Found) -> Found:
     return replace(found, disturbance=replace(found.disturbance, moves_without_percent=moves))
 
 
-def _is_in_doubt(found: Found, less: Found) -> bool:
-    """Whether what is left over is a share of what an effect takes that would be a name of its own."""
-    with_it, without = found.in_torque[1].held_relative, less.in_torque[1].held_relative
-    return bool(found.disturbance.depends_on[0].relative ** 2 > WEIGHT * (without**2 - with_it**2))
-
-
 def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
     """The same without effects that may only stand in.
 
-    What they had taken up may be torque of an effect that does not follow almost anything: that is added. Where there
-    is none, what was left beside them is left without them, too. One of them may be real all the same: J, C and K are
-    no surer than they differ with and without.
+    What one that follows almost anything had taken up may be torque of an effect that does not: that is added. Where
+    there is none, what was left beside them is left without them, too. One of them may be real all the same: J, C and
+    K are no surer than they differ with and without.
     """
     depends = found.disturbance.depends_on
-    less = found.without(*names, others=True)
+    flexible = any(effects.get(n).is_flexible for n in names)
+    less = found.without(*names, others=flexible)
     left = less.disturbance
     for dependence in depends if set(less.named) < set(found.named) else ():
         left = left.with_free_form(dependence, {})
     search = less.search
+    follows = " but can follow almost any torque," if flexible else ""
+    share, on = number(100.0 * depends[0].relative, 2), quantity_of(depends[0], axis)
     words = (
-        f"Not named: {_listed(names)}. This would explain part of what is missing, but can follow almost any torque, "
-        f"and with it the residual still depends on the {quantity_of(depends[0], axis)}."
+        f"Not named: {_listed(names)}. This would explain part of what is missing,{follows} and with it {share} % of "
+        f"the torque still depends on the {on}."
     )
     search.drop(less.kept, "left open")
     search.left_open = f"{search.left_open} {words}".strip()
     if not less.named:  # the declared model has all of its terms
         search.dropped = []
-    apart = {" and ".join(dict.fromkeys(effects.first_of(n) for n in names)): moved(less.after, found.after)}
+    apart = dict(found.disturbance.moves_without_percent)
+    apart |= {" and ".join(dict.fromkeys(effects.first_of(n) for n in names)): moved(less.after, found.after)}
     return replace(less, disturbance=replace(left, moves_without_percent=apart))
 
 

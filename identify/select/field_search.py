@@ -17,16 +17,14 @@ from identify.estimate.initial_guess import Start, scale_of
 from identify.likelihood.by_prediction_error import as_final, fitted_on_all
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
-from identify.model.parameter_fit import ParameterFit
 from identify.model.structure import Structure
 from identify.results import Dependence, Disturbance
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
-from identify.select.disturbance_lines import lines_left
 from identify.select.evidence import MAX_TRUSTED_INFLATION, STRONG_SUPPORT, in_band, inflation, torque_fit_of
 from identify.select.likelihood_search import MAX_CUTOFF_SHARE
 from identify.select.preference import is_more_flexible, leaves_less
-from identify.select.search_state import Search
+from identify.select.search_state import Found, Search, describes
 from identify.select.torque_search import TorqueSearch
 from identify.signals.trace import Trace
 from rig import effects
@@ -38,7 +36,6 @@ WIDER = {"angle": 10.0**0.4, "rate": 10.0 ** (2.0 / 3.0)}
 UNFOLLOWED = 0.5  # of the residual in torque, that the likelihood takes the disturbance for
 NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
 A_MULTIPLE = 2.0  # of the residual in torque: four times its power is no disturbance, whatever the likelihood says
-ANOTHER = 0.5  # of the inertia, by which the likeliest platform is another than the one that is reported
 
 
 @dataclass(frozen=True)
@@ -56,58 +53,6 @@ class Judged:
     fit: Fit
     search: Search
     curves: Sequence[tuple[Dependence, Mapping[str, float]]] = ()
-
-
-@dataclass(frozen=True)
-class Found:
-    """What the search found.
-
-    Attributes
-    ----------
-    search
-        Candidates, rivals and what was dropped, for the report.
-    before, after
-        The declared model and the final one, fitted.
-    in_torque
-        How far both are from the torque.
-    disturbance
-        What the final model leaves.
-    """
-
-    search: Search
-    before: FinalFit
-    after: FinalFit
-    disturbance: Disturbance
-    in_torque: tuple[TorqueErrors, TorqueErrors]
-    lacking: Callable[..., tuple[FinalFit, TorqueErrors, Disturbance]]  # the final model without some effects
-    taken_back: tuple[str, ...] = ()
-
-    def without(self, *several: str, others: bool = False) -> Found:
-        """The same with effects taken back; what was found beside them stays, fitted anew.
-
-        With ``others`` in their place that carry weight without them, but do not follow almost anything.
-        """
-        gone = (*self.taken_back, *several)
-        after, errors, disturbance = self.lacking(*gone, others=others)
-        return replace(
-            self, taken_back=gone, after=after, in_torque=(self.in_torque[0], errors), disturbance=disturbance
-        )
-
-    def with_lines(self, likeliest: Fit, torque_nm: float) -> Found:
-        """The same with the spectral lines of what the likeliest model leaves, where that is the final one."""
-        final = _describes(likeliest, self.after) and not self.disturbance.depends_on
-        lines = lines_left(likeliest, torque_nm) if final else None
-        return self if lines is None else replace(self, disturbance=self.disturbance.with_free_form(lines, {}))
-
-    @property
-    def kept(self) -> ParameterFit:
-        """The model that is believed, as the search tells it."""
-        return self.after.fit if self.named else self.search.base
-
-    @property
-    def named(self) -> list[str]:
-        """Effects that the declared model lacked."""
-        return [e for e in self.after.structure.effects if e not in self.before.structure.effects]
 
 
 def search_in_torque(
@@ -198,7 +143,7 @@ def search_in_torque(
     lost = [e for e in final.effects if e not in best.structure.effects and effects.get(e).place is not Place.SENSOR]
     if by_likelihood and (unfollowed or lost):
         disturbance = Disturbance(size_nm, unit, size_nm / regression.torque_nm, (), {})
-    if _describes(known.fit, after):
+    if describes(known.fit, after):
         for curve in known.curves:
             disturbance = disturbance.with_free_form(*curve)
 
@@ -206,12 +151,14 @@ def search_in_torque(
         size = regression.torque_nm
         return TorqueErrors(fit.sigma, fit.sigma / size, fit.held_nm / size, floor, cutoff)
 
+    in_torque: dict[tuple[object, ...], TorqueFit] = {(False,): best}  # by others, and by what was taken back
+
     def lacking(*several: str, others: bool = False) -> tuple[FinalFit, TorqueErrors, Disturbance]:
         less, there = final, best  # without a low-pass of the gyro, which no torque shows
         for name in several:
             less, there = less.minus(name), search.without(there, name)
         values = {k: v for k, v in after.values.items() if k[0] not in several}
-        there, added = search.with_others(there) if others else (there, [])
+        there, added = search.with_others(there, several) if others else (there, [])
         while True:
             model = replace(less, terms=there.structure.terms).plus(*(c.effect for c in added)) if added else less
             fitted = before
@@ -223,16 +170,23 @@ def search_in_torque(
             if none is None:
                 break
             added, there = [c for c in added if c is not none], search.without(there, none.effect)
-        reported.candidates += added
+        reported.candidates += [c for c in added if c not in reported.candidates]
         reported.contribution |= {c.effect: search.without(there, c.effect).held_nm / there.held_nm for c in added}
+        in_torque[(others, *several)] = there
         return fitted, errors(there), disturbance_of(regression, there, floor, unit)
+
+    def share_of(name: str, *gone: str, others: bool) -> float:
+        there = in_torque[(others, *gone)]
+        if name not in there.structure.effects:
+            return float("inf")
+        return (search.without(there, name).held_nm ** 2 - there.held_nm**2) / regression.torque_nm**2
 
     reported = search.as_search(best)
     if by_likelihood:
         reported = replace(by_likelihood.search, contribution=reported.contribution)
         if final != found_so_far:
             reported.drop(after.fit)
-    return Found(reported, before, after, disturbance, (errors(base), errors(best)), lacking)
+    return Found(reported, before, after, disturbance, (errors(base), errors(best)), lacking, share_of)
 
 
 def _unsupported(final: FinalFit, declared: Structure, by_likelihood: bool) -> str | None:
@@ -247,13 +201,6 @@ def _unsupported(final: FinalFit, declared: Structure, by_likelihood: bool) -> s
     asked = [e for e in found if e not in builds_on and (by_likelihood or effects.get(e).is_flexible)]
     weakest = min(asked, key=final.support_of, default=None)
     return weakest if weakest is not None and final.support_of(weakest) < STRONG_SUPPORT else None
-
-
-def _describes(likeliest: Fit, final: FinalFit) -> bool:
-    """Whether what is left beside the likeliest model is left beside the final one, too."""
-    ours, theirs = (f.values.get(("inertia",), 0.0) for f in (final, likeliest))
-    same = abs(theirs - ours) <= ANOTHER * abs(ours)
-    return same and set(final.structure.effects) <= set(likeliest.structure.effects)
 
 
 def _final(

@@ -7,11 +7,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from identify.diagnose.torque_fit import TorqueErrors
+from identify.estimate.final_fit import FinalFit
+from identify.likelihood.fit import Fit
 from identify.model.parameter_fit import ParameterFit, reduced_chi_square
 from identify.model.parameters import Name
-from identify.results import Candidate
+from identify.results import Candidate, Disturbance
+from identify.select.disturbance_lines import lines_left
 from rig.arrays import Array
 from rig.platform import TERMS, Platform
+
+ANOTHER = 0.5  # of the inertia, by which the likeliest platform is another than the one that is reported
 
 
 @dataclass
@@ -93,3 +99,71 @@ class Search:
             self.rival_models.pop(effect, None)
             self.between_rivals.pop(effect, None)
         self.best = without
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the search found.
+
+    Attributes
+    ----------
+    search
+        Candidates, rivals and what was dropped, for the report.
+    before, after
+        The declared model and the final one, fitted.
+    in_torque
+        How far both are from the torque.
+    disturbance
+        What the final model leaves.
+    lacking
+        The final model without some effects.
+    share_of
+        What an effect takes of the torque's power on held-out samples, of the model without some.
+    """
+
+    search: Search
+    before: FinalFit
+    after: FinalFit
+    disturbance: Disturbance
+    in_torque: tuple[TorqueErrors, TorqueErrors]
+    lacking: Callable[..., tuple[FinalFit, TorqueErrors, Disturbance]]
+    share_of: Callable[..., float]
+    taken_back: tuple[str, ...] = ()
+    others: bool = False  # are in the place of what was taken back
+
+    def without(self, *several: str, others: bool = False) -> Found:
+        """The same with effects taken back; what was found beside them stays, fitted anew.
+
+        With ``others`` in their place that carry weight without them, but do not follow almost anything.
+        """
+        gone, others = (*self.taken_back, *several), others or self.others
+        after, errors, disturbance = self.lacking(*gone, others=others)
+        both = (self.in_torque[0], errors)
+        return replace(self, taken_back=gone, others=others, after=after, in_torque=both, disturbance=disturbance)
+
+    def taken_by(self, name: str) -> float:
+        """What an effect takes of the torque's power on held-out samples; infinite where no torque shows it."""
+        return self.share_of(name, *self.taken_back, others=self.others)
+
+    def with_lines(self, likeliest: Fit, torque_nm: float) -> Found:
+        """The same with the spectral lines of what the likeliest model leaves, where that is the final one."""
+        final = describes(likeliest, self.after) and not self.disturbance.depends_on
+        lines = lines_left(likeliest, torque_nm) if final else None
+        return self if lines is None else replace(self, disturbance=self.disturbance.with_free_form(lines, {}))
+
+    @property
+    def kept(self) -> ParameterFit:
+        """The model that is believed, as the search tells it."""
+        return self.after.fit if self.named else self.search.base
+
+    @property
+    def named(self) -> list[str]:
+        """Effects that the declared model lacked."""
+        return [e for e in self.after.structure.effects if e not in self.before.structure.effects]
+
+
+def describes(likeliest: Fit, final: FinalFit) -> bool:
+    """Whether what is left beside the likeliest model is left beside the final one, too."""
+    ours, theirs = (f.values.get(("inertia",), 0.0) for f in (final, likeliest))
+    same = abs(theirs - ours) <= ANOTHER * abs(ours)
+    return same and set(final.structure.effects) <= set(likeliest.structure.effects)

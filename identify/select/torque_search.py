@@ -194,12 +194,14 @@ class TorqueSearch:
                 return self.backward_elimination(without)
         return now
 
-    def with_others(self, now: TorqueFit) -> tuple[TorqueFit, list[Candidate]]:
+    def with_others(self, now: TorqueFit, gone: Sequence[str] = ()) -> tuple[TorqueFit, list[Candidate]]:
         """The same with what else carries weight but does not follow almost anything, and what that is.
 
-        What is there already stays: unchanged where something of it would be dropped for the others.
+        What is there already stays: unchanged where something of it would be dropped for the others. What is ``gone``
+        was taken back before, and is not asked.
         """
-        bound = [name for name in self.allowed if not effects.get(name).is_flexible]
+        before = {effects.first_of(name) for name in gone}
+        bound = [n for n in self.allowed if not effects.get(n).is_flexible and effects.first_of(n) not in before]
         further = replace(self, allowed=bound, rounds=[], path=[])
         found = further.run(now)
         new = [e for e in found.structure.effects if e not in now.structure.effects]

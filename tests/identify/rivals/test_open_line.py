@@ -16,8 +16,7 @@ from identify.results import Candidate
 from identify.rivals import open_line
 from identify.rivals.open_line import with_line_left_open
 from identify.rivals.tone_origin import TONE, SpectralLine
-from identify.select.field_search import Found
-from identify.select.search_state import Search
+from identify.select.search_state import Found, Search
 
 
 def final(effects: tuple[str, ...], inertia: float, error: float) -> FinalFit:
@@ -50,7 +49,7 @@ def left_open(
     search = Search(final((), 1.3, 0.2).fit, with_tone.fit, 0.0, 0.0)
     search.candidates = [Candidate(name, 1, -100.0, None, "added") for name in effects]
     left = Disturbance(0.01, "N*m", 0.01)
-    found = Found(search, final((), 1.3, 0.2), with_tone, left, (nothing, nothing), lacking)
+    found = Found(search, final((), 1.3, 0.2), with_tone, left, (nothing, nothing), lacking, nothing)
     monkeypatch.setattr(Found, "with_lines", lambda self, likeliest, torque_nm: self)
     best: Any = SimpleNamespace(structure=Structure())
     stepwise: Any = SimpleNamespace(best=best, problem=SimpleNamespace(torque_nm=1.0))

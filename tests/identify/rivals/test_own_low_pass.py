@@ -16,7 +16,7 @@ from identify.residual import Dependence, Disturbance
 from identify.rivals import open_line, own_low_pass
 from identify.rivals.own_low_pass import with_own_low_pass
 from identify.select.evidence import Evidence
-from identify.select.field_search import Found
+from identify.select.search_state import Found
 from rig.dynamics.gains import Noise
 
 SECOND, FIRST = "sensor_lag_second_order", "sensor_lag"
@@ -39,7 +39,8 @@ def final(fit: Fit) -> FinalFit:
 def found_with(effects: tuple[str, ...] = ()) -> Found:
     after = final(fit_with(effects, -1000.0, 1.0))
     nothing = cast(Any, None)
-    return Found(nothing, final(fit_with((), 0.0, 1.1)), after, Disturbance(0.1, "N*m", 0.01), nothing, nothing)
+    left = Disturbance(0.1, "N*m", 0.01)
+    return Found(nothing, final(fit_with((), 0.0, 1.1)), after, left, nothing, nothing, nothing)
 
 
 @pytest.fixture
