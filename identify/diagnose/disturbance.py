@@ -81,7 +81,8 @@ def _dependence(
     if term.wave_on and not _in_most_runs(alone, richer, share):
         return None
     size = float(np.sqrt(share)) * alone.held_nm
-    if size < MIN_OVER_NOISE * regression.made_by_noise_nm(fit.values, term.columns):
+    made_nm = term.noise_nm() if term.noise_nm else regression.made_by_noise_nm(fit.values, term.columns)
+    if size < MIN_OVER_NOISE * made_nm:
         return None
     at, shape_nm = tuple(term.at.tolist()), tuple((term.shape @ gains).tolist())
     found = Dependence(

@@ -182,24 +182,35 @@ class LowPassedTorque:
 
     def _of_noise(self, values: Mapping[Name, float], seed: int) -> Array:
         """What a draw of the sensor's noise leaves of the torque at the samples of all runs, (n,)."""
-        rng = np.random.default_rng(seed)
         inertia = 1.0 if self.torque_free else values.get(("inertia",), 0.0)
         out: list[Array] = []
-        for trace, rows in zip(self.traces, self._rows, strict=True):
-            if len(rows) == 0:
+        for trace, (angle, rate, acceleration) in zip(self.traces, self.motion_of_noise(seed), strict=True):
+            rows = len(angle)
+            if rows == 0:
                 continue
+            left = (inertia + trace.run.added_inertia_kg_m2) * acceleration + values.get(("damping",), 0.0) * rate
+            left = left + values.get(("stiffness",), 0.0) * (angle - np.mean(angle))
+            if trace.biased:
+                line = np.column_stack([np.ones(rows), np.arange(rows)])
+                left = left - line @ np.linalg.lstsq(line, left, rcond=None)[0]
+            out.append(left)
+        return np.concatenate(out)
+
+    def motion_of_noise(self, seed: int) -> list[tuple[Array, Array, Array]]:
+        """Angle, rate and acceleration that a draw of the sensor's noise adds to every run, behind the low-pass."""
+        return self._kept(("motion of noise", seed), partial(self._draw, seed))  # type: ignore[return-value]
+
+    def _draw(self, seed: int) -> list[tuple[Array, Array, Array]]:
+        rng = np.random.default_rng(seed)
+        out = []
+        for trace, rows in zip(self.traces, self._rows, strict=True):
             noise = trace.noise * rng.standard_normal(len(trace.measured))
             read = trace.beside
             of_angle = None if read is None else trace.beside_noise * rng.standard_normal(len(read))
             only = replace(trace, measured=noise, beside=of_angle, drift_rad=None, motion=None, _series={})
-            angle, rate, acceleration = (x[rows] for x in motion(only, self.cutoff_hz))
-            left = (inertia + trace.run.added_inertia_kg_m2) * acceleration + values.get(("damping",), 0.0) * rate
-            left = left + values.get(("stiffness",), 0.0) * (angle - np.mean(angle))
-            if trace.biased:
-                line = np.column_stack([np.ones(len(rows)), rows])
-                left = left - line @ np.linalg.lstsq(line, left, rcond=None)[0]
-            out.append(left)
-        return np.concatenate(out)
+            angle, rate, acceleration = motion(only, self.cutoff_hz)
+            out.append((angle[rows], rate[rows], acceleration[rows]))
+        return out
 
     def values_of(self, quantity: str) -> Array:
         """Angle, rate or torque of all runs as they are, ahead of the low-pass, at the samples behind it, (n,)."""

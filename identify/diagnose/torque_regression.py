@@ -98,10 +98,10 @@ class TorqueRegression(LowPassedTorque):
             held_nm=rms(held[self._judged]), residuals=np.split(r, ends), held=np.split(held, ends),
         ), x[a.shape[1] :]  # fmt: skip
 
-    def columns_of(self, fit: TorqueFit) -> dict[Name, Array]:
-        """The column of every linear parameter of a model over all runs, (n,) each."""
+    def columns_of(self, fit: TorqueFit) -> tuple[dict[Name, Array], Array]:
+        """The column of every linear parameter over all runs, (n,) each, and what is free in each run, (n, m)."""
         a, _, names, _ = self._over_all_runs(fit.structure, fit.shapes)
-        return {name: a[:, k] for k, name in enumerate(names)}
+        return {name: a[:, k] for k, name in enumerate(names)}, a[:, len(names) :]
 
     def covariance_beside(self, richer: TorqueFit, columns: Array) -> tuple[list[Name], Array]:
         """Names of a model's linear parameters, and the covariance of these and of the gains of further columns."""

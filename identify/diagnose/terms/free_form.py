@@ -26,6 +26,7 @@ class FreeForm:
     wave_on: str = ""
     wave_hz: float | None = None
     changes: str = ""
+    noise_nm: Callable[[], float] | None = None  # what it makes of noise, where that is not its fit to noise alone
 
 
 def free_splines(x: Array) -> tuple[Callable[[Array], Array] | None, Array]:

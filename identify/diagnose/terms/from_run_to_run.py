@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
+from identify.diagnose.low_passed_torque import NOISE_DRAWS
 from identify.diagnose.terms.free_form import FreeForm
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
@@ -23,7 +25,10 @@ def between_runs(regression: TorqueRegression, fit: TorqueFit) -> list[FreeForm]
     if not columns:
         return []
     none = np.zeros((0, len(columns)))
-    return [FreeForm("time", np.stack(columns, axis=1), np.zeros(0), none, True, changes=FROM_RUN_TO_RUN)]
+    made = partial(_made_by_noise_nm, regression, fit)
+    return [
+        FreeForm("time", np.stack(columns, axis=1), np.zeros(0), none, True, changes=FROM_RUN_TO_RUN, noise_nm=made)
+    ]
 
 
 def moved_on_average(
@@ -60,4 +65,28 @@ def moved_on_average(
 
 def _own(regression: TorqueRegression, fit: TorqueFit) -> dict[Name, Array]:
     """The columns of J, C and K over all runs, (n,) each."""
-    return {name: column for name, column in regression.columns_of(fit).items() if len(name) == 1}
+    return {name: column for name, column in regression.columns_of(fit)[0].items() if len(name) == 1}
+
+
+def _made_by_noise_nm(regression: TorqueRegression, fit: TorqueFit) -> float:
+    """What numbers of each run's own explain under a model that holds, because the sensor's noise is in the motion.
+
+    In a run of one sine, inertia and stiffness are nearly one number: what the noise adds to the acceleration is taken
+    off again by a smaller inertia and a smaller stiffness. So noise is added to the motion once more, with the torque
+    that the model takes along it as it was.
+    """
+    columns, free = regression.columns_of(fit)
+    torque = sum(fit.values[name] * column for name, column in columns.items())
+    run, own = regression.run_of_each, [name for name in columns if len(name) == 1]
+    gained = []
+    for seed in range(1, 1 + NOISE_DRAWS):
+        draws = regression.motion_of_noise(seed)
+        angle, rate, acceleration = (np.concatenate([d[k] for d in draws]) for k in range(3))
+        noise = {"inertia": acceleration, "damping": rate, "stiffness": angle}
+        noisy = {name: c + noise[str(name[0])] if name in own else c for name, c in columns.items()}
+        rest = [c for name, c in noisy.items() if name not in own]
+        together = np.column_stack([*(noisy[n] for n in own), *rest, free])
+        apart = np.column_stack([*(noisy[n] * (run == k) for n in own for k in np.unique(run)), *rest, free])
+        left = [torque - a @ np.linalg.lstsq(a, torque, rcond=None)[0] for a in (together, apart)]
+        gained.append(np.mean(left[0] ** 2) - np.mean(left[1] ** 2))
+    return float(np.sqrt(max(np.mean(gained), 0.0)))
