@@ -13,7 +13,7 @@ from rig.arrays import Array
 
 AUTOREGRESSION_ORDER = 24  # of the autoregression: six periods of the cut-off, at four samples each
 AUTOREGRESSION_ROUNDS = 3  # of fitting the autoregression and the parameters in turn
-LEAST_RATE = 1e-12  # below it a rate of error tells nothing: neither test is exact that far out
+MIN_ERROR_RATE = 1e-12  # below it a rate of error tells nothing: neither test is exact that far out
 LINES = 4  # that are looked for in a run
 
 
@@ -41,8 +41,8 @@ def combined(groups: Sequence[Array]) -> float:
     """The same of several groups of values of which only some may lie above zero, in standard errors."""
     enough = [g for g in groups if len(g) > 1]
     rates = [float(student.sf(standard_errors(g), len(g) - 1)) for g in enough]
-    rate = float(chi2.sf(-2.0 * np.sum(np.log(np.maximum(rates, LEAST_RATE))), 2 * len(rates))) if rates else 1.0
-    return float(norm.isf(max(rate, LEAST_RATE)))
+    rate = float(chi2.sf(-2.0 * np.sum(np.log(np.maximum(rates, MIN_ERROR_RATE))), 2 * len(rates))) if rates else 1.0
+    return float(norm.isf(max(rate, MIN_ERROR_RATE)))
 
 
 def rms(values: Array) -> float:

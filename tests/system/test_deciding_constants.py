@@ -46,9 +46,10 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "select/curve_rivals.py": "NEAR",
     "select/disturbance_lines.py": "FLOOR_BINS LOWEST_BIN MIN_LINE_SAMPLES",
     "select/evidence.py": "ALONE",
-    "select/field_search.py": "ANOTHER NO_WORSE",
+    "select/field_search.py": "NO_WORSE",
     "select/free_form_residual.py": "MIN_CURVE_SCORE CURVE_STEPS CURVES_TRIED",
     "select/likelihood_search.py": "RIVAL_SAMPLES MIN_MORE_SAMPLES_RATIO SAMPLES",
+    "select/search_state.py": "ANOTHER",
     "select/stepwise.py": "MIN_RIVAL_SHARE PROMISING",
     "select/torque_search.py": "POLISHED RIVAL WORTH_EVIDENCE",
     "select/trial_fits.py": "BEHIND COMPARABLE FAINT_SCORE FOLLOWED_LINES FOLLOWS FOLLOWS_LESS FULL_FIT_RATIO "

@@ -13,9 +13,8 @@ from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.model.parameters import Name
 from identify.residual import FROM_RUN_TO_RUN
+from identify.results import NORMAL_95
 from rig.arrays import Array
-
-MOVED_SIGMAS = 2.0  # standard errors of the difference: a move inside a 95 % interval is none
 
 
 def between_runs(regression: TorqueRegression, fit: TorqueFit) -> list[FreeForm]:
@@ -58,7 +57,7 @@ def moved_on_average(
         if not np.sum(weights) > 0.0:
             continue
         moved = float(weights @ np.array(values) / np.sum(weights)) - fit.values[name]
-        if abs(moved) > MOVED_SIGMAS / np.sqrt(np.sum(weights)):
+        if abs(moved) > NORMAL_95 / np.sqrt(np.sum(weights)):
             out[name] = moved
     return out
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from identify.diagnose.harmonics import ORDERS, PLAYED
 from identify.diagnose.terms.free_form import FreeForm
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.signals.period import period_of
 from identify.signals.trace import Trace
 
-HIGHEST_MULTIPLE = 11  # of the excitation's frequency: a friction that steps leaves 1 % of its power beyond
-PLAYED_POWER = 1e-4  # of the torque's power: a multiple with more was played
 MIN_PERIODS_PLAYED = 3  # in a run: of fewer, what repeats cannot be told from what happens once
 
 
@@ -41,9 +40,9 @@ def _unplayed_hz(trace: Trace, highest_hz: float) -> list[float]:
     time = step_s * np.arange(len(whole))
     power = float(np.mean((whole - np.mean(whole)) ** 2))
     out = []
-    for multiple in range(2, HIGHEST_MULTIPLE + 1):
+    for multiple in range(2, ORDERS + 1):
         hz = multiple / period_s
         size = abs(np.mean(whole * np.exp(-2j * np.pi * hz * time)))
-        if hz < highest_hz and 2.0 * size**2 < PLAYED_POWER * power:
+        if hz < highest_hz and 2.0 * size**2 < PLAYED * power:
             out.append(hz)
     return out
