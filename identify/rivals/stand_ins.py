@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from identify.estimate.final_fit import FinalFit
+from identify.residual import Dependence
 from identify.runs.observability import is_seen_to_repeat
 from identify.select.evidence import WEIGHT
 from identify.select.free_form_residual import MOVED_SIGMAS
@@ -35,10 +36,15 @@ def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callab
     """
     if not found.disturbance.depends_on:
         return _with_unproven(found)
-    while stand_ins := [name for name in _in_doubt(found) if _may_stand_in(name, found, traces)]:
-        on = quantity_of(found.disturbance.depends_on[0], axis)
-        found = _taken_back(found, stand_ins, axis)
-        say(f"not named: {_listed(stand_ins)}; what is left then still depends on the {on}")
+    left_beside: list[Dependence] = []
+    while stand_ins := _first([name for name in _in_doubt(found) if _may_stand_in(name, found, traces)], found):
+        depends = found.disturbance.depends_on
+        less = _taken_back(found, stand_ins, axis)
+        say(f"not named: {_listed(stand_ins)}; what is left then still depends on the {quantity_of(depends[0], axis)}")
+        left_beside += depends if set(less.named) < set(found.named) else ()
+        found = less
+    for dependence in left_beside:  # is left without them, too, even if it is not seen any more
+        found = replace(found, disturbance=found.disturbance.with_free_form(dependence, {}))
     flexible = _in_doubt(found)
     if not flexible:
         return found
@@ -57,6 +63,12 @@ def _in_doubt(found: Found) -> list[str]:
     depends = found.disturbance.depends_on  # the largest first
     asked = [n for n in found.named if effects.get(n).place not in (Place.DRIVE, Place.SENSOR)] if depends else []
     return [name for name in asked if depends[0].relative ** 2 > WEIGHT * found.taken_by(name)]
+
+
+def _first(names: Sequence[str], found: Found) -> Sequence[str]:
+    """Which go first: flexible ones, for what these had taken up may be another's; then the one that takes least."""
+    flexible = [name for name in names if effects.get(name).is_flexible]
+    return flexible or sorted(names, key=found.taken_by)[:1]
 
 
 def _may_stand_in(name: str, found: Found, traces: Sequence[Trace]) -> bool:
@@ -83,16 +95,12 @@ def _with_unproven(found: Found) -> Found:
 def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
     """The same without effects that may only stand in.
 
-    What one that follows almost anything had taken up may be torque of an effect that does not: that is added. Where
-    there is none, what was left beside them is left without them, too. One of them may be real all the same: J, C and
-    K are no surer than they differ with and without.
+    What one that follows almost anything had taken up may be torque of an effect that does not: that is added. One of
+    them may be real all the same: J, C and K are no surer than they differ with and without.
     """
     depends = found.disturbance.depends_on
     flexible = any(effects.get(n).is_flexible for n in names)
     less = found.without(*names, others=flexible)
-    left = less.disturbance
-    for dependence in depends if set(less.named) < set(found.named) else ():
-        left = left.with_free_form(dependence, {})
     search = less.search
     follows = " but can follow almost any torque," if flexible else ""
     share, on = number(100.0 * depends[0].relative, 2), quantity_of(depends[0], axis)
@@ -106,7 +114,7 @@ def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
         search.dropped = []
     apart = dict(found.disturbance.moves_without_percent)
     apart |= {" and ".join(dict.fromkeys(effects.first_of(n) for n in names)): moved(less.after, found.after)}
-    return replace(less, disturbance=replace(left, moves_without_percent=apart))
+    return replace(less, disturbance=replace(less.disturbance, moves_without_percent=apart))
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -49,7 +49,9 @@ def found(
         return final(1.06, 1e-3, *kept), left, Disturbance(0.05, "N*m", 0.05)
 
     def share_of(name: str, *gone: str, others: bool) -> float:
-        return 0.25 if name == "coulomb_friction" and friction_takes_much else without**2 - 0.05**2
+        alone = name == "torque_offset" and "cogging" in gone  # it takes what the ripple had taken
+        much = alone or (name == "coulomb_friction" and friction_takes_much)
+        return 0.25 if much else without**2 - 0.05**2
 
     left = Disturbance(0.01, "N*m", 0.01, depends)
     errors = cast(Any, SimpleNamespace(held_relative=0.05))
@@ -151,3 +153,10 @@ def test_a_stiff_effect_that_takes_little_more_than_what_is_left_is_not_named_ei
 def test_a_delay_is_known_however_little_torque_it_takes() -> None:
     begun, asked = found(("torque_delay",), LINES)
     assert looked_at(begun) is begun and asked == []
+
+
+def test_a_flexible_effect_goes_first_and_what_it_had_taken_up_is_given_to_the_others() -> None:
+    begun, asked = found(("cogging", "torque_offset"), PAST)
+    less = looked_at(begun)
+    assert asked == [("cogging", "and others")]
+    assert less.named == ["torque_offset"]
