@@ -47,6 +47,7 @@ def test_the_identifier_is_handed_a_recording_a_declared_model_its_settings_and_
     assert hints["settings"] is IdentifyConfig
 
 
+@pytest.mark.slow
 def test_a_spring_that_is_declared_and_not_there_is_left_out_and_the_rest_is_right() -> None:
     platform = (0.02, 0.3, 0.0)
     runs = tuple(sine_run(m, f, jck=platform) for m, f in ((2.0, 0.7), (4.0, 2.0), (8.0, 5.0)))

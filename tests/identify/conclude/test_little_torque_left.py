@@ -28,7 +28,8 @@ def disturbed(torque_nm: float, frequency_hz: float, disturbance_nm: float, seed
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("disturbance_nm", [0.0005, pytest.param(0.0007, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("disturbance_nm", [0.0005, 0.0007])
 def test_a_hundred_thousandth_of_the_torque_is_accepted_though_a_free_run_shows_it(disturbance_nm: float) -> None:
     runs = tuple(disturbed(m, f, disturbance_nm, i) for i, (m, f) in enumerate(SETS))
     found = identify(Recording(runs), DECLARED, IdentifyConfig())

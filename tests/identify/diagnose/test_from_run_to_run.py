@@ -22,7 +22,7 @@ SWINGS = ((0.5, 0.14), (1.0, 0.12), (3.0, 0.14), (6.0, 0.12), (10.0, 0.1), (14.0
 def swung(number: int, hz: float, travel_rad: float, bent: float) -> Run:
     """Two sines, far below the resonance or about it, read by a gyro that reads w + ``bent`` w^3, and their torque."""
     rng = np.random.default_rng(number)
-    time = np.arange(6001) * 1e-3
+    time = np.arange(3001) * 1e-3
     angle, rate, acceleration = np.zeros((3, len(time)))
     for size, factor in ((travel_rad, 1.0), (0.3 * travel_rad, 2.3)):
         w, phase = 2.0 * np.pi * hz * factor, rng.uniform(0.0, 2.0 * np.pi)
@@ -38,7 +38,7 @@ def swung(number: int, hz: float, travel_rad: float, bent: float) -> Run:
 def identified(bent: float) -> Identification:
     runs = tuple(swung(k, hz, travel, bent) for k, (hz, travel) in enumerate(SWINGS))
     declared = Platform(0.023, 0.35, 460.0)
-    return identify(Recording(runs), declared, IdentifyConfig(candidates=("coulomb_friction", "unbalance")))
+    return identify(Recording(runs), declared, IdentifyConfig(candidates=("coulomb_friction",)))
 
 
 def test_a_gyro_whose_scale_bends_makes_the_runs_differ_and_the_result_is_refused() -> None:

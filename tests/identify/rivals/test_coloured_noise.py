@@ -199,6 +199,7 @@ def damped_multisine(seed: int) -> Run:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_second_look_that_sees_nothing_leaves_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
     found, _ = found_without_its_effect()
     monkeypatch.setattr(coloured_noise, "colour_of", lambda seen: Colour(1.0, 1.0, 100.0))
