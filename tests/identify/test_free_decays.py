@@ -48,7 +48,7 @@ def pendulum(
 @pytest.mark.parametrize(
     "offered",
     [
-        ["unbalance", "coulomb_friction", "quadratic_damping", "stribeck_friction", "cubic_stiffness"],
+        ["unbalance", "coulomb_friction", "quadratic_damping"],
         pytest.param(None, marks=pytest.mark.slow),  # the whole library
     ],
 )

@@ -8,12 +8,18 @@ import pytest
 from identify.conclude.headline import headline
 from identify.conclude.next_steps import next_steps
 from identify.diagnose.coloured_residual import combined
+from identify.diagnose.disturbance import disturbance_of
+from identify.diagnose.torque_regression import TorqueRegression
+from identify.estimate.initial_guess import scale_of
+from identify.model.structure import Structure
 from identify.pipeline import identify
 from identify.residual import FROM_RUN_TO_RUN
 from identify.results import Identification
+from identify.runs.holdout import split
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
 from rig.recording.run import Recording, Run
+from tests.identify.simulated import traces_of
 
 INERTIA, DAMPING, STIFFNESS = 0.025, 0.3, 470.0
 SWINGS = ((0.5, 0.14), (1.0, 0.12), (3.0, 0.14), (6.0, 0.12), (10.0, 0.1), (14.0, 0.12))  # Hz, rad
@@ -35,12 +41,16 @@ def swung(number: int, hz: float, travel_rad: float, bent: float) -> Run:
     return Run(f"{hz:g} Hz", time, np.ones(len(time), bool), rate_rad_s=read, torque_time_s=time, torque_nm=torque)
 
 
+def runs_of(bent: float) -> tuple[Run, ...]:
+    return tuple(swung(k, hz, travel, bent) for k, (hz, travel) in enumerate(SWINGS))
+
+
 def identified(bent: float) -> Identification:
-    runs = tuple(swung(k, hz, travel, bent) for k, (hz, travel) in enumerate(SWINGS))
     declared = Platform(0.023, 0.35, 460.0)
-    return identify(Recording(runs), declared, IdentifyConfig(candidates=("coulomb_friction",)))
+    return identify(Recording(runs_of(bent)), declared, IdentifyConfig(candidates=("coulomb_friction",)))
 
 
+@pytest.mark.slow
 def test_a_gyro_whose_scale_bends_makes_the_runs_differ_and_the_result_is_refused() -> None:
     found = identified(4e-4)
     assert found.disturbance is not None
@@ -53,6 +63,18 @@ def test_a_gyro_whose_scale_bends_makes_the_runs_differ_and_the_result_is_refuse
     assert any("at half and at twice the torque" in step for step in next_steps(found))
 
 
+@pytest.mark.parametrize(("bent", "differ"), [(4e-4, True), (0.0, False)])
+def test_in_torque_the_runs_differ_where_the_scale_bends_and_only_there(bent: float, differ: bool) -> None:
+    traces = traces_of(Recording(runs_of(bent)))
+    scale = scale_of(traces, (INERTIA, DAMPING, STIFFNESS), ())
+    along = TorqueRegression(traces, split(traces, "auto"), 60.0, scale)
+    fit = along.solve(Structure(), {})
+    left = disturbance_of(along, fit, along.noise_floor_nm(fit.values), "N*m")
+    assert (FROM_RUN_TO_RUN in [d.changes for d in left.depends_on]) is differ
+    assert (left.moves_percent.get("inertia", 0.0) > 2.0) is differ
+
+
+@pytest.mark.slow
 def test_a_gyro_that_is_straight_does_not() -> None:
     found = identified(0.0)
     assert found.accepted, found.reasons

@@ -106,7 +106,8 @@ def test_a_winding_that_warms_is_named_as_what_lowers_the_torque_with_its_slope(
     assert_terms(found)
 
 
-@pytest.mark.parametrize("identification", [of_the_spring, pytest.param(of_the_magnet, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("identification", [of_the_spring, of_the_magnet])
 def test_the_verdict_says_at_which_temperature_the_parameters_hold(
     identification: Callable[[], Identification],
 ) -> None:
