@@ -52,10 +52,8 @@ def identified(inertia_share: float, damping_share: float, drift: float = 0.0) -
     return identify(Recording(runs), declared, IdentifyConfig(candidates=("coulomb_friction",)))
 
 
-@pytest.mark.parametrize(
-    ("inertia_share", "damping_share", "what"),
-    [(0.15, 0.0, "inertia"), pytest.param(0.0, 0.5, "damping", marks=pytest.mark.slow)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("inertia_share", "damping_share", "what"), [(0.15, 0.0, "inertia"), (0.0, 0.5, "damping")])
 def test_a_platform_that_changes_along_the_angle_is_not_accepted_and_what_changes_is_told(
     inertia_share: float, damping_share: float, what: str
 ) -> None:
