@@ -184,14 +184,14 @@ class LowPassedTorque:
         """What a draw of the sensor's noise leaves of the torque at the samples of all runs, (n,)."""
         inertia = 1.0 if self.torque_free else values.get(("inertia",), 0.0)
         out: list[Array] = []
-        for trace, (angle, rate, acceleration) in zip(self.traces, self.motion_of_noise(seed), strict=True):
-            rows = len(angle)
-            if rows == 0:
+        motions = self.motion_of_noise(seed)
+        for trace, rows, (angle, rate, acceleration) in zip(self.traces, self._rows, motions, strict=True):
+            if len(rows) == 0:
                 continue
             left = (inertia + trace.run.added_inertia_kg_m2) * acceleration + values.get(("damping",), 0.0) * rate
             left = left + values.get(("stiffness",), 0.0) * (angle - np.mean(angle))
             if trace.biased:
-                line = np.column_stack([np.ones(rows), np.arange(rows)])
+                line = np.column_stack([np.ones(len(rows)), rows])
                 left = left - line @ np.linalg.lstsq(line, left, rcond=None)[0]
             out.append(left)
         return np.concatenate(out)

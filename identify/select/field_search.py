@@ -23,7 +23,7 @@ from identify.runs.holdout import Split
 from identify.runs.observability import can_show
 from identify.select.evidence import MAX_TRUSTED_INFLATION, STRONG_SUPPORT, in_band, inflation, torque_fit_of
 from identify.select.likelihood_search import MAX_CUTOFF_SHARE
-from identify.select.preference import is_more_flexible, leaves_less
+from identify.select.preference import follows_nothing_freely, is_more_flexible, leaves_less
 from identify.select.search_state import Found, Search, describes
 from identify.select.torque_search import TorqueSearch
 from identify.signals.trace import Trace
@@ -109,8 +109,11 @@ def search_in_torque(
         search.run()
 
         def is_better(proposed: TorqueFit) -> bool:
-            flexible = trusted and is_more_flexible(proposed, trial)
-            return leaves_less(search, proposed, trial, depends) and not flexible and not refutes(proposed)
+            if not leaves_less(search, proposed, trial, depends):
+                return False
+            if trial.held_nm > A_MULTIPLE * proposed.held_nm and follows_nothing_freely(proposed, trial):
+                return True
+            return not (trusted and is_more_flexible(proposed, trial)) and not refutes(proposed)
 
         # A lag at the end of the way is no reason to give away what was found before it.
         proposed = next(filter(is_better, reversed(search.path)), None)

@@ -73,3 +73,13 @@ def is_more_flexible(best: TorqueFit, trial: TorqueFit) -> bool:
     found = trial.structure.effects
     added = [effects.get(e) for e in best.structure.effects if e not in found]
     return any(e.place is Place.DRIVE or (bool(found) and e.is_flexible) for e in added)
+
+
+def follows_nothing_freely(best: TorqueFit, trial: TorqueFit) -> bool:
+    """Whether a model has nothing but stiff effects besides: none that fits almost anything, and no lag of the drive.
+
+    What such a model leaves on held-out samples is no matter of how freely it follows: where another leaves a multiple,
+    that is no disturbance.
+    """
+    added = [effects.get(e) for e in best.structure.effects if e not in trial.structure.effects]
+    return not any(e.place is Place.DRIVE or e.is_flexible for e in added)

@@ -6,6 +6,7 @@ import numpy as np
 
 from identify.diagnose.terms.changing import with_time
 from identify.diagnose.terms.free_form import SHAPE_POINTS, FreeForm, free_splines
+from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from rig.arrays import Array
 
@@ -13,14 +14,18 @@ OUTER = (0.8, 0.95)  # shares of the samples inside of which nothing is touched
 PAST_RUN_SHARES = (0.05, 0.5)  # of the run: time constants with which a rate is remembered
 
 
-def curves(regression: TorqueRegression) -> list[FreeForm]:
-    """The terms that are tried, without what the linear model has of the same quantity."""
+def curves(regression: TorqueRegression, fit: TorqueFit) -> list[FreeForm]:
+    """The terms that are tried, without what the model has of the same quantity.
+
+    Of a model whose damping was dropped, what goes with the rate is also what is linear in it; and so with the angle.
+    """
     _, rate, _, _, time, run = regression.series()
     slow = 0.05 * float(np.sqrt(np.mean(rate**2))) + 1e-300
     driven = [] if regression.torque_free else [_spline("torque", regression)]
     ends = np.array([-1.0, 1.0])
     out = [
-        _spline("angle", regression), _beyond("angle", regression), _spline("rate", regression), *driven,
+        _spline("angle", regression, "stiffness" not in fit.structure.terms), _beyond("angle", regression),
+        _spline("rate", regression, "damping" not in fit.structure.terms), *driven,
         FreeForm(
             "direction", regression.along("rate", lambda v: np.tanh(v / slow)[:, None]), ends, ends[:, None]
         ),
@@ -31,13 +36,17 @@ def curves(regression: TorqueRegression) -> list[FreeForm]:
     return [f for f in out if f.columns.shape[1] > 0 and np.all(np.isfinite(f.columns))]
 
 
-def _spline(on: str, regression: TorqueRegression) -> FreeForm:
-    """Cubic splines of a quantity with what is constant and linear in it taken out."""
+def _spline(on: str, regression: TorqueRegression, with_line: bool = False) -> FreeForm:
+    """Cubic splines of a quantity with what is constant and linear in it taken out; a line of its own beside them."""
     x = regression.values_of(on)
     free, at = free_splines(x)
     if free is None:
         return FreeForm(on, np.zeros((len(regression.series()[0]), 0)), np.zeros(0), np.zeros((0, 0)))
-    return FreeForm(on, regression.along(on, free), at, free(at))
+
+    def shape(values: Array) -> Array:
+        return np.column_stack([free(values), values - np.mean(x)]) if with_line else free(values)
+
+    return FreeForm(on, regression.along(on, shape), at, shape(at))
 
 
 def _over_time(time: Array) -> FreeForm:
