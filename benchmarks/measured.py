@@ -138,14 +138,15 @@ def judge(name: str, case: Case, result: Mapping[str, Any] | None, ran: Mapping[
     """Set an answer beside what was asked."""
     if result is None or result.get("aborted"):
         return Answer(name, (), None, None, ran["seconds"], ran["peak_mib"], (f"exit {ran['exit_code']}",))
-    named, error = tuple(result["verdict"]["effects"]), result["after"]["error"]
+    final = result["after"] or result["before"]
+    named, error = tuple(result["verdict"]["effects"]), final["error"]
     left = error["holdout_torque_relative"] or error["residual_torque_relative"]
     left_percent = None if left is None else 100.0 * left
     short = [f"{asked} not named" for asked in case.named if not set(asked.split("|")) & set(named)]
     if case.left_percent is not None and (left_percent is None or left_percent > case.left_percent):
         short.append(f"at most {case.left_percent:g} % asked")
     for parameter, (value, percent) in case.numbers.items():
-        short += _off(result["after"], parameter, value, percent)
+        short += _off(final, parameter, value, percent)
     if case.accepted is not None and result["accepted"] is not case.accepted:
         short.append("accepted" if result["accepted"] else "not accepted")
     return Answer(name, named, result["accepted"], left_percent, ran["seconds"], ran["peak_mib"], tuple(short))

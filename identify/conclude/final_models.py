@@ -14,6 +14,7 @@ from identify.model.parameter_fit import ParameterFit
 from identify.model.structure import Structure
 from identify.results import ParameterEstimate
 from identify.runs.holdout import Split
+from identify.select.evidence import STRONG_SUPPORT
 from identify.select.search_state import Search
 from identify.signals.trace import Trace, loads_differ
 from identify.wording import joined, plain
@@ -64,10 +65,29 @@ class FinalModels:
             self.split.final, self.split.everything,
         )  # fmt: skip
         if fitted.sensor_limited:
-            return self._with_dropped_damping(search, fitted)
+            return self._with_dropped_damping(search, self._without_unsupported(search, fitted))
         if all(t.torque is None for t in self.traces):
             return fitted
         return self._predicted(search.best)
+
+    def _without_unsupported(self, search: Search, fitted: FinalFit) -> FinalFit:
+        """The same without effects that can follow almost anything and that whole runs do not support.
+
+        The search looks at spans of the runs, and predicts a few samples ahead. A free run at the sensor's noise is the
+        likelihood itself: what does not differ from none there, and is not missed, was found by chance.
+        """
+        for name in [e for e in fitted.structure.effects if e not in self.structure.effects]:
+            if not effects.get(name).is_flexible or fitted.is_significant(name):
+                continue
+            rest = {n: v for n, v in fitted.values.items() if n[0] != name}
+            less = by_output_error(
+                self.traces, fitted.structure.minus(name), rest, search.horizon, self.split.final, self.split.everything
+            )  # fmt: skip
+            if less.sensor_limited and less.fit.penalised - fitted.fit.penalised < STRONG_SUPPORT:
+                self.say(f"dropped {plain(name)}: whole runs are explained as well without it")
+                search.drop(less.fit)
+                fitted = less
+        return fitted
 
     def regressed(self, best: ParameterFit) -> FinalFit:
         """A model by regression alone: where there is no time for more."""

@@ -28,6 +28,7 @@ DEPENDENCE_SIGMAS = 4.0  # standard errors over blocks of held-out samples; by c
 MIN_POWER_SHARE = 0.02  # of the power that is left: less is not worth a word
 MIN_OVER_NOISE = 2.0  # times what the term makes of the sensor's noise alone: an integrated rate wanders with that
 MOST_OF_IT = 2.0**0.5  # times the largest other part: what repeats is told where no curve shows half of its power
+ABOUT = 1.0 / 16.0  # of the angle's range, to either side of the start: the spring there, and not a ripple on it
 MISSING_IN_RUNS, MISSING_SHARE = 0.25, 0.25  # runs in which a wave may be missing: with less of its share in all
 
 
@@ -68,12 +69,10 @@ def _dependence(
     regression: TorqueRegression, fit: TorqueFit, term: FreeForm
 ) -> tuple[Dependence, Mapping[Name, float]] | None:  # fmt: skip
     """What of the residual goes with a term, and how far the parameters move; None where held-out samples show none."""
-    if term.on == "torque":  # what is explained is a torque: with the parameters free, it would explain itself
-        richer, gains = regression.following(fit, term.columns)
-    else:
-        richer, gains = regression.beside(fit, term.columns, term.of_each_run)
+    tried = [(penalty, *regression.beside(fit, term, penalty)) for penalty in term.penalties]
+    penalty, richer, gains = min(tried, key=lambda one: one[1].held_nm)
     # What is fitted to each run is held out by blocks, and so is what it stands beside.
-    alone = regression.beside(fit, term.columns[:, :0], True)[0] if term.of_each_run else fit
+    alone = regression.beside(fit, term.without_columns())[0] if term.of_each_run else fit
     sure = max(regression.fall_in_sigmas(alone, richer, of_each_run=term.changes == FROM_RUN_TO_RUN))
     share = 1.0 - richer.held_nm**2 / max(alone.held_nm**2, 1e-300)
     if share < MIN_POWER_SHARE or sure < DEPENDENCE_SIGMAS:
@@ -81,7 +80,9 @@ def _dependence(
     if term.wave_on and not _in_most_runs(alone, richer, share):
         return None
     size = float(np.sqrt(share)) * alone.held_nm
-    made_nm = term.noise_nm() if term.noise_nm else regression.made_by_noise_nm(fit.values, term.columns)
+    made_nm = (
+        term.noise_nm() if term.noise_nm else regression.made_by_noise_nm(fit.values, term.columns, term.ridge(penalty))
+    )
     if size < MIN_OVER_NOISE * made_nm:
         return None
     at, shape_nm = tuple(term.at.tolist()), tuple((term.shape @ gains).tolist())
@@ -105,17 +106,15 @@ def _moved(
 ) -> Mapping[Name, float]:  # fmt: skip
     """By how much parameters are others with a free-form term beside them.
 
-    The stiffness is that at the start angle: what the term adds to the slope there is part of it.
+    The stiffness is that about the start angle: what the term adds to the slope there is part of it.
     """
-    if term.on == "torque":
-        return regression.moved_by(fit, term.columns @ gains)
     if term.changes == FROM_RUN_TO_RUN:
         return moved_on_average(regression, fit, richer, term.columns, gains)
     moved = {n: v - fit.values[n] for n, v in richer.values.items() if n in fit.values}
     if term.on == "angle" and term.at.size and ("stiffness",) in moved:
-        slope = np.gradient(term.shape @ gains, term.at)
         start = float(np.clip(0.0, term.at[0], term.at[-1]))
-        moved[("stiffness",)] += float(np.interp(start, term.at, slope))
+        ends = np.clip([start - ABOUT * np.ptp(term.at), start + ABOUT * np.ptp(term.at)], term.at[0], term.at[-1])
+        moved[("stiffness",)] += float(np.diff(np.interp(ends, term.at, term.shape @ gains))[0] / np.ptp(ends))
     return moved
 
 

@@ -172,12 +172,16 @@ class LowPassedTorque:
         """What the sensor's noise alone leaves of the torque, root mean square, from simulated noise."""
         return float(np.sqrt(np.mean(self._of_noise(values, 1) ** 2)))
 
-    def made_by_noise_nm(self, values: Mapping[Name, float], columns: Array) -> float:
-        """What columns, (n, k), explain of the sensor's noise alone, root mean square, from simulated noise."""
+    def made_by_noise_nm(self, values: Mapping[Name, float], columns: Array, ridge: Array) -> float:
+        """What columns, (n, k), explain of the sensor's noise alone, root mean square, from simulated noise.
+
+        ``ridge``, (k,), is what their normal equations have besides.
+        """
+        solving = np.linalg.pinv(columns.T @ columns + np.diag(ridge), hermitian=True) @ columns.T
         squares = []
         for seed in range(1, 1 + NOISE_DRAWS):
             noise = self._kept(("noise", seed, tuple(values.items())), partial(self._of_noise, values, seed))
-            squares.append(np.mean((columns @ np.linalg.lstsq(columns, noise, rcond=None)[0]) ** 2))
+            squares.append(np.mean((columns @ (solving @ noise)) ** 2))
         return float(np.sqrt(np.mean(squares)))
 
     def _of_noise(self, values: Mapping[Name, float], seed: int) -> Array:

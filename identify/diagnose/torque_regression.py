@@ -17,6 +17,7 @@ from scipy.linalg import block_diag
 
 from identify.diagnose.coloured_residual import bounded, coloured_cost, combined, lines, rms, standard_errors, strongest
 from identify.diagnose.low_passed_torque import LowPassedTorque
+from identify.diagnose.terms.free_form import FreeForm
 from identify.diagnose.torque_fit import TorqueFit
 from identify.model.effect_torque import feeds_on_torque
 from identify.model.parameters import Name
@@ -25,7 +26,6 @@ from rig import effects
 from rig.arrays import Array
 
 BLOCK_SAMPLES, BLOCKS_A_RUN, MIN_BLOCKS = 8, 24, 8  # samples behind the low-pass in a block, and how many blocks
-CURVE_RIDGE = 1e-9  # of their own size, on the gains of free-form columns: two of them may be alike
 LEAST_PASSED_ON = 1e6  # times: a drive that passes on less passes on nothing
 MIN_FOR_LINES, MIN_TRAVEL_RAD = 64, 0.5  # samples, and travel to show a line against the angle
 
@@ -45,51 +45,26 @@ class _Stacked(NamedTuple):
 class TorqueRegression(LowPassedTorque):
     """Fits structures in torque over a set of runs."""
 
-    def following(self, fit: TorqueFit, columns: Array) -> tuple[TorqueFit, Array]:
-        """A model whose residual is followed by further columns, and their gains; the model stays as it is."""
-        r = np.concatenate(fit.residuals)
-        used, low = self._used, np.full(columns.shape[1], -np.inf)
+    def beside(self, fit: TorqueFit, term: FreeForm, roughness_penalty: float = 0.0) -> tuple[TorqueFit, Array]:
+        """A model fitted together with a free-form term, what that leaves on held-out samples, and the term's gains.
 
-        def gains(rows: Any) -> Array:
-            a = columns[rows]
-            return bounded(
-                a.T @ a + CURVE_RIDGE * np.eye(a.shape[1]) * float(np.mean(np.sum(a * a, axis=0))), a.T @ r[rows], low
-            )
-
-        g = gains(self._fitted)
-        held = np.concatenate(fit.held).copy()
-        for fold in self._by_run:
-            held[fold] -= (columns @ gains(used & ~fold))[fold]
-        left = r - columns @ g
-        ends = np.cumsum([len(x) for x in fit.residuals])[:-1]
-        return replace(
-            fit, variance=rms(left[used]) ** 2, held_nm=rms(held[self._judged]), residuals=np.split(left, ends),
-            held=np.split(held, ends),
-        ), g  # fmt: skip
-
-    def moved_by(self, fit: TorqueFit, torque: Array) -> dict[Name, float]:
-        """How far the parameters move where a torque, one value a sample, is taken off what they explain."""
-        parts = [self._columns(i, fit.structure, fit.shapes) for i in range(len(self.traces))]
-        names = list(dict.fromkeys(n for _, own, _ in parts for n in own if len(n) < 3))
-        wide = np.concatenate([a[:, [own.index(n) for n in names]] for a, own, _ in parts])[self._used]
-        x = bounded(wide.T @ wide, wide.T @ torque[self._used], np.full(len(names), -np.inf))
-        return dict(zip(names, x.tolist(), strict=True))
-
-    def beside(self, fit: TorqueFit, columns: Array, of_each_run: bool = False) -> tuple[TorqueFit, Array]:
-        """A model fitted together with further columns, and the gains of these; what it leaves on samples held out.
-
-        Columns ``of_each_run`` are zero in all other runs: blocks of every run are held out instead of whole ones.
+        Of a term of each run by itself, blocks of every run are held out instead of whole runs.
         """
         a, y, names, extra = self._over_all_runs(fit.structure, fit.shapes)
-        wide = np.column_stack([a, columns])
-        low = np.array([self._low(n) for n in names] + [-np.inf] * (extra + columns.shape[1]))
-        ridge = np.zeros(wide.shape[1])
-        ridge[a.shape[1] :] = CURVE_RIDGE * float(np.mean(np.sum(columns * columns, axis=0))) if columns.size else 0.0
+        wide = np.column_stack([a, term.columns])
+        low = np.array([self._low(n) for n in names] + [-np.inf] * (wide.shape[1] - len(names)))
+        ridge = np.concatenate([np.zeros(a.shape[1]), term.ridge(roughness_penalty)])
         own = np.arange(wide.shape[1])
         free = (own >= len(names)) & (own < a.shape[1])
-        folds = self._by_block if of_each_run else self._folds(names, extra)
-        x, held, _ = self._with_folds(wide, y, low, folds, free, ridge)
+        folds = self._by_block if term.of_each_run else self._folds(names, extra)
+        x, held, _ = self._with_folds(
+            wide, y, low, folds, free, ridge, None if term.over is None else (term.over, own >= a.shape[1])
+        )
         scale = self._passed_on(y - self._taken(names, x[: a.shape[1]], a))
+        if term.on == "torque":  # a friction and a curve explain any torque: what of it sets in motion has to be kept
+            moves = [k for k, n in enumerate(names) if len(n) == 1]
+            was, now = (rms(a[:, moves] @ v) for v in ([fit.values[names[k]] for k in moves], x[moves]))
+            scale *= min(max(was / max(now, 1e-300), 1.0), LEAST_PASSED_ON)
         r, held = scale * (y - wide @ x), scale * held
         ends = np.cumsum([len(rows) for rows in self._rows])[:-1]
         values = {**fit.values, **dict(zip(names, x[: len(names)].tolist(), strict=True))}
@@ -117,11 +92,13 @@ class TorqueRegression(LowPassedTorque):
         return self._by_block if extra or any(len(n) == 3 for n in names) else self._by_run
 
     def _with_folds(
-        self, a: Array, y: Array, low: Array, folds: Sequence[Any], free: Any, ridge: Any = 0.0
-    ) -> tuple[Array, Array, Array]:
+        self, a: Array, y: Array, low: Array, folds: Sequence[Any], free: Any, ridge: Any = 0.0,
+        curve: tuple[Array, Any] | None = None,
+    ) -> tuple[Array, Array, Array]:  # fmt: skip
         """Least squares, the residual where every fold was left out of its own fit, and the normal matrix.
 
         What is ``free`` in each run, (columns,) boolean, is no part of the model: it is fitted to held-out samples too.
+        A ``curve``, its quantity, (n,), and its columns, (columns,) boolean, says nothing about values it has not seen.
         """
 
         def normal(rows: Any) -> Array:
@@ -135,6 +112,10 @@ class TorqueRegression(LowPassedTorque):
             rest = used & ~fold
             gains = bounded(normal(rest), a[rest].T @ y[rest], low)
             left = y - a[:, ~free] @ gains[~free]
+            if curve is not None:
+                over, its = curve
+                unseen = (over < np.min(over[rest])) | (over > np.max(over[rest]))
+                left[unseen] += a[np.ix_(unseen, its)] @ gains[its]
             if np.any(free):
                 own = a[used][:, free]
                 left = left - a[:, free] @ bounded(own.T @ own, own.T @ left[used], np.full(own.shape[1], -np.inf))

@@ -23,7 +23,7 @@ from identify.select.search_state import Found
 from identify.signals.trace import Trace
 from identify.wording import joined, number, plain, quantity_of
 from rig import effects
-from rig.effects.base import Place
+from rig.effects.base import Effect, Place
 from rig.platform import TERMS
 
 
@@ -58,11 +58,16 @@ def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callab
 def _in_doubt(found: Found) -> list[str]:
     """Effects beside which so much is left over as a share of what they take that it would be a name of its own.
 
-    A lag is not asked: it takes little torque and is known all the same, by when the platform answers.
+    A lag is not asked: it takes little torque and is known all the same, by when the platform answers. What bends the
+    torque of the drive (a dead zone) is.
     """
     depends = found.disturbance.depends_on  # the largest first
-    asked = [n for n in found.named if effects.get(n).place not in (Place.DRIVE, Place.SENSOR)] if depends else []
+    asked = [n for n in found.named if not _is_lag(effects.get(n))] if depends else []
     return [name for name in asked if depends[0].relative ** 2 > WEIGHT * found.taken_by(name)]
+
+
+def _is_lag(effect: Effect) -> bool:
+    return effect.place in (Place.DRIVE, Place.SENSOR) and not effect.bends_torque
 
 
 def _first(names: Sequence[str], found: Found) -> Sequence[str]:
@@ -82,14 +87,19 @@ def _may_stand_in(name: str, found: Found, traces: Sequence[Trace]) -> bool:
 def _with_unproven(found: Found) -> Found:
     """The same with how far J, C and K move without a flexible effect that does nothing for samples that were held out.
 
-    The name is kept, for its evidence lies elsewhere (a mode beyond what was excited shows as the inertia it takes).
+    Where they move the name is kept, for its evidence lies there (a mode beyond what was excited shows as the inertia
+    it takes). Where they do not, nothing speaks for it but that it can follow almost anything.
     """
     gained = found.search.contribution
-    unproven = [n for n in found.named if effects.get(n).is_flexible and gained.get(n, np.inf) <= 1.0]
-    if not unproven:
-        return found
-    moves = {effects.first_of(name): moved(found.after, found.without(name).after) for name in unproven}
-    return replace(found, disturbance=replace(found.disturbance, moves_without_percent=moves))
+    moves: dict[str, dict[str, float]] = {}
+    for name in [n for n in found.named if effects.get(n).is_flexible and gained.get(n, np.inf) <= 1.0]:
+        less = found.without(name)
+        if by := moved(found.after, less.after):
+            moves[effects.first_of(name)] = by
+        else:
+            less.search.drop(less.kept)
+            found = less
+    return replace(found, disturbance=replace(found.disturbance, moves_without_percent=moves)) if moves else found
 
 
 def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:

@@ -75,6 +75,8 @@ class TorqueSearch:
         Root mean square of the motion's acceleration, rad/s^2.
     allowed
         Names of the effects that may be named.
+    repeats
+        Whether another of an effect that is there may be named, as another order of cogging.
     """
 
     regression: TorqueRegression
@@ -85,6 +87,7 @@ class TorqueSearch:
     say: Callable[[str], None] = lambda text: None
     rounds: list[tuple[TorqueCandidate, ...]] = field(default_factory=list)
     path: list[TorqueFit] = field(default_factory=list)  # models on the way, the last one the result
+    repeats: bool = True
 
     def run(self, begin: TorqueFit | None = None) -> TorqueFit:
         """Add effects as long as one carries weight, then drop what no longer does.
@@ -137,7 +140,7 @@ class TorqueSearch:
         spring = "stiffness" in now.structure.terms
         answers = now.values.get(("inertia",), 0.0) * self.acceleration > INERTIA_MATTERS * self.regression.torque_nm
         have = now.structure.effects
-        more = one_more(have, now.values, self.regression.traces)
+        more = one_more(have, now.values, self.regression.traces) if self.repeats else []
         names = [
             n for n in (*(a for a in self.allowed if a not in have), *more)
             if (spring or effects.get(n).family != "restoring torque")
@@ -202,7 +205,7 @@ class TorqueSearch:
         """
         before = {effects.first_of(name) for name in gone}
         bound = [n for n in self.allowed if not effects.get(n).is_flexible and effects.first_of(n) not in before]
-        further = replace(self, allowed=bound, rounds=[], path=[])
+        further = replace(self, allowed=bound, repeats=False, rounds=[], path=[])  # what repeats is flexible
         found = further.run(now)
         new = [e for e in found.structure.effects if e not in now.structure.effects]
         if not new or not set(now.structure.effects) <= set(found.structure.effects):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identify.diagnose.terms.changing import with_time
-from identify.diagnose.terms.free_form import SHAPE_POINTS, FreeForm, free_splines
+from identify.diagnose.terms.free_form import SHAPE_POINTS, FreeForm, free_splines, smooth_splines
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from rig.arrays import Array
@@ -37,16 +37,24 @@ def curves(regression: TorqueRegression, fit: TorqueFit) -> list[FreeForm]:
 
 
 def _spline(on: str, regression: TorqueRegression, with_line: bool = False) -> FreeForm:
-    """Cubic splines of a quantity with what is constant and linear in it taken out; a line of its own beside them."""
+    """A smoothing spline of a quantity without what is constant and linear in it; a line of its own beside it."""
     x = regression.values_of(on)
-    free, at = free_splines(x)
+    free, at = smooth_splines(x)
     if free is None:
         return FreeForm(on, np.zeros((len(regression.series()[0]), 0)), np.zeros(0), np.zeros((0, 0)))
 
-    def shape(values: Array) -> Array:
-        return np.column_stack([free(values), values - np.mean(x)]) if with_line else free(values)
+    def straight(values: Array) -> Array:
+        return np.column_stack([np.ones(len(values)), values])
 
-    return FreeForm(on, regression.along(on, shape), at, shape(at))
+    # Of a torque that is noisy or in steps, a curve behind the low-pass has a line that it has not ahead of it.
+    columns, line = regression.along(on, free), regression.along(on, straight)
+    slope = np.linalg.lstsq(line, columns, rcond=None)[0]
+    columns, shape = columns - line @ slope, free(at) - straight(at) @ slope
+    rough = np.ones(columns.shape[1] + with_line, dtype=np.bool_)
+    if with_line:
+        rough[-1] = False
+        columns, shape = np.column_stack([columns, line[:, 1]]), np.column_stack([shape, at])
+    return FreeForm(on, columns, at, shape, over=regression.values_of(on), rough=rough)
 
 
 def _over_time(time: Array) -> FreeForm:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -49,6 +51,20 @@ def test_what_follows_almost_any_torque_is_not_asked() -> None:
     begun.regression.evidence = lambda now, fit: asked.extend(fit.structure.effects) or 0.0  # type: ignore[method-assign]
     begun.with_others(begun.base)
     assert "coulomb_friction" in asked and "creep" not in asked
+
+
+def test_nor_is_another_of_what_is_there() -> None:
+    """A further order of cogging follows as much as the first; asked again, what was taken back would come back."""
+    begun = search(0.5)
+    now = begun.regression.solve(Structure((*begun.base.structure.terms,), ("cogging",)), {"cogging": (40.0,)})
+    asked = [look.effect for look in begun.candidates(now)]
+    asked_in_place = [look.effect for look in replace(begun, repeats=False).candidates(now)]
+    assert "cogging_2" in asked
+    assert asked_in_place and "cogging_2" not in asked_in_place
+    looks: list[str] = []
+    begun.regression.evidence = lambda now, fit: looks.extend(fit.structure.effects) or 0.0  # type: ignore[method-assign]
+    begun.with_others(now, ["cogging_3"])
+    assert "cogging_2" not in looks
 
 
 def test_the_way_to_the_result_is_kept() -> None:
