@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from identify.residual import FROM_RUN_TO_RUN, Dependence, Disturbance
+from identify.residual import FROM_RUN_TO_RUN, Dependence
 from identify.results import NORMAL_95, Errors, Identification, NotReported, ParameterEstimate
 
 SYMBOLS = {
@@ -229,35 +229,6 @@ def not_said_yet(several: Sequence[NotReported], found: Identification) -> list[
 def not_reported(several: Sequence[NotReported]) -> list[str]:
     """Parameters that stand in no table, with the reason, one sentence each."""
     return [capital(f"{plain(item.name.replace('.', ', '))}: {item.reason}") for item in several]
-
-
-def residual_torque_sentence(left: Disturbance, axis: str) -> str:
-    """What is left after the final model, in one sentence: how large a torque, and what it goes with."""
-    torque = "force" if axis == "linear" else "torque"
-    share = f"{number(100.0 * left.relative, 2)} % of the {torque}"
-    size = f"{number(left.torque_rms, 2)} {unit(left.unit)} rms, sensor noise removed ({share})"
-    if not left.depends_on:
-        return (
-            f"The final model leaves a residual {torque} of {size}. It depends on no quantity that was tested, so it "
-            "counts as noise and is included in the intervals."
-        )
-    each = joined(
-        [f"{number(100.0 * d.relative, 2)} % depends on the {quantity_of(d, axis)}{_how(d)}" for d in left.depends_on]
-    )
-    moved = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in left.moves_percent.items() if v > 0.0])
-    change = f" Fitting this part too changes {moved}." if moved else ""
-    return f"The final model leaves a residual {torque} of {size}. Of the {torque}, {each}.{change}"
-
-
-def _how(part: Dependence) -> str:
-    """Of what changes as a wave: what, and how fast; of what changes with a quantity: what."""
-    if part.changes == FROM_RUN_TO_RUN:
-        return " (J, C and K fitted to each run by itself differ)"
-    if part.changes:
-        return f" (as if the {part.changes} changed with it)"
-    if part.wave_hz is None:
-        return ""
-    return f", as if something changed the {PULSATING[part.wave_on]} at {number(part.wave_hz, 3)} Hz"
 
 
 PULSATING = {"angle": "stiffness", "rate": "damping", "torque": "torque of the drive"}

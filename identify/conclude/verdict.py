@@ -5,11 +5,14 @@ from __future__ import annotations
 from identify.bounds.advice import DETERMINED_RELATIVE_ERROR
 from identify.conclude.acceptance import of_reported, opposite_signs
 from identify.conclude.next_steps import to_determine, torque_free
+from identify.residual import FROM_RUN_TO_RUN, Dependence, Disturbance
 from identify.results import NORMAL_95, Identification
 from identify.runs.measured_channels import REFUSED
 from identify.runs.sign_convention import SENTENCE
 from identify.select.evidence import WEIGHT
 from identify.wording import (
+    PULSATING,
+    SYMBOLS,
     capital,
     half_interval,
     how_to_separate,
@@ -18,8 +21,8 @@ from identify.wording import (
     off_by,
     plain,
     quantities_of,
+    quantity_of,
     readable,
-    residual_torque_sentence,
     title,
     unit,
     value_in_sentence,
@@ -159,3 +162,32 @@ def _change(found: Identification) -> str:
     before = {*found.before.parameters, *found.before.effect_parameters}
     dropped = [plain(item.name) for item in found.after.dropped if item.name in before] if found.after else []
     return f"With {joined(dropped)} in the model" if dropped else "In the model as declared"
+
+
+def residual_torque_sentence(left: Disturbance, axis: str) -> str:
+    """What is left after the final model, in one sentence: how large a torque, and what it goes with."""
+    torque = "force" if axis == "linear" else "torque"
+    share = f"{number(100.0 * left.relative, 2)} % of the {torque}"
+    size = f"{number(left.torque_rms, 2)} {unit(left.unit)} rms, sensor noise removed ({share})"
+    if not left.depends_on:
+        return (
+            f"The final model leaves a residual {torque} of {size}. It depends on no quantity that was tested, so it "
+            "counts as noise and is included in the intervals."
+        )
+    each = joined(
+        [f"{number(100.0 * d.relative, 2)} % depends on the {quantity_of(d, axis)}{_how(d)}" for d in left.depends_on]
+    )
+    moved = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in left.moves_percent.items() if v > 0.0])
+    change = f" Fitting this part too changes {moved}." if moved else ""
+    return f"The final model leaves a residual {torque} of {size}. Of the {torque}, {each}.{change}"
+
+
+def _how(part: Dependence) -> str:
+    """Of what changes as a wave: what, and how fast; of what changes with a quantity: what."""
+    if part.changes == FROM_RUN_TO_RUN:
+        return " (J, C and K fitted to each run by itself differ)"
+    if part.changes:
+        return f" (as if the {part.changes} changed with it)"
+    if part.wave_hz is None:
+        return ""
+    return f", as if something changed the {PULSATING[part.wave_on]} at {number(part.wave_hz, 3)} Hz"

@@ -11,9 +11,9 @@ from typing import Any
 from identify.report.files import result_json
 from identify.report.own_effects import make_effects_known
 from identify.report.page import report_html
+from identify.report.read_result import RESULT, read_result
 from identify.report.replaced_file import replace_file
 from identify.report.report_data import FILE, ReportData, read_report_data
-from identify.report.result_file import RESULT, read_result
 from identify.results import Identification
 from rig.errors import RecordingError, UsageError
 from rig.recording.hdf5 import read_recording_h5

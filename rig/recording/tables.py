@@ -16,7 +16,7 @@ from rig.errors import RecordingError
 from rig.recording.checks import check_channel, check_lengths, check_samples, missing_column
 from rig.recording.missing import Rows, lost_within, read_between, with_values
 from rig.recording.run import Run
-from rig.recording.stand_ins import in_words, stand_ins, without
+from rig.recording.sentinels import in_words, sentinels, without
 from rig.recording.stated_units import column_named, factor_of, is_none
 from rig.recording.table import Table
 from rig.units import DEG
@@ -41,7 +41,7 @@ def columns_of(table: Table, factors: Mapping[str, float], section: RecordedConf
     A row without a value is lost. Raises RecordingError where a column "valid" says that it is not.
     """
     columns, at = _as_stored(table, section)
-    rows, _ = _without_stand_ins(Rows(columns, at), table)
+    rows, _ = _without_sentinels(Rows(columns, at), table)
     return _checked(table, dataclasses.replace(rows, columns=lost_within(rows.columns)), factors)
 
 
@@ -64,7 +64,7 @@ def run_of_table(table: Table, factors: Mapping[str, float], entry: RecordedRun,
     for name, x in channels.items():
         check_channel(table, name, x, len(at))
     inside = between(columns["time"] * factors["time"], entry, table.path)
-    rows, instead = _without_stand_ins(Rows(columns, at).only(inside), table)
+    rows, instead = _without_sentinels(Rows(columns, at).only(inside), table)
     rows = with_values(rows, table)
     if rows.missing and rows.missing.between:
         stamps = columns["time"]
@@ -122,7 +122,7 @@ def _as_stored(table: Table, section: RecordedConfig) -> tuple[dict[str, Array],
     return columns, np.arange(count)
 
 
-def _without_stand_ins(rows: Rows, table: Table) -> tuple[Rows, tuple[str, ...]]:
+def _without_sentinels(rows: Rows, table: Table) -> tuple[Rows, tuple[str, ...]]:
     """The rows without numbers that stand for no reading, and what those are, in words.
 
     Raises RecordingError where a column "valid" says that such a number counts.
@@ -132,7 +132,7 @@ def _without_stand_ins(rows: Rows, table: Table) -> tuple[Rows, tuple[str, ...]]
     instead = []
     for quantity in ("torque", "rate", "angle"):
         values = columns.get(quantity)
-        if values is None or not (numbers := stand_ins(values)):
+        if values is None or not (numbers := sentinels(values)):
             continue
         columns[quantity] = without(values, numbers)
         instead.append(f"{in_words(numbers)} as {quantity}")
@@ -174,7 +174,7 @@ def channels_of(table: Table, section: RecordedConfig) -> dict[str, Array]:
             raise missing_column(table, f"channels.{name}", [column], mapped=True)
     values = table.read(list(named.values())) if named else {}
     return {
-        name: wanted[name].scale * without(values[column], stand_ins(values[column])) for name, column in named.items()
+        name: wanted[name].scale * without(values[column], sentinels(values[column])) for name, column in named.items()
     }
 
 
@@ -182,7 +182,7 @@ def _told_of_channels(table: Table, section: RecordedConfig) -> list[str]:
     """Which numbers of further columns stand for no reading, in words."""
     named = {name: config.column or name for name, config in section.columns.channels.items()}
     values = table.read(list(named.values())) if named else {}
-    found = {name: stand_ins(values[column]) for name, column in named.items()}
+    found = {name: sentinels(values[column]) for name, column in named.items()}
     return [f"channel {n} has {in_words(x)} for no reading, {sum(x.values())} times" for n, x in found.items() if x]
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from identify.report.result_file import RESULT, read_result
+from identify.report.read_result import RESULT, read_result
 from identify.report.value_codec import CodecError, decode
 from identify.results import ParameterEstimate
 from rig.errors import RecordingError

@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.errors import RecordingError
-from rig.recording.stand_ins import in_words, stand_ins, without
+from rig.recording.sentinels import in_words, sentinels, without
 from rig.recording.stated_units import stated_unit
 from rig.recording.table import SingleNumberError, Table
 from rig.units import Unit, name_and_unit, unit_of
@@ -119,7 +119,7 @@ def _column(table: Table, name: str, values: Array | str, length: int) -> Column
 
 def _readings(values: Array) -> tuple[Array, str]:
     """The numbers, NaN where one stands for no reading, and which those are, in words."""
-    numbers = {} if _increases(values) else stand_ins(values)
+    numbers = {} if _increases(values) else sentinels(values)
     return without(values, numbers), in_words(numbers)
 
 

@@ -8,9 +8,9 @@ from typing import Any, cast
 import pytest
 
 from identify.conclude.acceptance import of_reported, reasons_against_disturbance, reasons_against_fit
+from identify.conclude.verdict import residual_torque_sentence
 from identify.residual import Dependence, Disturbance
 from identify.results import ParameterEstimate
-from identify.wording import residual_torque_sentence
 from rig.config.identify import AcceptConfig
 
 RATE = Dependence("rate", 0.03, 0.03, 1e-9)

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from identify.conclude.next_steps import next_steps
+from identify.conclude.verdict import residual_torque_sentence
 from identify.diagnose.disturbance import disturbance_of
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.initial_guess import scale_of
 from identify.model.structure import Structure
 from identify.pipeline import identify
 from identify.runs.holdout import split
-from identify.wording import residual_torque_sentence
 from rig.config.identify import IdentifyConfig
 from rig.recording.run import Recording, Run
 from tests.identify.simulated import DECLARED, NOISE_RAD_S, TRUTH, traces_of

@@ -9,7 +9,7 @@ import pytest
 
 from commands.rig.app import app
 from identify.runs.reading import describe_missing
-from rig.recording.stand_ins import stand_ins
+from rig.recording.sentinels import sentinels
 from tests.commands.support import command
 from tests.rig.recording.support import csv_of, motion, read, refusal
 
@@ -63,14 +63,14 @@ def test_where_a_column_valid_says_that_it_counts_it_is_refused(tmp_path: Path) 
 def test_readings_that_are_large_themselves_stand_for_nothing_else() -> None:
     counts = 30_000.0 * np.sin(np.arange(500.0) / 20.0)
     counts[70:80] = 32767.0  # a converter at its end
-    assert stand_ins(counts) == {}
-    assert stand_ins(np.full(500, 9999.0)) == {}
+    assert sentinels(counts) == {}
+    assert sentinels(np.full(500, 9999.0)) == {}
     pulse = np.zeros(500)
     pulse[250] = 1234.5
-    assert stand_ins(pulse) == {}
-    assert stand_ins(np.where(np.arange(500) % 3, 0.1 * np.arange(500), -9999.0)) == {-9999.0: 167}
-    assert stand_ins(np.where(np.arange(500) % 3, -9999.0, 0.1 * np.arange(500))) == {-9999.0: 333}
+    assert sentinels(pulse) == {}
+    assert sentinels(np.where(np.arange(500) % 3, 0.1 * np.arange(500), -9999.0)) == {-9999.0: 167}
+    assert sentinels(np.where(np.arange(500) % 3, -9999.0, 0.1 * np.arange(500))) == {-9999.0: 333}
     switched = np.where(np.arange(500) // 50 % 2, -9999.0, 9999.0)
     switched[::20] = 0.0
-    assert stand_ins(switched) == {}
-    assert stand_ins(np.where(np.arange(500) % 2, -9999.0, 0.1 * np.arange(500))) == {-9999.0: 250}
+    assert sentinels(switched) == {}
+    assert sentinels(np.where(np.arange(500) % 2, -9999.0, 0.1 * np.arange(500))) == {-9999.0: 250}

@@ -19,7 +19,7 @@ BEYOND = 3.0  # times the largest of the other numbers: no reading
 MIN_OTHERS = 10  # of which that is known
 
 
-def stand_ins(values: Array) -> Mapping[float, int]:
+def sentinels(values: Array) -> Mapping[float, int]:
     """Which numbers of a column, shape (n,), stand for no reading, and how often; empty for nearly all columns.
 
     A number counts as one if it is known as such and lies far beyond all that are not. Where most are known, one alone
