@@ -162,17 +162,12 @@ def search_in_torque(
             less, there = less.minus(name), search.without(there, name)
         values = {k: v for k, v in after.values.items() if k[0] not in several}
         there, added = search.with_others(there, several) if others else (there, [])
-        while True:
-            model = replace(less, terms=there.structure.terms).plus(*(c.effect for c in added)) if added else less
-            fitted = before
-            if model.effects != structure.effects:
-                like = after.fit if isinstance(after.fit, Fit) else None
-                likely = fitted_on_all(traces, model, {**there.values, **values}, split.final, like)
-                fitted = _final(regression, there, likely, traces, split, trusted=like is not None)
-            none = next((c for c in added if not fitted.is_significant(c.effect)), None)
-            if none is None:
-                break
-            added, there = [c for c in added if c is not none], search.without(there, none.effect)
+        model = replace(less, terms=there.structure.terms).plus(*(c.effect for c in added)) if added else less
+        fitted = before
+        if model.effects != structure.effects:
+            like = after.fit if isinstance(after.fit, Fit) else None
+            likely = fitted_on_all(traces, model, {**there.values, **values}, split.final, like)
+            fitted = _final(regression, there, likely, traces, split, trusted=like is not None)
         reported.candidates += [c for c in added if c not in reported.candidates]
         reported.contribution |= {c.effect: search.without(there, c.effect).held_nm / there.held_nm for c in added}
         in_torque[(others, *several)] = there
