@@ -40,6 +40,7 @@ from identify.runs.reading import describe_reading
 from identify.runs.reduced import reduced
 from identify.runs.refusals import refuse_added_inertia, refuse_lowpass, refuse_without_motion
 from identify.runs.usable import runs_used
+from identify.select.curve_rivals import still_offered
 from identify.select.field_search import Judged, search_in_torque
 from identify.select.free_form_residual import curves_left, dependence_on
 from identify.select.likelihood_search import LikelihoodSearch, filtered_above, start_search
@@ -236,10 +237,9 @@ class _Identifier:
         """The way for measured data: what the model lacks is told by the torque that it leaves."""
         self.say("the residual holds a torque that was not recorded, in addition to the sensor's noise")
         self.more_than_noise = True
-        allowed = [n for n in self._allowed() if n not in search.stepwise.stood_for_curves]
         step, most = search.stepwise, {t: getattr(self.settings.accept, f"{t}_percent") for t in TERMS}
         found = search_in_torque(
-            self.traces, self.split, self.structure, shapes, self.start, allowed,
+            self.traces, self.split, self.structure, shapes, self.start, still_offered(step, self._allowed()),
             UNITS[self.recording.axis]["torque"], self.say, Judged(step.best, found_there, curves_left(step, most)),
             step.trusted, step.weigher.regression, search.refutes,
         )  # fmt: skip

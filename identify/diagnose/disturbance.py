@@ -58,6 +58,22 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
     return Disturbance(left, unit, relative, tuple(d for d, _ in found), moves)
 
 
+def beside(regression: TorqueRegression, fit: TorqueFit, part: Dependence, other: TorqueFit) -> tuple[TorqueFit, ...]:
+    """A model and another one, each with the free-form term by which a part of the first one's residual was found.
+
+    Nothing where that part was found by another way than in torque.
+    """
+    every = (
+        *curves(regression, fit), *along_angle(regression), *between_runs(regression, fit), *repeating(regression),
+        *pulsating(regression, fit),
+    )  # fmt: skip
+    same = [t for t in every if (t.on, t.changes, t.wave_on) == (part.on, part.changes, part.wave_on)]
+    if not same:
+        return ()
+    tried = [[regression.beside(f, t, p)[0] for t in same for p in t.penalties] for f in (fit, other)]
+    return tuple(min(fits, key=lambda f: f.held_nm) for fits in tried)
+
+
 def _depends(
     regression: TorqueRegression, fit: TorqueFit, terms: Sequence[FreeForm]
 ) -> list[tuple[Dependence, Mapping[Name, float]]]:  # fmt: skip

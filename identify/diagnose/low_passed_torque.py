@@ -216,20 +216,22 @@ class LowPassedTorque:
             out.append((angle[rows], rate[rows], acceleration[rows]))
         return out
 
-    def values_of(self, quantity: str) -> Array:
-        """Angle, rate or torque of all runs as they are, ahead of the low-pass, at the samples behind it, (n,)."""
+    def ahead(self, quantity: str, without: Sequence[Array] = ()) -> list[Array]:
+        """Angle, rate or torque of every run as it is, ahead of the low-pass, (n,); without a residual behind it."""
         k = _QUANTITIES[quantity]
-        return np.concatenate(
-            [np.asarray(t.fine[k])[::UPSAMPLING][r] for t, r in zip(self.traces, self._rows, strict=True)]
-        )  # fmt: skip
+        values = [np.asarray(t.fine[k])[::UPSAMPLING] for t in self.traces]
+        if not without:
+            return values
+        parts = zip(values, self._rows, without, strict=True)
+        return [x - np.interp(np.arange(len(x)), rows, r) if len(rows) else x for x, rows, r in parts]
 
-    def along(self, quantity: str, of: Callable[[Array], Array]) -> Array:
-        """Functions of angle, rate or torque, (n, k) for (n,) values, behind the low-pass as a torque is, (m, k)."""
-        k = _QUANTITIES[quantity]
-        out = []
-        for i, t in enumerate(self.traces):
-            columns = of(np.asarray(t.fine[k])[::UPSAMPLING])
-            out.append(np.stack([self._passed(i, c) for c in columns.T], axis=1))
+    def at_rows(self, series: Sequence[Array]) -> Array:
+        """What every run has ahead of the low-pass at the samples behind it, (n,)."""
+        return np.concatenate([x[rows] for x, rows in zip(series, self._rows, strict=True)])
+
+    def along(self, series: Sequence[Array], of: Callable[[Array], Array]) -> Array:
+        """Functions of what every run has ahead of the low-pass, (m, k) for (m,) values, behind it as a torque is."""
+        out = [np.stack([self._passed(i, c) for c in of(x).T], axis=1) for i, x in enumerate(series)]
         return np.concatenate(out)
 
     def series(self) -> tuple[Array, Array, Array, Array, Array, Array]:

@@ -26,6 +26,8 @@ from rig import effects
 from rig.effects.base import Effect, Place
 from rig.platform import TERMS
 
+KEPT = 0.1  # of what an effect takes, that it takes beside a curve too, and is no stand-in for that
+
 
 def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callable[[str], None]) -> Found:
     """The same without the effects that too much else is left beside; unchanged where nothing is left over.
@@ -37,7 +39,7 @@ def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callab
     if not found.disturbance.depends_on:
         return _with_unproven(found)
     left_beside: list[Dependence] = []
-    while stand_ins := _first([name for name in _in_doubt(found) if _may_stand_in(name, found, traces)], found):
+    while stand_ins := _first([n for n in _in_doubt(found, traces) if _may_stand_in(n, found, traces)], found):
         depends = found.disturbance.depends_on
         less = _taken_back(found, stand_ins, axis)
         say(f"not named: {_listed(stand_ins)}; what is left then still depends on the {quantity_of(depends[0], axis)}")
@@ -45,7 +47,7 @@ def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callab
         found = less
     for dependence in left_beside:  # is left without them, too, even if it is not seen any more
         found = replace(found, disturbance=found.disturbance.with_free_form(dependence, {}))
-    flexible = _in_doubt(found)
+    flexible = _in_doubt(found, traces)
     if not flexible:
         return found
     say(f"something is left over: checking how far the parameters depend on {_listed(flexible)}")
@@ -55,19 +57,41 @@ def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callab
     return replace(found, disturbance=replace(found.disturbance, moves_without_percent=moves))
 
 
-def _in_doubt(found: Found) -> list[str]:
+def _in_doubt(found: Found, traces: Sequence[Trace]) -> list[str]:
     """Effects beside which so much is left over as a share of what they take that it would be a name of its own.
 
     A lag is not asked: it takes little torque and is known all the same, by when the platform answers. What bends the
-    torque of the drive (a dead zone) is.
+    torque of the drive (a dead zone) is. Nor is a constant torque: what is left has none. Of a wave over the angle that
+    is not seen to repeat, whatever else goes with the angle is too much: only its fit tells it from any other curve.
     """
     depends = found.disturbance.depends_on  # the largest first
-    asked = [n for n in found.named if not _is_lag(effects.get(n))] if depends else []
-    return [name for name in asked if depends[0].relative ** 2 > WEIGHT * found.taken_by(name)]
+    asked = [n for n in found.named if not _is_bound(effects.get(n))] if depends else []
+    return [
+        name for name in asked
+        if (depends[0].relative ** 2 > WEIGHT * found.taken_by(name) and not _is_needed_beside(name, found))
+        or _is_one_of_many_curves(name, found, traces)
+    ]  # fmt: skip
 
 
-def _is_lag(effect: Effect) -> bool:
-    return effect.place in (Place.DRIVE, Place.SENSOR) and not effect.bends_torque
+def _is_needed_beside(name: str, found: Found) -> bool:
+    """Whether an effect takes something beside a free-form term of what is left, too: it does not stand for that.
+
+    One that can follow almost any torque is not asked, unless it is a wave over the angle: that has to fit every turn.
+    """
+    effect = effects.get(name)
+    asked = not effect.is_flexible or bool(effect.repeats_over_angle)
+    return asked and found.taken_by(name, found.disturbance.depends_on[0]) > KEPT * found.taken_by(name)
+
+
+def _is_bound(effect: Effect) -> bool:
+    """Whether an effect cannot take up what depends on something: a lag, or a constant."""
+    return effect.is_constant or (effect.place in (Place.DRIVE, Place.SENSOR) and not effect.bends_torque)
+
+
+def _is_one_of_many_curves(name: str, found: Found, traces: Sequence[Trace]) -> bool:
+    """Whether an effect is a wave of which no period is seen twice, and more of what it goes with is left."""
+    same = {d.on for d in found.disturbance.depends_on} & set(effects.get(name).goes_with)
+    return bool(same) and not is_seen_to_repeat(effects.first_of(name), found.named, found.after.values, traces)
 
 
 def _first(names: Sequence[str], found: Found) -> Sequence[str]:
@@ -110,7 +134,7 @@ def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
     """
     depends = found.disturbance.depends_on
     flexible = any(effects.get(n).is_flexible for n in names)
-    less = found.without(*names, others=flexible)
+    less = found.without(*names, others=depends[0].on if flexible else None)
     search = less.search
     follows = " but can follow almost any torque," if flexible else ""
     share, on = number(100.0 * depends[0].relative, 2), quantity_of(depends[0], axis)

@@ -16,6 +16,7 @@ import numpy as np
 from identify.likelihood.fit import Fit
 from identify.propose.free_forms import fitted, ranges
 from identify.propose.innovation_score import InnovationScores
+from identify.runs.observability import is_seen_to_repeat
 from identify.select.evidence import STRONG_SUPPORT, support_difference
 from identify.select.free_form_residual import CURVE_STEPS, ON
 from identify.select.trial_fits import COMPARABLE, TRIAL_ITERATIONS
@@ -47,11 +48,28 @@ def against_curves(search: Stepwise, now: Fit) -> Fit:
         return now
     names, curve, rest, with_curve = found
     search.in_place = with_curve
-    search.stood_for_curves |= set(names)
+    if not all(_seen_to_repeat(n, now, search) for n in names):  # of a wave that is, further orders may make the curve
+        alike = [n for n in search.allowed if curve in CURVES.get(effects.get(n).family, ())]
+        search.stood_for_curves |= {*names, *alike}  # what is worse than those, and of the same kind, is beaten as well
     search.dropped = [d for d in search.dropped if d[0] not in rest.structure.terms]
     search.dropped += [(n, f"a curve over the {ON[curve]} explains clearly more in its place") for n in names]
     search.say(f"took {joined([plain(n) for n in names])} back: a curve over the {ON[curve]} explains clearly more")
     return rest
+
+
+def _seen_to_repeat(name: str, now: Fit, search: Stepwise) -> bool:
+    effect = effects.get(name)
+    have = now.structure.effects
+    return bool(effect.repeats_over_angle) and is_seen_to_repeat(
+        effects.first_of(name), have, now.values, search.problem.traces
+    )
+
+
+def still_offered(search: Stepwise, names: Sequence[str]) -> list[str]:
+    """Effects that are not of a kind of which all that was found has stood for a curve; their numbers are no kinds."""
+    left = {effects.first_of(n) for n in search.best.structure.effects}
+    stood = {effects.first_of(n) for n in search.stood_for_curves} - left
+    return [n for n in names if effects.first_of(n) not in stood]
 
 
 def is_beaten(search: Stepwise, now: Fit) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from identify.diagnose.disturbance import disturbance_of
+from identify.diagnose.disturbance import beside, disturbance_of
 from identify.diagnose.torque_fit import TorqueErrors, TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.covariance import covariance_of
@@ -154,14 +154,14 @@ def search_in_torque(
         size = regression.torque_nm
         return TorqueErrors(fit.sigma, fit.sigma / size, fit.held_nm / size, floor, cutoff)
 
-    in_torque: dict[tuple[object, ...], TorqueFit] = {(False,): best}  # by others, and by what was taken back
+    in_torque: dict[tuple[object, ...], TorqueFit] = {(None,): best}  # by others, and by what was taken back
 
-    def lacking(*several: str, others: bool = False) -> tuple[FinalFit, TorqueErrors, Disturbance]:
+    def lacking(*several: str, others: str | None = None) -> tuple[FinalFit, TorqueErrors, Disturbance]:
         less, there = final, best  # without a low-pass of the gyro, which no torque shows
         for name in several:
             less, there = less.minus(name), search.without(there, name)
         values = {k: v for k, v in after.values.items() if k[0] not in several}
-        there, added = search.with_others(there, several) if others else (there, [])
+        there, added = (there, []) if others is None else search.with_others(there, several, others)
         model = replace(less, terms=there.structure.terms).plus(*(c.effect for c in added)) if added else less
         fitted = before
         if model.effects != structure.effects:
@@ -173,11 +173,14 @@ def search_in_torque(
         in_torque[(others, *several)] = there
         return fitted, errors(there), disturbance_of(regression, there, floor, unit)
 
-    def share_of(name: str, *gone: str, others: bool) -> float:
+    def share_of(name: str, *gone: str, others: str | None, part: Dependence | None) -> float:
         there = in_torque[(others, *gone)]
         if name not in there.structure.effects:
             return float("inf")
-        return (search.without(there, name).held_nm ** 2 - there.held_nm**2) / regression.torque_nm**2
+        both: tuple[TorqueFit, ...] = (there, search.without(there, name))
+        if part is not None and not (both := beside(regression, there, part, both[1])):
+            return 0.0
+        return (both[1].held_nm ** 2 - both[0].held_nm ** 2) / regression.torque_nm**2
 
     reported = search.as_search(best)
     if by_likelihood:

@@ -12,7 +12,7 @@ from identify.estimate.final_fit import FinalFit
 from identify.likelihood.fit import Fit
 from identify.model.parameter_fit import ParameterFit, reduced_chi_square
 from identify.model.parameters import Name
-from identify.results import Candidate, Disturbance
+from identify.results import Candidate, Dependence, Disturbance
 from identify.select.disturbance_lines import lines_left
 from rig.arrays import Array
 from rig.platform import TERMS, Platform
@@ -118,7 +118,8 @@ class Found:
     lacking
         The final model without some effects.
     share_of
-        What an effect takes of the torque's power on held-out samples, of the model without some.
+        What an effect takes of the torque's power on held-out samples, of the model without some, and beside the
+        free-form term of a part of what is left.
     """
 
     search: Search
@@ -129,21 +130,25 @@ class Found:
     lacking: Callable[..., tuple[FinalFit, TorqueErrors, Disturbance]]
     share_of: Callable[..., float]
     taken_back: tuple[str, ...] = ()
-    others: bool = False  # are in the place of what was taken back
+    others: str | None = None  # what the rest depended on when others were put in the place of what was taken back
 
-    def without(self, *several: str, others: bool = False) -> Found:
+    def without(self, *several: str, others: str | None = None) -> Found:
         """The same with effects taken back; what was found beside them stays, fitted anew.
 
-        With ``others`` in their place that carry weight without them, but do not follow almost anything.
+        With others in their place that carry weight without them, where a quantity is given that the rest depends on:
+        such as go with that, or do not follow almost anything.
         """
-        gone, others = (*self.taken_back, *several), others or self.others
+        gone, others = (*self.taken_back, *several), self.others if others is None else others
         after, errors, disturbance = self.lacking(*gone, others=others)
         both = (self.in_torque[0], errors)
         return replace(self, taken_back=gone, others=others, after=after, in_torque=both, disturbance=disturbance)
 
-    def taken_by(self, name: str) -> float:
-        """What an effect takes of the torque's power on held-out samples; infinite where no torque shows it."""
-        return self.share_of(name, *self.taken_back, others=self.others)
+    def taken_by(self, name: str, part: Dependence | None = None) -> float:
+        """What an effect takes of the torque's power on held-out samples; infinite where no torque shows it.
+
+        Beside the free-form term of a part of what is left, where one is given.
+        """
+        return self.share_of(name, *self.taken_back, others=self.others, part=part)
 
     def with_lines(self, likeliest: Fit, torque_nm: float) -> Found:
         """The same with the spectral lines of what the likeliest model leaves, where that is the final one."""

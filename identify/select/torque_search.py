@@ -75,8 +75,6 @@ class TorqueSearch:
         Root mean square of the motion's acceleration, rad/s^2.
     allowed
         Names of the effects that may be named.
-    repeats
-        Whether another of an effect that is there may be named, as another order of cogging.
     """
 
     regression: TorqueRegression
@@ -87,7 +85,6 @@ class TorqueSearch:
     say: Callable[[str], None] = lambda text: None
     rounds: list[tuple[TorqueCandidate, ...]] = field(default_factory=list)
     path: list[TorqueFit] = field(default_factory=list)  # models on the way, the last one the result
-    repeats: bool = True
 
     def run(self, begin: TorqueFit | None = None) -> TorqueFit:
         """Add effects as long as one carries weight, then drop what no longer does.
@@ -140,7 +137,7 @@ class TorqueSearch:
         spring = "stiffness" in now.structure.terms
         answers = now.values.get(("inertia",), 0.0) * self.acceleration > INERTIA_MATTERS * self.regression.torque_nm
         have = now.structure.effects
-        more = one_more(have, now.values, self.regression.traces) if self.repeats else []
+        more = [m for m in one_more(have, now.values, self.regression.traces) if effects.first_of(m) in self.allowed]
         names = [
             n for n in (*(a for a in self.allowed if a not in have), *more)
             if (spring or effects.get(n).family != "restoring torque")
@@ -197,15 +194,21 @@ class TorqueSearch:
                 return self.backward_elimination(without)
         return now
 
-    def with_others(self, now: TorqueFit, gone: Sequence[str] = ()) -> tuple[TorqueFit, list[Candidate]]:
+    def with_others(
+        self, now: TorqueFit, gone: Sequence[str] = (), on: str = ""
+    ) -> tuple[TorqueFit, list[Candidate]]:  # fmt: skip
         """The same with what else carries weight but does not follow almost anything, and what that is.
 
-        What is there already stays: unchanged where something of it would be dropped for the others. What is ``gone``
-        was taken back before, and is not asked.
+        What goes with ``on``, the quantity that the rest depends on, is asked even so. What is there already stays:
+        unchanged where something of it would be dropped for the others. What is ``gone`` was taken back before, and is
+        not asked.
         """
         before = {effects.first_of(name) for name in gone}
-        bound = [n for n in self.allowed if not effects.get(n).is_flexible and effects.first_of(n) not in before]
-        further = replace(self, allowed=bound, repeats=False, rounds=[], path=[])  # what repeats is flexible
+        bound = [
+            n for n in self.allowed
+            if effects.first_of(n) not in before and (not effects.get(n).is_flexible or on in effects.get(n).goes_with)
+        ]  # fmt: skip
+        further = replace(self, allowed=bound, rounds=[], path=[])
         found = further.run(now)
         new = [e for e in found.structure.effects if e not in now.structure.effects]
         if not new or not set(now.structure.effects) <= set(found.structure.effects):

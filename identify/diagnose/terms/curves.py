@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from identify.diagnose.terms.changing import with_time
@@ -21,14 +23,18 @@ def curves(regression: TorqueRegression, fit: TorqueFit) -> list[FreeForm]:
     """
     _, rate, _, _, time, run = regression.series()
     slow = 0.05 * float(np.sqrt(np.mean(rate**2))) + 1e-300
-    driven = [] if regression.torque_free else [_spline("torque", regression)]
+    angles, rates = regression.ahead("angle"), regression.ahead("rate")
+    # A controller answers a disturbance with torque, and a curve over that would be the disturbance itself: what the
+    # model explains of the torque is without it.
+    driven = (
+        [] if regression.torque_free else [_spline("torque", regression, regression.ahead("torque", fit.residuals))]
+    )
     ends = np.array([-1.0, 1.0])
     out = [
-        _spline("angle", regression, "stiffness" not in fit.structure.terms), _beyond("angle", regression),
-        _spline("rate", regression, "damping" not in fit.structure.terms), *driven,
-        FreeForm(
-            "direction", regression.along("rate", lambda v: np.tanh(v / slow)[:, None]), ends, ends[:, None]
-        ),
+        _spline("angle", regression, angles, "stiffness" not in fit.structure.terms),
+        _beyond("angle", regression, angles),
+        _spline("rate", regression, rates, "damping" not in fit.structure.terms), *driven,
+        FreeForm("direction", regression.along(rates, lambda v: np.tanh(v / slow)[:, None]), ends, ends[:, None]),
     ]  # fmt: skip
     if float(np.max(time)) > 0.0:
         out += [_over_time(time), *with_time(regression)]
@@ -36,9 +42,9 @@ def curves(regression: TorqueRegression, fit: TorqueFit) -> list[FreeForm]:
     return [f for f in out if f.columns.shape[1] > 0 and np.all(np.isfinite(f.columns))]
 
 
-def _spline(on: str, regression: TorqueRegression, with_line: bool = False) -> FreeForm:
+def _spline(on: str, regression: TorqueRegression, series: Sequence[Array], with_line: bool = False) -> FreeForm:
     """A smoothing spline of a quantity without what is constant and linear in it; a line of its own beside it."""
-    x = regression.values_of(on)
+    x = regression.at_rows(series)
     free, at = smooth_splines(x)
     if free is None:
         return FreeForm(on, np.zeros((len(regression.series()[0]), 0)), np.zeros(0), np.zeros((0, 0)))
@@ -47,14 +53,14 @@ def _spline(on: str, regression: TorqueRegression, with_line: bool = False) -> F
         return np.column_stack([np.ones(len(values)), values])
 
     # Of a torque that is noisy or in steps, a curve behind the low-pass has a line that it has not ahead of it.
-    columns, line = regression.along(on, free), regression.along(on, straight)
+    columns, line = regression.along(series, free), regression.along(series, straight)
     slope = np.linalg.lstsq(line, columns, rcond=None)[0]
     columns, shape = columns - line @ slope, free(at) - straight(at) @ slope
     rough = np.ones(columns.shape[1] + with_line, dtype=np.bool_)
     if with_line:
         rough[-1] = False
         columns, shape = np.column_stack([columns, line[:, 1]]), np.column_stack([shape, at])
-    return FreeForm(on, columns, at, shape, over=regression.values_of(on), rough=rough)
+    return FreeForm(on, columns, at, shape, over=x, rough=rough)
 
 
 def _over_time(time: Array) -> FreeForm:
@@ -63,9 +69,9 @@ def _over_time(time: Array) -> FreeForm:
     return FreeForm("time", np.zeros((len(time), 0)) if free is None else free(time), at, free(at) if free else at)
 
 
-def _beyond(on: str, regression: TorqueRegression) -> FreeForm:
+def _beyond(on: str, regression: TorqueRegression, series: Sequence[Array]) -> FreeForm:
     """What begins at the ends of a quantity's range, as a stop does: straight from the outer shares of samples on."""
-    x = regression.values_of(on)
+    x = regression.at_rows(series)
     middle = float(np.median(x))
     starts = [(s, float(np.quantile(s * (x - middle), share))) for s in (-1.0, 1.0) for share in OUTER]
 
@@ -73,7 +79,7 @@ def _beyond(on: str, regression: TorqueRegression) -> FreeForm:
         return np.stack([s * np.maximum(s * (values - middle) - b, 0.0) for s, b in starts], axis=1)
 
     at = np.linspace(float(np.min(x)), float(np.max(x)), SHAPE_POINTS)
-    return FreeForm(on, regression.along(on, hinges), at, hinges(at))
+    return FreeForm(on, regression.along(series, hinges), at, hinges(at))
 
 
 def _history(rate: Array, run: Array, regression: TorqueRegression) -> FreeForm:

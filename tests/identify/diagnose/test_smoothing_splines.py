@@ -56,7 +56,7 @@ def test_nothing_is_seen_where_there_is_nothing() -> None:
 def test_it_says_nothing_about_values_that_it_has_not_seen() -> None:
     along = regression([sine_run(m, f, seed=k) for k, (m, f) in enumerate(((20.0, 1.0), (20.0, 3.0), (111.0, 1.5)))])
     fit = along.solve(Structure(), {})
-    torque = along.values_of("torque")
+    torque = along.at_rows(along.ahead("torque"))
     bump = FreeForm("torque", np.sin(torque)[:, None], np.zeros(0), np.zeros((0, 1)), over=torque)
     large = along.run_of_each == 2
     unseen = large & (np.abs(torque) > np.max(np.abs(torque[~large])))

@@ -54,5 +54,5 @@ def test_a_motion_that_does_not_stand_out_of_its_noise_is_looked_at_as_a_whole()
     runs = tuple(sine_run(m, f, seed=i) for i, (m, f) in enumerate(SETS))
     traces = [replace(t, noise=1e6 * t.noise) for t in traces_of(Recording(runs))]
     found = TorqueRegression(traces, split(traces, "auto"), 50.0, scale_of(traces, TRUTH, ()))
-    assert len(found.values_of("rate")) > 100 and np.isfinite(found.torque_nm)
+    assert len(found.at_rows(found.ahead("rate"))) > 100 and np.isfinite(found.torque_nm)
     assert found.noise_floor_nm({("inertia",): 0.02}) > 0.0

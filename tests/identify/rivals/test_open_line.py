@@ -41,7 +41,7 @@ def left_open(
     monkeypatch.setattr(open_line, "describe", lambda line, axis, channel: ("left open.", "try this."))
     monkeypatch.setattr(open_line, "free_run_of", lambda *_: "simulated anew")
 
-    def lacking(*names: str, others: bool = False) -> Any:
+    def lacking(*names: str, others: str | None = None) -> Any:
         rest = tuple(e for e in effects if e not in names)
         return final(rest, 1.3, 0.2), None, Disturbance(0.5, "N*m", 0.5)
 

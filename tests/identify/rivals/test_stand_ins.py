@@ -34,21 +34,24 @@ def found(
     without: float = 0.0505,
     in_place: tuple[str, ...] = (),
     friction_takes_much: bool = True,
+    needed: tuple[str, ...] = (),
 ) -> tuple[Found, list[tuple[str, ...]]]:
     """A final model whose inertia is 6 % larger without any of its effects, and which were taken out together.
 
     It leaves 5 % of the torque, and ``without`` any of them so much of it. Of a model ``in_place`` of one that is taken
-    back, nothing of what is left depends on something.
+    back, nothing of what is left depends on something. Beside that, effects take nothing but those that are ``needed``.
     """
     asked: list[tuple[str, ...]] = []
 
-    def lacking(*several: str, others: bool = False) -> Any:
-        asked.append((*several, "and others") if others else several)
+    def lacking(*several: str, others: str | None = None) -> Any:
+        asked.append((*several, "and others") if others is not None else several)
         left = cast(Any, SimpleNamespace(held_relative=without))
-        kept = [e for e in effects if e not in several] + list(in_place if others else ())
+        kept = [e for e in effects if e not in several] + list(in_place if others is not None else ())
         return final(1.06, 1e-3, *kept), left, Disturbance(0.05, "N*m", 0.05)
 
-    def share_of(name: str, *gone: str, others: bool) -> float:
+    def share_of(name: str, *gone: str, others: str | None, part: Any = None) -> float:
+        if part is not None and name not in needed:
+            return 0.0
         alone = name == "torque_offset" and "cogging" in gone  # it takes what the ripple had taken
         much = alone or (name == "coulomb_friction" and friction_takes_much)
         return 0.25 if much else without**2 - 0.05**2
@@ -160,3 +163,21 @@ def test_a_flexible_effect_goes_first_and_what_it_had_taken_up_is_given_to_the_o
     less = looked_at(begun)
     assert asked == [("cogging", "and others")]
     assert less.named == ["torque_offset"]
+
+
+@pytest.mark.parametrize(
+    ("name", "named"), [("coulomb_friction", True), ("cogging", True), ("flexible_mode", False), ("creep", False)]
+)
+def test_what_is_needed_beside_what_is_left_stands_unless_it_follows_almost_any_torque(name: str, named: bool) -> None:
+    begun, _ = found((name,), ANGLE if name != "cogging" else PAST, friction_takes_much=False, needed=(name,))
+    assert (name in looked_at(begun).named) is named
+
+
+def test_a_constant_torque_takes_up_nothing_that_depends_on_something() -> None:
+    begun, asked = found(("torque_offset",), ANGLE)
+    assert looked_at(begun) is begun and asked == []
+
+
+def test_a_dead_zone_may_stand_in_though_it_belongs_to_the_drive() -> None:
+    begun, _ = found(("torque_deadzone",), ANGLE)
+    assert looked_at(begun).named == []

@@ -11,7 +11,7 @@ import pytest
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
 from identify.select import curve_rivals
-from identify.select.curve_rivals import against_curves, is_beaten
+from identify.select.curve_rivals import against_curves, is_beaten, still_offered
 from identify.select.evidence import block_costs
 from identify.signals.prepare import one_noise, prepare
 from rig.dynamics import TorqueSignal, simulate
@@ -31,6 +31,7 @@ class Searched:
         self.trials = SimpleNamespace(added=lambda fit: list(fit.structure.effects))
         self.problem = SimpleNamespace(fit=self._fit)
         self.dropped = [("stiffness", "cubic_stiffness explains more in its place")] if terms != TERMS else []
+        self.allowed = ["cubic_stiffness", "unbalance", "cogging", "coulomb_friction"]
         self.stood_for_curves: set[str] = set()
         self.in_place: Any = None
 
@@ -89,3 +90,14 @@ def test_blocks_add_up_to_the_cost_of_all_readings() -> None:
     assert problem.both
     fit = problem.fit(Structure(), {(k,): v for k, v in zip(TERMS, TRUTH, strict=True)}, iterations=1, thorough=False)
     assert float(np.sum(block_costs(fit))) == pytest.approx(fit.cost + fit.count, rel=1e-9)
+
+
+def test_what_is_of_the_kind_that_a_curve_has_beaten_is_not_offered_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = Searched("cubic_stiffness", "coulomb_friction")
+    asked(monkeypatch, search, ("cubic_stiffness",))
+    search.best = against_curves(cast(Any, search), search.best)
+    offered = still_offered(
+        cast(Any, search), ["cubic_stiffness", "unbalance", "cogging_2", "coulomb_friction", "creep"]
+    )
+    assert "coulomb_friction" in offered and "creep" in offered
+    assert not {"cubic_stiffness", "unbalance", "cogging_2"} & set(offered)

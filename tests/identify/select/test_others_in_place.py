@@ -11,6 +11,7 @@ from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.initial_guess import scale_of
 from identify.model.structure import Structure
 from identify.runs.holdout import split
+from identify.select import torque_search
 from identify.select.torque_search import TorqueSearch
 from rig.recording.run import Recording
 from tests.identify.simulated import TRUTH, sine_run, traces_of
@@ -53,18 +54,17 @@ def test_what_follows_almost_any_torque_is_not_asked() -> None:
     assert "coulomb_friction" in asked and "creep" not in asked
 
 
-def test_nor_is_another_of_what_is_there() -> None:
+def test_nor_is_another_of_what_is_there_but_what_goes_with_the_rest_is(monkeypatch: pytest.MonkeyPatch) -> None:
     """A further order of cogging follows as much as the first; asked again, what was taken back would come back."""
-    begun = search(0.5)
+    begun = replace(search(0.5), allowed=["coulomb_friction", "creep", "cogging"])
     now = begun.regression.solve(Structure((*begun.base.structure.terms,), ("cogging",)), {"cogging": (40.0,)})
-    asked = [look.effect for look in begun.candidates(now)]
-    asked_in_place = [look.effect for look in replace(begun, repeats=False).candidates(now)]
-    assert "cogging_2" in asked
-    assert asked_in_place and "cogging_2" not in asked_in_place
-    looks: list[str] = []
-    begun.regression.evidence = lambda now, fit: looks.extend(fit.structure.effects) or 0.0  # type: ignore[method-assign]
-    begun.with_others(now, ["cogging_3"])
-    assert "cogging_2" not in looks
+    asked: list[str] = []
+    monkeypatch.setattr(torque_search, "candidate_torques", lambda r, now, names, *a, **k: asked.extend(names) or [])
+    begun.with_others(now, ["cogging_3"], "angle")
+    assert asked == ["coulomb_friction"]
+    asked.clear()
+    begun.with_others(now, ["periodic_disturbance"], "angle")
+    assert asked == ["coulomb_friction", "cogging_2"]
 
 
 def test_the_way_to_the_result_is_kept() -> None:
