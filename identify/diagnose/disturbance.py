@@ -44,7 +44,12 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
     """
     left = float(np.sqrt(max(fit.held_nm**2 - floor_nm**2, 0.0)))
     relative = left / max(regression.torque_nm, 1e-300)
-    found = _depends(regression, fit, curves(regression, fit))
+    terms = curves(regression, fit)
+    found = _depends(regression, fit, [t for t in terms if t.on != "torque"])
+    over_torque = [t for t in terms if t.on == "torque"]
+    both = _depends(regression, fit, over_torque)
+    if both and len(both) == len(over_torque):
+        found.append(min(both, key=lambda f: f[0].torque_rms))
     # Where a trajectory repeats, these follow what anything else explains: they count where they explain more.
     most = max((f[0].torque_rms for f in found), default=0.0)
     follow = [*along_angle(regression), *between_runs(regression, fit)]

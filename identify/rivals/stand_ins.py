@@ -26,6 +26,8 @@ from rig import effects
 from rig.effects.base import Effect, Place
 from rig.platform import TERMS
 
+MOSTLY = 0.5  # of the torque, that is left: then what goes with that is looked for, however freely it follows
+MORE = 0.5  # of what an effect takes, that is left: with more it does not help that it is needed, too
 KEPT = 0.1  # of what an effect takes, that it takes beside a curve too, and is no stand-in for that
 
 
@@ -77,10 +79,15 @@ def _is_needed_beside(name: str, found: Found) -> bool:
     """Whether an effect takes something beside a free-form term of what is left, too: it does not stand for that.
 
     One that can follow almost any torque is not asked, unless it is a wave over the angle: that has to fit every turn.
+    Nor is any beside a term for what changes about its average: the average is not in it.
     """
-    effect = effects.get(name)
-    asked = not effect.is_flexible or bool(effect.repeats_over_angle)
-    return asked and found.taken_by(name, found.disturbance.depends_on[0]) > KEPT * found.taken_by(name)
+    effect, part = effects.get(name), found.disturbance.depends_on[0]
+    asked = (
+        part.relative**2 < MORE * found.taken_by(name)
+        and not part.changes
+        and (not effect.is_flexible or bool(effect.repeats_over_angle))
+    )
+    return asked and found.taken_by(name, part) > KEPT * found.taken_by(name)
 
 
 def _is_bound(effect: Effect) -> bool:
@@ -134,7 +141,8 @@ def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
     """
     depends = found.disturbance.depends_on
     flexible = any(effects.get(n).is_flexible for n in names)
-    less = found.without(*names, others=depends[0].on if flexible else None)
+    goes_with = depends[0].on if depends[0].relative > MOSTLY else ""
+    less = found.without(*names, others=goes_with if flexible else None)
     search = less.search
     follows = " but can follow almost any torque," if flexible else ""
     share, on = number(100.0 * depends[0].relative, 2), quantity_of(depends[0], axis)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -173,11 +174,11 @@ def search_in_torque(
         in_torque[(others, *several)] = there
         return fitted, errors(there), disturbance_of(regression, there, floor, unit)
 
-    def share_of(name: str, *gone: str, others: str | None, part: Dependence | None) -> float:
+    def share_of(names: Sequence[str], *gone: str, others: str | None, part: Dependence | None) -> float:
         there = in_torque[(others, *gone)]
-        if name not in there.structure.effects:
+        if not set(names) & set(there.structure.effects):
             return float("inf")
-        both: tuple[TorqueFit, ...] = (there, search.without(there, name))
+        both: tuple[TorqueFit, ...] = (there, reduce(search.without, names, there))
         if part is not None and not (both := beside(regression, there, part, both[1])):
             return 0.0
         return (both[1].held_nm ** 2 - both[0].held_nm ** 2) / regression.torque_nm**2

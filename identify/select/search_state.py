@@ -14,6 +14,7 @@ from identify.model.parameter_fit import ParameterFit, reduced_chi_square
 from identify.model.parameters import Name
 from identify.results import Candidate, Dependence, Disturbance
 from identify.select.disturbance_lines import lines_left
+from rig import effects
 from rig.arrays import Array
 from rig.platform import TERMS, Platform
 
@@ -118,7 +119,7 @@ class Found:
     lacking
         The final model without some effects.
     share_of
-        What an effect takes of the torque's power on held-out samples, of the model without some, and beside the
+        What effects take of the torque's power on held-out samples, of the model without some, and beside the
         free-form term of a part of what is left.
     """
 
@@ -144,11 +145,12 @@ class Found:
         return replace(self, taken_back=gone, others=others, after=after, in_torque=both, disturbance=disturbance)
 
     def taken_by(self, name: str, part: Dependence | None = None) -> float:
-        """What an effect takes of the torque's power on held-out samples; infinite where no torque shows it.
+        """What effects of one kind take of the torque's power on held-out samples; infinite where no torque shows them.
 
         Beside the free-form term of a part of what is left, where one is given.
         """
-        return self.share_of(name, *self.taken_back, others=self.others, part=part)
+        kind = [n for n in self.named if effects.first_of(n) == effects.first_of(name)]
+        return self.share_of(kind, *self.taken_back, others=self.others, part=part)
 
     def with_lines(self, likeliest: Fit, torque_nm: float) -> Found:
         """The same with the spectral lines of what the likeliest model leaves, where that is the final one."""

@@ -24,11 +24,10 @@ def curves(regression: TorqueRegression, fit: TorqueFit) -> list[FreeForm]:
     _, rate, _, _, time, run = regression.series()
     slow = 0.05 * float(np.sqrt(np.mean(rate**2))) + 1e-300
     angles, rates = regression.ahead("angle"), regression.ahead("rate")
-    # A controller answers a disturbance with torque, and a curve over that would be the disturbance itself: what the
-    # model explains of the torque is without it.
-    driven = (
-        [] if regression.torque_free else [_spline("torque", regression, regression.ahead("torque", fit.residuals))]
-    )
+    # Over the recorded torque, and over what the model explains of it: a controller answers a disturbance, which is in
+    # the first then, and a torque of a few levels is the second and what is left. What is real shows over both.
+    torques = [] if regression.torque_free else [regression.ahead("torque"), regression.ahead("torque", fit.residuals)]
+    driven = [_spline("torque", regression, torque) for torque in torques]
     ends = np.array([-1.0, 1.0])
     out = [
         _spline("angle", regression, angles, "stiffness" not in fit.structure.terms),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -49,7 +50,8 @@ def found(
         kept = [e for e in effects if e not in several] + list(in_place if others is not None else ())
         return final(1.06, 1e-3, *kept), left, Disturbance(0.05, "N*m", 0.05)
 
-    def share_of(name: str, *gone: str, others: str | None, part: Any = None) -> float:
+    def share_of(names: Sequence[str], *gone: str, others: str | None, part: Any = None) -> float:
+        name = names[0]
         if part is not None and name not in needed:
             return 0.0
         alone = name == "torque_offset" and "cogging" in gone  # it takes what the ripple had taken
@@ -169,7 +171,8 @@ def test_a_flexible_effect_goes_first_and_what_it_had_taken_up_is_given_to_the_o
     ("name", "named"), [("coulomb_friction", True), ("cogging", True), ("flexible_mode", False), ("creep", False)]
 )
 def test_what_is_needed_beside_what_is_left_stands_unless_it_follows_almost_any_torque(name: str, named: bool) -> None:
-    begun, _ = found((name,), ANGLE if name != "cogging" else PAST, friction_takes_much=False, needed=(name,))
+    part = Dependence("history" if name == "cogging" else "angle", 0.02, 0.02, 1e-9)
+    begun, _ = found((name,), part, without=0.06, friction_takes_much=False, needed=(name,))
     assert (name in looked_at(begun).named) is named
 
 
@@ -180,4 +183,18 @@ def test_a_constant_torque_takes_up_nothing_that_depends_on_something() -> None:
 
 def test_a_dead_zone_may_stand_in_though_it_belongs_to_the_drive() -> None:
     begun, _ = found(("torque_deadzone",), ANGLE)
+    assert looked_at(begun).named == []
+
+
+def test_with_more_than_half_left_it_does_not_help_that_a_name_is_needed() -> None:
+    much = Dependence("angle", 0.03, 0.03, 1e-9)
+    begun, _ = found(("coulomb_friction",), much, without=0.06, friction_takes_much=False, needed=("coulomb_friction",))
+    assert looked_at(begun).named == []
+
+
+def test_beside_what_changes_about_its_average_no_name_is_asked_whether_it_is_needed() -> None:
+    changing = Dependence("angle", 0.02, 0.02, 1e-9, changes="friction")
+    begun, _ = found(
+        ("coulomb_friction",), changing, without=0.06, friction_takes_much=False, needed=("coulomb_friction",)
+    )
     assert looked_at(begun).named == []
