@@ -75,7 +75,7 @@ def beside(regression: TorqueRegression, fit: TorqueFit, part: Dependence, other
     same = [t for t in every if (t.on, t.changes, t.wave_on) == (part.on, part.changes, part.wave_on)]
     if not same:
         return ()
-    tried = [[regression.beside(f, t, p)[0] for t in same for p in t.penalties] for f in (fit, other)]
+    tried = [[regression.beside(f, t)[0] for t in same] for f in (fit, other)]
     return tuple(min(fits, key=lambda f: f.held_nm) for fits in tried)
 
 
@@ -90,8 +90,7 @@ def _dependence(
     regression: TorqueRegression, fit: TorqueFit, term: FreeForm
 ) -> tuple[Dependence, Mapping[Name, float]] | None:  # fmt: skip
     """What of the residual goes with a term, and how far the parameters move; None where held-out samples show none."""
-    tried = [(penalty, *regression.beside(fit, term, penalty)) for penalty in term.penalties]
-    penalty, richer, gains = min(tried, key=lambda one: one[1].held_nm)
+    richer, gains, penalty = regression.beside(fit, term)
     # What is fitted to each run is held out by blocks, and so is what it stands beside.
     alone = regression.beside(fit, term.without_columns())[0] if term.of_each_run else fit
     sure = max(regression.fall_in_sigmas(alone, richer, of_each_run=term.changes == FROM_RUN_TO_RUN))

@@ -45,33 +45,44 @@ class _Stacked(NamedTuple):
 class TorqueRegression(LowPassedTorque):
     """Fits structures in torque over a set of runs."""
 
-    def beside(self, fit: TorqueFit, term: FreeForm, roughness_penalty: float = 0.0) -> tuple[TorqueFit, Array]:
-        """A model fitted together with a free-form term, what that leaves on held-out samples, and the term's gains.
+    def beside(self, fit: TorqueFit, term: FreeForm) -> tuple[TorqueFit, Array, float]:
+        """A model fitted together with a free-form term, the term's gains, and the penalty on its roughness.
 
-        Of a term of each run by itself, blocks of every run are held out instead of whole runs.
+        Of several penalties that which leaves least on held-out samples. Of a term of each run by itself, blocks of
+        every run are held out instead of whole runs.
         """
         a, y, names, extra = self._over_all_runs(fit.structure, fit.shapes)
         wide = np.column_stack([a, term.columns])
         low = np.array([self._low(n) for n in names] + [-np.inf] * (wide.shape[1] - len(names)))
-        ridge = np.concatenate([np.zeros(a.shape[1]), term.ridge(roughness_penalty)])
         own = np.arange(wide.shape[1])
         free = (own >= len(names)) & (own < a.shape[1])
         folds = self._by_block if term.of_each_run else self._folds(names, extra)
-        x, held, _ = self._with_folds(
-            wide, y, low, folds, free, ridge, None if term.over is None else (term.over, own >= a.shape[1])
-        )
-        scale = self._passed_on(y - self._taken(names, x[: a.shape[1]], a))
-        if term.on == "torque":  # a friction and a curve explain any torque: what of it sets in motion has to be kept
-            moves = [k for k, n in enumerate(names) if len(n) == 1]
-            was, now = (rms(a[:, moves] @ v) for v in ([fit.values[names[k]] for k in moves], x[moves]))
-            scale *= min(max(was / max(now, 1e-300), 1.0), LEAST_PASSED_ON)
+        curve = None if term.over is None else (term.over, own >= a.shape[1])
+        sums = self._sums(wide, y, folds)
+        tried = []
+        for penalty in term.penalties:
+            ridge = np.concatenate([np.zeros(a.shape[1]), term.ridge(penalty)])
+            tried.append((*self._with_folds(wide, y, low, folds, free, sums, ridge, curve), penalty))
+        x, held, penalty = min(tried, key=lambda one: self._left(fit, term, names, a, y, *one[:2])[0])
+        _, scale = self._left(fit, term, names, a, y, x, held)
         r, held = scale * (y - wide @ x), scale * held
         ends = np.cumsum([len(rows) for rows in self._rows])[:-1]
         values = {**fit.values, **dict(zip(names, x[: len(names)].tolist(), strict=True))}
         return replace(
             fit, vector=np.array([values[n] for n in fit.names]), variance=rms(r[self._fitted]) ** 2,
             held_nm=rms(held[self._judged]), residuals=np.split(r, ends), held=np.split(held, ends),
-        ), x[a.shape[1] :]  # fmt: skip
+        ), x[a.shape[1] :], penalty  # fmt: skip
+
+    def _left(
+        self, fit: TorqueFit, term: FreeForm, names: Sequence[Name], a: Array, y: Array, x: Array, held: Array
+    ) -> tuple[float, float]:  # fmt: skip
+        """What is left on held-out samples beside a term, N m, and by how much more than its size it counts."""
+        scale = self._passed_on(y - self._taken(names, x[: a.shape[1]], a))
+        if term.on == "torque":  # a friction and a curve explain any torque: what of it sets in motion has to be kept
+            moves = [k for k, n in enumerate(names) if len(n) == 1]
+            was, now = (rms(a[:, moves] @ v) for v in ([fit.values[names[k]] for k in moves], x[moves]))
+            scale *= min(max(was / max(now, 1e-300), 1.0), LEAST_PASSED_ON)
+        return scale * rms(held[self._judged]), scale
 
     def columns_of(self, fit: TorqueFit) -> tuple[dict[Name, Array], Array]:
         """The column of every linear parameter over all runs, (n,) each, and what is free in each run, (n, m)."""
@@ -92,25 +103,20 @@ class TorqueRegression(LowPassedTorque):
         return self._by_block if extra or any(len(n) == 3 for n in names) else self._by_run
 
     def _with_folds(
-        self, a: Array, y: Array, low: Array, folds: Sequence[Any], free: Any, ridge: Any = 0.0,
-        curve: tuple[Array, Any] | None = None,
-    ) -> tuple[Array, Array, Array]:  # fmt: skip
-        """Least squares, the residual where every fold was left out of its own fit, and the normal matrix.
+        self, a: Array, y: Array, low: Array, folds: Sequence[Any], free: Any,
+        sums: Sequence[tuple[Array, Array]], ridge: Any = 0.0, curve: tuple[Array, Any] | None = None,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """Least squares from their ``sums``, and the residual where every fold was left out of its own fit.
 
         What is ``free`` in each run, (columns,) boolean, is no part of the model: it is fitted to held-out samples too.
         A ``curve``, its quantity, (n,), and its columns, (columns,) boolean, says nothing about values it has not seen.
         """
 
-        def normal(rows: Any) -> Array:
-            return np.asarray(a[rows].T @ a[rows] + np.diag(np.broadcast_to(ridge, a.shape[1])))
-
-        fitted = normal(self._fitted)
-        x = bounded(fitted, a[self._fitted].T @ y[self._fitted], low)
-        held = y - a @ x
+        fitted, *rests = [bounded(square + np.diag(np.broadcast_to(ridge, a.shape[1])), of, low) for square, of in sums]
+        held = y - a @ fitted
         used = self._used
-        for fold in folds:
+        for fold, gains in zip(folds, rests, strict=True):
             rest = used & ~fold
-            gains = bounded(normal(rest), a[rest].T @ y[rest], low)
             left = y - a[:, ~free] @ gains[~free]
             if curve is not None:
                 over, its = curve
@@ -120,7 +126,12 @@ class TorqueRegression(LowPassedTorque):
                 own = a[used][:, free]
                 left = left - a[:, free] @ bounded(own.T @ own, own.T @ left[used], np.full(own.shape[1], -np.inf))
             held[fold] = left[fold]
-        return x, held, fitted
+        return fitted, held
+
+    def _sums(self, a: Array, y: Array, folds: Sequence[Any]) -> list[tuple[Array, Array]]:
+        """Normal equations of the samples that fit, and of those without each fold."""
+        every = [self._fitted, *(self._used & ~fold for fold in folds)]
+        return [(a[rows].T @ a[rows], a[rows].T @ y[rows]) for rows in every]
 
     def left_by(self, structure: Structure, values: Mapping[Name, float]) -> float:
         """Root mean square residual at given parameters, biases fitted, N m."""
@@ -190,7 +201,10 @@ class TorqueRegression(LowPassedTorque):
         low = np.array([self._low(n) for n in names] + [-np.inf] * extra)
         used, fitting = self._used, self._fitted
         own = np.arange(a.shape[1]) >= len(names)
-        x, held, normal = self._with_folds(a, y, low, self._folds(names, extra), own)
+        folds = self._folds(names, extra)
+        sums = self._sums(a, y, folds)
+        x, held = self._with_folds(a, y, low, folds, own, sums)
+        normal = sums[0][0]
         r = y - a @ x
         # A drive that passes on little of the torque leaves little of it unexplained: what counts is the share.
         scale = self._passed_on(y - self._taken(names, x, a))
