@@ -71,13 +71,13 @@ class FinalModels:
         return self._predicted(search.best)
 
     def _without_unsupported(self, search: Search, fitted: FinalFit) -> FinalFit:
-        """The same without effects that can follow almost anything and that whole runs do not support.
+        """The same without effects that whole runs do not support.
 
         The search looks at spans of the runs, and predicts a few samples ahead. A free run at the sensor's noise is the
         likelihood itself: what does not differ from none there, and is not missed, was found by chance.
         """
         for name in [e for e in fitted.structure.effects if e not in self.structure.effects]:
-            if not effects.get(name).is_flexible or fitted.is_significant(name):
+            if fitted.is_significant(name):
                 continue
             rest = {n: v for n, v in fitted.values.items() if n[0] != name}
             less = by_output_error(
