@@ -30,8 +30,8 @@ from commands.terminal.options import (
 )
 
 RECORDINGS = (
-    "Recordings of the same columns, one a run: CSV (also .tsv, .txt, .lvm, .csv.gz), JSON, NPZ, MAT, HDF5; with an "
-    "extra: Parquet, MDF4, TDMS, ROS bags, Excel. None: a bench."
+    "Recordings of the same columns, one a run: CSV (also .tsv, .txt, .lvm, .csv.gz), JSON, NPZ, MAT, HDF5; as extras "
+    "Parquet, Excel, MDF4, TDMS, ROS bags. None: a bench."
 )
 ResultsDir = Annotated[
     Path, typer.Argument(metavar="DIR", help="The results folder of a campaign.", show_default=False)
