@@ -143,8 +143,8 @@ def test_a_file_that_is_not_there_is_said_without_a_word_of_a_configuration(tmp_
 
 
 def test_the_help_names_the_formats() -> None:
-    text = " ".join(command(app, "init", "--help").stdout.split())
-    for word in (".lvm", "NPZ", "HDF5", "Parquet", "MDF4", "TDMS", "ROS bags", "--sample-rate"):
+    text = " ".join(command(app, "init", "--help").stdout.replace("│", " ").split())
+    for word in (".lvm", "NPZ", "HDF5", "Parquet", "MDF4", "TDMS", "ROS bags", "JSON", "--sample-rate"):
         assert word in text
 
 
