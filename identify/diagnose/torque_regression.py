@@ -120,7 +120,7 @@ class TorqueRegression(LowPassedTorque):
             left = y - a[:, ~free] @ gains[~free]
             if curve is not None:
                 over, its = curve
-                unseen = (over < np.min(over[rest])) | (over > np.max(over[rest]))
+                unseen = (over < np.min(over[rest], initial=np.inf)) | (over > np.max(over[rest], initial=-np.inf))
                 left[unseen] += a[np.ix_(unseen, its)] @ gains[its]
             if np.any(free):
                 own = a[used][:, free]

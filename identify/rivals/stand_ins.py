@@ -17,8 +17,9 @@ import numpy as np
 from identify.estimate.final_fit import FinalFit
 from identify.residual import Dependence
 from identify.runs.observability import is_seen_to_repeat
+from identify.select.curve_rivals import CURVES
 from identify.select.evidence import WEIGHT
-from identify.select.free_form_residual import MOVED_SIGMAS
+from identify.select.free_form_residual import MOVED_SIGMAS, ON
 from identify.select.search_state import Found
 from identify.signals.trace import Trace
 from identify.wording import joined, number, plain, quantity_of
@@ -72,6 +73,7 @@ def _in_doubt(found: Found, traces: Sequence[Trace]) -> list[str]:
         name for name in asked
         if (depends[0].relative ** 2 > WEIGHT * found.taken_by(name) and not _is_needed_beside(name, found))
         or _is_one_of_many_curves(name, found, traces)
+        or _follows_one_of_its_kind(name, found)
     ]  # fmt: skip
 
 
@@ -79,11 +81,13 @@ def _is_needed_beside(name: str, found: Found) -> bool:
     """Whether an effect takes something beside a free-form term of what is left, too: it does not stand for that.
 
     One that can follow almost any torque is not asked, unless it is a wave over the angle: that has to fit every turn.
-    Nor is any beside a term for what changes about its average: the average is not in it.
+    Nor is any but beside a curve over a quantity: a term for what changes has not its average in it, and one for
+    multiples of the excitation not what is played.
     """
     effect, part = effects.get(name), found.disturbance.depends_on[0]
     asked = (
         part.relative**2 < MORE * found.taken_by(name)
+        and bool(part.at)
         and not part.changes
         and (not effect.is_flexible or bool(effect.repeats_over_angle))
     )
@@ -99,6 +103,17 @@ def _is_one_of_many_curves(name: str, found: Found, traces: Sequence[Trace]) -> 
     """Whether an effect is a wave of which no period is seen twice, and more of what it goes with is left."""
     same = {d.on for d in found.disturbance.depends_on} & set(effects.get(name).goes_with)
     return bool(same) and not is_seen_to_repeat(effects.first_of(name), found.named, found.after.values, traces)
+
+
+def _follows_one_of_its_kind(name: str, found: Found) -> bool:
+    """Whether another effect that a curve over the same quantity stands for was taken back, and more goes with that.
+
+    Of all effects of one kind the best one remains when the others are taken back: that it is not in doubt by its size
+    says little then.
+    """
+    kinds = set(CURVES.get(effects.get(name).family, ()))
+    taken_back = {c for n in found.taken_back for c in CURVES.get(effects.get(effects.first_of(n)).family, ())}
+    return bool({ON[c] for c in kinds & taken_back} & {d.on for d in found.disturbance.depends_on if not d.changes})
 
 
 def _first(names: Sequence[str], found: Found) -> Sequence[str]:

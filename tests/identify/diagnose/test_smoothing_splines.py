@@ -96,3 +96,12 @@ def test_a_torque_that_friction_takes_is_not_explained_by_a_curve_over_itself() 
     curve = next(c for c in curves(along, fit) if c.on == "torque")
     richer = along.beside(fit, curve)[0]
     assert richer.values[("inertia",)] > 0.8 * fit.values[("inertia",)]
+
+
+def test_where_all_samples_are_held_out_at_once_a_curve_says_nothing() -> None:
+    along = regression([sine_run(m, f, seed=k) for k, (m, f) in enumerate(SETS)])
+    fit = along.solve(Structure(), {})
+    along._by_run = along._by_block = [along._used]
+    torque = along.at_rows(along.ahead("torque"))
+    bump = FreeForm("torque", np.sin(torque)[:, None], np.zeros(0), np.zeros((0, 1)), over=torque)
+    assert np.all(np.isfinite(np.concatenate(along.beside(fit, bump)[0].held)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -171,7 +172,7 @@ def test_a_flexible_effect_goes_first_and_what_it_had_taken_up_is_given_to_the_o
     ("name", "named"), [("coulomb_friction", True), ("cogging", True), ("flexible_mode", False), ("creep", False)]
 )
 def test_what_is_needed_beside_what_is_left_stands_unless_it_follows_almost_any_torque(name: str, named: bool) -> None:
-    part = Dependence("history" if name == "cogging" else "angle", 0.02, 0.02, 1e-9)
+    part = Dependence("rate" if name == "cogging" else "angle", 0.02, 0.02, 1e-9, (-1.0, 1.0), (0.0, 0.1))
     begun, _ = found((name,), part, without=0.06, friction_takes_much=False, needed=(name,))
     assert (name in looked_at(begun).named) is named
 
@@ -198,3 +199,19 @@ def test_beside_what_changes_about_its_average_no_name_is_asked_whether_it_is_ne
         ("coulomb_friction",), changing, without=0.06, friction_takes_much=False, needed=("coulomb_friction",)
     )
     assert looked_at(begun).named == []
+
+
+def test_multiples_of_the_excitation_are_no_curve_beside_which_a_name_is_needed() -> None:
+    lines = Dependence("frequency", 0.02, 0.02, 1e-9)
+    begun, _ = found(("cubic_stiffness",), lines, without=0.06, needed=("cubic_stiffness",))
+    assert looked_at(begun).named == []
+
+
+@pytest.mark.parametrize(("name", "named"), [("unbalance", False), ("coulomb_friction", True)])
+def test_in_the_place_of_one_of_its_kind_an_effect_stands_only_if_nothing_more_goes_with_the_angle(
+    name: str, named: bool
+) -> None:
+    """The best of all effects over the angle takes nearly all of any curve over it."""
+    begun, _ = found((name,), Dependence("angle", 1e-4, 1e-4, 1e-9, (-1.0, 1.0), (0.0, 0.1)))
+    assert name in looked_at(begun).named
+    assert (name in looked_at(replace(begun, taken_back=("cogging_2",))).named) is named
