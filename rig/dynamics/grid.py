@@ -38,6 +38,7 @@ def _projection(parts: int) -> Array:
 
 _PARTS = 8  # of a step, where the torque has corners
 _PROJECTION = _projection(_PARTS)
+FINE_SUBSTEPS = 16  # of a sample period: with so many, a corner needs no parts of a step
 
 
 KEPT = 3  # torques behind the drive: of all parameters only the drive's own change it
@@ -112,6 +113,7 @@ class Grid:
         sample_s = float(np.median(spacing))
         self.time_s = time_s
         self.step_s = sample_s / substeps
+        self._fine = substeps >= FINE_SUBSTEPS
         steps = (time_s - time_s[0]) / self.step_s
         nearest = np.rint(steps).astype(np.int64)
         self._index = nearest if np.max(np.abs(steps - nearest)) < 1e-4 else None
@@ -175,7 +177,7 @@ class Grid:
         return found
 
     def _behind(self, equations: Equations) -> Array:
-        if not self._held and any(effects.get(name).bends_torque for name in equations.drive.names):
+        if not self._held and not self._fine and any(effects.get(name).bends_torque for name in equations.drive.names):
             return self._bent(equations)
         given = equations.drive.apply(self._given, self.step_s / self._pieces)
         return self._by_step(given[self._lead * self._pieces :])

@@ -17,6 +17,9 @@ from rig.excitation import PlannedSet
 from rig.platform import Platform
 
 PEAK_RATE_HZ = 4000.0  # the crest of a 29 Hz ring read at 4 kHz is low by 0.03 %
+SAMPLES_A_PERIOD = 138.0  # of a ring, for that: 4000 / 29
+LONG_SAMPLES = 400_000  # 100 s at 4 kHz; a simulation with corners in its torque keeps about 500 bytes for each
+STRAIGHT = 1e-3  # of the largest torque: as far as a sine bends between 70 samples a period
 COAST_RATE_HZ = 200.0  # only the end of a rest is used, and the integrator chooses its own substeps
 SETTLED_TIME_CONSTANTS = 3.0  # time constants after which a spring has pulled it back
 BISECTIONS = 24  # halvings: the factor to 6e-8
@@ -49,8 +52,8 @@ class SetForecast:
 
     def __init__(self, platform: Platform, planned_set: PlannedSet) -> None:
         self._equations = Equations(platform)
-        time_s, self._torque_nm = _sampled(planned_set)
-        substeps = self._equations.substeps(1.0 / PEAK_RATE_HZ)
+        time_s, self._torque_nm = _sampled(planned_set, self._equations.fastest_rad_s() / (2.0 * math.pi))
+        substeps = self._equations.substeps(float(time_s[1] - time_s[0]))
         self._grid = Grid(time_s, TorqueSignal(time_s, self._torque_nm), substeps)
 
     def play(self, scale: float, start: State = AT_ORIGIN) -> SetMotion:
@@ -69,10 +72,26 @@ def peak_torque_nm(planned_set: PlannedSet) -> float:
     return _peak(_sampled(planned_set)[1])
 
 
-def _sampled(planned_set: PlannedSet) -> tuple[Array, Array]:
-    """Time and torque of a set, each (n,)."""
-    time_s: Array = np.arange(math.ceil(planned_set.duration_s * PEAK_RATE_HZ) + 1) / PEAK_RATE_HZ
-    return time_s, np.asarray(planned_set.torque(time_s), dtype=float)
+def _sampled(planned_set: PlannedSet, fastest_hz: float = math.inf) -> tuple[Array, Array]:
+    """Time and torque of a set, each (n,), for a platform that rings at most so fast.
+
+    Of a long set every second instant is left out as long as neither the platform nor the torque needs it: a slow
+    platform is asked for sets of many minutes.
+    """
+    rate_hz = PEAK_RATE_HZ
+    while True:
+        time_s: Array = np.arange(math.ceil(planned_set.duration_s * rate_hz) + 1) / rate_hz
+        torque_nm = np.asarray(planned_set.torque(time_s), dtype=float)
+        slow = rate_hz >= 2.0 * SAMPLES_A_PERIOD * fastest_hz
+        if len(time_s) <= LONG_SAMPLES or not slow or not _is_straight(torque_nm):
+            return time_s, torque_nm
+        rate_hz *= 0.5
+
+
+def _is_straight(torque_nm: Array) -> bool:
+    """Whether every second value lies between its neighbours, to a thousandth of the largest."""
+    between = torque_nm[1:-1:2] - 0.5 * (torque_nm[:-2:2] + torque_nm[2::2])
+    return float(np.max(np.abs(between))) <= STRAIGHT * _peak(torque_nm)
 
 
 def _peak(x: Array) -> float:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 import re
+from typing import Any
 
 import pytest
 
+from rig.arrays import Array
 from rig.config.excitation import PAPER_SETS, ExcitationConfig
 from rig.config.limits import LimitsConfig
+from rig.dynamics import Grid
 from rig.errors import PreflightRefusal
-from rig.excitation import PlannedSet, Sine
+from rig.excitation import PlannedSet, Sine, planned
 from rig.platform import Platform
-from rig.preflight import limits_broken, model_hint, peaks, plan, predict_all
+from rig.preflight import limits_broken, model_hint, peaks, plan, predict_all, simulated_sets
 
 PAPER = Platform()
 WIDE = LimitsConfig(travel_deg=10, rate_deg_s=4000, torque_nm=350)
@@ -186,3 +189,27 @@ def test_a_model_that_drifts_or_runs_away_is_refused_with_the_reason(platform: P
         plan(platform, ExcitationConfig(), LimitsConfig())
     assert said in str(refused.value)
     assert said in model_hint(platform)
+
+
+@pytest.mark.parametrize(
+    ("stiffness_nm_rad", "sine_hz", "thinned"),
+    [(40.0, 0.05, True), (40.0, 50.0, False), (2.0e6, 0.05, False)],
+)  # fmt: skip
+def test_a_set_of_many_minutes_is_thinned_where_torque_and_platform_are_slow(
+    stiffness_nm_rad: float, sine_hz: float, thinned: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    platform = Platform(inertia_kg_m2=60.0, damping_nm_s_rad=8.0, stiffness_nm_rad=stiffness_nm_rad)
+    (long,) = planned([Sine(torque_nm=1.0, frequency_hz=sine_hz, duration_s=240.0)])
+    kept: list[int] = []
+    simulated = simulated_sets.Grid
+
+    def grid(time_s: Array, *rest: Any) -> Grid:
+        kept.append(len(time_s))
+        return simulated(time_s, *rest)
+
+    monkeypatch.setattr(simulated_sets, "Grid", grid)
+    found = peaks(platform, long)
+    monkeypatch.setattr(simulated_sets, "LONG_SAMPLES", 10**9)
+    assert found == pytest.approx(peaks(platform, long), rel=1e-4)
+    assert (kept[0] <= 400_000) is thinned
+    assert kept[1] > 900_000
