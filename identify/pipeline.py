@@ -29,7 +29,7 @@ from identify.rivals.open_line import with_line_left_open
 from identify.rivals.own_low_pass import beside_own_low_pass, with_own_low_pass
 from identify.rivals.run_delays import aligned, told
 from identify.rivals.stand_ins import with_stand_ins
-from identify.rivals.whiteness_test import fails_whiteness_test, leaves_more_than_noise
+from identify.rivals.whiteness_test import fails_whiteness_test, leaves_a_disturbance, leaves_more_than_noise
 from identify.rivals.whole_runs import FreeRunFitter
 from identify.runs.clipping import full_scale_of
 from identify.runs.gyro_drift import without_drift
@@ -81,8 +81,7 @@ def identify(
     """
     say = progress or (lambda text: None)
     with threadpool_limits(1):  # small matrices: a second BLAS thread only waits
-        first = _Identifier(recording, declared, settings, say)
-        found = first.run()
+        found = (first := _Identifier(recording, declared, settings, say)).run()
         no_other_noise = found.aborted or first.torque_free or recording.noise is not None
         if no_other_noise or not (found.verdict.unexplained or first.more_than_noise):
             return found
@@ -203,7 +202,8 @@ class _Identifier:
         before = models.before(search)
         after = models.after(search) if changed else before
         taken_back = causes.mark_undetermined(search, after)
-        if not taken_back and fails_whiteness_test(after, self.structure.effects):
+        disturbed = not self.torque_free and self.colour is None and leaves_a_disturbance(after, self.traces)
+        if not taken_back and (disturbed or fails_whiteness_test(after, self.structure.effects)):
             if not self.torque_free:
                 return in_torque()
             self.say("no effect is named: three flexible effects still leave more than noise")

@@ -39,6 +39,7 @@ from identify.results import (
     Verdict,
 )
 from identify.rivals import coloured_noise
+from identify.rivals.whiteness_test import UNEXPLAINED_CHI_SQUARE
 from identify.runs import clipping
 from identify.runs.sign_convention import SENTENCE
 from identify.select.search_state import Search
@@ -50,7 +51,6 @@ from rig.effects.base import Place
 
 DIVERGED = 3.0**2  # reduced chi-square: a free run with friction may have gone astray
 EXACT_MODEL_SHARE = 1e-6  # of the torque: what a model leaves where neither noise nor an effect is
-UNEXPLAINED_CHI_SQUARE = 1.1**2  # reduced chi-square in free run: above it, something is left that no effect explains
 
 
 def conclude(

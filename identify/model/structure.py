@@ -36,6 +36,15 @@ class Structure:
         """With more effects."""
         return replace(self, effects=(*self.effects, *names))
 
+    def other_order(self) -> Structure | None:
+        """The same with the last effect ahead of all others, where that is another drive; else None.
+
+        A current loop that lags and an amplifier that clips give another torque in the other order.
+        """
+        *others, last = (effects.get(e) for e in self.effects)
+        matters = any((e.bends_torque and last.spreads) or (e.spreads and last.bends_torque) for e in others)
+        return replace(self, effects=(self.effects[-1], *self.effects[:-1])) if matters else None
+
     def minus(self, name: str) -> Structure:
         """With one effect or term less."""
         return replace(

@@ -13,7 +13,7 @@ import numpy as np
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.effect_torque import torque_along
-from identify.model.parameters import Name
+from identify.model.parameters import Name, equations_of
 from identify.propose.innovation_score import InnovationScores, Score
 from rig import effects
 from rig.arrays import Array
@@ -32,11 +32,21 @@ def states_of(problem: PredictionError, fit: Fit) -> list[Array]:
     ]  # fmt: skip
 
 
+def shaft_torque_of(fit: Fit) -> list[Array]:
+    """Torque behind the drive at every sample, (n,), one array a run: what is passed on, where the drive clips."""
+    out: list[Array] = []
+    for s in fit.shots:
+        equations = equations_of(fit.structure, fit.names, fit.vector, s.number, s.added)
+        begins, ends = s.grid.shaft_torque(equations)[:, 0], s.grid.shaft_torque(equations)[-1:, 2]
+        out.append(np.ascontiguousarray(np.concatenate([begins, ends])[:: round(s.trace.step_s / s.grid.step_s)]))
+    return out
+
+
 def ranges(problem: PredictionError, fit: Fit) -> dict[str, Range]:
     """Where the curve of every free form begins and ends."""
     states = np.concatenate(states_of(problem, fit))
     angle, rate = states[:, 0], states[:, 1]
-    torque = np.concatenate([t.fine[3] for t in problem.traces])
+    torque = np.concatenate(shaft_torque_of(fit))
     # What is measured ahead of a cut stretch holds no curve: whatever it did there has died away by the first sample.
     first_s = min(float(np.argmax(s.weight)) * s.trace.step_s for s in fit.shots)
     time = (first_s, problem.longest_s)
@@ -91,10 +101,8 @@ def torque_of(problem: PredictionError, fit: Fit, name: str) -> list[Array]:
 
     effect = effects.get(name)
     out: list[Array] = []
-    for trace, states in zip(problem.traces, states_of(problem, fit), strict=True):
+    for trace, states, torque in zip(problem.traces, states_of(problem, fit), shaft_torque_of(fit), strict=True):
         n = len(states)
-        every = (len(trace.fine[3]) - 1) // max(n - 1, 1)
-        torque = np.ascontiguousarray(trace.fine[3][:: max(every, 1)][:n])
         p = np.array([0.0, 0.0, 0.0, *(fit.values[(name, q.name)] for q in effect.parameters)])
         angle, rate = np.ascontiguousarray(states[:, 0]), np.ascontiguousarray(states[:, 1])
         z = np.array(

@@ -18,6 +18,7 @@ from identify.likelihood.fit import Fit
 from identify.model.parameters import Name
 from identify.rivals.open_line import with_numbers_of
 from identify.runs.holdout import Split
+from identify.select.disturbance_lines import lines_left
 from identify.select.evidence import Evidence, inflation
 from identify.select.search_state import Found
 from identify.select.stepwise import Stepwise
@@ -34,12 +35,26 @@ def with_own_low_pass(
 ) -> tuple[Found, str]:
     """The same with its numbers as they are beside the gyro's low-pass, and a note; unchanged where none shows.
 
-    Where something is left over, a low-pass smooths that away and proves nothing.
+    Where something is left over, a low-pass smooths that away and proves nothing, unless that is spectral lines that it
+    explains: what a lag makes of a sine that is not quite its own stands at the sine's frequency.
     """
-    if found.disturbance.depends_on or not isinstance(found.after.fit, Fit):
+    depends = found.disturbance.depends_on
+    if not isinstance(found.after.fit, Fit):
+        return found, ""
+    if depends and not _explains_lines(found, search, traces):
         return found, ""
     after, note = beside_own_low_pass(found.after, search, traces, split, say, scored=False)
-    return replace(found, after=after), note
+    explained = replace(found.disturbance, depends_on=()) if note else found.disturbance
+    return replace(found, after=after, disturbance=explained), note
+
+
+def _explains_lines(found: Found, search: Stepwise, traces: Sequence[Trace]) -> bool:
+    """Whether nothing but spectral lines is left, and none beside the likeliest low-pass."""
+    torque_nm = search.problem.torque_nm
+    if found.disturbance.depends_on != (lines_left(search.best, torque_nm),):
+        return False
+    form = _form_for(found.after, search, traces, scored=False)
+    return form is not None and lines_left(_evidence(search, form).fit, torque_nm) is None
 
 
 def beside_own_low_pass(
@@ -51,9 +66,8 @@ def beside_own_low_pass(
     ``scored``: only a low-pass that its score promises is fitted. Where a large disturbance follows the readings, the
     score of one that is there may be small.
     """
-    gyro = all(t.channel == "rate" and t.beside is None and t.torque is not None for t in traces)
     structure = after.structure
-    form = _likeliest_form(search, scored) if gyro and structure == search.best.structure else None
+    form = _form_for(after, search, traces, scored)
     if form is None:
         return after, ""
     say("the rate sensor's own low-pass shows: fitting it beside what was found")
@@ -68,6 +82,12 @@ def beside_own_low_pass(
         return after, ""
     beside = as_final(problem, richer, traces, split.everything)
     return with_numbers_of(beside, after, traces, split.everything), _note(beside, (form, "time"))
+
+
+def _form_for(after: FinalFit, search: Stepwise, traces: Sequence[Trace], scored: bool) -> str | None:
+    """The likeliest low-pass where gyros alone are read and the final model is the one that the search believes."""
+    gyro = all(t.channel == "rate" and t.beside is None and t.torque is not None for t in traces)
+    return _likeliest_form(search, scored) if gyro and after.structure == search.best.structure else None
 
 
 def _likeliest_form(search: Stepwise, scored: bool) -> str | None:

@@ -13,11 +13,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.estimate.final_fit import FinalFit
+from identify.model.parameter_fit import reduced_chi_square
+from identify.signals.trace import Trace, pooled_noise
 from rig import effects
 
 MIN_EFFECTS_TESTED = 3  # effects beside those declared
 BANDS = (0.05, 0.1, 0.2, 0.4)  # of Nyquist: where a platform may move
 MOTIONLESS_BAND = (0.5, 0.98)  # of Nyquist: where it does not
+UNEXPLAINED_CHI_SQUARE = 1.1**2  # reduced chi-square in free run: above it, something is left that no effect explains
 COLOURED_SIGMAS = 5.0  # standard errors by which a band may stand out
 
 
@@ -32,6 +35,14 @@ def fails_whiteness_test(fitted: FinalFit, declared: Sequence[str]) -> bool:
 def leaves_more_than_noise(fitted: FinalFit) -> bool:
     """Whether a free run over whole runs leaves more than white noise of the sensor."""
     return not fitted.sensor_limited or coloured(fitted) > COLOURED_SIGMAS
+
+
+def leaves_a_disturbance(fitted: FinalFit, traces: Sequence[Trace]) -> bool:
+    """Whether a free run leaves more than the sensor's noise, though every next sample is predicted down to that.
+
+    A small torque that nobody recorded adds up over a run. It is a disturbance, of which is told what it depends on.
+    """
+    return reduced_chi_square(fitted.fit.held_out_error, pooled_noise(traces)) > UNEXPLAINED_CHI_SQUARE
 
 
 def coloured(fitted: FinalFit) -> float:

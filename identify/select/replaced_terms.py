@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from identify.likelihood.fit import Fit
 from identify.select.evidence import STRONG_SUPPORT, WEIGHT, support_difference
 from identify.select.preference import simplest
-from identify.select.trial_fits import TRIAL_ITERATIONS
+from identify.select.trial_fits import FULL_ITERATIONS, TRIAL_ITERATIONS
 from identify.wording import plain
+from rig.platform import TERMS
 
 if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
@@ -38,10 +42,33 @@ def replace_linear_terms(search: Stepwise, now: Fit) -> Fit:
         evidence = search.weigher.evidence(name, rest, fits[name])
         if evidence.support < STRONG_SUPPORT or evidence.weight < WEIGHT or _goes_with(search, term, now, fits[name]):
             continue
+        if (without := _needless_beside(search, term, fits[name])) is not None:
+            now = without
+            continue
         search.dropped.append((term, f"{plain(name)} explains more in its place"))
         search.say(f"replaced {term} by {plain(name)}")
         now, search.inflation[name] = fits[name], evidence.inflation
     return now
+
+
+def _needless_beside(search: Stepwise, term: str, instead: Fit) -> Fit | None:
+    """The model with the term again and without one of its effects, where that does as well; None where none does.
+
+    Two effects may share what a term does: a creep that settles within the motion damps it, and a delay turns the phase
+    that is left over.
+    """
+    terms = tuple(t for t in TERMS if t in (*instead.structure.terms, term))
+    fits: list[tuple[str, Fit]] = []
+    for name in search.trials.added(instead):
+        structure = replace(instead.structure.minus(name), terms=terms)
+        start = {**search.base.values, **instead.values}
+        fits.append((name, search.problem.fit(structure, start, instead.noise, FULL_ITERATIONS, thorough=False)))
+    fits = [(n, f) for n, f in fits if np.isfinite(f.cost) and support_difference(f, instead) < STRONG_SUPPORT]
+    if not fits:
+        return None
+    name, best = min(fits, key=lambda both: both[1].penalised)
+    search.say(f"dropped {plain(name)}: {term} does as well in its place")
+    return best
 
 
 def _goes_with(search: Stepwise, term: str, now: Fit, instead: Fit) -> bool:

@@ -12,22 +12,19 @@ from typing import TypeVar
 
 import numpy as np
 
-from identify.estimate.initial_guess import scale_of
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.propose.innovation_score import InnovationScores, Score
+from identify.propose.motion_scale import scale_at
 from identify.propose.starts import OTHER_START, about_a_sample, as_special_case, gain_of, is_small
 from identify.propose.torque_looks import CandidateTorque, candidate_torques
 from identify.runs.measured_channels import simplicity
 from identify.runs.observability import one_more, shows_a_period
 from identify.select.evidence import WEIGHT, EvidenceModel
-from identify.signals.resonances import resonances_hz
-from identify.signals.spectral_lines import foreign_lines_hz, ringing_hz, rings_hz
 from rig import effects
 from rig.effects.base import Place, Scale
-from rig.platform import TERMS
 
 _Item = TypeVar("_Item")
 
@@ -40,7 +37,6 @@ TRIAL_ITERATIONS, FULL_ITERATIONS = 14, 25  # steps of a fit that is compared, a
 FULL_FIT_RATIO = 0.9  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
 BEHIND = 0.3  # of the best fall of the cost so far: what has less after a few steps is not followed
 COMPARABLE = 0.3  # of the score of an effect, that another or a curve has in its place: with less no rival
-FOLLOWED_LINES = 2  # of the disturbance: lines at which a periodic torque is looked for beside those of what is left
 FOLLOWS = 1.1  # reduced chi-square: where a prediction errs by less, no disturbance follows the readings
 FOLLOWS_LESS = 0.5  # of the excess beside which lags were tried: only then may one show that did not before
 
@@ -73,20 +69,7 @@ class TrialFits:
 
     def scale(self, fit: Fit) -> Scale:
         """How large the motion is, and the lines in what a model predicts wrongly."""
-        values, traces = fit.values, self.problem.traces
-        inertia, damping, stiffness = (values.get((t,), 0.0) for t in TERMS)
-        natural_hz = float(np.sqrt(max(stiffness, 0.0) / max(inertia, 1e-300)) / (2.0 * np.pi))
-        left = fit.prediction.innovations
-        noise = float(np.sqrt(fit.variance * self.problem.reading_variance))
-        noise = float(np.sqrt(np.mean([np.mean(r[t.keep] ** 2) for r, t in zip(left, traces, strict=True)]))) or noise
-        lines = foreign_lines_hz(traces, left, noise, natural_hz)
-        # A line that the disturbance follows is none in what is left.
-        followed = fit.prediction.disturbance_nm
-        size_nm = float(np.sqrt(np.mean([np.mean(d[t.keep] ** 2) for d, t in zip(followed, traces, strict=True)])))
-        also = foreign_lines_hz(traces, followed, size_nm, natural_hz)[:FOLLOWED_LINES] if size_nm > 0.0 else ()
-        lines = (*lines, *also)
-        scale = scale_of(traces, (inertia, damping, stiffness), lines, ringing_hz(traces, natural_hz))
-        return replace(scale, rings_hz=rings_hz(traces, left, natural_hz), modes_hz=resonances_hz(traces, followed))
+        return scale_at(self.problem, fit)
 
     def names(self, now: Fit) -> list[str]:
         """What may be added, or put in the place of a special case; of an effect that is there, one more of it."""
@@ -123,10 +106,11 @@ class TrialFits:
         ][:PAIRS]  # fmt: skip
 
         def fitted(one: Score, other: Score) -> Fit:
-            return self.problem.fit(
+            both = self.problem.fit(
                 now.structure.plus(one.effect, other.effect), {**now.values, **one.start, **other.start}, now.noise,
                 FULL_ITERATIONS, carry=now.shots, thorough=False, against=now.cost,
             )  # fmt: skip
+            return self._in_likelier_order(both, now)
 
         fits = self.problem.workers.side_by_side([partial(fitted, *pair) for pair in worth])
         return [(one.effect, fit) for (one, _), fit in zip(worth, fits, strict=True)]
@@ -222,8 +206,23 @@ class TrialFits:
             own = {k: v for k, v in best.values.items() if k[0] == name and k[1] not in linear}
             fits.append(begun_where_it_stands(own))
             best = min(fits, key=lambda f: f.cost)
+        best = self._in_likelier_order(best, now)
         shown = shows_a_period(name, best.values, self.problem.traces)
         return best if np.isfinite(best.cost) and shown else None
+
+    def _in_likelier_order(self, fit: Fit, now: Fit) -> Fit:
+        """The same, or with its last effect ahead of the drive's others, where that fits better.
+
+        What the wrong order makes of J, C and K is no place to begin.
+        """
+        other = fit.structure.other_order()
+        if other is None:
+            return fit
+        begin = {k: now.values.get(k, v) for k, v in fit.values.items()}
+        there = self.problem.fit(
+            other, begin, now.noise, TRIAL_ITERATIONS, carry=now.shots, thorough=False, against=now.cost
+        )  # fmt: skip
+        return there if there.cost < fit.cost else fit
 
     def _leaves_more(self, fit: Fit, start: CandidateTorque) -> bool:
         """Whether a fit has missed what the same effect takes in torque."""

@@ -43,5 +43,6 @@ EFFECT = Effect(
     },
     inverse=_led,
     delay_s=lambda values: values[0],
+    spreads=True,
     separated_by="from a delay: excite at higher frequencies",
 )

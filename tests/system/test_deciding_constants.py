@@ -37,6 +37,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "likelihood/settling.py": "LARGEST_SHARE LEAD_SHARE LONGEST_LEAD SETTLING_SAMPLES",
     "likelihood/workers.py": "PATIENCE SHORTEST_WAIT_S",
     "propose/innovation_score.py": "LITTLE SCALED SHAPES",
+    "propose/motion_scale.py": "FOLLOWED_LINES",
     "propose/starts.py": "OTHER_START",
     "propose/torque_looks.py": "EVALUATIONS",
     "rivals/own_low_pass.py": "BEGUN_SAMPLES",
@@ -52,7 +53,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "select/search_state.py": "ANOTHER",
     "select/stepwise.py": "MIN_RIVAL_SHARE PROMISING",
     "select/torque_search.py": "POLISHED RIVAL WORTH_EVIDENCE",
-    "select/trial_fits.py": "BEHIND COMPARABLE FAINT_SCORE FOLLOWED_LINES FOLLOWS FOLLOWS_LESS FULL_FIT_RATIO "
+    "select/trial_fits.py": "BEHIND COMPARABLE FAINT_SCORE FOLLOWS FOLLOWS_LESS FULL_FIT_RATIO "
     "FULL_ITERATIONS HEAVIEST MIN_TRIAL_SCORE PAIRS TRIAL_ITERATIONS TRIED",
 }
 

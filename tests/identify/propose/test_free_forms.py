@@ -7,7 +7,7 @@ import pytest
 
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
-from identify.propose.free_forms import ranges
+from identify.propose.free_forms import ranges, shaft_torque_of
 from identify.signals.prepare import one_noise, prepare
 from rig.platform import TERMS
 from tests.identify.simulated import TRUTH, sine_run
@@ -23,3 +23,14 @@ def test_a_curve_over_time_begins_with_the_first_sample_that_counts() -> None:
     begin, end = ranges(problem, fit)["free_time"]
     assert begin == pytest.approx(LEAD_S, abs=0.1)
     assert end == pytest.approx(3.0, abs=0.1)
+
+
+def test_a_curve_over_the_torque_is_one_over_what_the_drive_passes_on() -> None:
+    clips: dict[str, dict[str, float]] = {"torque_saturation": {"limit": 30.0}}
+    problem = PredictionError(one_noise([prepare(sine_run(100.0, 2.0, effects=clips, duration_s=2.0))], False))
+    start = {**{(k,): v for k, v in zip(TERMS, TRUTH, strict=True)}, ("torque_saturation", "limit"): 30.0}
+    fit = problem.fit(Structure(effects=("torque_saturation",)), start, iterations=2, thorough=False)
+    assert ranges(problem, fit)["free_torque"] == pytest.approx((-30.0, 30.0), rel=0.01)
+    (shaft,) = shaft_torque_of(fit)
+    assert len(shaft) == len(problem.traces[0].measured)
+    assert np.max(np.abs(shaft)) == pytest.approx(30.0, rel=0.01)

@@ -71,7 +71,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 def search_with(best: Fit, samples: int = 10_000, **scores: float) -> Any:
     """A search through whose last round looked at the best model, and what that scored."""
     last = SimpleNamespace(now=best, tried={}, scores=[SimpleNamespace(effect=e, gain=g) for e, g in scores.items()])
-    return SimpleNamespace(best=best, samples=samples, problem=SimpleNamespace(step_s=1e-3), rounds=[last])
+    return SimpleNamespace(best=best, samples=samples, problem=SimpleNamespace(step_s=1e-3, torque_nm=10.0), rounds=[last])
 
 
 def asked_of(found: Found, traces: Any = GYRO, samples: int = 10_000) -> tuple[Found, str]:
@@ -118,6 +118,21 @@ def test_beside_an_encoder_and_where_something_is_left_over_it_is_not_asked(aske
     assert asked_of(found, ENCODER) == (found, "")
     assert asked_of(over) == (over, "")
     assert asked["form"] is None
+
+
+@pytest.mark.parametrize(("beside", "taken"), [(None, True), (Dependence("frequency", 0.05, 0.005, 3e-5), False)])
+def test_spectral_lines_that_a_low_pass_explains_are_no_torque_that_is_left(
+    asked: dict[str, Any], monkeypatch: pytest.MonkeyPatch, beside: Dependence | None, taken: bool
+) -> None:
+    lines = Dependence("frequency", 0.1, 0.01, 3e-5)
+    seen = {True: beside, False: lines}
+    monkeypatch.setattr(own_low_pass, "lines_left", lambda fit, torque_nm: seen[SECOND in fit.structure.effects])
+    found = found_with((FIRST,))
+    found = replace(found, disturbance=replace(found.disturbance, depends_on=(lines,)))
+    less, note = asked_of(found)
+    assert bool(note) is taken
+    assert less.disturbance.depends_on == (() if taken else (lines,))
+    assert less.after.values["inertia",] == (0.9 if taken else 1.0)
 
 
 def test_of_two_forms_the_likelier_is_fitted(asked: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from identify.estimate.final_fit import FinalFit, by_output_error
 from identify.model.structure import Structure
-from identify.rivals.whiteness_test import COLOURED_SIGMAS, coloured, fails_whiteness_test
+from identify.rivals.whiteness_test import COLOURED_SIGMAS, coloured, fails_whiteness_test, leaves_a_disturbance
 from rig.platform import TERMS
 from rig.recording.run import Array, Recording
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, campaign, traces_of
@@ -52,3 +52,9 @@ def test_only_three_of_which_one_follows_anything_are_asked(
 ) -> None:
     assert fails_whiteness_test(named(fitted(LINE), *names), declared) == too_much
     assert not fails_whiteness_test(named(fitted(), *names), declared)
+
+
+@pytest.mark.parametrize(("times_noise", "disturbed"), [(0.0, False), (0.3, False), (0.9, True)])
+def test_what_a_free_run_leaves_beyond_the_noise_is_a_disturbance(times_noise: float, disturbed: bool) -> None:
+    fit = fitted(times_noise / 0.3 * LINE)
+    assert leaves_a_disturbance(fit, traces_of(campaign(duration_s=2.0))) is disturbed
