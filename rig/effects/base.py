@@ -145,7 +145,7 @@ class Effect:
     follows_within_rad: Callable[[tuple[float, ...]], float] | None = None
     kinks: Callable[[tuple[float, ...]], tuple[float, ...]] | None = None  # angles at which its torque bends
     bends_torque: bool = False  # a drive effect that makes a smooth torque non-smooth (corners)
-    spreads: bool = False  # a drive effect whose memory is more than a delay: ahead of a bend it does other than behind it
+    spreads: bool = False  # a drive effect with more memory than a delay: ahead of a bend it is another than behind it
     may_push: bool = False  # can push away from rest itself: what is left to the stiffness is a spring
     leans_on: tuple[str, ...] = ()  # terms of the platform on which its torque depends (backlash: the stiffness)
     ordered: tuple[tuple[str, str], ...] = ()  # pairs of parameters of which the first is the smaller

@@ -71,7 +71,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 def search_with(best: Fit, samples: int = 10_000, **scores: float) -> Any:
     """A search through whose last round looked at the best model, and what that scored."""
     last = SimpleNamespace(now=best, tried={}, scores=[SimpleNamespace(effect=e, gain=g) for e, g in scores.items()])
-    return SimpleNamespace(best=best, samples=samples, problem=SimpleNamespace(step_s=1e-3, torque_nm=10.0), rounds=[last])
+    return SimpleNamespace(
+        best=best, samples=samples, problem=SimpleNamespace(step_s=1e-3, torque_nm=10.0), rounds=[last]
+    )
 
 
 def asked_of(found: Found, traces: Any = GYRO, samples: int = 10_000) -> tuple[Found, str]:
