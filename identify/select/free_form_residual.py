@@ -18,7 +18,7 @@ from scipy.stats import chi2
 from identify.diagnose.terms.free_form import SHAPE_POINTS
 from identify.likelihood.fit import Fit
 from identify.model.parameters import Name
-from identify.propose.free_forms import fitted, scores, states_of, torque_of
+from identify.propose.free_forms import fitted, scores, shaft_torque_of, states_of, torque_of
 from identify.results import Dependence
 from identify.select.evidence import STRONG_SUPPORT, WEIGHT, Evidence, likely_share, support_difference
 from rig import effects
@@ -147,6 +147,9 @@ def dependence_on(search: Stepwise, left: FreeFormFit) -> tuple[Dependence, dict
     )
     counts = np.concatenate([s.weight for s in fit.shots])
     torque, states, acceleration = torque[counts], states[counts], acceleration[counts]
+    scale, swing = 0.0, 0.0
+    if "gain" in form:
+        torque, scale, swing = _without_scale(torque, np.concatenate(shaft_torque_of(fit))[counts])
     terms = np.column_stack([acceleration, states[:, 1], states[:, 0], np.ones(len(states))])
     size = np.maximum(np.linalg.norm(terms, axis=0), 1e-300)
     as_terms = np.linalg.lstsq(terms / size, torque, rcond=1e-9)[0] / size
@@ -157,16 +160,29 @@ def dependence_on(search: Stepwise, left: FreeFormFit) -> tuple[Dependence, dict
         here, there = left.now.values.get((term,)), fit.values.get((term,))
         if not here or there is None:
             continue
-        moved = there - here + _slope(form, term, at, shape)
+        moved = there / (1.0 - scale) - here + _slope(form, term, at, shape)
         if ON[form] == "torque":  # what passes on another share of the torque is another scale
             moved = float(as_terms[k])
         elif "gain" in form:  # so is a gain that changes, and nobody knows where along it the recorded torque is right
-            moved = max(moved, float(as_terms[k]), key=abs)
+            moved = max(moved, swing * here, key=abs)
         elif ON[form] == "history":  # a short memory is damping and inertia itself: the platform has both together
             moved += float(as_terms[k])
         if abs(moved) > MOVED_SIGMAS * _error(fit, (term,)):
             moves[term] = 100.0 * abs(moved / here)
     return Dependence(ON[form], rms, rms / problem.torque_nm, left.chance_level, tuple(at), tuple(shape)), moves
+
+
+def _without_scale(resisted: Array, torque: Array) -> tuple[Array, float, float]:
+    """What a gain that changes takes of a torque beside what it takes of all of it, the latter, and the largest change.
+
+    A torque that is passed on by the same share throughout is one on another scale, with J, C and K on that, too.
+    """
+    scale = float(np.dot(resisted, torque) / max(float(np.dot(torque, torque)), 1e-300))
+    if not scale < 1.0:
+        return resisted, 0.0, 0.0
+    beside = (resisted - scale * torque) / (1.0 - scale)
+    large = np.abs(torque) > np.sqrt(np.mean(torque**2))
+    return beside, scale, float(np.max(np.abs(beside[large] / torque[large]), initial=0.0))
 
 
 def _error(fit: Fit, name: Name) -> float:

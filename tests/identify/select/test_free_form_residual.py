@@ -10,6 +10,7 @@ import pytest
 
 from identify.pipeline import identify
 from identify.results import Identification
+from identify.select.free_form_residual import _without_scale
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
 from rig.recording.run import Recording
@@ -68,3 +69,18 @@ def test_the_shape_of_what_is_left_is_that_of_the_torque_that_nobody_offered() -
     missing = 4000.0 * at**3
     straight = np.polynomial.Polynomial.fit(at, missing - shape, 1)
     assert np.std(shape + straight(at) - missing) < 0.1 * np.std(missing)
+
+
+def test_a_gain_that_is_the_same_throughout_is_another_scale_and_no_torque_that_is_left() -> None:
+    torque = np.sin(np.linspace(0.0, 60.0, 3000))
+    beside, scale, swing = _without_scale(0.65 * torque, torque)
+    assert scale == pytest.approx(0.65)
+    assert np.max(np.abs(beside)) < 1e-12 and swing < 1e-12
+
+
+def test_of_a_gain_that_falls_the_change_counts() -> None:
+    torque = np.sin(np.linspace(0.0, 60.0, 3000))
+    beside, scale, swing = _without_scale(np.linspace(0.0, 0.1, 3000) * torque, torque)
+    assert scale == pytest.approx(0.05, rel=0.02)
+    assert swing == pytest.approx(0.05 / 0.95, rel=0.05)
+    assert np.sqrt(np.mean(beside**2) / np.mean(torque**2)) == pytest.approx(0.1 / 12**0.5 / 0.95, rel=0.05)
