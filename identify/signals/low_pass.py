@@ -13,7 +13,7 @@ from rig.recording.run import Array
 
 LOW_PASS_ORDER = 2  # of the Butterworth filter; run forwards and backwards it is of the fourth order
 EDGE_PERIODS = 3.0  # of the cut-off: so much at either end of a run the filter has not settled
-GAP_PERIODS = 0.5  # of the cut-off: over a shorter gap what stands in for the motion is as good as it
+GAP_PERIODS = 0.1  # of the cut-off: over a longer gap a torque that steps moves what nothing stands in for
 
 
 @lru_cache(maxsize=64)
@@ -25,7 +25,7 @@ def _sections(wn: float) -> Array:
 def settled(keep: NDArray[Any], step_s: float, cutoff_hz: float | None) -> NDArray[np.bool_]:
     """Samples of a run that count and at which the low-pass has settled, (n,): not at its ends, nor beside a gap.
 
-    Where samples are missing for longer than half a period of the cut-off, what stands in for the motion is none, and
+    Where samples are missing for longer than a tenth of the cut-off's period, what stands in for the motion is none, and
     the torque went on. Of a run so short, or so full of gaps, that this would be most of it, more stays: the middle
     half, and what lies beside gaps. All samples that count where there is no low-pass.
 
