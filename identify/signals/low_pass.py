@@ -25,8 +25,8 @@ def _sections(wn: float) -> Array:
 def settled(keep: NDArray[Any], step_s: float, cutoff_hz: float | None) -> NDArray[np.bool_]:
     """Samples of a run that count and at which the low-pass has settled, (n,): not at its ends, nor beside a gap.
 
-    Where samples are missing for longer than a tenth of the cut-off's period, what stands in for the motion is none, and
-    the torque went on. Of a run so short, or so full of gaps, that this would be most of it, more stays: the middle
+    Where samples are missing for longer than a tenth of the cut-off's period, what stands in for the motion is none,
+    and the torque went on. Of a run so short, or so full of gaps, that this would be most of it, more stays: the middle
     half, and what lies beside gaps. All samples that count where there is no low-pass.
 
     Parameters
