@@ -41,6 +41,8 @@ class Structure:
 
         A current loop that lags and an amplifier that clips give another torque in the other order.
         """
+        if not self.effects:
+            return None
         *others, last = (effects.get(e) for e in self.effects)
         matters = any((e.bends_torque and last.spreads) or (e.spreads and last.bends_torque) for e in others)
         return replace(self, effects=(self.effects[-1], *self.effects[:-1])) if matters else None

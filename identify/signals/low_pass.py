@@ -13,7 +13,8 @@ from rig.recording.run import Array
 
 LOW_PASS_ORDER = 2  # of the Butterworth filter; run forwards and backwards it is of the fourth order
 EDGE_PERIODS = 3.0  # of the cut-off: so much at either end of a run the filter has not settled
-GAP_PERIODS = 0.1  # of the cut-off: over a longer gap a torque that steps moves what nothing stands in for
+# Of the cut-off, set by hand: over a longer gap a torque that steps moves what nothing stands in for.
+GAP_PERIODS = 0.1
 
 
 @lru_cache(maxsize=64)
