@@ -22,7 +22,8 @@ LAG, CLIPS = "actuator_lag", "torque_saturation"
         ((CLIPS, LAG), (LAG, CLIPS)), ((LAG, CLIPS), (CLIPS, LAG)),
         (("torque_deadzone", LAG), (LAG, "torque_deadzone")),
         ((CLIPS, "sensor_lag", LAG), (LAG, CLIPS, "sensor_lag")),
-        ((CLIPS, "torque_delay"), None), ((LAG, "torque_delay"), None), ((CLIPS, "sensor_lag"), None), ((LAG,), None), ((), None),
+        ((CLIPS, "torque_delay"), None), ((LAG, "torque_delay"), None), ((CLIPS, "sensor_lag"), None), ((LAG,), None),
+        ((), None),
     ],
 )  # fmt: skip
 def test_the_order_matters_where_one_spreads_and_the_other_bends(
