@@ -35,7 +35,7 @@ def effect_free(trace: Trace, shots: Shots, fit: OutputErrorFit) -> Trace:
     mean = np.empty(len(torque) + 1)
     h = grid.step_s
     # What remembers goes on from span to span.
-    motion = equations.integrate_shots(torque, h, spans, shots.starts, trace.offset_s, trace)
+    motion = equations.integrate_shots(torque, h, spans, shots.starts, trace.since_start_s, trace)
     for first, last in spans:
         fine = motion[first : last + 1].copy()
         if last < len(motion) - 1 and last - first > 2:  # the next span's start stands there

@@ -188,7 +188,7 @@ class PredictionError:
         smoothing = None if low_pass is None else s.grid.smoothing(equations, low_pass)
         predicted, state = predict_ahead(
             equations, s.grid.shaft_torque(equations), s.grid.step_s, round(trace.step_s / s.grid.step_s), spans,
-            s.starts, measured, trace.keep, gains, sensing.rate, s.bias, trace.offset_s, trace, s.reads, low_pass,
+            s.starts, measured, trace.keep, gains, sensing.rate, s.bias, trace.since_start_s, trace, s.reads, low_pass,
             smoothing,
         )  # fmt: skip
         return Look(measured - predicted, gains.variance, state, gains, self.floor_of(sensing.lag, noise))

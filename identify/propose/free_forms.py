@@ -48,8 +48,8 @@ def ranges(problem: PredictionError, fit: Fit) -> dict[str, Range]:
     angle, rate = states[:, 0], states[:, 1]
     torque = np.concatenate(shaft_torque_of(fit))
     # What is measured ahead of a cut stretch holds no curve: whatever it did there has died away by the first sample.
-    first_s = min(s.trace.offset_s + float(np.argmax(s.weight)) * s.trace.step_s for s in fit.shots)
-    last_s = max(s.trace.offset_s + (len(s.weight) - 1) * s.trace.step_s for s in fit.shots)
+    first_s = min(s.trace.since_start_s + float(np.argmax(s.weight)) * s.trace.step_s for s in fit.shots)
+    last_s = max(s.trace.since_start_s + (len(s.weight) - 1) * s.trace.step_s for s in fit.shots)
     time = (first_s, last_s)
     turning = float(np.sqrt(np.mean(rate**2) / max(float(np.var(angle)), 1e-300)))
 
@@ -109,7 +109,7 @@ def torque_of(problem: PredictionError, fit: Fit, name: str) -> list[Array]:
         z = np.array(
             effect.rest_state(angle[0], rate[0]) if effect.rest_state else np.zeros(effect.states), dtype=float
         )
-        along, time = np.zeros(n), trace.offset_s + np.arange(n) * trace.step_s
+        along, time = np.zeros(n), trace.since_start_s + np.arange(n) * trace.step_s
         torque_along(
             effect.kernel.address, angle, rate, time, torque, trace.step_s, z, 4, p,
             effect.place is Place.FRICTION, max(2.0 * trace.fine[4], 1e-12), along,

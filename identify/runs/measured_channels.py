@@ -182,7 +182,7 @@ def _why_not(channel: Channel, traces: Sequence[Trace]) -> dict[str, str]:
 
 def _at_samples(channel: Channel, trace: Trace) -> Array:
     """factor * (x - reference) at the samples of a trace."""
-    table, per_s = trace.table(channel)
+    table, per_s, _begin_s = trace.table(channel)
     time = trace.offset_s + trace.step_s * np.arange(len(trace.measured))
     return np.interp(time, np.arange(len(table)) / per_s, table)
 

@@ -59,7 +59,7 @@ class Trace:
     noise: float
     cutoff_hz: float  # of the zero-phase low-pass behind ``fine``
     number: int = 0  # which run of the recording
-    offset_s: float = 0.0  # of the first sample from the start of the run
+    offset_s: float = 0.0  # of the first sample from where the torque of the run is known
     glitches_s: Array = field(default_factory=lambda: np.zeros(0))  # times of samples left out as such
     clipped: tuple[int, float] = (0, 0.0)  # samples left out because the gyro stood at its largest rate, and that
     scatter: tuple[float, bool] = (0.0, False)  # of the time stamps about an even beat in s; whether they are wrong
@@ -75,6 +75,11 @@ class Trace:
         """Time stamp of the first sample."""
         return float(self.run.time_s[0]) + self.offset_s
 
+    @property
+    def since_start_s(self) -> float:
+        """Of the first sample from the start of the run, of which this may be an excerpt: the time that effects see."""
+        return self.offset_s + self.run.since_start_s
+
     @cached_property
     def upper_spectrum(self) -> tuple[float, bool]:
         """The noise that the end of this run's spectrum shows, and whether it is noise and not motion up there."""
@@ -86,27 +91,26 @@ class Trace:
         """Samples first..last as a trace of their own."""
         angle, rate, time, torque, left = self.fine
         fine = slice(first * UPSAMPLING, last * UPSAMPLING + 1)
-        inside = [(max(a, first) - first, min(b, last) - first) for a, b in self.stretches]
-        kept = [(a, b) for a, b in inside if b - a + 1 >= SHORTEST_STRETCH]
+        inside = ((max(a, first) - first, min(b, last) - first) for a, b in self.stretches)
         return replace(
             self,
             measured=self.measured[first : last + 1],
             keep=self.keep[first : last + 1],
             beside=None if self.beside is None else self.beside[first : last + 1],
             drift_rad=None if self.drift_rad is None else self.drift_rad[first : last + 1],
-            stretches=kept,
+            stretches=[(a, b) for a, b in inside if b - a + 1 >= SHORTEST_STRETCH],
             offset_s=self.offset_s + first * self.step_s,
             motion=(angle[fine], rate[fine], time[fine], torque[fine], left),
             _series={},
         )
 
-    def table(self, channel: Channel) -> tuple[Array, float]:
-        """What a channel does from the start of the run, finer than the samples, and the entries a second."""
+    def table(self, channel: Channel) -> tuple[Array, float, float]:
+        """What a channel does, finer than the samples, the entries a second, and when in the run the first one is."""
         if channel not in self._tables:
             from identify.signals.channel_readings import table_of  # noqa: PLC0415  as below
 
             self._tables[channel] = table_of(self.run, channel, self.step_s)
-        return self._tables[channel]
+        return *self._tables[channel], self.run.since_start_s
 
     @property
     def low_pass(self) -> tuple[float, float] | None:
@@ -172,7 +176,7 @@ class Trace:
             angle, rate = Polynomials(spline)(fine_t), Polynomials(spline.derivative())(fine_t)
             left = self.noise * 2.0 * np.pi * self.cutoff_hz / np.sqrt(3.0) * np.sqrt(min(1.0, wn))
         torque = np.zeros_like(fine_t) if self.torque is None else self.torque.at(fine_t + self.start_s)
-        return angle, rate, fine_t + self.offset_s, torque, float(left)
+        return angle, rate, fine_t + self.since_start_s, torque, float(left)
 
     def put_right(self, angle_rad: Array, time_s: Array) -> Array:
         """An angle integrated from the rate, (n,), where an encoder reads it or the spring holds it."""
@@ -251,11 +255,8 @@ class Trace:
             p[3 + unit] = 1.0
         if effect.reads is not None:
             p = np.append(p, slots(effect.reads, self)[1])
-        z = np.array(
-            effect.rest_state(angle[0], rate[0]) if effect.rest_state else np.zeros(effect.states), dtype=float
-        )
-        fine = self.step_s / UPSAMPLING
-        substeps = 1
+        z = np.array(effect.rest_state(angle[0], rate[0]) if effect.rest_state else [0.0] * effect.states, dtype=float)
+        fine, substeps = self.step_s / UPSAMPLING, 1
         if effect.states and effect.fastest_rad_s:
             full = (1.0, 0.0, 0.0, *(v if v else 1e-12 for v in p[3 : 3 + len(effect.parameters)]))
             substeps = int(np.clip(np.ceil(fine * effect.fastest_rad_s(full) / STEP_PHASE_RAD), 1, 8))

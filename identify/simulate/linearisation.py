@@ -31,8 +31,8 @@ class Neighbourhood:
         self._moving = motion(shots, equations, shots.starts)
         fine, torque, spans, starts = self._moving
         self.channel = self._read(fine[:, :2])
-        offset_s = shots.trace.offset_s
-        self._tangent = Tangent(equations, fine, torque, shots.grid.step_s, spans, starts, offset_s, shots.trace)
+        begin_s = shots.trace.since_start_s
+        self._tangent = Tangent(equations, fine, torque, shots.grid.step_s, spans, starts, begin_s, shots.trace)
 
     @cached_property
     def half(self) -> tuple[Array, Array, Array, Array]:
@@ -43,7 +43,7 @@ class Neighbourhood:
         angle[1::2], rate[1::2], pushed[1::2] = middle[:, 0], middle[:, 1], torque[:, 1]
         begin = 2 * self._moving.first
         angle[:begin], rate[:begin] = angle[begin], 0.0  # at rest where nothing was simulated
-        time = self._shots.trace.offset_s + 0.5 * self._shots.grid.step_s * np.arange(len(angle))
+        time = self._shots.trace.since_start_s + 0.5 * self._shots.grid.step_s * np.arange(len(angle))
         return angle, rate, time, pushed
 
     def resisted(self, push: Array) -> Array:

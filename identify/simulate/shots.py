@@ -193,7 +193,7 @@ def motion(shots: Shots, equations: Equations, starts: Array, push: Array | None
     if remembers and len(on) > 1 and not on[0] and shots.first[1] * shots.trace.step_s <= LATEST_FIRST_STRETCH_S:
         on = np.concatenate([[True], on[1:]])  # what remembers begins where the run does, not where samples count
     active = [(a * ratio, min(b, n - 1) * ratio) for (a, b), used in zip(shots.edges, on, strict=True) if used]
-    fine = equations.integrate_shots(torque, grid.step_s, active, starts[on], shots.trace.offset_s, shots.trace)
+    fine = equations.integrate_shots(torque, grid.step_s, active, starts[on], shots.trace.since_start_s, shots.trace)
     return Moving(fine, torque, active, starts[on])
 
 

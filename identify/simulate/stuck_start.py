@@ -79,5 +79,5 @@ def _looked_at(shots: Shots, equations: Equations) -> int:
     inertia, _, stiffness = equations.jck.tolist()
     span = max(SPAN_S, SPAN_PERIODS * 2.0 * np.pi * float(np.sqrt(inertia / stiffness)))
     pushed = np.abs(trace.fine[3]) > SLOW_TO_BREAK * holding_nm(equations)
-    breaks = trace.fine[2][int(np.argmax(pushed))] - trace.offset_s if np.any(pushed) else 0.0
+    breaks = trace.fine[2][int(np.argmax(pushed))] - trace.since_start_s if np.any(pushed) else 0.0
     return min(len(trace.measured) - 1, int(np.ceil((breaks + span) / trace.step_s)))

@@ -28,17 +28,17 @@ _BESIDE_RAD = 1e-6
 class Readings(Protocol):
     """Whoever knows what the channels of a run read."""
 
-    def table(self, channel: Channel) -> tuple[Array, float]:
-        """What acts (see ``Channel``), evenly spaced from the start of the run, and the entries a second."""
+    def table(self, channel: Channel) -> tuple[Array, float, float]:
+        """What acts (see ``Channel``), evenly spaced, the entries a second, and when in the run the first is, s."""
 
 
-def slots(channel: Channel, readings: Readings | None) -> tuple[Array, tuple[float, float, float]]:
+def slots(channel: Channel, readings: Readings | None) -> tuple[Array, tuple[float, float, float, float]]:
     """The table of a channel and the numbers by which a kernel finds it; the table must outlive their use.
 
     Without ``readings`` the channel stands at its reference.
     """
-    table, per_s = readings.table(channel) if readings is not None else (AT_REST, 0.0)
-    return table, (float(table.ctypes.data), per_s, float(len(table)))
+    table, per_s, begin_s = readings.table(channel) if readings is not None else (AT_REST, 0.0, 0.0)
+    return table, (float(table.ctypes.data), per_s, float(len(table)), begin_s)
 
 
 @lru_cache(maxsize=512)

@@ -31,7 +31,7 @@ def _floats(typingctx: Any, address: Any) -> Any:
 def _reading(time, p):  # type: ignore[no-untyped-def]
     """What the channel reads at a time, straight between the entries of its table, constant beyond its ends."""
     table, count = _floats(np.int64(p[4])), np.int64(p[6])
-    place = min(max(time * p[5], 0.0), count - 1.0)
+    place = min(max((time - p[7]) * p[5], 0.0), count - 1.0)
     i = min(np.int64(place), count - 2)
     return table[i] + (place - i) * (table[i + 1] - table[i])
 

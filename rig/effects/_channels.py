@@ -18,7 +18,7 @@ from rig.channels import Channel
 from rig.effects.base import Effect, Parameter, Place
 from rig.errors import ConfigError
 
-SLOTS = 3  # numbers behind an effect's own parameters: where the table is, entries a second, entries
+SLOTS = 4  # behind an effect's own parameters: where the table is, entries a second, entries, time of the first in s
 AT_REST: Any = np.zeros(2)  # the table of a channel that nobody measures: it stands at its reference
 
 

@@ -30,6 +30,8 @@ class Excerpt:
         Of the decimation, behind a low-pass; 1 for none.
     begin_s, end_s
         What of it the run is made of.
+    start_s
+        Where the file begins, or the window of it that was asked for: times in a run count from there.
     whole
         Whether that is all of it.
     """
@@ -38,6 +40,7 @@ class Excerpt:
     factor: int
     begin_s: float
     end_s: float
+    start_s: float
     whole: bool
 
 
@@ -145,6 +148,11 @@ class Run:
     def duration_s(self) -> float:
         """Length of the run in seconds."""
         return float(self.time_s[-1] - self.time_s[0])
+
+    @property
+    def since_start_s(self) -> float:
+        """Time from the start of the run to its first sample here: 0 but for an excerpt."""
+        return 0.0 if self.excerpt is None else float(self.time_s[0]) - self.excerpt.start_s
 
 
 @dataclass(frozen=True)

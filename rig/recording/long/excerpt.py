@@ -56,8 +56,9 @@ def take(rows: Rows, first: int, last: int, most: int, *, held: bool) -> Taken:
             best, most_told = columns, told
     if not best:  # a hole in every place: then as it is
         factor, best = 1, _joined(_blocks(rows, first, min(last, first + most)))
-    time = best["time"]
-    return Taken(best, Excerpt(last - first, factor, float(time[0]), float(time[-1]), count == last - first))
+    time, start = best["time"], next(_blocks(rows, first, last))["time"]
+    cut = Excerpt(last - first, factor, float(time[0]), float(time[-1]), float(start[0]), count == last - first)
+    return Taken(best, cut)
 
 
 def _blocks(rows: Rows, first: int, last: int) -> Iterator[Mapping[str, Array]]:

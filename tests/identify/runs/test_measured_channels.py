@@ -347,8 +347,8 @@ def swinging_along() -> np.ndarray:
 class Straight:
     """A channel that is one throughout a run."""
 
-    def table(self, channel: Channel) -> tuple[np.ndarray, float]:
-        return np.ones(2), 1.0
+    def table(self, channel: Channel) -> tuple[np.ndarray, float, float]:
+        return np.ones(2), 1.0, 0.0
 
 
 @pytest.mark.parametrize(

@@ -103,8 +103,8 @@ def test_rows_without_a_value_are_lost_and_counted(tmp_path: Path) -> None:
 
 def test_what_was_left_out_is_said() -> None:
     time = np.arange(3.0)
-    cut = Run("a.h5", time, time > 0, excerpt=Excerpt(72_000_000, 21, 10.0, 130.0, False))
-    whole = Run("b.h5", time, time > 0, excerpt=Excerpt(90_000, 2, 0.0, 90.0, True))
+    cut = Run("a.h5", time, time > 0, excerpt=Excerpt(72_000_000, 21, 10.0, 130.0, 0.0, False))
+    whole = Run("b.h5", time, time > 0, excerpt=Excerpt(90_000, 2, 0.0, 90.0, 0.0, True))
     said: list[str] = []
     assert describe_excerpts([Run("c.h5", time, time > 0)], said.append) == () and not said
     (told,) = describe_excerpts([cut, whole], said.append)
