@@ -17,6 +17,7 @@ from identify.likelihood.by_prediction_error import as_final, fitted_on_all
 from identify.likelihood.fit import Fit
 from identify.model.parameters import Name
 from identify.rivals.open_line import with_numbers_of
+from identify.rivals.tone_origin import TONE
 from identify.runs.holdout import Split
 from identify.select.disturbance_lines import lines_left
 from identify.select.evidence import Evidence, inflation
@@ -66,17 +67,19 @@ def beside_own_low_pass(
     ``scored``: only a low-pass that its score promises is fitted. Where a large disturbance follows the readings, the
     score of one that is there may be small.
     """
-    structure = after.structure
     form = _form_for(after, search, traces, scored)
     if form is None:
         return after, ""
     say("the rate sensor's own low-pass shows: fitting it beside what was found")
-    start = {**after.values, (form, "time"): BEGUN_SAMPLES * search.problem.step_s}
-    known = after.fit if isinstance(after.fit, Fit) else search.best
+    structure, known = search.best.structure, after.fit  # which holds a line that was left open, too
+    values = {**search.best.values, **after.values}
+    start = {**values, (form, "time"): BEGUN_SAMPLES * search.problem.step_s}
+    if not isinstance(known, Fit) or known.structure != structure:
+        known = search.best
     problem, richer = fitted_on_all(traces, structure.plus(form), start, split.final, known)
-    less = after.fit
-    if not isinstance(less, Fit):  # fitted by its free run
-        less = problem.fit(structure, after.values, richer.noise)
+    less = known
+    if known is not after.fit:  # which was fitted by its free run, or without the line
+        less = problem.fit(structure, values, richer.noise)
     inflated = inflation(problem.columns_at(richer, with_variance=True), richer, [(form, "time")])
     if not (less.cost - richer.cost) / inflated > _price(richer, less):
         return after, ""
@@ -87,7 +90,8 @@ def beside_own_low_pass(
 def _form_for(after: FinalFit, search: Stepwise, traces: Sequence[Trace], scored: bool) -> str | None:
     """The likeliest low-pass where gyros alone are read and the final model is the one that the search believes."""
     gyro = all(t.channel == "rate" and t.beside is None and t.torque is not None for t in traces)
-    return _likeliest_form(search, scored) if gyro and after.structure == search.best.structure else None
+    believed = after.structure in (search.best.structure, search.best.structure.minus(TONE))
+    return _likeliest_form(search, scored) if gyro and believed else None
 
 
 def _likeliest_form(search: Stepwise, scored: bool) -> str | None:

@@ -56,9 +56,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
     def on_all(traces: Any, structure: Structure, start: Any, use: Any, like: Fit) -> Any:
         seen["form"] = structure.effects[-1]
-        return SimpleNamespace(columns_at=lambda *_, **__: []), fit_with(
-            structure.effects, like.cost - seen["all"], 0.9
-        )
+        problem = SimpleNamespace(columns_at=lambda *_, **__: [], fit=lambda s, *_: fit_with(s.effects, like.cost, 1.0))
+        return problem, fit_with(structure.effects, like.cost - seen["all"], 0.9)
 
     monkeypatch.setattr(own_low_pass, "_evidence", evidence)
     monkeypatch.setattr(own_low_pass, "fitted_on_all", on_all)
@@ -88,6 +87,16 @@ def test_what_was_found_stays_and_has_the_numbers_beside_the_low_pass(asked: dic
     assert less.after.structure.effects == ("torque_delay",)
     assert less.after.values["inertia",] == 0.9
     assert "1.00 ms" in note and "too little to be named" in note
+
+
+def test_it_is_asked_beside_a_line_that_was_left_open(asked: dict[str, Any]) -> None:
+    found = found_with(("torque_delay",))
+    search = search_with(fit_with(("torque_delay", "periodic_disturbance"), -1020.0, 1.0))
+    split: Any = SimpleNamespace(final=[], everything=[])
+    less, note = with_own_low_pass(found, search, cast(Any, GYRO), split, lambda text: None)
+    assert asked["form"] == SECOND and note
+    assert less.after.structure.effects == ("torque_delay",)
+    assert less.after.values["inertia",] == 0.9
 
 
 def test_beside_a_low_pass_that_is_named_the_other_form_is_asked(asked: dict[str, Any]) -> None:
