@@ -76,6 +76,7 @@ class Stepwise:
     between_rivals: dict[str, tuple[Structure, Array]] = field(default_factory=dict)  # ``model_spread``, and of what
     dropped: list[tuple[str, str]] = field(default_factory=list)
     stood_for_curves: set[str] = field(default_factory=set)  # wrong names: a curve explains what they seemed to
+    settled: frozenset[str] = frozenset()  # effects that a search on fewer samples has judged against all others
     best: Fit = None  # type: ignore[assignment]
     inflation: dict[str, float] = field(default_factory=dict)  # of every effect that was added, beside all others
     left: FreeFormFit | None = None  # a curve that belongs beside the model, though no effect of that kind is known
@@ -149,7 +150,7 @@ class Stepwise:
     def re_evaluate(self, now: Fit) -> Fit:
         """Every named effect against all others in its place, beside the finished rest."""
         for name in self.trials.added(now):
-            if name not in now.structure.effects:
+            if name not in now.structure.effects or name in self.settled:
                 continue
             rest, others = self._others(now, name)
             gap = MIN_RIVAL_SHARE * (rest.cost - now.cost)

@@ -38,7 +38,7 @@ def test_a_curve_refutes_only_effects_of_its_kind(
     left = curve and SimpleNamespace(form=curve, evidence=SimpleNamespace(fit=fit((), COST_WITH_CURVE)))
     problem = SimpleNamespace(fit=lambda structure, values: fit(structure.effects, COST_IN_TORQUE))
     search = LikelihoodSearch(
-        cast(Any, SimpleNamespace(best=bare, base=bare, left=left, problem=problem)), [], Structure()
+        cast(Any, SimpleNamespace(best=bare, base=bare, left=left, problem=problem)), [], Structure(), cast(Any, None)
     )
     assert search.refutes(fit(found, 0.0)) is refuted
 
@@ -51,6 +51,6 @@ def test_a_model_that_takes_a_delay_for_a_negative_damping_is_refuted_however_li
     there.names, there.values, there.std_error = (("damping",),), {("damping",): -2.4}, lambda name: 0.03
     problem = SimpleNamespace(fit=lambda structure, values: there)
     search = LikelihoodSearch(
-        cast(Any, SimpleNamespace(best=bare, base=bare, left=None, problem=problem)), [], Structure()
+        cast(Any, SimpleNamespace(best=bare, base=bare, left=None, problem=problem)), [], Structure(), cast(Any, None)
     )
     assert search.refutes(fit(("creep",), 0.0))
