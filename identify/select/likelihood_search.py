@@ -24,12 +24,12 @@ from identify.runs.observability import can_show
 from identify.runs.reduced import reduced
 from identify.select.curve_rivals import is_part_of
 from identify.select.evidence import STRONG_SUPPORT, EvidenceModel, support_difference
-from identify.select.forward_selection import Round
+from identify.select.forward_selection import Round, add_effects
 from identify.select.lags import drives
 from identify.select.search_state import Search
 from identify.select.stepwise import PREDICTS_TO_NOISE, Stepwise
 from identify.signals.torque_noise import quieter
-from identify.signals.trace import Trace, pooled_noise
+from identify.signals.trace import Trace, pooled_noise, release
 from rig.platform import TERMS
 
 SAMPLES = 10_000  # that the search looks at
@@ -93,10 +93,12 @@ class LikelihoodSearch:
 
     def run(self) -> bool:
         """Search; whether the last model predicts down to the sensor's noise."""
-        best = self.stepwise.run()
+        less, best = self.stepwise, self.stepwise.run()
         if self.more is not None and (beyond := self._beyond(*self.more)) is not None:
-            self.earlier, self.stepwise = tuple(self.stepwise.rounds), beyond
-            best = beyond.run()
+            add_effects(beyond)
+            if shows_more(beyond.best, best) and shows_more(there := beyond.concluded(), best):
+                release(less.problem.traces)
+                self.earlier, self.stepwise, best = tuple(less.rounds), beyond, there
         return best.reduced_chi_square < PREDICTS_TO_NOISE
 
     def _beyond(self, traces: Sequence[Trace], parts: Split) -> Stepwise | None:
@@ -177,6 +179,11 @@ class LikelihoodSearch:
         found.between_rivals = {k: v for k, (structure, v) in apart.items() if set(structure.effects) == same}
         found.dropped = [(n, why) for n, why in s.dropped if n not in (*best.structure.terms, *best.structure.effects)]
         return found
+
+
+def shows_more(fit: Fit, than: Fit) -> bool:
+    """Whether a model has an effect that another lacks."""
+    return not set(fit.structure.effects) <= set(than.structure.effects)
 
 
 def _scores(problem: PredictionError, fit: Fit, names: Sequence[str]) -> list[list[Score]]:

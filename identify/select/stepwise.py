@@ -93,6 +93,10 @@ class Stepwise:
     def run(self) -> Fit:
         """Add effects as long as one is worth it; judge each again beside the others; drop what is needless."""
         add_effects(self)
+        return self.concluded()
+
+    def concluded(self) -> Fit:
+        """The best model judged again and compared with curves."""
         for other in (partial(replace_linear_terms, self), self.re_evaluate):
             before, self.best = self.best.structure, other(self.best)
             if self.best.structure.parts != before.parts:  # beside what was replaced, others may have shown nothing

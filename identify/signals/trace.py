@@ -27,6 +27,7 @@ MOTION_FILTER_ORDER = 3  # Butterworth, run forwards and backwards: of the sixth
 UPSAMPLING = 4  # nonlinear torques have corners between samples
 SHORTEST_STRETCH = 40  # samples; a shorter one costs more in start states than it tells
 LEAD_S = 0.1  # of torque ahead of a piece of a run, for a drive with memory
+KEPT_SAMPLES = 4_000_000  # of the torques that a run keeps: 64 bytes each
 RUNAWAY_TORQUE = 1e100  # torque of an effect along a noisy motion, in any unit: it was integrated beyond all bounds
 MOST_WALK = 0.01  # of the rate, that a gyro's bias walks over a run
 MOST_BIAS_RAD_S = 0.05  # of a gyro: what its integral runs away faster with is the motion itself
@@ -205,9 +206,7 @@ class Trace:
         if self.torque is None:
             return None
         key = ("torque", drive)
-        if key not in self._series:
-            self._series[key] = self._make_torque(drive)
-        return self._series[key]
+        return self.once(key, lambda: self._make_torque(drive))
 
     def _make_torque(self, drive: tuple[tuple[str, tuple[float, ...]], ...]) -> tuple[Array, int]:
         assert self.torque is not None
@@ -240,7 +239,7 @@ class Trace:
         """
         key = (effect.name, shape, unit)
         if key not in self._series:
-            if len(self._series) > 400:
+            if len(self._series) > min(400, KEPT_SAMPLES // len(self.measured)):
                 self._series.clear()
             self._series[key] = self._make_effect(effect, shape, unit)
         return self._series[key]
