@@ -116,10 +116,8 @@ class Stepwise:
         while True:
             left, self.doubtful = fit_free_forms(self, now)
             self.left = left
-            if left is None:
-                break
-            name = redundant_given(self, left, self.trials.added(now))
-            if name is None:
+            name = left and redundant_given(self, left, self.trials.added(now))
+            if left is None or name is None:
                 break
             self.dropped.append((name, "a free-form curve explains its share as well, so it is not needed"))
             self.stood_for_curves.add(name)
@@ -140,9 +138,9 @@ class Stepwise:
     def best_candidate(self, tried: Mapping[str, Evidence]) -> str | None:
         """The candidate that is best supported, or the simplest of those that are as likely; None where none counts."""
         good = {n: e for n, e in tried.items() if e.support > ADDED_SUPPORT and e.weight > WEIGHT}
-        if not good:
+        best = min(good.values(), key=lambda e: e.fit.penalised, default=None)
+        if best is None:
             return None
-        best = min(good.values(), key=lambda e: e.fit.penalised)
         special = [n for n in effects.get(best.effect).nests if n in good and prefers_special_case(good[n], best)]
         if special:
             best = max((good[n] for n in special), key=lambda e: e.support)
