@@ -116,7 +116,7 @@ class Stepwise:
         while True:
             left, self.doubtful = fit_free_forms(self, now)
             self.left = left
-            name = left and redundant_given(self, left, self.trials.added(now))
+            name = None if left is None else redundant_given(self, left, self.trials.added(now))
             if left is None or name is None:
                 break
             self.dropped.append((name, "a free-form curve explains its share as well, so it is not needed"))
