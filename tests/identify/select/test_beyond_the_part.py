@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from identify.estimate.initial_guess import first_guess
+from identify.likelihood.fit import Fit
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.runs.holdout import Split, split
 from identify.runs.reduced import reduced
 from identify.select import likelihood_search
 from identify.select.likelihood_search import SAMPLES, LikelihoodSearch
+from identify.select.stepwise import Stepwise
 from identify.signals.prepare import prepare
 from identify.signals.trace import Trace
 from rig.dynamics import TorqueSignal, simulate
@@ -67,6 +69,30 @@ def test_what_only_the_rest_shows_is_found_and_what_the_part_showed_is_kept(monk
     assert best.values["inertia",] == pytest.approx(TRUTH[0], rel=1e-3)
     statuses = {c.effect: c.status for c in search.found.candidates if c.status == "added"}
     assert set(statuses) == {"coulomb_friction", "torque_saturation"}
+
+
+def test_where_it_ends_with_no_other_effect_the_part_keeps_its_model_and_all_that_it_knows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    concluded = Stepwise.concluded
+
+    def taking_all_back(search: Stepwise) -> Fit:
+        if not search.settled:
+            return concluded(search)
+        search.stood_for_curves.add("coulomb_friction")
+        search.dropped.append(("coulomb_friction", "a curve"))
+        search.inflation["coulomb_friction"] = np.inf
+        search.rivals.clear()
+        return search.base
+
+    monkeypatch.setattr(Stepwise, "concluded", taking_all_back)
+    search, said = searched({**FRICTION, **CLIPS}, monkeypatch)
+    kept = search.stepwise
+    assert len(said) == 1 and search.earlier == ()
+    assert kept.best.structure.effects == ("coulomb_friction",)
+    assert kept.problem.traces[0].measured.shape == (PART + 1,)
+    assert kept.stood_for_curves == set() and kept.dropped == [] and "coulomb_friction" in kept.rivals
+    assert np.isfinite(kept.inflation["coulomb_friction"])
 
 
 def test_where_the_part_shows_all_the_search_ends_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
