@@ -35,6 +35,7 @@ from rig.platform import TERMS
 SAMPLES = 10_000  # that the search looks at
 MAX_CUTOFF_SHARE = 0.2  # of the sample rate: the low-pass for a first guess in torque cuts off no higher
 RIVAL_SAMPLES = 40_000  # samples on which rivals are parted
+BEYOND_SAMPLES = 25_000  # with which a search goes on: what its candidates do to so many takes half a gibibyte
 MIN_MORE_SAMPLES_RATIO = 1.5  # times the samples: else there is nothing more to be seen in all of them
 # Times the score that a candidate has on the samples of the search, for as many: more on all is not to be seen on those
 # (a torque that only a later resonance limits, a lag that a slow beginning hides). Set by hand.
@@ -85,8 +86,10 @@ class LikelihoodSearch:
             if twin.cost < base.cost - COST_TOLERANCE:
                 base = min((base, problem.fit(structure, twin.values)), key=lambda f: f.cost)
         count = sum(t.count for t in traces)
-        more = reduced(traces, split, RIVAL_SAMPLES) if count > MIN_MORE_SAMPLES_RATIO * base.count else None
-        whole = PredictionError(more[0]) if more else None
+        whole, more = None, None
+        if count > MIN_MORE_SAMPLES_RATIO * base.count:
+            whole = PredictionError(reduced(traces, split, RIVAL_SAMPLES)[0])
+            more = reduced(traces, split, BEYOND_SAMPLES)
         offered = [n for n in allowed if n not in structure.effects and can_show(n, traces)]
         weigher = _weigher(problem, few, parts, start, base)
         return cls(Stepwise(problem, base, offered, weigher, say, whole, count), traces, structure, start, more)
@@ -106,9 +109,7 @@ class LikelihoodSearch:
 
         The samples that tell J, C, K and friction best need not show every effect.
         """
-        less = self.stepwise
-        problem = less.whole
-        assert problem is not None
+        less, problem = self.stepwise, PredictionError(traces)
         best = problem.fit(less.best.structure, less.best.values, problem.noise_of(less.best), 0, thorough=False)
         scatter = float(np.sqrt(2.0 / less.best.count))  # of a mean square of white innovations
         here, there = less.best.variance / less.problem.reading_variance, best.variance / problem.reading_variance
@@ -124,7 +125,7 @@ class LikelihoodSearch:
         if all(v[0].gain < seen.get(v[0].effect, 0.0) for v in looks):
             return None
         less.say("more of the recording shows what its most informative part does not: the search goes on with that")
-        base = less.on_all(less.base)
+        base = problem.fit(less.base.structure, less.base.values, problem.noise_of(less.base))
         out = replace(  # with lists of its own: what it takes back is not taken from the part's model
             less, problem=problem, base=base, weigher=_weigher(problem, traces, parts, self.start, base), whole=None,
             rounds=[], settled=frozenset(less.trials.added(best)), left=None, in_place=None, doubtful=[], _on_all={},
