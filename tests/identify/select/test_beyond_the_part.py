@@ -23,7 +23,7 @@ from rig.platform import Platform
 from rig.recording.run import Run
 from tests.identify.simulated import NOISE_RAD_S, TRUTH, Effects, white
 
-PART, ALL = 2_500, 5_000  # samples at 1 kHz
+PART, ALL = 1_500, 3_000  # samples at 1 kHz
 FRICTION: Effects = {"coulomb_friction": {"level": 1.0}}
 CLIPS: Effects = {"torque_saturation": {"limit": 45.0}}
 
