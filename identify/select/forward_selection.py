@@ -45,7 +45,7 @@ class Round:
 def add_effects(search: Stepwise) -> None:
     """Add effects to a search's best model as long as some are worth it."""
     trial: tuple[str, Fit] | None = None  # the effect on trial, and the model without it
-    for number in range(len(search.rounds) + 1, MAX_EFFECTS + 1):
+    for number in range(len(search.settled) + len(search.rounds) + 1, MAX_EFFECTS + 1):
         now = search.best
         scores, tried = search.score_candidates(now)
         chosen = search.best_candidate(tried)

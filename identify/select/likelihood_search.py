@@ -99,7 +99,7 @@ class LikelihoodSearch:
         less, best = self.stepwise, self.stepwise.run()
         if self.more is not None and (beyond := self._beyond(*self.more)) is not None:
             add_effects(beyond)
-            if shows_more(beyond.best, best) and shows_more(there := beyond.concluded(), best):
+            if _shows_more(beyond.best, best) and _shows_more(there := beyond.concluded(), best):
                 release(less.problem.traces)
                 self.earlier, self.stepwise, best = tuple(less.rounds), beyond, there
         return best.reduced_chi_square < PREDICTS_TO_NOISE
@@ -183,7 +183,7 @@ class LikelihoodSearch:
         return found
 
 
-def shows_more(fit: Fit, than: Fit) -> bool:
+def _shows_more(fit: Fit, than: Fit) -> bool:
     """Whether a model has an effect that another lacks."""
     return not set(fit.structure.effects) <= set(than.structure.effects)
 
