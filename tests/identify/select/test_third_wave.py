@@ -20,6 +20,7 @@ class Waves:
     def __init__(self) -> None:
         self.best: Any = SimpleNamespace(structure=Structure())
         self.rounds: list[Any] = []
+        self.settled: list[str] = []  # no search came before this one
         self.trials = SimpleNamespace(added=lambda fit: list(fit.structure.effects), pairs=lambda now, scores: [])
         self.said: list[str] = []
 
