@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 from functools import cache
 from pathlib import Path
@@ -69,6 +70,13 @@ LONGEST = (
 # Files that compile the same plant: on two workers each would compile it for itself the first time.
 COMPILED_TOGETHER = ("tests/benchmarks/test_blind", "tests/benchmarks/test_field")
 HERE = Path(__file__).parent
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """In a fresh clone: compile before workers start, each of which would do it for itself."""
+    starts_workers = session.config.getoption("numprocesses", None) and "PYTEST_XDIST_WORKER" not in os.environ
+    if starts_workers and not any((HERE.parent / "rig/dynamics/__pycache__").glob("riccati.riccati-*.nbi")):
+        subprocess.run([sys.executable, "-m", "tests.compile_ahead"], cwd=HERE.parent, check=True)
 
 
 def _has_deadlines(path: Path) -> bool:

@@ -121,6 +121,7 @@ def test_where_nothing_is_missing_there_is_no_after() -> None:
         assert abs(estimate.value - truth) < 4.5 * estimate.std_error
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_declared_is_fitted_and_not_named_as_missing() -> None:
     declared = Platform(*TRUTH, effects={"coulomb_friction": {"level": 0.5}})
     found = identify(recording(), declared, SETTINGS)
@@ -128,6 +129,7 @@ def test_an_effect_that_is_declared_is_fitted_and_not_named_as_missing() -> None
     assert found.final.effect_parameters["coulomb_friction"]["level"].value == pytest.approx(1.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_torque_that_wanders_at_random_is_no_effect_and_its_size_is_said() -> None:
     runs, wanders, torques = [], [], []
     for i, run in enumerate(recording(friction=False).runs):
@@ -179,6 +181,7 @@ def test_a_result_can_be_written_and_a_second_run_repeats_it() -> None:
     assert first["per_set"] == again["per_set"]
 
 
+@pytest.mark.slow
 def test_one_tone_without_its_ring_gives_no_inertia() -> None:
     time = np.arange(8001) * 1e-3
     tone = Sine(torque_nm=111, frequency_hz=0.5, duration_s=8, soft_start_s=2)
@@ -231,7 +234,8 @@ def test_who_stops_before_anything_is_fitted_gets_nothing() -> None:
         identify(campaign(duration_s=2.5), LOW, SETTINGS, interrupt)
 
 
-@pytest.mark.parametrize(("scale", "named"), [pytest.param(1.0, (), marks=pytest.mark.slow), (1.05, ("torque_scale",))])
+@pytest.mark.slow
+@pytest.mark.parametrize(("scale", "named"), [(1.0, ()), (1.05, ("torque_scale",))])
 def test_a_known_added_inertia_tells_the_torque_scale(scale: float, named: tuple[str, ...]) -> None:
     time = np.arange(2501) * 1e-3
     runs = []

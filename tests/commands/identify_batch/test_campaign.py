@@ -72,6 +72,7 @@ def test_a_row_has_the_numbers_of_identify_run_on_the_same_recording(tmp_path: P
     assert sorted(p.name for p in tmp_path.iterdir()) == ["kept", "rig.yaml", "run"]
 
 
+@pytest.mark.slow
 def test_settings_of_today_come_on_top_of_those_of_the_recording(played: Path) -> None:
     row = identified_here(job(played, "identify.candidates=[]"))
     assert row["status"] == IDENTIFIED

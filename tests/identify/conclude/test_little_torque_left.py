@@ -56,6 +56,7 @@ def beside_a_mode(torque_nm: float, low_hz: float, high_hz: float, seed: int) ->
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_what_depends_on_nothing_and_is_a_thousandth_of_the_torque_refuses_no_model_that_is_right() -> None:
     sets = ((0.3, 1.0, 50.0), (0.3, 2.0, 2.0), (0.4, 5.0, 5.0), (0.6, 12.0, 12.0))
     runs = tuple(beside_a_mode(*given, seed=i) for i, given in enumerate(sets))

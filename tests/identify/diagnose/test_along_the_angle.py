@@ -67,6 +67,7 @@ def test_a_platform_that_changes_along_the_angle_is_not_accepted_and_what_change
     assert any(f"The {what} changes with the angle" in step for step in next_steps(found))
 
 
+@pytest.mark.slow
 def test_one_that_does_not_change_is_accepted() -> None:
     found = identified(0.0, 0.0)
     assert found.accepted, found.reasons

@@ -210,6 +210,7 @@ def test_a_second_look_that_sees_nothing_leaves_the_first(monkeypatch: pytest.Mo
     assert coloured_noise.with_noise_known(found, refused, lambda text: None) is found
 
 
+@pytest.mark.slow
 def test_who_stops_the_second_look_keeps_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
     found, _ = found_without_its_effect()
     monkeypatch.setattr(coloured_noise, "colour_of", lambda seen: Colour(1.0, 1.0, 100.0))

@@ -86,7 +86,8 @@ def test_a_line_that_stood_before_the_runs_began_may_be_torque_or_sensor_and_is_
     assert statuses["periodic_disturbance"] == "left open"
 
 
-@pytest.mark.parametrize("made", [shaken, pytest.param(heard, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("made", [shaken, heard])
 def test_records_that_begin_in_motion_do_not_tell_either(made) -> None:  # type: ignore[no-untyped-def]
     runs = []
     for k, one in enumerate(SETS):
@@ -103,6 +104,7 @@ def test_records_that_begin_in_motion_do_not_tell_either(made) -> None:  # type:
     assert "do not begin at rest" in found.verdict.left_open
 
 
+@pytest.mark.slow
 def test_a_line_in_one_run_is_told_with_that_run_and_its_size_there() -> None:
     runs = [
         heard(*one, seed=k, lasts_s=2.5) if k == 1 else sine_run(*one, seed=k, duration_s=2.5)
@@ -114,6 +116,7 @@ def test_a_line_in_one_run_is_told_with_that_run_and_its_size_there() -> None:
     assert "5.16 deg/s" in found.verdict.left_open
 
 
+@pytest.mark.slow
 def test_who_knows_that_it_is_a_torque_declares_it() -> None:
     tone = {"sine": 0.7 * TORQUE_NM, "cosine": 0.0, "frequency": HERTZ + 0.003}
     runs = [shaken(*one, seed=k) for k, one in enumerate(SETS)]
@@ -126,6 +129,7 @@ def test_who_knows_that_it_is_a_torque_declares_it() -> None:
 LOADS = (0.0, 0.6 * TRUTH[0])
 
 
+@pytest.mark.slow
 def test_a_known_mass_shows_a_torque() -> None:
     torque = found_in([shaken(*one, seed=k, added=m) for k, (one, m) in enumerate(zip(SETS, LOADS, strict=True))])
     assert torque.verdict.effects == ("periodic_disturbance",)

@@ -53,6 +53,7 @@ def test_it_is_told_in_which_runs() -> None:
     assert describe([("b", 0, 0.0)], "rotary") == ""
 
 
+@pytest.mark.slow
 def test_what_is_cut_off_bends_no_parameter_and_nothing_is_named_for_it() -> None:
     whole = campaign(duration_s=2.0)
     highest = max(float(np.max(np.abs(run.rate_rad_s))) for run in whole.runs if run.rate_rad_s is not None)

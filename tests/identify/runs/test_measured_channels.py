@@ -125,6 +125,7 @@ def test_another_axis_that_accelerates_is_named_and_its_coupling_measured() -> N
     assert_terms(found)
 
 
+@pytest.mark.slow
 def test_a_spring_that_softens_with_temperature_is_told_from_one_that_drifts() -> None:
     found = of_the_spring()
     assert found.accepted, found.reasons

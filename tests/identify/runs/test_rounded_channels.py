@@ -62,6 +62,7 @@ def test_friction_that_holds_the_platform_beside_a_coarse_encoder_is_explained_t
     assert found.noise_floor.holdout_rate_rms == pytest.approx(STEP_RAD / np.sqrt(12.0), rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_run_of_few_steps_has_the_noise_of_the_others() -> None:
     """Its reading, of nearly nothing, had been the noise of all, and J came out a thousandth of what it is."""
     found = identify(

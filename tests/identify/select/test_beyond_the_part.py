@@ -60,6 +60,7 @@ def searched(hidden: Effects, monkeypatch: pytest.MonkeyPatch) -> tuple[Likeliho
     return search, [s for s in said if s.startswith("more of the recording")]
 
 
+@pytest.mark.slow
 def test_what_only_the_rest_shows_is_found_and_what_the_part_showed_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     search, said = searched({**FRICTION, **CLIPS}, monkeypatch)
     assert len(said) == 1

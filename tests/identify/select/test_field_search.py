@@ -66,6 +66,7 @@ def test_a_servo_with_nothing_hidden_is_accepted_and_nothing_is_named(offered: t
     right(found, PLAIN)
 
 
+@pytest.mark.slow
 @OFFERED
 def test_coulomb_friction_of_a_servo_is_named_alone_and_what_is_left_is_told(offered: tuple[str, ...] | None) -> None:
     found = found_in(RUBBING, offered)

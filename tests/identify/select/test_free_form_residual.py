@@ -51,6 +51,7 @@ def test_what_no_effect_on_offer_describes_is_unexplained_and_not_called_a_delay
     assert on in [d.on for d in identification.disturbance.depends_on]
 
 
+@pytest.mark.slow
 def test_of_a_right_model_no_curve_is_left() -> None:
     identification = found({})
     assert identification.verdict.effects == ()
