@@ -147,7 +147,8 @@ def each_set(
         return (), None
     linear = linear_traces(traces, fitted)
     terms = fitted.structure.terms
-    begin = replace(start, platform=_platform(fitted))
+    # Without an inertia there is nothing to filter with: what was guessed first has one.
+    begin = replace(start, platform=_platform(fitted)) if _platform(fitted)[0] > 0.0 else start
     whole = [replace(t, number=i) for i, t in enumerate(linear)]
     bounds = _bounds(traces, fitted) if fitted.sensor_limited and fitted.structure.effects else [{} for _ in traces]
     rho = 0.0 if fitted.sensor_limited else start.rho

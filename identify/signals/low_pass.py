@@ -1,7 +1,8 @@
-"""The zero-phase low-pass that torque and motion pass alike."""
+"""The zero-phase low-pass that torque and motion pass alike, and what is slow of the difference of two channels."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -15,6 +16,7 @@ LOW_PASS_ORDER = 2  # of the Butterworth filter; run forwards and backwards it i
 EDGE_PERIODS = 3.0  # of the cut-off: so much at either end of a run the filter has not settled
 # Of the cut-off, set by hand: over a longer gap a torque that steps moves what nothing stands in for.
 GAP_PERIODS = 0.1
+DRIFT_PERIODS = 10.0  # of the motion, at least, in which it averages out of two channels' difference; set by hand
 
 
 @lru_cache(maxsize=64)
@@ -57,3 +59,44 @@ def low_pass(values: Array, cutoff_hz: float, step_s: float) -> Array:
     if wn >= 0.95:
         return values
     return np.asarray(signal.sosfiltfilt(_sections(wn), values, padlen=min(len(values) - 1, int(6.0 / wn) + 10)))
+
+
+def drift_between(
+    encoder_rad: Array, angle_rad: Array, rate_rad_s: Array, step_s: float, stretches: Sequence[tuple[int, int]],
+    noise_rad: float,
+) -> Array:  # fmt: skip
+    """By how much an encoder reads more than a gyro's integral, as far as that is slow, (n,).
+
+    A line through the means of blocks of every stretch, and straight on over gaps. The blocks are as long as what is
+    left shows no more than the encoder's noise in the means of their halves.
+
+    Parameters
+    ----------
+    rate_rad_s
+        What was integrated, (n,).
+    stretches
+        First and last sample of each, in order; the whole run where there are none.
+    noise_rad
+        Of the encoder, one standard deviation.
+    """
+    period_s = 2.0 * np.pi * float(np.std(encoder_rad)) / max(float(np.std(rate_rad_s)), 1e-300)
+    shortest = max(1, int(min(DRIFT_PERIODS * period_s / step_s, len(encoder_rad))))
+    more, at, level = encoder_rad - angle_rad, [], []
+    for first, last in stretches or [(0, len(more) - 1)]:
+        own, blocks = more[first : last + 1], 1
+        while True:
+            centres, means = _means(own, blocks)
+            line = np.interp(np.arange(len(own)), centres, means)
+            halves = _means(own - line, 2 * blocks)[1]
+            if np.sqrt(np.mean(halves**2)) <= noise_rad or len(own) < 2 * blocks * shortest:
+                break
+            blocks *= 2
+        at += [np.array([first]), first + centres, np.array([last])]
+        level += [means[:1], means, means[-1:]]
+    return np.interp(np.arange(len(more)), np.concatenate(at), np.concatenate(level))
+
+
+def _means(values: Array, blocks: int) -> tuple[Array, Array]:
+    """The middle of every block, and the mean there."""
+    parts = np.array_split(np.arange(len(values)), blocks)
+    return np.array([float(np.mean(p)) for p in parts]), np.array([float(np.mean(values[p])) for p in parts])

@@ -167,6 +167,7 @@ def prepare(
     if run.min_rate_rad_s > 0.0:
         slow = np.abs(trace.fine[1][::UPSAMPLING]) <= run.min_rate_rad_s
         broken |= slow
+        del trace.fine  # its angle is put right in every stretch
     first = int(np.ceil(lead_in_s / step))
     if torque is not None and first > 0 and n > 100 * first:
         # A delay reaches back to torque from before the record began, which nobody knows; what it did

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from identify.model.effect_torque import torque_along
+from identify.signals.low_pass import drift_between
 from identify.signals.noise import is_noise, noise_of, rounding_of
 from identify.signals.prefilter import held_pieces, linear_pieces, smooth_pieces
 from rig import effects
@@ -156,8 +157,7 @@ class Trace:
         """Angle, rate, time and torque, upsampled and smoothed, and the noise left in the rate."""
         if self.motion is not None:
             return self.motion
-        nyquist = 0.5 / self.step_s
-        wn = self.cutoff_hz / nyquist
+        wn = 2.0 * self.cutoff_hz * self.step_s
         y = self.measured
         if wn < 0.8:
             from scipy import signal  # noqa: PLC0415  slow to load: a forecast knows its motion
@@ -170,9 +170,7 @@ class Trace:
         if self.channel == "rate":
             angle, rate = Polynomials(spline.antiderivative())(fine_t), Polynomials(spline)(fine_t)
             left = self.noise * np.sqrt(min(1.0, wn))
-            angle = angle + self._offset(angle[::UPSAMPLING], t)
-            if self.drift_rad is not None:
-                angle = angle - np.interp(fine_t, t, self.drift_rad)
+            angle = angle + np.interp(fine_t, t, self.put_right(angle[::UPSAMPLING], t) - angle[::UPSAMPLING])
         else:
             angle, rate = Polynomials(spline)(fine_t), Polynomials(spline.derivative())(fine_t)
             left = self.noise * 2.0 * np.pi * self.cutoff_hz / np.sqrt(3.0) * np.sqrt(min(1.0, wn))
@@ -183,17 +181,20 @@ class Trace:
         """An angle integrated from the rate, (n,), where an encoder reads it or the spring holds it."""
         return angle_rad + self._offset(angle_rad, time_s) - (0.0 if self.drift_rad is None else self.drift_rad)
 
-    def _offset(self, angle_rad: Array, time_s: Array) -> float:
-        if self.run.angle_rad is None:
+    def _offset(self, angle_rad: Array, time_s: Array) -> Array | float:
+        """By how much an encoder reads more, (n,): a gyro has not seen what turned while readings were lost."""
+        run = self.run
+        if run.angle_rad is None:
             return 0.0
-        encoder = np.interp(time_s + self.start_s, self.run.time_s, self.run.angle_rad)
-        return float(np.median(encoder - angle_rad))
+        ok = run.valid & np.isfinite(run.angle_rad)
+        encoder = np.interp(time_s + self.start_s, run.time_s[ok], run.angle_rad[ok])
+        noise = max(noise_of(encoder), rounding_of(run.angle_rad[ok]) or 0.0)
+        return drift_between(encoder, angle_rad, self.measured, self.step_s, self.stretches, noise)
 
     @cached_property
     def bend_rad_s3(self) -> float:
         """Second derivative of the rate, root mean square."""
-        bend = np.diff(self.fine[1], 2) / (self.step_s / UPSAMPLING) ** 2
-        return float(np.sqrt(np.mean(bend**2)))
+        return float(np.sqrt(np.mean((np.diff(self.fine[1], 2) / (self.step_s / UPSAMPLING) ** 2) ** 2)))
 
     def once(self, key: Any, make: Callable[[], Any]) -> Any:
         """What is the same for this run whatever the model is, made the first time that it is asked for."""

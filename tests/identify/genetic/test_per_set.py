@@ -50,6 +50,15 @@ def test_each_set_alone_and_all_together_find_the_truth_that_the_declared_model_
     np.testing.assert_allclose([joint.parameters[t] for t in TERMS], TRUTH, rtol=2e-3)
 
 
+def test_sets_are_fitted_though_the_final_model_has_no_inertia(monkeypatch: pytest.MonkeyPatch) -> None:
+    traces = traces_of(campaign(sets=TWO_SETS))
+    begin, final = start_of(traces), fitted(traces, {})
+    monkeypatch.setattr("identify.genetic.per_set._platform", lambda fitted: (0.0, 0.005, 0.08))
+    sets, _ = each_set(traces, final, begin, CENTRE, QUICK, "rotary")
+    for one in sets:
+        np.testing.assert_allclose(one.parameters["inertia"].value, TRUTH[0], rtol=2e-3)
+
+
 def test_the_best_individual_stands_beside_the_closed_form_with_the_gap_between_them() -> None:
     traces = traces_of(campaign(sets=TWO_SETS))
     run = genetic("all", traces, TERMS, start_of(traces), CENTRE, QUICK, 1, 0.0, beside=True)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from identify.signals.noise import NOISE_SCATTER, bandwidth_of, least_of, noise_of
-from identify.signals.prepare import one_noise, prepare
+from identify.signals.prepare import Channels, one_noise, prepare
 from identify.signals.trace import UPSAMPLING
 from rig import effects
 from rig.recording.run import Array, Run
@@ -75,6 +75,21 @@ def test_a_long_gap_cuts_the_run_in_two_stretches() -> None:
     trace = prepare(gyro(np.sin(TIME[kept]), TIME[kept]))
     assert trace.stretches == [(0, 2999), (3500, 8000)]
     assert not trace.keep[3000:3500].any()
+
+
+def test_an_encoder_tells_what_turned_in_a_gap_and_how_far_the_gyro_has_drifted() -> None:
+    w = 2.0 * np.pi * 10.0
+    kept = np.delete(np.arange(len(TIME)), np.arange(3020, 3120))
+    t = TIME[kept]
+    drift = 0.02 * np.sin(np.pi * t / t[-1])  # of the integral: a bias that wanders
+    rate = 5.0 * w * np.cos(w * t) + np.gradient(drift, t)
+    encoder = 2e-3 * np.round((5.0 * np.sin(w * t)) / 2e-3)
+    run = gyro(rate, t, angle_rad=encoder)
+    trace = prepare(run, channels=Channels("rate"))
+    angle = trace.fine[0][::UPSAMPLING]
+    for first, last in trace.stretches:
+        at = np.arange(first + 20, last - 20)
+        assert np.max(np.abs(angle[at] - 5.0 * np.sin(w * TIME[at]))) < 0.01  # of 5 rad
 
 
 def test_samples_whose_filter_reaches_across_a_seam_do_not_count() -> None:
