@@ -251,9 +251,14 @@ def quantities_of(parts: Sequence[Dependence], axis: str) -> str:
     return joined(list(dict.fromkeys(quantity_of(d, axis) for d in parts)))
 
 
+def contributes(times: float) -> bool:
+    """Whether the held-out error is larger without an effect, by half a percent: what is less is read as none."""
+    return not round(times, 2) <= 1.0
+
+
 def without(times: float) -> str:
     """What an effect contributes: the held-out error without it over the one with it."""
-    if round(times, 2) <= 1.0:
+    if not contributes(times):
         return "Without it, after refitting, the error on held-out data is no larger."
     percentage = f"{number(100.0 * (times - 1.0), 2)} % larger"
     more = percentage if times < MANY_TIMES else f"{number(times, 3)} times as large"

@@ -22,7 +22,7 @@ from identify.select.evidence import WEIGHT
 from identify.select.free_form_residual import MOVED_SIGMAS, ON
 from identify.select.search_state import Found
 from identify.signals.trace import Trace
-from identify.wording import joined, number, plain, quantity_of
+from identify.wording import contributes, joined, number, plain, quantity_of
 from rig import effects
 from rig.effects.base import Effect, Place
 from rig.platform import TERMS
@@ -131,14 +131,15 @@ def _may_stand_in(name: str, found: Found, traces: Sequence[Trace]) -> bool:
 
 
 def _with_unproven(found: Found) -> Found:
-    """The same with how far J, C and K move without a flexible effect that does nothing for samples that were held out.
+    """The same with how far J, C and K move without an effect that does nothing for samples that were held out.
 
     Where they move the name is kept, for its evidence lies there (a mode beyond what was excited shows as the inertia
-    it takes). Where they do not, nothing speaks for it but that it can follow almost anything.
+    it takes). Where they do not, nothing speaks for it but the likelihood of samples that were fitted, and that may
+    take for an effect what is wrong with the torque that was recorded: steps of a coarse current while the platform
+    stands look like a friction that holds it.
     """
-    gained = found.search.contribution
     moves: dict[str, dict[str, float]] = {}
-    for name in [n for n in found.named if effects.get(n).is_flexible and gained.get(n, np.inf) <= 1.0]:
+    for name in [n for n in found.named if not contributes(_gained(n, found))]:
         less = found.without(name)
         if by := moved(found.after, less.after):
             moves[effects.first_of(name)] = by
@@ -146,6 +147,15 @@ def _with_unproven(found: Found) -> Found:
             less.search.drop(less.kept)
             found = less
     return replace(found, disturbance=replace(found.disturbance, moves_without_percent=moves)) if moves else found
+
+
+def _gained(name: str, found: Found) -> float:
+    """How many times as large the held-out error is without an effect, the sensor's noise taken off both."""
+    times, left = found.search.contribution.get(name, np.inf), found.disturbance.relative
+    if times <= 1.0 or not np.isfinite(times) or left <= 0.0:
+        return times
+    noisy = max(found.in_torque[1].held_relative / left, 1.0)
+    return float(np.sqrt(1.0 + (times**2 - 1.0) * noisy**2))
 
 
 def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
