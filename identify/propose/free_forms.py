@@ -98,8 +98,7 @@ def fitted(problem: PredictionError, now: Fit, form: Score, steps: int, least: f
 
 
 def torque_of(problem: PredictionError, fit: Fit, name: str) -> list[Array]:
-    """What a free form of a fit resists with along the motion the fit predicts, (n,), one array a run."""
-
+    """What an effect or a free form of a fit resists with along the motion that it predicts, (n,), one array a run."""
     effect = effects.get(name)
     out: list[Array] = []
     for trace, states, torque in zip(problem.traces, states_of(problem, fit), shaft_torque_of(fit), strict=True):

@@ -23,6 +23,7 @@ from identify.results import Dependence
 from identify.select.evidence import STRONG_SUPPORT, WEIGHT, Evidence, likely_share, support_difference
 from rig import effects
 from rig.arrays import Array
+from rig.effects.base import Place
 from rig.platform import TERMS
 
 if TYPE_CHECKING:
@@ -138,7 +139,11 @@ def redundant_given(search: Stepwise, left: FreeFormFit, names: Sequence[str]) -
 
 
 def dependence_on(search: Stepwise, left: FreeFormFit) -> tuple[Dependence, dict[str, float]]:
-    """The curve as the report tells it, and by how much J, C and K are others with it, percent."""
+    """The curve as the report tells it, and by how much J, C and K are others with it, percent.
+
+    What inertia, damping, stiffness or an effect of the model would take with another size is theirs and not left over:
+    beside a spring with a kink, a curve over the angle may have any kink that the spring gives up.
+    """
     problem, fit, form = search.problem, left.evidence.fit, left.form
     states = np.concatenate(states_of(problem, fit))
     torque = np.concatenate(torque_of(problem, fit, form))
@@ -150,7 +155,9 @@ def dependence_on(search: Stepwise, left: FreeFormFit) -> tuple[Dependence, dict
     scale, swing = 0.0, 0.0
     if "gain" in form:
         torque, scale, swing = _without_scale(torque, np.concatenate(shaft_torque_of(fit))[counts])
-    terms = np.column_stack([acceleration, states[:, 1], states[:, 0], np.ones(len(states))])
+    sized = [e for e in left.now.structure.effects if _is_sized(e)]  # beside the curve it may have no size at all
+    others = [np.concatenate(torque_of(problem, left.now, e))[counts] for e in sized]
+    terms = np.column_stack([acceleration, states[:, 1], states[:, 0], np.ones(len(states)), *others])
     size = np.maximum(np.linalg.norm(terms, axis=0), 1e-300)
     as_terms = np.linalg.lstsq(terms / size, torque, rcond=1e-9)[0] / size
     rms = float(np.sqrt(np.mean((torque - terms @ as_terms) ** 2)))
@@ -170,6 +177,13 @@ def dependence_on(search: Stepwise, left: FreeFormFit) -> tuple[Dependence, dict
         if abs(moved) > MOVED_SIGMAS * _error(fit, (term,)):
             moves[term] = 100.0 * abs(moved / here)
     return Dependence(ON[form], rms, rms / problem.torque_nm, left.chance_level, tuple(at), tuple(shape)), moves
+
+
+def _is_sized(name: str) -> bool:
+    """Whether an effect is a torque along the motion that all runs have with one size."""
+    effect = effects.get(name)
+    along_motion = effect.place in (Place.LOAD, Place.FRICTION) and effect.reads is None
+    return along_motion and not any(p.per_run for p in effect.parameters)
 
 
 def _without_scale(resisted: Array, torque: Array) -> tuple[Array, float, float]:

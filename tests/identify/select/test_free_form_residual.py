@@ -4,28 +4,34 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from identify.likelihood.prediction_error import PredictionError
+from identify.model.parameters import Name
+from identify.model.structure import Structure
 from identify.pipeline import identify
 from identify.results import Identification
-from identify.select.free_form_residual import _without_scale
+from identify.select.free_form_residual import _without_scale, dependence_on
+from rig import effects
 from rig.config.identify import IdentifyConfig
-from rig.platform import Platform
+from rig.platform import TERMS, Platform
 from rig.recording.run import Recording
-from tests.identify.simulated import TRUTH, Effects, sine_run, white
+from tests.identify.simulated import TRUTH, Effects, sine_run, traces_of, white
 
 SETS = ((67.0, 6.0), (111.0, 1.0), (104.0, 3.0))
 OFFERED = IdentifyConfig.model_validate({"candidates": ["torque_delay", "actuator_lag", "creep", "coulomb_friction"]})
 CUBIC = {"cubic_stiffness": {"factor": 4000.0}}
 
 
-def found(effects: Effects) -> Identification:
+def found(hidden: Effects) -> Identification:
     """Sets with an effect and with a small torque that was not recorded."""
     runs = []
     for seed, (torque_nm, hertz) in enumerate(SETS):
-        run = sine_run(torque_nm, hertz, seed=seed, effects=effects, duration_s=2.5)
+        run = sine_run(torque_nm, hertz, seed=seed, effects=hidden, duration_s=2.5)
         assert run.torque_nm is not None
         runs.append(replace(run, torque_nm=run.torque_nm + white(len(run.torque_nm), 0.003 * torque_nm, 50 + seed)))
     return identify(Recording(tuple(runs)), Platform(*TRUTH), OFFERED)
@@ -37,14 +43,14 @@ def found_beside_a_cube() -> Identification:
 
 
 @pytest.mark.parametrize(
-    ("effects", "on"),
+    ("hidden", "on"),
     [
         (CUBIC, "angle"),
         pytest.param({"quadratic_damping": {"factor": 0.05}}, "rate", marks=pytest.mark.slow),
     ],
 )
-def test_what_no_effect_on_offer_describes_is_unexplained_and_not_called_a_delay(effects: Effects, on: str) -> None:
-    identification = found_beside_a_cube() if effects is CUBIC else found(effects)
+def test_what_no_effect_on_offer_describes_is_unexplained_and_not_called_a_delay(hidden: Effects, on: str) -> None:
+    identification = found_beside_a_cube() if hidden is CUBIC else found(hidden)
     assert identification.verdict.effects == ()
     assert identification.verdict.unexplained
     assert identification.disturbance is not None
@@ -70,6 +76,24 @@ def test_the_shape_of_what_is_left_is_that_of_the_torque_that_nobody_offered() -
     missing = 4000.0 * at**3
     straight = np.polynomial.Polynomial.fit(at, missing - shape, 1)
     assert np.std(shape + straight(at) - missing) < 0.1 * np.std(missing)
+
+
+def test_what_a_spring_of_the_model_would_take_with_another_size_is_not_left_over() -> None:
+    """A cube and a curve over the angle beside it: whatever the one gives up the other takes."""
+    sets = [sine_run(*one, seed=k, effects=CUBIC, duration_s=2.5) for k, one in enumerate(SETS[:2])]
+    problem = PredictionError(traces_of(Recording(tuple(sets))))
+    start: dict[Name, float] = {(t,): v for t, v in zip(TERMS, TRUTH, strict=True)}
+    now = problem.fit(Structure(effects=("cubic_stiffness",)), {**start, ("cubic_stiffness", "factor"): 4000.0})
+    most = max(float(np.max(np.abs(t.fine[0]))) for t in problem.traces)
+    names = [p.name for p in effects.get("free_angle").parameters]
+    places = np.linspace(-most, most, len(names) - 1)
+    taken = 4000.0 * (places**3 - most**2 * places)  # a curve is zero at its ends
+    shape = dict(zip(names, [-most, most, 0.0, *taken[1:-1]], strict=True))
+    values = {**now.values, ("cubic_stiffness", "factor"): 0.0, **{("free_angle", n): v for n, v in shape.items()}}
+    beside = problem.fit(now.structure.plus("free_angle"), values, now.noise, 0)
+    left = SimpleNamespace(now=now, evidence=SimpleNamespace(fit=beside), form="free_angle", chance_level=1e-9)
+    curve, _ = dependence_on(cast(Any, SimpleNamespace(problem=problem)), cast(Any, left))
+    assert curve.torque_rms < 0.2 * float(np.std(taken))
 
 
 def test_a_gain_that_is_the_same_throughout_is_another_scale_and_no_torque_that_is_left() -> None:
