@@ -139,8 +139,13 @@ def _with_unproven(found: Found) -> Found:
     stands look like a friction that holds it.
     """
     moves: dict[str, dict[str, float]] = {}
-    for name in [n for n in found.named if not contributes(_gained(n, found))]:
+    gained, begun = found.search.contribution, found
+    for name in [n for n in found.named if not contributes(_beyond_noise(gained.get(n, np.inf), found))]:
         less = found.without(name)
+        # Of two effects of which either explains it all, neither seems to do anything as long as both are there.
+        again = less.in_torque[1].held_relative / max(found.in_torque[1].held_relative, 1e-300)
+        if found is not begun and contributes(_beyond_noise(again, found)):
+            continue
         if by := moved(found.after, less.after):
             moves[effects.first_of(name)] = by
         else:
@@ -149,9 +154,9 @@ def _with_unproven(found: Found) -> Found:
     return replace(found, disturbance=replace(found.disturbance, moves_without_percent=moves)) if moves else found
 
 
-def _gained(name: str, found: Found) -> float:
+def _beyond_noise(times: float, found: Found) -> float:
     """How many times as large the held-out error is without an effect, the sensor's noise taken off both."""
-    times, left = found.search.contribution.get(name, np.inf), found.disturbance.relative
+    left = found.disturbance.relative
     if times <= 1.0 or not np.isfinite(times) or left <= 0.0:
         return times
     noisy = max(found.in_torque[1].held_relative / left, 1.0)

@@ -149,6 +149,19 @@ def test_an_effect_that_does_nothing_for_held_out_samples_nor_for_j_is_not_named
     assert {c.effect: c.status for c in less.search.candidates}["stribeck_friction"] == "added, then no longer needed"
 
 
+def test_of_two_effects_of_which_either_does_it_one_stays() -> None:
+    """Neither seems to do anything as long as the other is there; without the first, the second is needed."""
+    begun, _ = found(("stribeck_friction", "coulomb_friction"), inertia_without=1.0)
+    begun.search.contribution.update(stribeck_friction=1.0, coulomb_friction=1.0)
+    lacking = begun.lacking
+
+    def redundant(*several: str, others: str | None = None) -> Any:
+        after, _, left = lacking(*several, others=others)
+        return after, cast(Any, SimpleNamespace(held_relative=0.05 if len(several) == 1 else 0.3)), left
+
+    assert looked_at(replace(begun, lacking=redundant)).named == ["coulomb_friction"]
+
+
 def test_a_move_within_what_the_fits_are_uncertain_by_is_none() -> None:
     assert moved(final(1.0, 0.05), final(1.06, 0.05)) == {}
     assert moved(final(1.0, 0.01), final(1.06, 0.01)) == {"inertia": pytest.approx(6.0)}
