@@ -83,6 +83,7 @@ def a_decay() -> Identification:
     return identify(Recording((decay_run(LIGHT, 0.5, 30.0),)), Platform(0.0057, 0.002, 0.3), FEW)
 
 
+@pytest.mark.slow
 def test_without_torque_all_that_is_a_torque_is_scaled_by_the_declared_inertia() -> None:
     assert a_decay().verdict.effects == ("coulomb_friction",)
     text, model = written(a_decay(), Platform(0.0057, 0.002, 0.3))

@@ -74,6 +74,7 @@ def test_one_that_does_not_change_is_accepted() -> None:
     assert found.final.parameters["inertia"].value == pytest.approx(JC[0], rel=5e-3)
 
 
+@pytest.mark.slow
 def test_a_damping_that_falls_in_every_run_is_told_as_such() -> None:
     found = identified(0.0, 0.0, -0.4)
     assert found.disturbance is not None

@@ -64,6 +64,7 @@ def test_a_gyro_whose_scale_bends_makes_the_runs_differ_and_the_result_is_refuse
     assert any("at half and at twice the torque" in step for step in next_steps(found))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("bent", "differ"), [(4e-4, True), (0.0, False)])
 def test_in_torque_the_runs_differ_where_the_scale_bends_and_only_there(bent: float, differ: bool) -> None:
     traces = traces_of(Recording(runs_of(bent)))

@@ -22,7 +22,7 @@ from tests.identify.simulated import DECLARED, NOISE_RAD_S, TRUTH, traces_of
 
 PULSE_HZ = 3.7
 TONES_HZ = (0.6, 1.7, 4.3, 7.9)
-FINE = 8  # steps a sample
+FINE = 2  # steps a sample
 
 
 def run_with(depth: dict[str, float], number: int, duration_s: float = 8.0) -> Run:

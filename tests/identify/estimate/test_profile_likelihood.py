@@ -76,6 +76,7 @@ def in_motion(seed: int) -> list[Trace]:
     return out
 
 
+@pytest.mark.slow
 def test_runs_that_begin_in_motion_tell_as_little_and_say_so() -> None:
     off = []
     for seed in range(3):

@@ -78,6 +78,7 @@ def models_of(rival: str) -> tuple[Platform, Platform]:
     return found.final.platform, next(iter(found.verdict.rival_models.values()))[rival]
 
 
+@pytest.mark.slow
 @EACH_PAIR
 def test_a_pair_that_the_record_leaves_alike_gets_a_plan_within_a_minute_of_torque(rival: str) -> None:
     plan = plan_for(rival)

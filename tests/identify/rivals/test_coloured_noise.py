@@ -144,6 +144,7 @@ def test_two_runs_of_different_noise_have_no_colour_in_common() -> None:
     assert colour_of(found) is None
 
 
+@pytest.mark.slow
 def test_runs_under_one_and_the_same_sine_do_not_tell_noise_from_what_answers_to_it() -> None:
     b = passed(2, 100.0)
     runs = []

@@ -54,6 +54,7 @@ def found_in(runs: list[Run], settings: IdentifyConfig = SETTINGS, model: Platfo
     return identify(Recording(tuple(runs)), model or Platform(*TRUTH), settings)
 
 
+@pytest.mark.slow
 def test_a_torque_that_begins_with_the_runs_is_named() -> None:
     found = found_in([shaken(*one, seed=k, stands=False, lasts_s=4.0) for k, one in enumerate(SETS)])
     assert found.verdict.effects == ("periodic_disturbance",)

@@ -66,6 +66,7 @@ def test_the_share_that_somebody_asks_for_judges_and_never_a_runs_start(share: f
     assert f"identify.holdout: {share:g}" in found.note
 
 
+@pytest.mark.slow
 def test_a_disturbance_is_named_where_whole_runs_are_held_out_whose_phase_no_fit_knows() -> None:
     tone = [{"sine": 0.3 * np.cos(k), "cosine": 0.3 * np.sin(k), "frequency": 3.37} for k in range(3)]
     sets = ((67.0, 6.0), (111.0, 1.0), (104.0, 3.0))

@@ -51,6 +51,7 @@ def read_in_steps(effects: Effects, sets: Sequence[tuple[float, float]] = SETS[2
     return Recording(tuple(runs))
 
 
+@pytest.mark.slow
 def test_friction_that_holds_the_platform_beside_a_coarse_encoder_is_explained_to_the_noise() -> None:
     """Read where it stood still, the noise was a third of what the steps leave, and nothing came down to it."""
     settings = IdentifyConfig.model_validate({"candidates": ["coulomb_friction", "cubic_stiffness", "torque_delay"]})

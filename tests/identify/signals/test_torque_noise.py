@@ -47,6 +47,7 @@ def test_a_commanded_torque_is_known_and_stays_as_it_is() -> None:
     assert quieter(traces_of(Recording(held))) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("share", "offered"),
     [
