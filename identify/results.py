@@ -81,6 +81,9 @@ class ModelResult:
     platform: Platform | None = None
 
 
+TAKEN_BACK = "added, then no longer needed"  # status of a candidate that stood for a while
+
+
 @dataclass(frozen=True)
 class Candidate:
     """One effect that was tried on the model as it then stood."""

@@ -6,7 +6,7 @@ from identify.bounds.advice import DETERMINED_RELATIVE_ERROR
 from identify.conclude.acceptance import of_reported, opposite_signs
 from identify.conclude.next_steps import to_determine, torque_free
 from identify.residual import FROM_RUN_TO_RUN, Dependence, Disturbance
-from identify.results import NORMAL_95, Identification
+from identify.results import NORMAL_95, TAKEN_BACK, Identification
 from identify.runs.measured_channels import REFUSED
 from identify.runs.sign_convention import SENTENCE
 from identify.select.evidence import WEIGHT
@@ -102,6 +102,11 @@ def _decided_in_torque(found: Identification) -> bool:
 
 def _nothing_named(found: Identification) -> str:
     """Why no effect is named."""
+    back = list(dict.fromkeys(plain(c.effect) for c in found.verdict.candidates if c.status == TAKEN_BACK))
+    if back and (_decided_in_torque(found) or found.verdict.unexplained):
+        return (
+            f"{joined(back)} explained part of the residual, but not better than an arbitrary curve or fewer terms do."
+        )
     if _decided_in_torque(found):
         torque = "force" if found.axis == "linear" else "torque"
         return f"every candidate explains less than {100.0 * WEIGHT:.0f} % of the residual {torque}."

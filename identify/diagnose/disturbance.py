@@ -55,8 +55,9 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
     follow = [*along_angle(regression), *between_runs(regression, fit)]
     found += [f for f in _depends(regression, fit, follow) if f[0].torque_rms > most]
     found += [f for f in _depends(regression, fit, repeating(regression)) if f[0].torque_rms > MOST_OF_IT * most]
-    if not found:  # asked last: it may follow, as a change over time, what an angle or a rate explains by itself
-        found = _depends(regression, fit, pulsating(regression, fit))
+    # What pulsates may follow, as a change over time, what an angle or a rate explains by itself, too.
+    most = max((f[0].torque_rms for f in found), default=0.0)
+    found += [f for f in _depends(regression, fit, pulsating(regression, fit)) if f[0].torque_rms > MOST_OF_IT * most]
     found.sort(key=lambda f: -f[0].torque_rms)
     found = [f for i, f in enumerate(found) if f[0].on not in [g[0].on for g in found[:i]]]
     moves = _moves(fit, [moved for _, moved in found])

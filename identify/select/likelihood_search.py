@@ -18,7 +18,7 @@ from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.propose.innovation_score import InnovationScores, Score
 from identify.propose.motion_scale import scale_at
-from identify.results import Candidate
+from identify.results import TAKEN_BACK, Candidate
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
 from identify.runs.reduced import reduced
@@ -224,7 +224,7 @@ def filtered_above(cutoff_hz: float, axis: str) -> str:
 
 def _status(name: str, added: Sequence[str], named: Sequence[str], fit: Fit | None) -> str:
     if name in added:
-        return "added" if name in named else "added, then no longer needed"
+        return "added" if name in named else TAKEN_BACK
     if fit is None:
         return "screened out"
     return "no better" if added else "too little evidence"

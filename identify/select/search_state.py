@@ -12,7 +12,7 @@ from identify.estimate.final_fit import FinalFit
 from identify.likelihood.fit import Fit
 from identify.model.parameter_fit import ParameterFit, reduced_chi_square
 from identify.model.parameters import Name
-from identify.results import Candidate, Dependence, Disturbance
+from identify.results import TAKEN_BACK, Candidate, Dependence, Disturbance
 from identify.select.disturbance_lines import lines_left
 from rig import effects
 from rig.arrays import Array
@@ -76,7 +76,7 @@ class Search:
         self.best, self.rivals, self.rival_models, self.dropped = self.base, {}, {}, []
         self.between_rivals = {}
 
-    def drop(self, without: ParameterFit, status: str = "added, then no longer needed") -> None:
+    def drop(self, without: ParameterFit, status: str = TAKEN_BACK) -> None:
         """Take back the effects that the final model does without; the report gives them this status."""
         self._take_back(without, lambda effect: status)
 

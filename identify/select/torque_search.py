@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.propose.torque_looks import candidate_torques
-from identify.results import Candidate
+from identify.results import TAKEN_BACK, Candidate
 from identify.runs.observability import one_more
 from identify.select.evidence import MAX_EFFECTS, STRONG_SUPPORT, WEIGHT
 from identify.select.search_state import Search
@@ -244,7 +244,7 @@ def _holds(simple: TorqueCandidate, rich: TorqueCandidate) -> bool:
 
 def _status(look: TorqueCandidate, chosen: TorqueCandidate | None, named: Sequence[str]) -> str:
     if chosen is not None and look.effect == chosen.effect:
-        return "added" if look.effect in named else "added, then no longer needed"
+        return "added" if look.effect in named else TAKEN_BACK
     if look.is_significant:
         return "carries less than what was added"
     if look.fall_sigmas >= FALL_SIGMAS and look.weight > 0.0:

@@ -10,7 +10,7 @@ from identify.conclude.conclusion import inseparable
 from identify.conclude.verdict import sentences_of
 from identify.model.structure import Structure
 from identify.residual import Dependence, Disturbance
-from identify.results import NotReported
+from identify.results import TAKEN_BACK, Candidate, NotReported
 from tests.identify.sample import estimate, sample
 
 FOUND, _ = sample(1.0)
@@ -76,6 +76,16 @@ def test_nothing_found_is_said_as_plainly_whether_the_floor_is_reached_or_not() 
         assert any(f"unexplained; it depends on {on}." in s for s in sentences_of(accepted))
     refused = replace(FOUND, verdict=lost, after=None, accepted=False)
     assert any("the plots show what it depends on" in s for s in sentences_of(refused))
+
+
+def test_of_what_was_found_and_taken_back_it_is_not_said_that_it_explains_little() -> None:
+    back = Candidate("cubic_stiffness", 1, -500.0, None, TAKEN_BACK)
+    empty = replace(FOUND.verdict, effects=(), unexplained=True, candidates=(back,))
+    said = sentences_of(replace(FOUND, verdict=empty, after=None))[0]
+    assert said == (
+        "No effect is named: cubic stiffness explained part of the residual, but not better than an arbitrary curve or "
+        "fewer terms do."
+    )
 
 
 def test_a_scale_that_was_found_is_said_with_what_it_means() -> None:

@@ -77,6 +77,17 @@ def test_what_pulsates_is_told_with_its_frequency(on: str, depth: float, what: s
     assert f"depends on the time, as if something changed the {what} at 3.7" in said
 
 
+def test_a_curve_over_the_angle_that_takes_a_quarter_of_it_does_not_hide_it() -> None:
+    traces = traces_of(Recording((run_with({"angle": 0.3}, 0),)))
+    regression = TorqueRegression(traces, split(traces, "auto"), 30.0, scale_of(traces, TRUTH, ()))
+    fit = regression.solve(Structure(), {})
+    wave, curve = disturbance_of(regression, fit, regression.noise_floor_nm(fit.values), "N*m").depends_on
+    assert (wave.on, wave.wave_on) == ("time", "angle")
+    assert wave.wave_hz == pytest.approx(PULSE_HZ, abs=0.07)
+    assert (curve.on, curve.wave_on) == ("angle", "")
+    assert curve.relative < 0.6 * wave.relative
+
+
 @pytest.mark.parametrize("runs", [1, 3])
 def test_noise_of_the_torque_does_not_pulsate(runs: int) -> None:
     clean = [run_with({}, i) for i in range(runs)]
