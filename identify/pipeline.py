@@ -237,15 +237,15 @@ class _Identifier:
         """The way for measured data: what the model lacks is told by the torque that it leaves."""
         self.say("the residual holds a torque that was not recorded, in addition to the sensor's noise")
         self.more_than_noise = True
-        step, most = search.stepwise, {t: getattr(self.settings.accept, f"{t}_percent") for t in TERMS}
+        step, axis = search.stepwise, self.recording.axis
+        most = {t: getattr(self.settings.accept, f"{t}_percent") for t in TERMS}
         found = search_in_torque(
             self.traces, self.split, self.structure, shapes, self.start, still_offered(step, self._allowed()),
-            UNITS[self.recording.axis]["torque"], self.say, Judged(step.best, found_there, curves_left(step, most)),
+            UNITS[axis]["torque"], self.say, Judged(step.best, found_there, curves_left(step, most)),
             step.trusted, step.weigher.regression, search.refutes,
-        )  # fmt: skip
-        found = found.with_lines(step.best, step.problem.torque_nm)
-        found = with_line_left_open(found, step, self.traces, self.split.everything, self.recording.axis, self.say)
-        found = with_stand_ins(found, self.traces, self.recording.axis, self.say)
+        ).with_lines(step.best, step.problem.torque_nm)  # fmt: skip
+        judged = partial(with_stand_ins, traces=self.traces, axis=axis, say=self.say)
+        found = with_line_left_open(found, step, self.traces, self.split.everything, axis, self.say, judged)
         found, note = with_own_low_pass(found, step, self.traces, self.split, self.say)
         self.left_out = (*self.left_out, note) if note else self.left_out
         return self._report(found.search, found.before, found.after, measured=found)

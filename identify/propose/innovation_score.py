@@ -19,6 +19,7 @@ from identify.likelihood.normal_equations import NORMAL_RCOND
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name, bounds_of, names_of
 from identify.propose.shape_grids import grid_of
+from identify.propose.starts import stable_part
 from identify.simulate.shots import RUNAWAY
 from rig import effects
 from rig.arrays import Array
@@ -165,7 +166,9 @@ class InnovationScores:
             if as_it_is > 0.5 * gain:  # where it does as well at its own size, that is a better place to begin
                 return Score(effect.name, max(gain, as_it_is), dict(there.pushes[0][0]), shape)
         moved = self.follow @ (there.along_base @ share)
-        return Score(effect.name, gain, {**self._followed(moved), **_start(effect, there.pushes, share)}, shape)
+        part = stable_part(self.fit, moved, self.problem.longest_s)
+        start = {**self._followed(part * moved), **_start(effect, there.pushes, part * share)}
+        return Score(effect.name, gain, start, shape)
 
     @RUNAWAY
     def _projected(self, effect: Effect, shape: tuple[float, ...]) -> _Projected | None:

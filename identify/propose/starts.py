@@ -10,6 +10,7 @@ from identify.likelihood.fit import Fit
 from identify.model.parameters import Name
 from identify.propose.torque_looks import CandidateTorque
 from rig import effects
+from rig.arrays import Array
 from rig.effects.base import Place, Scale
 
 OTHER_START = 1.5  # times the power in torque that a look leaves: a fit that leaves more is begun from there, too
@@ -21,6 +22,21 @@ def about_a_sample(name: str, scale: Scale, step_s: float) -> dict[Name, float]:
         (name, p.name): sorted(p.start(scale), key=lambda t: abs(np.log(t / step_s)))[0]
         for p in effects.get(name).parameters if p.start is not None
     }  # fmt: skip
+
+
+def stable_part(fit: Fit, moved: Array, longest_s: float) -> float:
+    """How much of a change of a model's gains leaves a platform that does not run away during a run.
+
+    Of two numbers that do nearly the same (a delay of the drive and a damping) one may go beyond zero by what the other
+    takes back. A prediction that rings up is no place to begin: no step leads down from there.
+    """
+    inertia = fit.values.get(("inertia",), 0.0)
+    least = {("damping",): -2.0 * inertia / longest_s, ("stiffness",): -inertia / longest_s**2}  # e-fold in a run
+    part = 1.0
+    for name, change in zip(fit.names, moved, strict=True):
+        if name in least and fit.values[name] + change < least[name] < fit.values[name]:
+            part = min(part, float((least[name] - fit.values[name]) / change))
+    return part
 
 
 def gain_of(fit: Fit, name: str) -> float:

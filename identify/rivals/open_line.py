@@ -22,24 +22,25 @@ from identify.signals.trace import Trace
 
 def with_line_left_open(
     found: Found, search: Stepwise, traces: Sequence[Trace], everything: Sequence[Any], axis: str,
-    say: Callable[[str], None],
+    say: Callable[[str], None], judged: Callable[[Found], Found],
 ) -> Found:  # fmt: skip
-    """The same without a periodic disturbance that may be a line of the gyro's own; unchanged where it is none.
+    """The same without a periodic disturbance that may be a line of the gyro's own, the other names ``judged``.
 
+    They are judged by what is left beside the line: that nobody knows where it comes from does not speak against them.
     An encoder has no line of its own, but the torque of a run may differ from the recorded one under any sensor.
     """
     line = standing_line(found.after, traces) if TONE in found.named else None
     gyro = all(t.channel == "rate" and t.beside is None for t in traces)
     if line is None or not (gyro or line.of_torque):
-        return found
+        return judged(found)
     where = "the recorded torque of one run" if line.of_torque else "the sensor itself"
     say(f"not named: {TONE}; the line may come from {where}")
     bare = search.without(search.best, TONE) if TONE in search.best.structure.effects else search.best
-    less = replace(found.without(TONE), disturbance=found.disturbance).with_lines(bare, search.problem.torque_nm)
+    less = replace(found.without(TONE), disturbance=found.disturbance)
     if less.named:
         less = replace(less, after=with_numbers_of(found.after, less.after, traces, everything))
     less.search.mark_undetermined(TONE, describe(line, axis, traces[0].channel), less.kept)
-    return less
+    return judged(less).with_lines(bare, search.problem.torque_nm)
 
 
 def with_numbers_of(richer: FinalFit, less: FinalFit, traces: Sequence[Trace], use: Sequence[Any]) -> FinalFit:

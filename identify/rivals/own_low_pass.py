@@ -84,6 +84,8 @@ def beside_own_low_pass(
     if not (less.cost - richer.cost) / inflated > _price(richer, less):
         return after, ""
     beside = as_final(problem, richer, traces, split.everything)
+    if any(after.is_significant(e) and not beside.is_significant(e) for e in after.structure.effects):
+        return after, ""  # what takes the place of an effect is no property of the gyro that was there all along
     return with_numbers_of(beside, after, traces, split.everything), _note(beside, (form, "time"))
 
 

@@ -179,7 +179,8 @@ class WrongSign(Check):
             "torque and rate have opposite signs: the platform returned more work than was put in "
             "(limits.motion_check)",
             missing, allowed, "J", time_s,
-            "Check bench.amplifier.invert and bench.gyroscope.invert, and the coupling of gyro and motor to the shaft.",
+            "Check bench.amplifier.invert and bench.gyroscope.invert, the coupling of gyro and motor to the shaft, and "
+            "whether the declared inertia and stiffness are right to within a factor of two.",
         )  # fmt: skip
 
 

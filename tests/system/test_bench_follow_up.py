@@ -18,12 +18,12 @@ pytestmark = [
 # What is looked at is the playing, not the finding: the first identification is made to doubt, and a plan is given.
 DOUBTING = """
 from dataclasses import replace
-import identify.follow_up
-import identify.loop
+import identify.follow_up.planner
+import identify.pipeline
 from commands.identify_run import main
 from identify.results import FollowUp, FollowUpPlan, Parting
 
-certain, pair = identify.loop.identify, ("coulomb_friction", "stribeck_friction")
+certain, pair = identify.pipeline.identify, ("coulomb_friction", "stribeck_friction")
 SET = {"kind": "sine", "torque_nm": 10.0, "frequency_hz": 4.0, "duration_s": 1.0, "name": "follow-up: 4 Hz"}
 EXCITATION = {"sample_rate_hz": 1000.0, "rest_s": 0.5, "scale_to_limits": True, "sets": [SET]}
 
@@ -40,7 +40,7 @@ def planned(found, *more):
     return FollowUp(FollowUpPlan(EXCITATION, (Parting(*pair, 99.0),), 1.0, "A sine parts them."))
 
 
-identify.loop.identify, identify.follow_up.plan_follow_up = doubting, planned
+identify.pipeline.identify, identify.follow_up.planner.plan_follow_up = doubting, planned
 main()
 """
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
@@ -33,7 +34,12 @@ LINE = SpectralLine(5.0, 0.1, 0.01)
 
 
 def left_open(
-    monkeypatch: pytest.MonkeyPatch, line: SpectralLine | None, beside: str | None, channel: str = "rate"
+    monkeypatch: pytest.MonkeyPatch,
+    line: SpectralLine | None,
+    beside: str | None,
+    channel: str = "rate",
+    judged: Callable[[Found], Found] = lambda found: found,
+    lines: Disturbance | None = None,
 ) -> tuple[Found, Found]:
     """What the search found with a tone, maybe beside something else, and the same with the line left open."""
     effects = (TONE,) if beside is None else (beside, TONE)
@@ -50,11 +56,13 @@ def left_open(
     search.candidates = [Candidate(name, 1, -100.0, None, "added") for name in effects]
     left = Disturbance(0.01, "N*m", 0.01)
     found = Found(search, final((), 1.3, 0.2), with_tone, left, (nothing, nothing), lacking, nothing)
-    monkeypatch.setattr(Found, "with_lines", lambda self, likeliest, torque_nm: self)
+    monkeypatch.setattr(
+        Found, "with_lines", lambda self, likeliest, torque_nm: replace(self, disturbance=lines or self.disturbance)
+    )
     best: Any = SimpleNamespace(structure=Structure())
     stepwise: Any = SimpleNamespace(best=best, problem=SimpleNamespace(torque_nm=1.0))
     traces: Any = [SimpleNamespace(channel=channel, beside=None)]
-    return found, with_line_left_open(found, stepwise, traces, [], "rotary", lambda text: None)
+    return found, with_line_left_open(found, stepwise, traces, [], "rotary", lambda text: None, judged)
 
 
 def test_the_numbers_of_the_others_are_those_beside_the_line(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -66,6 +74,20 @@ def test_the_numbers_of_the_others_are_those_beside_the_line(monkeypatch: pytest
     assert less.after.free_run == "simulated anew"  # type: ignore[comparison-overlap]
     assert less.disturbance.torque_rms == 0.01
     assert less.search.left_open == "left open."
+
+
+def test_what_stands_at_the_line_does_not_speak_against_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are judged by what is left beside the line; that it stands there is told afterwards."""
+    at: list[Disturbance] = []
+
+    def judged(found: Found) -> Found:
+        at.append(found.disturbance)
+        return found
+
+    lines = Disturbance(0.3, "N*m", 0.3)
+    _, less = left_open(monkeypatch, LINE, "coulomb_friction", judged=judged, lines=lines)
+    assert [d.torque_rms for d in at] == [0.01]
+    assert less.disturbance is lines
 
 
 def test_a_line_alone_leaves_the_declared_model(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -64,6 +64,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     monkeypatch.setattr(own_low_pass, "inflation", lambda *_: 2.0)
     monkeypatch.setattr(own_low_pass, "as_final", lambda problem, fit, traces, use: final(fit))
     monkeypatch.setattr(open_line, "free_run_of", lambda *_: None)
+    monkeypatch.setattr(FinalFit, "is_significant", lambda self, effect: True)
     return seen
 
 
@@ -87,6 +88,18 @@ def test_what_was_found_stays_and_has_the_numbers_beside_the_low_pass(asked: dic
     assert less.after.structure.effects == ("torque_delay",)
     assert less.after.values["inertia",] == 0.9
     assert "1.00 ms" in note and "too little to be named" in note
+
+
+def test_one_that_takes_the_place_of_an_effect_is_no_property_of_the_gyro(
+    asked: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside a play that innovations follow badly a low-pass of eight samples was likelier; the play had no size."""
+    monkeypatch.setattr(FinalFit, "is_significant", lambda self, effect: self.values["inertia",] == 1.0)
+    found = found_with(("torque_delay",))
+    less, note = asked_of(found)
+    assert asked["form"] == SECOND
+    assert less is found or less.after is found.after
+    assert note == ""
 
 
 def test_it_is_asked_beside_a_line_that_was_left_open(asked: dict[str, Any]) -> None:
