@@ -86,12 +86,15 @@ class Fit(ParameterFit):
         The runs with their start states and biases.
     reduced_chi_square
         Variance of the prediction over what it were without a torque disturbance: one at the noise of the sensor.
+    arrived
+        Whether no step leads down from here; not known of a fit that was only to be compared.
     """
 
     noise: Noise
     shots: tuple[Shots, ...]
     prediction: Prediction
     reduced_chi_square: float
+    arrived: bool = True
 
     @property
     def penalised(self) -> float:

@@ -164,7 +164,7 @@ class PredictionError:
                         break
                     descent = again
                 ran_away = not np.isfinite(descent.cost) and len(valleys) > 1
-                return None if ran_away else descent.found()
+                return None if ran_away else replace(descent.found(), arrived=against is None and left > 0)
 
         ends = self.workers.side_by_side([partial(down, smooth) for smooth in valleys])
         fits = [fit for fit in ends if fit is not None]

@@ -23,6 +23,7 @@ from rig import effects
 if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
 
+MOST_PASSES = 4  # of a fit that is kept and has not arrived: its noise may begin many decades off
 SERIES = 2  # effects of one kind, beside which a curve in their place is tried before a third is added
 
 
@@ -45,6 +46,7 @@ class Round:
 def add_effects(search: Stepwise) -> None:
     """Add effects to a search's best model as long as some are worth it."""
     trial: tuple[str, Fit] | None = None  # the effect on trial, and the model without it
+    search.best = _to_its_end(search, search.best)
     for number in range(len(search.settled) + len(search.rounds) + 1, MAX_EFFECTS + 1):
         now = search.best
         scores, tried = search.score_candidates(now)
@@ -63,10 +65,11 @@ def add_effects(search: Stepwise) -> None:
         if new is None:
             break
         search.say(f"added {joined([plain(name) for name in added])}: {how}")
+        best = _to_its_end(search, new.fit)
         if trial and trial[1] is now:
-            search.best = new.fit
+            search.best = best
             continue
-        search.best = search.backward_elimination(new.fit, [e for e in search.trials.added(new.fit) if e not in added])
+        search.best = search.backward_elimination(best, [e for e in search.trials.added(best) if e not in added])
         if trial and _carries_its_share(search, trial[0]):
             trial = None
     if trial:
@@ -90,6 +93,17 @@ def _arrived(search: Stepwise, now: Fit, tried: dict[str, Evidence]) -> dict[str
     ends = dict(zip(doubted, search.trials.all_further([tried[n].fit for n in doubted]), strict=True))
     moved = {n: fit for n, fit in ends.items() if fit.cost < tried[n].fit.cost - COST_TOLERANCE}
     return {**tried, **search.weigher.all(now, moved)} if moved else tried
+
+
+def _to_its_end(search: Stepwise, fit: Fit) -> Fit:
+    """A fit that has arrived: short of it, whatever is added next lets it go on, and passes for what was missing."""
+    for _ in range(MOST_PASSES):
+        if fit.arrived:
+            break
+        before, fit = fit, search.trials.further(fit)
+        if before.cost - fit.cost < COST_TOLERANCE:
+            break
+    return fit
 
 
 def _is_series(search: Stepwise, now: Fit, name: str) -> bool:

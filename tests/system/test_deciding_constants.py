@@ -45,6 +45,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "rivals/run_heterogeneity.py": "RUN_CHANGE_ROUNDS",
     "rivals/whole_runs.py": "WHOLE_RUN_STEPS TOLERANCE",
     "select/curve_rivals.py": "NEAR",
+    "select/forward_selection.py": "MOST_PASSES",
     "select/disturbance_lines.py": "FLOOR_BINS LOWEST_BIN MIN_LINE_SAMPLES",
     "select/evidence.py": "ALONE",
     "select/field_search.py": "NO_WORSE",

@@ -18,7 +18,7 @@ class Waves:
     """A search that finds one more wave in every round."""
 
     def __init__(self) -> None:
-        self.best: Any = SimpleNamespace(structure=Structure())
+        self.best: Any = SimpleNamespace(structure=Structure(), arrived=True)
         self.rounds: list[Any] = []
         self.settled: list[str] = []  # no search came before this one
         self.trials = SimpleNamespace(added=lambda fit: list(fit.structure.effects), pairs=lambda now, scores: [])
@@ -29,7 +29,7 @@ class Waves:
         if found == len(WAVES):
             return [], {}
         name = WAVES[found]
-        fit = SimpleNamespace(structure=now.structure.plus(name))
+        fit = SimpleNamespace(structure=now.structure.plus(name), arrived=True)
         return [], {name: SimpleNamespace(effect=name, fit=fit, gain=100.0, weight=0.5, support=0.0)}
 
     def best_candidate(self, tried: dict[str, Any]) -> str | None:
