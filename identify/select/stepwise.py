@@ -176,9 +176,9 @@ class Stepwise:
 
     def without(self, now: Fit, name: str, steps: int = TRIAL_ITERATIONS) -> Fit:
         """The same without a term or an effect."""
-        return self.problem.fit(
-            now.structure.minus(name), now.without(name), now.noise, steps, carry=now.shots, thorough=False
-        )  # fmt: skip
+        start, less = now.without(name), now.structure.minus(name)
+        fit = self.problem.fit(less, start, now.noise, steps, carry=now.shots, thorough=False)
+        return fit if fit.arrived or not np.isfinite(fit.cost) else self.trials.further(fit)
 
     def all_without(self, now: Fit, names: Sequence[str]) -> list[Fit]:
         """The same without each of some terms or effects, side by side."""
