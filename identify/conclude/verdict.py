@@ -10,6 +10,7 @@ from identify.results import NORMAL_95, TAKEN_BACK, Identification
 from identify.runs.measured_channels import REFUSED
 from identify.runs.sign_convention import SENTENCE
 from identify.select.evidence import WEIGHT
+from identify.select.lags import FIRST_ORDER
 from identify.wording import (
     PULSATING,
     SYMBOLS,
@@ -51,6 +52,7 @@ def sentences_of(found: Identification, damping_said: bool = False) -> tuple[str
         )  # fmt: skip
     out += [found.verdict.left_open] if found.verdict.left_open else []
     out += _parameter_bias(found)
+    out += _exchangeable(found)
     if found.torque_scale is not None and "torque_scale" not in found.verdict.effects:
         scale = found.torque_scale
         off = abs(scale.value - 1.0) > NORMAL_95 * scale.std_error
@@ -157,6 +159,24 @@ def _parameter_bias(found: Identification) -> list[str]:
         if abs(100.0 * (ratio - 1.0)) >= MIN_SHOWN_PERCENT:
             moved.append(f"{title(name, found.axis)} is {off_by(ratio)}")
     return [f"{_change(found)}, {joined(moved)}."] if moved else []
+
+
+def _exchangeable(found: Identification) -> list[str]:
+    """That of two low-passes in a row nobody knows which is the platform, where nothing bends the motion."""
+    lags = [e for e in found.final.effect_parameters if e in FIRST_ORDER]
+    other = [e for e in found.final.effect_parameters if e not in lags and not effects.get(e).is_constant]
+    inertia, damping = (found.final.parameters.get(term) for term in ("inertia", "damping"))
+    if torque_free(found) or len(lags) != 1 or other or "stiffness" in found.final.parameters:
+        return []
+    if inertia is None or damping is None or min(inertia.value, damping.value) <= 0.0:
+        return []
+    late_s = found.final.effect_parameters[lags[0]]["time"].value
+    return [
+        f"Without a spring, platform and {plain(lags[0])} may have changed places: {title('inertia', found.axis)} of "
+        f"{number(damping.value * late_s, 3)} {unit(inertia.unit)} beside a lag of "
+        f"{number(1e3 * inertia.value / damping.value, 3)} ms fits as well. Reported is what is nearer to the declared "
+        "model."
+    ]
 
 
 def _change(found: Identification) -> str:

@@ -8,7 +8,9 @@ from rig import effects
 
 SAME_DELAY = 0.1  # relative difference of a lag of the gyro and a delay of the drive that are one in torque
 PASSIVE_SIGMAS = 3.0  # standard errors below zero, from which a damping is no chance
+INERTIA: Name = ("inertia",)
 DAMPING: Name = ("damping",)
+FIRST_ORDER = ("sensor_lag", "actuator_lag")  # low-passes as a platform without a spring is one
 
 
 class KnownDelays:
@@ -44,6 +46,22 @@ def drives(fit: Fit) -> bool:
     if DAMPING not in fit.names:
         return False
     return bool(fit.values[DAMPING] < -PASSIVE_SIGMAS * fit.std_error(DAMPING))
+
+
+def exchanged(fit: Fit) -> dict[Name, float] | None:
+    """The numbers of a model whose lag and platform have changed places; None where they cannot.
+
+    Without a spring a platform is a low-pass of first order, and so is a lag: of two in a row, no torque and rate tell
+    which has the time J / C and which the lag's.
+    """
+    lags = [e for e in fit.structure.effects if e in FIRST_ORDER]
+    if "stiffness" in fit.structure.terms or len(lags) != 1:
+        return None
+    time: Name = (lags[0], "time")
+    inertia, damping, late_s = (fit.values.get(n, 0.0) for n in (INERTIA, DAMPING, time))
+    if min(inertia, damping, late_s) <= 0.0:
+        return None
+    return {**fit.values, INERTIA: damping * late_s, time: inertia / damping}
 
 
 def _late_by(effect: str, fit: Fit) -> float:

@@ -25,7 +25,7 @@ from identify.runs.reduced import reduced
 from identify.select.curve_rivals import is_part_of
 from identify.select.evidence import STRONG_SUPPORT, EvidenceModel, support_difference
 from identify.select.forward_selection import Round, add_effects
-from identify.select.lags import drives
+from identify.select.lags import INERTIA, drives, exchanged
 from identify.select.search_state import Search
 from identify.select.stepwise import PREDICTS_TO_NOISE, Stepwise
 from identify.signals.torque_noise import quieter
@@ -61,6 +61,7 @@ class LikelihoodSearch:
     start: Start
     more: tuple[Sequence[Trace], Split] | None = None  # of the recording, than the search looks at
     earlier: tuple[Round, ...] = ()  # of a search that looked at less
+    declared_inertia: float = 0.0
 
     @classmethod
     def of(
@@ -92,7 +93,8 @@ class LikelihoodSearch:
             more = reduced(traces, split, BEYOND_SAMPLES)
         offered = [n for n in allowed if n not in structure.effects and can_show(n, traces)]
         weigher = _weigher(problem, few, parts, start, base)
-        return cls(Stepwise(problem, base, offered, weigher, say, whole, count), traces, structure, start, more)
+        stepwise = Stepwise(problem, base, offered, weigher, say, whole, count)
+        return cls(stepwise, traces, structure, start, more, declared_inertia=declared.get(INERTIA, 0.0))
 
     def run(self) -> bool:
         """Search; whether the last model predicts down to the sensor's noise."""
@@ -102,7 +104,20 @@ class LikelihoodSearch:
             if _shows_more(beyond.best, best) and _shows_more(there := beyond.concluded(), best):
                 release(less.problem.traces)
                 self.earlier, self.stepwise, best = tuple(less.rounds), beyond, there
-        return best.reduced_chi_square < PREDICTS_TO_NOISE
+        return self._nearer(best).reduced_chi_square < PREDICTS_TO_NOISE
+
+    def _nearer(self, best: Fit) -> Fit:
+        """The best model; with platform and lag exchanged where that is as likely and nearer to what was declared."""
+        values, declared = exchanged(best), self.declared_inertia
+        if values is None or declared <= 0.0:
+            return best
+        there, here = (abs(np.log(v[INERTIA] / declared)) for v in (values, best.values))
+        if there >= here:
+            return best
+        other = self.stepwise.problem.fit(best.structure, values, best.noise)
+        if np.isfinite(other.cost) and support_difference(other, best) < STRONG_SUPPORT:
+            self.stepwise.best = other
+        return self.stepwise.best
 
     def _beyond(self, traces: Sequence[Trace], parts: Split) -> Stepwise | None:
         """A search that goes on from the best model with more of the recording; None where that shows nothing else.

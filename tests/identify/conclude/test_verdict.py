@@ -109,6 +109,18 @@ def test_gravity_and_a_bent_spring_are_inseparable_in_small_swings_alone(travel_
     assert "actuator_lag / sensor_lag" in never
 
 
+def test_without_a_spring_a_lag_and_the_platform_may_have_changed_places() -> None:
+    numbers = {"inertia": estimate(4e-4, 1e-6), "damping": estimate(0.02, 1e-4, "N*m*s/rad")}
+    lag = {"sensor_lag": {"time": estimate(0.4, 1e-3, "s")}}
+    after = replace(FOUND.after, parameters=numbers, effect_parameters=lag)
+    (said,) = [s for s in sentences_of(replace(FOUND, after=after)) if "changed places" in s]
+    assert "rotary inertia J of 0.00800 kg·m² beside a lag of 20.0 ms fits as well" in said
+    bent = {**lag, "coulomb_friction": {"level": estimate(1.0, 0.01, "N*m")}}
+    spring = {**numbers, "stiffness": estimate(600.0, 1.0, "N*m/rad")}
+    for other in (replace(after, effect_parameters=bent), replace(after, parameters=spring)):
+        assert not any("changed places" in s for s in sentences_of(replace(FOUND, after=other)))
+
+
 def test_what_can_never_be_told_apart_is_said_with_the_reason() -> None:
     verdict = replace(FOUND.verdict, never_separable={"actuator_lag / sensor_lag": "they answer alike"})
     said = sentences_of(replace(FOUND, verdict=verdict))[-1]

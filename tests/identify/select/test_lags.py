@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from identify.model.structure import Structure
-from identify.select.lags import PASSIVE_SIGMAS, SAME_DELAY, KnownDelays, takes_damping
+from identify.select.lags import PASSIVE_SIGMAS, SAME_DELAY, KnownDelays, exchanged, takes_damping
+from identify.select.likelihood_search import LikelihoodSearch
 
 
 def fit(
@@ -46,3 +47,56 @@ def test_a_lag_that_takes_the_damping_below_zero(
     effect: str, parameter: str, before: float | None, after: float | None, taken: bool
 ) -> None:
     assert takes_damping(effect, fit(None, damping=before), fit(effect, parameter, 1e-3, after)) is taken
+
+
+NO_SPRING = Structure(terms=("inertia", "damping"), effects=("sensor_lag",))
+
+
+def lagging(inertia: float, time_s: float, cost: float = 0.0, structure: Structure = NO_SPRING) -> Any:
+    values = {("inertia",): inertia, ("damping",): 0.02, ("sensor_lag", "time"): time_s}
+    return SimpleNamespace(structure=structure, values=values, noise=None, cost=cost)
+
+
+def test_platform_and_lag_change_places_and_back() -> None:
+    """(J s + C)(t s + 1) has the same coefficients with J' = C t and t' = J / C."""
+    there = exchanged(lagging(4e-4, 0.4))
+    assert there is not None
+    inertia, late_s = there["inertia",], there["sensor_lag", "time"]
+    assert inertia * late_s == pytest.approx(4e-4 * 0.4)
+    assert inertia + 0.02 * late_s == pytest.approx(4e-4 + 0.02 * 0.4)
+    back = exchanged(lagging(inertia, late_s))
+    assert back is not None and back["inertia",] == pytest.approx(4e-4)
+
+
+def test_beside_a_spring_or_a_damping_that_drives_they_do_not() -> None:
+    assert exchanged(lagging(4e-4, 0.4, structure=Structure(effects=("sensor_lag",)))) is None
+    assert exchanged(lagging(-4e-4, 0.4)) is None
+    assert exchanged(fit("torque_delay", "delay", 0.4)) is None
+
+
+@pytest.mark.parametrize(
+    ("declared", "lead", "found"),
+    [
+        (5e-4, 0.0, 4e-4),
+        (6e-3, 0.0, 8e-3),
+        (5e-4, 50.0, 8e-3),
+        (0.0, 0.0, 8e-3),
+    ],  # as likely, nearer, likelier, unknown
+)
+def test_of_two_that_are_as_likely_the_one_nearer_to_what_was_declared_is_taken(
+    declared: float, lead: float, found: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """``lead``: of the one that the search has found (8e-3 beside 20 ms) over the other (4e-4 beside 0.4 s)."""
+    best = lagging(8e-3, 0.02)
+
+    def fitted(structure: Structure, start: Any, noise: Any) -> Any:
+        return lagging(start["inertia",], start["sensor_lag", "time"], cost=lead)
+
+    monkeypatch.setattr(
+        "identify.select.likelihood_search.support_difference", lambda one, other: one.cost - other.cost
+    )
+    stepwise: Any = SimpleNamespace(best=best, problem=SimpleNamespace(fit=fitted))
+    nothing: Any = None
+    search = LikelihoodSearch(stepwise, [], NO_SPRING, nothing, declared_inertia=declared)
+    assert search._nearer(best).values["inertia",] == pytest.approx(found)
+    assert stepwise.best.values["inertia",] == pytest.approx(found)
