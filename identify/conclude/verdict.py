@@ -162,7 +162,10 @@ def _parameter_bias(found: Identification) -> list[str]:
 
 
 def _exchangeable(found: Identification) -> list[str]:
-    """That of two low-passes in a row nobody knows which is the platform, where nothing bends the motion."""
+    """That of two low-passes in a row nobody knows which is the platform, where nothing bends the motion.
+
+    Said where the slower of the two is reported as the lag; the other way round is what anybody expects.
+    """
     lags = [e for e in found.final.effect_parameters if e in FIRST_ORDER]
     other = [e for e in found.final.effect_parameters if e not in lags and not effects.get(e).is_constant]
     inertia, damping = (found.final.parameters.get(term) for term in ("inertia", "damping"))
@@ -171,11 +174,12 @@ def _exchangeable(found: Identification) -> list[str]:
     if inertia is None or damping is None or min(inertia.value, damping.value) <= 0.0:
         return []
     late_s = found.final.effect_parameters[lags[0]]["time"].value
+    if late_s < inertia.value / damping.value:
+        return []
     return [
         f"Without a spring, platform and {plain(lags[0])} may have changed places: {title('inertia', found.axis)} of "
         f"{number(damping.value * late_s, 3)} {unit(inertia.unit)} beside a lag of "
-        f"{number(1e3 * inertia.value / damping.value, 3)} ms fits as well. Reported is what is nearer to the declared "
-        "model."
+        f"{number(1e3 * inertia.value / damping.value, 3)} ms fits as well. Only the declared inertia tells which."
     ]
 
 

@@ -40,6 +40,7 @@ MIN_MORE_SAMPLES_RATIO = 1.5  # times the samples: else there is nothing more to
 # Times the score that a candidate has on the samples of the search, for as many: more on all is not to be seen on those
 # (a torque that only a later resonance limits, a lag that a slow beginning hides). Set by hand.
 BEYOND_RATIO = 4.0
+DECLARED_WITHIN = 2.0  # factor that a declared inertia may be off by, as the check of the motion takes it
 EXCESS_SIGMAS = 3.0  # by which the innovations of all may be larger than those of a part by chance
 
 
@@ -107,12 +108,15 @@ class LikelihoodSearch:
         return self._nearer(best).reduced_chi_square < PREDICTS_TO_NOISE
 
     def _nearer(self, best: Fit) -> Fit:
-        """The best model; with platform and lag exchanged where that is as likely and nearer to what was declared."""
+        """The best model; with platform and lag exchanged where that is as likely and the declared inertia says so.
+
+        It says so where it is right to a factor of two of the one and not of the other: it may be a default.
+        """
         values, declared = exchanged(best), self.declared_inertia
         if values is None or declared <= 0.0:
             return best
         there, here = (abs(np.log(v[INERTIA] / declared)) for v in (values, best.values))
-        if there >= here:
+        if not there < np.log(DECLARED_WITHIN) < here:
             return best
         other = self.stepwise.problem.fit(best.structure, values, best.noise)
         if np.isfinite(other.cost) and support_difference(other, best) < STRONG_SUPPORT:

@@ -50,7 +50,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "select/evidence.py": "ALONE",
     "select/field_search.py": "NO_WORSE",
     "select/free_form_residual.py": "MIN_CURVE_SCORE CURVE_STEPS CURVES_TRIED",
-    "select/likelihood_search.py": "RIVAL_SAMPLES BEYOND_SAMPLES MIN_MORE_SAMPLES_RATIO SAMPLES",
+    "select/likelihood_search.py": "RIVAL_SAMPLES BEYOND_SAMPLES DECLARED_WITHIN MIN_MORE_SAMPLES_RATIO SAMPLES",
     "select/search_state.py": "ANOTHER",
     "select/stepwise.py": "MIN_RIVAL_SHARE PROMISING",
     "select/torque_search.py": "POLISHED RIVAL WORTH_EVIDENCE",

@@ -116,8 +116,14 @@ def test_without_a_spring_a_lag_and_the_platform_may_have_changed_places() -> No
     (said,) = [s for s in sentences_of(replace(FOUND, after=after)) if "changed places" in s]
     assert "rotary inertia J of 0.00800 kg·m² beside a lag of 20.0 ms fits as well" in said
     bent = {**lag, "coulomb_friction": {"level": estimate(1.0, 0.01, "N*m")}}
+    short = {"sensor_lag": {"time": estimate(4e-4, 1e-6, "s")}}
     spring = {**numbers, "stiffness": estimate(600.0, 1.0, "N*m/rad")}
-    for other in (replace(after, effect_parameters=bent), replace(after, parameters=spring)):
+    others = (
+        replace(after, effect_parameters=bent),
+        replace(after, effect_parameters=short),
+        replace(after, parameters=spring),
+    )
+    for other in others:
         assert not any("changed places" in s for s in sentences_of(replace(FOUND, after=other)))
 
 

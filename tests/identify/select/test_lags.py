@@ -83,10 +83,13 @@ def test_beside_a_spring_or_a_damping_that_drives_they_do_not() -> None:
         (0.0, 0.0, 8e-3),
     ],  # as likely, nearer, likelier, unknown
 )
-def test_of_two_that_are_as_likely_the_one_nearer_to_what_was_declared_is_taken(
+def test_of_two_that_are_as_likely_the_one_that_was_declared_is_taken(
     declared: float, lead: float, found: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """``lead``: of the one that the search has found (8e-3 beside 20 ms) over the other (4e-4 beside 0.4 s)."""
+    """A declared inertia far from both may be a default and says nothing.
+
+    ``lead``: of the one that the search has found (8e-3 beside 20 ms) over the other (4e-4 beside 0.4 s).
+    """
     best = lagging(8e-3, 0.02)
 
     def fitted(structure: Structure, start: Any, noise: Any) -> Any:
