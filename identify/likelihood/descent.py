@@ -290,10 +290,10 @@ class Descent:
             + (inertia + s.added) * np.sum(q.gains.gain[:, :, RATE] * q.innovations, axis=1) / s.trace.step_s
             for q, s in zip(self.looks, self.shots, strict=True)
         ]  # fmt: skip
-        first, spread = [q.innovations[:, 0] for q in self.looks], [q.variance[:, 0] for q in self.looks]
+        wrong, spread = [q.innovations for q in self.looks], [q.variance for q in self.looks]
         variance = max(self._squares(self.looks) / max(self.count, 1), self.looks[0].floor)
         costs = [np.sum(q.innovations**2 / (v := q.variance * variance) + np.log(v), axis=1) for q in self.looks]
         return Fit(
             self.structure, self.names, self.x, self.count, variance, self.cost, self.information, self.noise,
-            tuple(self.shots), Prediction(first, spread, costs, disturbance), self.reduced_chi_square(),
+            tuple(self.shots), Prediction(wrong, spread, costs, disturbance), self.reduced_chi_square(),
         )  # fmt: skip

@@ -56,9 +56,9 @@ class Prediction:
     Attributes
     ----------
     innovations
-        Measured minus predicted, in units of the reading, (n,) each; where two are read, of the first.
+        Measured minus predicted, in units of the reading, (n, m) each of m readings.
     variance
-        Of the innovations, over the variance of one reading's noise, (n,) each.
+        Of the innovations, over the variance of one reading's noise, (n, m) each.
     costs
         What each sample adds to minus twice the log-likelihood, all its readings together, (n,) each.
     disturbance_nm

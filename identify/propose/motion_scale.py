@@ -22,7 +22,7 @@ def scale_at(problem: PredictionError, fit: Fit) -> Scale:
     values, traces = fit.values, problem.traces
     inertia, damping, stiffness = (values.get((t,), 0.0) for t in TERMS)
     natural_hz = float(np.sqrt(max(stiffness, 0.0) / max(inertia, 1e-300)) / (2.0 * np.pi))
-    left = fit.prediction.innovations
+    left = [e[:, 0] for e in fit.prediction.innovations]
     noise = float(np.sqrt(fit.variance * problem.reading_variance))
     noise = float(np.sqrt(np.mean([np.mean(r[t.keep] ** 2) for r, t in zip(left, traces, strict=True)]))) or noise
     lines = foreign_lines_hz(traces, left, noise, natural_hz)

@@ -53,9 +53,11 @@ def without_drift(traces: Sequence[Trace], cutoff_hz: float) -> list[Trace]:
         return list(traces)
     least = np.inf
     best: list[Array] = []
-    for degree in DRIFT_DEGREES:
-        for r in runs:
-            r.begin([min(degree, int((b - a) * r.step_s * own_hz / PERIODS_A_DEGREE)) for a, b in r.spans])
+    most = [[int((b - a) * r.step_s * own_hz / PERIODS_A_DEGREE) for a, b in r.spans] for r in runs]
+    capped = {tuple(tuple(min(degree, n) for n in run) for run in most): None for degree in DRIFT_DEGREES}
+    for degrees in capped:
+        for r, own in zip(runs, degrees, strict=True):
+            r.begin(own)
         held = _follow(runs)
         if held < WORTH_IT * least and all(map(_may_be_bias, runs)):
             least, best = held, [_over(t, r) for t, r in zip(traces, runs, strict=True)]

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from identify.bounds.separation import support_difference
 from identify.likelihood.fit import Fit
 from identify.propose.free_forms import fitted, ranges
 from identify.propose.innovation_score import InnovationScores
 from identify.runs.observability import is_seen_to_repeat
-from identify.select.evidence import STRONG_SUPPORT, support_difference
+from identify.select.evidence import STRONG_SUPPORT
 from identify.select.free_form_residual import CURVE_STEPS, ON
 from identify.select.trial_fits import COMPARABLE, TRIAL_ITERATIONS
 from identify.wording import joined, plain

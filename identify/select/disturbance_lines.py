@@ -66,7 +66,7 @@ def _spectra(fit: Fit) -> Iterator[tuple[Array, Array]]:
     for innovations, variance, torque, shots in zip(
         p.innovations, p.variance, p.disturbance_nm, fit.shots, strict=True
     ):
-        scaled = innovations / np.sqrt(variance)
+        scaled = innovations[:, 0] / np.sqrt(variance[:, 0])
         for first, last in _stretches(shots.weight):
             if last - first >= MIN_LINE_SAMPLES:
                 yield _power(scaled[first:last]), _power(torque[first:last])

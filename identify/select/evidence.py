@@ -17,9 +17,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.stats import chi2, rankdata
+from scipy.stats import chi2
 
 from identify.bounds.cramer_rao import DELAY
+from identify.bounds.separation import EVIDENCE_BLOCKS
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.covariance import orthogonal_part
@@ -33,13 +34,13 @@ from rig.dynamics.gains import Noise
 from rig.effects.base import Place
 from rig.platform import TERMS
 
-EVIDENCE_BLOCKS = 30  # of all runs together, over which scores scatter: their ratio is then known to a quarter
 CHANCE = 0.95  # quantile of a ratio of variances: what chance alone reaches is no sign of a wrong likelihood
 MIN_RUNS = 4  # whose scores show whether runs differ
 ALONE = 1e-3  # of a parameter's influence, that the others leave: of less only rounding is seen
 ADDED_SUPPORT = 20.0  # support of an effect that is added: no chance among all candidates and their shapes makes it
 STRONG_SUPPORT = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
 WEIGHT = 0.20  # share of the disturbance that an effect takes away to be named: below, it is true but small
+PREDICTS_TO_NOISE = 1.1  # reduced chi-square: a model that predicts as closely leaves no disturbance to follow
 MAX_EFFECTS = 6  # that one recording is believed to show
 MAX_UNFOLLOWED_SHARE = 0.5  # of what a prediction errs by beyond the sensor's noise
 MAX_TRUSTED_INFLATION = 1.5  # inflation up to which what the likelihood takes the disturbance for is believed
@@ -156,41 +157,6 @@ class EvidenceModel:
     def in_torque(self, fit: Fit) -> TorqueFit:
         """A model along the measured motion, its gains fitted there."""
         return torque_fit_of(self.regression, fit)
-
-
-def support_difference(one: Fit, other: Fit) -> float:
-    """By how much another model on the same samples is likelier, as far as that can be believed; zero if it is not.
-
-    The smaller of two numbers: the fall of the penalised cost, and the square of the standard errors by which blocks of
-    the record agree on it. That asks nothing of either model but that blocks are alike. Their mean over its scatter
-    (Vuong 1989) is ruined by a single block in which one of them happens to fail, so the ranks of the differences are
-    taken (Wilcoxon 1945; of models: Clarke 2007). Blocks of a decay are not alike: the first ones tell nearly all.
-    """
-    fall = one.penalised - other.penalised
-    if fall <= 0.0:
-        return 0.0
-    if all(s.trace.torque is None for s in one.shots):
-        return fall
-    price = (one.penalised - one.cost) - (other.penalised - other.cost)
-    return min(fall, agreement(block_costs(one) - block_costs(other), price) ** 2)
-
-
-def agreement(falls: Array, price: float = 0.0) -> float:
-    """Standard errors by which blocks agree that they fall, by the sum of their signed ranks; zero if they do not.
-
-    ``price`` is what they have to pay together.
-    """
-    each = falls + price / len(falls)
-    ranks = rankdata(np.abs(each))
-    return max(float(np.sum(np.sign(each) * ranks) / np.linalg.norm(ranks)), 0.0)
-
-
-def block_costs(fit: Fit) -> Array:
-    """What blocks of the record add to the cost of a fit, (b,)."""
-    costs = fit.prediction.costs
-    each = max(1, round(EVIDENCE_BLOCKS / len(costs)))
-    parts = [np.array_split(cost[s.weight], each) for cost, s in zip(costs, fit.shots, strict=True)]
-    return np.array([float(np.sum(part)) for run in parts for part in run])
 
 
 def in_band(noise: Noise, cutoff_hz: float) -> float:

@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2
 
+from identify.bounds.separation import support_difference
 from identify.diagnose.terms.free_form import SHAPE_POINTS
 from identify.likelihood.fit import Fit
 from identify.model.parameters import Name
 from identify.propose.free_forms import fitted, scores, shaft_torque_of, states_of, torque_of
 from identify.results import Dependence
-from identify.select.evidence import STRONG_SUPPORT, WEIGHT, Evidence, likely_share, support_difference
+from identify.select.evidence import STRONG_SUPPORT, WEIGHT, Evidence, likely_share
 from rig import effects
 from rig.arrays import Array
 from rig.effects.base import Place

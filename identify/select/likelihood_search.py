@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identify.bounds.separation import support_difference
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.initial_guess import Start, scale_of
@@ -23,11 +24,11 @@ from identify.runs.holdout import Split
 from identify.runs.observability import can_show
 from identify.runs.reduced import reduced
 from identify.select.curve_rivals import is_part_of
-from identify.select.evidence import STRONG_SUPPORT, EvidenceModel, support_difference
+from identify.select.evidence import PREDICTS_TO_NOISE, STRONG_SUPPORT, EvidenceModel
 from identify.select.forward_selection import Round, add_effects
 from identify.select.lags import INERTIA, drives, exchanged
 from identify.select.search_state import Search
-from identify.select.stepwise import PREDICTS_TO_NOISE, Stepwise
+from identify.select.stepwise import Stepwise
 from identify.signals.torque_noise import quieter
 from identify.signals.trace import Trace, pooled_noise, release
 from rig.platform import TERMS
@@ -255,6 +256,6 @@ def _with_disturbance(fit: Fit, noise: float) -> Fit:
     A large disturbance that follows every reading leaves a fit no noise of the sensor to tell. Where the sensor's noise
     is known to be more than all that is predicted wrongly, nothing disturbs.
     """
-    wrong = np.concatenate([e[s.weight] for e, s in zip(fit.prediction.innovations, fit.shots, strict=True)])
+    wrong = np.concatenate([e[s.weight, 0] for e, s in zip(fit.prediction.innovations, fit.shots, strict=True)])
     rms = float(np.sqrt(np.mean(wrong**2)))
     return replace(fit, variance=rms**2 if rms < noise else max(fit.variance, noise**2) * fit.reduced_chi_square)

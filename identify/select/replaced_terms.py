@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from identify.bounds.separation import support_difference
 from identify.likelihood.fit import Fit
-from identify.select.evidence import STRONG_SUPPORT, WEIGHT, support_difference
+from identify.likelihood.prediction_error import PredictionError
+from identify.select.evidence import PREDICTS_TO_NOISE, STRONG_SUPPORT, WEIGHT
 from identify.select.preference import simplest
 from identify.select.trial_fits import FULL_ITERATIONS, TRIAL_ITERATIONS
 from identify.wording import plain
@@ -77,3 +79,18 @@ def _goes_with(search: Stepwise, term: str, now: Fit, instead: Fit) -> bool:
     structure = now.structure.plus(*(e for e in instead.structure.effects if e not in now.structure.effects))
     both = search.problem.fit(structure, start, instead.noise, TRIAL_ITERATIONS, carry=instead.shots, thorough=False)
     return support_difference(instead, both) > STRONG_SUPPORT
+
+
+def stiffness_may_absorb(problem: PredictionError, now: Fit) -> bool:
+    """Whether the spring is so weak that it may only soak up what is constant over a run, or pushes."""
+    pull = now.values.get(("stiffness",), 0.0) * problem.angle_rad
+    return now.reduced_chi_square > PREDICTS_TO_NOISE and pull < WEIGHT * problem.torque_nm
+
+
+def without_absorbing_stiffness(search: Stepwise, now: Fit) -> Fit:
+    """The same without a spring that only soaks up what is constant: gravity is a spring of its own."""
+    if "stiffness" not in now.structure.terms or not stiffness_may_absorb(search.problem, now):
+        return now
+    without = search.without(now, "stiffness")
+    evidence = search.weigher.evidence("stiffness", without, now)
+    return without if evidence.support < STRONG_SUPPORT or evidence.weight < WEIGHT else now

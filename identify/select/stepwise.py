@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from identify.bounds.between_models import model_spread
+from identify.bounds.separation import support_difference
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
@@ -27,19 +28,22 @@ from identify.select.evidence import (
     WEIGHT,
     Evidence,
     EvidenceModel,
-    support_difference,
 )
 from identify.select.forward_selection import Round, add_effects
 from identify.select.free_form_residual import FreeFormFit, fit_free_forms, redundant_given
 from identify.select.preference import no_possible_gain, prefers_special_case, simplest
-from identify.select.replaced_terms import NEEDED_TERM_SIGMAS, replace_linear_terms
+from identify.select.replaced_terms import (
+    NEEDED_TERM_SIGMAS,
+    replace_linear_terms,
+    stiffness_may_absorb,
+    without_absorbing_stiffness,
+)
 from identify.select.trial_fits import FULL_ITERATIONS, TRIAL_ITERATIONS, TrialFits
 from identify.wording import plain
 from rig import effects
 from rig.arrays import Array
 from rig.platform import TERMS
 
-PREDICTS_TO_NOISE = 1.1  # reduced chi-square: a model that predicts as closely leaves no disturbance
 PROMISING = 0.1  # of the score of what was added: another with less was no rival then and is not asked again
 MIN_RIVAL_SHARE = 0.1  # of what an effect explains: another that leaves more than that is no rival
 
@@ -159,7 +163,7 @@ class Stepwise:
             near = [n for n, f in others.items() if f.penalised - now.penalised < gap]
             fits: dict[str, Fit] = {name: now, **others}
             fits |= zip(near, self.trials.all_further([others[n] for n in near]), strict=True)
-            fits = {n: self._without_absorbing_stiffness(f) for n, f in fits.items()}
+            fits = {n: without_absorbing_stiffness(self, f) for n, f in fits.items()}
             fits = self.trials.no_worse_than_special_cases(rest, fits)
             now = min((f for f in (now, fits[name]) if f.structure == now.structure), key=lambda f: f.cost)
             seen = self.weigher.all(rest, fits)
@@ -253,46 +257,42 @@ class Stepwise:
         return self._on_all[key]
 
     def backward_elimination(self, now: Fit, names: Sequence[str]) -> Fit:
-        """Without every term or effect that the data do as well without."""
-        begun, doubted = now, [n for n in names if self._is_in_doubt(now, n)]
-        lacking = dict(zip(doubted, self.all_without(now, doubted), strict=True))
-        for name in names:
-            if len(now.structure.terms) + len(now.structure.effects) <= 1 or not self._is_in_doubt(now, name):
-                continue
-            without = lacking[name] if now is begun and name in lacking else self.without(now, name)
+        """Without every term or effect that the data do as well without, the least needed first.
+
+        Of two that stand for each other either is needless beside the other, and neither once the other has gone.
+        """
+        while len(now.structure.terms) + len(now.structure.effects) > 1:
+            have = [n for n in names if n in (*now.structure.terms, *now.structure.effects)]
+            seen = self._needless(now, [n for n in have if self._is_in_doubt(now, n)])
+            if not seen:
+                break
+            least, light = min(seen, key=lambda s: s[0].support)
+            why = f"the log-likelihood changes by {-0.5 * least.gain:+.2g} without it"
+            by_others = light and least.effect in TERMS
+            self.dropped.append((least.effect, "the other terms already explain its torque" if by_others else why))
+            self.say(f"dropped {plain(least.effect)}")
+            now = self._lacking[now.structure.minus(least.effect).parts]
+        return now
+
+    def _needless(self, now: Fit, doubted: Sequence[str]) -> list[tuple[Evidence, bool]]:
+        """What speaks for each of those that the data do as well without, and whether it carries little torque."""
+        found = []
+        for name, without in zip(doubted, self.all_without(now, doubted), strict=True):
             if not np.isfinite(without.cost):  # it runs away without
                 continue
             self._lacking[without.structure.parts] = without
             evidence = self.weigher.evidence(name, without, now)
-            soaks = name == "stiffness" and self._stiffness_may_absorb(now)
+            soaks = name == "stiffness" and stiffness_may_absorb(self.problem, now)
             light = evidence.weight < WEIGHT and (name not in TERMS or soaks)
-            if evidence.support > STRONG_SUPPORT and not light:
-                continue
-            why = f"the log-likelihood changes by {-0.5 * evidence.gain:+.2g} without it"
-            why = "the other terms already explain its torque" if light and name in TERMS else why
-            self.dropped.append((name, why))
-            self.say(f"dropped {plain(name)}")
-            now = without
-        return now
-
-    def _stiffness_may_absorb(self, now: Fit) -> bool:
-        """Whether the spring is so weak that it may only soak up what is constant over a run, or pushes."""
-        pull = now.values.get(("stiffness",), 0.0) * self.problem.angle_rad
-        return now.reduced_chi_square > PREDICTS_TO_NOISE and pull < WEIGHT * self.problem.torque_nm
-
-    def _without_absorbing_stiffness(self, now: Fit) -> Fit:
-        """The same without a spring that only soaks up what is constant: gravity is a spring of its own."""
-        if "stiffness" not in now.structure.terms or not self._stiffness_may_absorb(now):
-            return now
-        without = self.without(now, "stiffness")
-        evidence = self.weigher.evidence("stiffness", without, now)
-        return without if evidence.support < STRONG_SUPPORT or evidence.weight < WEIGHT else now
+            if evidence.support <= STRONG_SUPPORT or light:
+                found.append((evidence, light))
+        return found
 
     def _is_in_doubt(self, now: Fit, name: str) -> bool:
         """Whether it is in doubt that a term or an effect is needed."""
         if name == "inertia":
             return False
-        if name == "stiffness" and self._stiffness_may_absorb(now):
+        if name == "stiffness" and stiffness_may_absorb(self.problem, now):
             return True
         if name in TERMS:
             return abs(now.values[(name,)]) < NEEDED_TERM_SIGMAS * now.std_error((name,))

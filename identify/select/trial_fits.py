@@ -22,7 +22,7 @@ from identify.propose.starts import OTHER_START, about_a_sample, as_special_case
 from identify.propose.torque_looks import CandidateTorque, candidate_torques
 from identify.runs.measured_channels import simplicity
 from identify.runs.observability import one_more, shows_a_period
-from identify.select.evidence import WEIGHT, EvidenceModel
+from identify.select.evidence import PREDICTS_TO_NOISE, WEIGHT, EvidenceModel
 from rig import effects
 from rig.effects.base import Place, Scale
 
@@ -37,7 +37,6 @@ TRIAL_ITERATIONS, FULL_ITERATIONS = 14, 25  # steps of a fit that is compared, a
 FULL_FIT_RATIO = 0.9  # of the best fall of the cost in a round: such a fit is taken to its end before it is judged
 BEHIND = 0.3  # of the best fall of the cost so far: what has less after a few steps is not followed
 COMPARABLE = 0.3  # of the score of an effect, that another or a curve has in its place: with less no rival
-FOLLOWS = 1.1  # reduced chi-square: where a prediction errs by less, no disturbance follows the readings
 FOLLOWS_LESS = 0.5  # of the excess beside which lags were tried: only then may one show that did not before
 
 
@@ -121,7 +120,7 @@ class TrialFits:
         follows the readings.
         """
         excess = now.reduced_chi_square - 1.0
-        if excess < FOLLOWS - 1.0 or excess > FOLLOWS_LESS * self._excess_with_lags:
+        if excess < PREDICTS_TO_NOISE - 1.0 or excess > FOLLOWS_LESS * self._excess_with_lags:
             return []
         lags = [n for n in (*now.structure.effects, *names) if effects.get(n).lag is not None]
         if set(lags) & set(now.structure.effects):
@@ -144,8 +143,10 @@ class TrialFits:
         return fits
 
     def largest_torques(self, now: Fit, names: Sequence[str]) -> list[CandidateTorque]:
-        """Candidates that carry much of the disturbance along the measured motion."""
+        """Candidates that carry much of the disturbance along the measured motion; none of what is the sensor's."""
         there = self.weigher.in_torque(now)
+        if there.held_nm <= self.weigher.floor_nm:
+            return []
         left = self.weigher.left(there)
         nested = {s for e in now.structure.effects for s in effects.get(e).nests}
         have = set(there.structure.effects)

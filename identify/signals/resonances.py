@@ -63,11 +63,22 @@ def _made(trace: Trace, hertz: Array) -> Array:
     platform = np.column_stack([acceleration, rate, angle, np.ones(len(rate))])
     basis = np.linalg.qr(np.where(trace.keep[:, None], platform, 0.0))[0]
     out = np.zeros((len(hertz), len(rate)))
-    for row, f in zip(out, hertz, strict=True):
-        warped = 2.0 / trace.step_s * np.tan(np.pi * f * trace.step_s)  # so that the peak stands at this frequency
-        damped = [2.0 * MODE_RATIO * warped, warped**2]
-        b, a = signal.bilinear(damped, [1.0, *damped], 1.0 / trace.step_s)
+    for row, (b, a) in zip(out, map(_resonator, hertz * trace.step_s), strict=True):
         row[:] = np.where(trace.keep, signal.lfilter(b, a, acceleration), 0.0)
     out -= (out @ basis) @ basis.T
     out[:, ~trace.keep] = 0.0
     return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300))
+
+
+def _resonator(cycles: float) -> tuple[Array, Array]:
+    """Numerator and denominator of the resonator that rings ``cycles`` times in a sample, (3,) each.
+
+    The bilinear transform of ``(d s + w^2) / (s^2 + d s + w^2)``; ``w`` is warped so that the peak stands there.
+    """
+    w = np.tan(np.pi * cycles)
+    d, square = 2.0 * MODE_RATIO * w, w * w
+    size = 1.0 + d + square
+    return (
+        np.array([d + square, 2.0 * square, square - d]) / size,
+        np.array([size, 2.0 * (square - 1.0), 1.0 - d + square]) / size,
+    )

@@ -15,10 +15,12 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "how-an-effect-is-named.md"
 PACKAGES = ("select", "likelihood", "propose", "rivals")
+ALSO = ("bounds/separation.py",)
 ORIGINS = ("derivation: ", "reference: ", "calibration run: ", "set by hand")
 # Judged by hand: these cost time, guard the arithmetic, or shape what is shown. None of them gives another name.
 DECIDE_NOTHING: Mapping[str, str] = {
-    "likelihood/by_prediction_error.py": "FINAL_FIT_ITERATIONS MAX_SAMPLES",
+    "bounds/separation.py": "ROUNDING",
+    "likelihood/by_prediction_error.py": "FINAL_FIT_ITERATIONS MAX_SAMPLES SHIFT_STEP UNIFORM_VARIANCE",
     "likelihood/derivatives.py": "GAIN_STEP MOTION_STEP NOISE_STEP RUNAWAY_SIGMAS",
     "likelihood/damped_step.py": "LEAST_DAMPING LEVENBERG_DAMPING MAX_STEP_TRIALS",
     "likelihood/descent.py": "COARSE_TOLERANCE DIFFERENCE_STEP EARLY_STEPS STALLED_STEPS",
@@ -54,7 +56,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "select/search_state.py": "ANOTHER",
     "select/stepwise.py": "MIN_RIVAL_SHARE PROMISING",
     "select/torque_search.py": "POLISHED RIVAL WORTH_EVIDENCE",
-    "select/trial_fits.py": "BEHIND COMPARABLE FAINT_SCORE FOLLOWS FOLLOWS_LESS FULL_FIT_RATIO "
+    "select/trial_fits.py": "BEHIND COMPARABLE FAINT_SCORE FOLLOWS_LESS FULL_FIT_RATIO "
     "FULL_ITERATIONS HEAVIEST MIN_TRIAL_SCORE PAIRS TRIAL_ITERATIONS TRIED",
 }
 
@@ -104,6 +106,7 @@ def constants_of(path: Path) -> dict[str, object]:
 @cache  # every row asks
 def in_the_code() -> dict[tuple[str, str], object]:
     paths = [path for package in PACKAGES for path in sorted((ROOT / "identify" / package).rglob("*.py"))]
+    paths += [ROOT / "identify" / name for name in ALSO]
     return {
         (path.relative_to(ROOT).as_posix(), name): value for path in paths for name, value in constants_of(path).items()
     }

@@ -55,7 +55,7 @@ def test_a_stretch_that_begins_while_the_low_pass_is_in_motion_tells_what_a_run_
     for name, value in true.items():
         assert abs(fit.values[name] - value) < 4.0 * fit.std_error(name), name
     assert fit.values[("damping",)] == pytest.approx(TRUTH[1], rel=1e-3)
-    early = fit.prediction.innovations[0] / np.sqrt(fit.prediction.variance[0] * fit.variance)
+    early = fit.prediction.innovations[0][:, 0] / np.sqrt(fit.prediction.variance[0][:, 0] * fit.variance)
     assert float(np.sqrt(np.mean(early[:20] ** 2))) < 1.5
 
 

@@ -8,11 +8,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from identify.bounds.separation import block_costs
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
 from identify.select import curve_rivals
 from identify.select.curve_rivals import against_curves, is_beaten, still_offered
-from identify.select.evidence import block_costs
 from identify.signals.prepare import one_noise, prepare
 from rig.dynamics import TorqueSignal, simulate
 from rig.platform import TERMS, Platform
