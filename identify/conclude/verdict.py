@@ -10,7 +10,6 @@ from identify.results import NORMAL_95, TAKEN_BACK, Identification
 from identify.runs.measured_channels import REFUSED
 from identify.runs.sign_convention import SENTENCE
 from identify.select.evidence import WEIGHT
-from identify.select.lags import FIRST_ORDER
 from identify.wording import (
     PULSATING,
     SYMBOLS,
@@ -166,7 +165,7 @@ def _exchangeable(found: Identification) -> list[str]:
 
     Said where the slower of the two is reported as the lag; the other way round is what anybody expects.
     """
-    lags = [e for e in found.final.effect_parameters if e in FIRST_ORDER]
+    lags = [e for e in found.final.effect_parameters if effects.get(e).is_first_order_lag]
     other = [e for e in found.final.effect_parameters if e not in lags and not effects.get(e).is_constant]
     inertia, damping = (found.final.parameters.get(term) for term in ("inertia", "damping"))
     if torque_free(found) or len(lags) != 1 or other or "stiffness" in found.final.parameters:

@@ -10,7 +10,6 @@ SAME_DELAY = 0.1  # relative difference of a lag of the gyro and a delay of the 
 PASSIVE_SIGMAS = 3.0  # standard errors below zero, from which a damping is no chance
 INERTIA: Name = ("inertia",)
 DAMPING: Name = ("damping",)
-FIRST_ORDER = ("sensor_lag", "actuator_lag")  # low-passes as a platform without a spring is one
 
 
 class KnownDelays:
@@ -54,10 +53,10 @@ def exchanged(fit: Fit) -> dict[Name, float] | None:
     Without a spring a platform is a low-pass of first order, and so is a lag: of two in a row, no torque and rate tell
     which has the time J / C and which the lag's.
     """
-    lags = [e for e in fit.structure.effects if e in FIRST_ORDER]
+    lags = [e for e in fit.structure.effects if effects.get(e).is_first_order_lag]
     if "stiffness" in fit.structure.terms or len(lags) != 1:
         return None
-    time: Name = (lags[0], "time")
+    time: Name = (lags[0], effects.get(lags[0]).parameters[0].name)
     inertia, damping, late_s = (fit.values.get(n, 0.0) for n in (INERTIA, DAMPING, time))
     if min(inertia, damping, late_s) <= 0.0:
         return None

@@ -44,5 +44,6 @@ EFFECT = Effect(
     inverse=_led,
     delay_s=lambda values: values[0],
     spreads=True,
+    is_first_order_lag=True,
     separated_by="from a delay: excite at higher frequencies",
 )

@@ -146,6 +146,7 @@ class Effect:
     kinks: Callable[[tuple[float, ...]], tuple[float, ...]] | None = None  # angles at which its torque bends
     bends_torque: bool = False  # a drive effect that makes a smooth torque non-smooth (corners)
     spreads: bool = False  # a drive effect with more memory than a delay: ahead of a bend it is another than behind it
+    is_first_order_lag: bool = False  # of one time: a low-pass as a platform without a spring is one
     may_push: bool = False  # can push away from rest itself: what is left to the stiffness is a spring
     leans_on: tuple[str, ...] = ()  # terms of the platform on which its torque depends (backlash: the stiffness)
     ordered: tuple[tuple[str, str], ...] = ()  # pairs of parameters of which the first is the smaller

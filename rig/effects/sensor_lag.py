@@ -27,6 +27,7 @@ EFFECT = Effect(
     kernel=lag,
     filter_states=remembers,
     lag=lambda values: (values[0], 0.0),
+    is_first_order_lag=True,
     never_separable={
         "actuator_lag": Alike(
             "a lag in the gyro and an equal one in the torque give the same response from torque to rate",
