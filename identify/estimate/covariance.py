@@ -30,12 +30,15 @@ def _inverse(information: Array) -> tuple[Array, tuple[bool, ...]]:
 
 def orthogonal_part(own: Array, values: Array) -> Array:
     """Columns (n, m) without what a run's own unknowns, (n, k), can follow."""
+    basis = own_basis(own)
+    return np.asarray(values - basis @ (basis.T @ values)) if basis.shape[1] else values
+
+
+def own_basis(own: Array) -> Array:
+    """Orthonormal columns that a run's own unknowns, (n, k), can follow: (n, k), fewer where one does nothing."""
     size: Array = np.linalg.norm(own, axis=0)
     nonzero = size > 0.0
-    if not np.any(nonzero):
-        return values
-    basis = np.linalg.qr(own[:, nonzero] / size[nonzero])[0]
-    return np.asarray(values - basis @ (basis.T @ values))
+    return np.asarray(np.linalg.qr(own[:, nonzero] / size[nonzero])[0]) if np.any(nonzero) else own[:, :0]
 
 
 def sandwich(parts: Sequence[tuple[Array, Array]], sigma: float) -> tuple[Array, Any]:

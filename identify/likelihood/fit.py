@@ -8,6 +8,7 @@ import numpy as np
 
 from identify.model.parameter_fit import MIN_EIGENVALUE_RATIO, ParameterFit
 from identify.model.parameters import Name, is_gain
+from identify.model.structure import Structure
 from identify.simulate.shots import Shots
 from rig import effects
 from rig.arrays import Array
@@ -117,3 +118,22 @@ class Fit(ParameterFit):
         inertia = there.get(("inertia",), 0.0)
         far = abs(new.get(("inertia",), inertia) - inertia) > MAX_LINEAR_INERTIA_CHANGE * inertia
         return there if far else there | new
+
+
+class KnownFits:
+    """The best fit of every structure to one set of runs: another model may have led to it from a better place."""
+
+    def __init__(self) -> None:
+        self._best: dict[tuple[frozenset[str], frozenset[str]], Fit] = {}
+
+    def of(self, structure: Structure) -> Fit | None:
+        """The best fit of a structure; None where it was not fitted."""
+        known = self._best.get(structure.parts)
+        return known if known is not None and structure.has_the_drive_of(known.structure) else None
+
+    def best(self, fit: Fit) -> Fit:
+        """The better one of a fit and of what is known of its structure, which is known from now on."""
+        known = self.of(fit.structure)
+        if known is None or fit.cost < known.cost:
+            self._best[fit.structure.parts] = known = fit
+        return known

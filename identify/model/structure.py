@@ -47,6 +47,11 @@ class Structure:
         matters = any((e.bends_torque and last.spreads) or (e.spreads and last.bends_torque) for e in others)
         return replace(self, effects=(self.effects[-1], *self.effects[:-1])) if matters else None
 
+    def has_the_drive_of(self, other: Structure) -> bool:
+        """Whether its drive has the same effects in the same order."""
+        mine, theirs = ([e for e in s.effects if effects.get(e).place is Place.DRIVE] for s in (self, other))
+        return mine == theirs
+
     def minus(self, name: str) -> Structure:
         """With one effect or term less."""
         return replace(

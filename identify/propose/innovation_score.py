@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.estimate.covariance import orthogonal_part
+from identify.estimate.covariance import own_basis
 from identify.likelihood.fit import MAX_LINEAR_INERTIA_CHANGE, Fit
 from identify.likelihood.normal_equations import NORMAL_RCOND
 from identify.likelihood.prediction_error import PredictionError
@@ -97,11 +97,11 @@ class InnovationScores:
         filtered = any(effects.get(e).lag is not None for e in fit.structure.effects)
         self.noise = fit.noise if filtered else problem.bounds.within(replace(fit.noise, ahead=0.0))
         parts = problem.columns_at(fit)
-        self.own = [p.own for p in parts]
+        self.own = [own_basis(p.own) for p in parts]
         self.base = [p.scaled for p in parts]
         self.variance = [p.variance for p in parts]
-        columns = np.concatenate([orthogonal_part(p.own, p.columns) for p in parts])
-        rest = np.concatenate([orthogonal_part(p.own, p.scaled[:, None])[:, 0] for p in parts])
+        columns = np.concatenate([p.columns - q @ (q.T @ p.columns) for p, q in zip(parts, self.own, strict=True)])
+        rest = np.concatenate([p.scaled - q @ (q.T @ p.scaled) for p, q in zip(parts, self.own, strict=True)])
         self.lost = not (np.all(np.isfinite(columns)) and np.all(np.isfinite(rest)))  # the model runs away
         if self.lost:
             return
@@ -112,6 +112,8 @@ class InnovationScores:
         self.follow = -(v[kept].T / s[kept]) / size[:, None]  # of the model's parameters, for what is projected out
         self.residual = rest - self.basis @ (self.basis.T @ rest)
         self.square = float(self.residual @ self.residual)
+        at = fit.structure, fit.names, fit.vector, self.noise
+        self.gains = [problem.gains_at(s, *at) for s in fit.shots]
 
     def pairs(self, singles: Sequence[Score]) -> list[tuple[Score, Score, float]]:
         """Two candidates at once, at the shapes of their single scores: the pairs that are worth more than twice what
@@ -244,22 +246,21 @@ class InnovationScores:
         own = {int(n[2]) for n in push if len(n) == 3}
         moved = list(self.base)
         spread = 0.0  # of the logarithms of the variance: a lag changes the gains, and what the prediction errs by
+        # A little of a torque does next to nothing to them.
+        changes_gains = effect.place is Place.SENSOR or effect.has_linear_states
         for i, s in enumerate(fit.shots):
             if own and s.number not in own:
                 continue
-            look = self.problem.look(s, structure, names, vector, self.noise)
+            gains = None if changes_gains else self.gains[i]
+            look = self.problem.look(s, structure, names, vector, self.noise, gains)
             variance = look.variance[s.weight].ravel()
             moved[i] = look.innovations[s.weight].ravel() / np.sqrt(variance)
             spread += float(np.sum(np.log(variance / self.variance[i])))
             if not np.all(np.isfinite(moved[i])):
                 return None
         level = np.exp(0.5 * spread / len(self.residual))  # the scale of all variances is free
-        return np.concatenate(
-            [
-                orthogonal_part(own, (b - level * m)[:, None])[:, 0]
-                for own, b, m in zip(self.own, self.base, moved, strict=True)
-            ]
-        )
+        changes = [b - level * m for b, m in zip(self.base, moved, strict=True)]
+        return np.concatenate([c - q @ (q.T @ c) for c, q in zip(changes, self.own, strict=True)])
 
 
 def _start(effect: Effect, pushes: Sequence[Push], share: Array) -> dict[Name, float]:

@@ -97,15 +97,18 @@ class EvidenceModel:
         self.problem, self.regression, self.floor_nm = problem, regression, floor_nm
         self._delays = KnownDelays()
 
-    def evidence(self, effect: str, now: Fit, new: Fit) -> Evidence:
-        """A model with more against the one without it; ``effect`` is the effect or term that is judged."""
+    def evidence(self, effect: str, now: Fit, new: Fit, in_doubt_for: bool = False) -> Evidence:
+        """A model with more against the one without it; ``effect`` is the effect or term that is judged.
+
+        Its weight is at least what can be believed of it; ``in_doubt_for`` it, at most what anything says of it.
+        """
         added = [n for n in new.names if n not in now.names]
         inflated = inflation(self.problem.columns_at(new, with_variance=True), new, added)
         torqueless = effect not in TERMS and effects.get(effect).place is Place.SENSOR
         if torqueless and (self.problem.both or not self.regression.by_gyro):
             weight = 1.0  # two sensors of one motion show by themselves which is late
         else:
-            weight = self.explained_share(now, new, inflated < MAX_TRUSTED_INFLATION, torqueless)
+            weight = self.explained_share(now, new, in_doubt_for or is_trusted(inflated), torqueless)
             weight = max(weight, self._delays.weight_of(effect, new)) if torqueless else weight
         if effect not in TERMS and takes_damping(effect, now, new):
             weight = 0.0
@@ -157,6 +160,11 @@ class EvidenceModel:
     def in_torque(self, fit: Fit) -> TorqueFit:
         """A model along the measured motion, its gains fitted there."""
         return torque_fit_of(self.regression, fit)
+
+
+def is_trusted(inflation: float) -> bool:
+    """Whether what the likelihood takes the disturbance for is believed."""
+    return inflation < MAX_TRUSTED_INFLATION
 
 
 def in_band(noise: Noise, cutoff_hz: float) -> float:

@@ -149,8 +149,8 @@ class LikelihoodSearch:
         out = replace(  # with lists of its own: what it takes back is not taken from the part's model
             less, problem=problem, base=base, weigher=_weigher(problem, traces, parts, self.start, base), whole=None,
             rounds=[], settled=frozenset(less.trials.added(best)), left=None, in_place=None, doubtful=[], _on_all={},
-            _lacking={}, rivals=dict(less.rivals), between_rivals=dict(less.between_rivals), dropped=list(less.dropped),
-            stood_for_curves=set(less.stood_for_curves), inflation=dict(less.inflation), _needed=dict(less._needed),
+            rivals=dict(less.rivals), between_rivals=dict(less.between_rivals), dropped=list(less.dropped),
+            stood_for_curves=set(less.stood_for_curves), inflation=dict(less.inflation), needed=dict(less.needed),
         )  # fmt: skip
         out.best = best
         return out

@@ -49,9 +49,9 @@ def prefers_special_case(special: Evidence, rich: Evidence) -> bool:
     return explains_most(special, rich) or as_heavy
 
 
-def explains_most(special: Evidence, rich: Evidence) -> bool:
-    """Whether most of the fall of the cost with an effect is that of its special case."""
-    return special.gain - special.price > SPECIAL * (rich.gain - rich.price)
+def explains_most(plain: Evidence, likelier: Evidence) -> bool:
+    """Whether one effect, a special case or a rival, makes most of the fall of the cost that a likelier one makes."""
+    return plain.gain - plain.price > SPECIAL * (likelier.gain - likelier.price)
 
 
 def leaves_less(search: TorqueSearch, best: TorqueFit, trial: TorqueFit, depends: bool) -> bool:

@@ -21,23 +21,11 @@ from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
 from identify.propose.innovation_score import Score
 from identify.select.curve_rivals import against_curves
-from identify.select.evidence import (
-    ADDED_SUPPORT,
-    MAX_TRUSTED_INFLATION,
-    STRONG_SUPPORT,
-    WEIGHT,
-    Evidence,
-    EvidenceModel,
-)
+from identify.select.evidence import ADDED_SUPPORT, STRONG_SUPPORT, WEIGHT, Evidence, EvidenceModel, is_trusted
 from identify.select.forward_selection import Round, add_effects
 from identify.select.free_form_residual import FreeFormFit, fit_free_forms, redundant_given
-from identify.select.preference import no_possible_gain, prefers_special_case, simplest
-from identify.select.replaced_terms import (
-    NEEDED_TERM_SIGMAS,
-    replace_linear_terms,
-    stiffness_may_absorb,
-    without_absorbing_stiffness,
-)
+from identify.select.needed_terms import is_in_doubt, is_light, replace_linear_terms, without_absorbing_stiffness
+from identify.select.preference import explains_most, no_possible_gain, prefers_special_case, simplest
 from identify.select.trial_fits import FULL_ITERATIONS, TRIAL_ITERATIONS, TrialFits
 from identify.wording import plain
 from rig import effects
@@ -87,8 +75,7 @@ class Stepwise:
     in_place: Fit | None = None  # the model with a curve in the place of names that it beat
     doubtful: list[FreeFormFit] = field(default_factory=list)  # curves beside the model that are hardly chance
     _on_all: dict[_Key, Fit] = field(default_factory=dict)
-    _lacking: dict[_Key, Fit] = field(default_factory=dict)  # fits with one effect less than one that was tried
-    _needed: dict[str, float] = field(default_factory=dict)  # support of an effect beside all others
+    needed: dict[str, float] = field(default_factory=dict)  # support of an effect beside all others
 
     def __post_init__(self) -> None:
         self.best = self.base
@@ -112,7 +99,7 @@ class Stepwise:
     def known(self, structure: Structure) -> Fit | None:
         """A structure as the search has fitted it, on the way or to ask what is needed; None where it has not."""
         on_the_way = [r.now for r in self.rounds if r.now.structure.parts == structure.parts]
-        return on_the_way[-1] if on_the_way else self._lacking.get(structure.parts)
+        return on_the_way[-1] if on_the_way else self.trials.known.of(structure)
 
     def compare_with_free_form(self, now: Fit) -> Fit:
         """Without names that explain nothing beside a curve over what is left."""
@@ -132,7 +119,7 @@ class Stepwise:
     @property
     def trusted(self) -> bool:
         """Whether the likelihood is right about every effect of its model, and so about the disturbance it leaves."""
-        return all(self.inflation.get(e, 1.0) < MAX_TRUSTED_INFLATION for e in self.trials.added(self.best))
+        return all(is_trusted(self.inflation.get(e, 1.0)) for e in self.trials.added(self.best))
 
     def score_candidates(self, now: Fit) -> tuple[list[Score], dict[str, Evidence]]:
         """All candidates' scores, and the evidence for the most promising, fitted."""
@@ -148,7 +135,8 @@ class Stepwise:
         special = [n for n in effects.get(best.effect).nests if n in good and prefers_special_case(good[n], best)]
         if special:
             best = max((good[n] for n in special), key=lambda e: e.support)
-        alike = [n for n, e in good.items() if e is best or support_difference(e.fit, best.fit) < STRONG_SUPPORT]
+        near = {n: e for n, e in good.items() if e is best or explains_most(e, best)}
+        alike = [n for n, e in near.items() if support_difference(e.fit, best.fit) < STRONG_SUPPORT]
         chosen = simplest(self.weigher, {n: good[n].fit for n in alike})
         lower = [n for n in effects.get(chosen).lower_order if n in good]
         return lower[0] if lower else chosen
@@ -167,7 +155,7 @@ class Stepwise:
             fits = self.trials.no_worse_than_special_cases(rest, fits)
             now = min((f for f in (now, fits[name]) if f.structure == now.structure), key=lambda f: f.cost)
             seen = self.weigher.all(rest, fits)
-            self._needed[name] = seen[name].support
+            self.needed[name] = seen[name].support
             chosen, alike = self._best_of(name, seen)
             self.inflation[chosen] = seen[chosen].inflation
             if chosen != name:
@@ -180,13 +168,19 @@ class Stepwise:
 
     def without(self, now: Fit, name: str, steps: int = TRIAL_ITERATIONS) -> Fit:
         """The same without a term or an effect."""
-        start, less = now.without(name), now.structure.minus(name)
-        fit = self.problem.fit(less, start, now.noise, steps, carry=now.shots, thorough=False)
-        return fit if fit.arrived or not np.isfinite(fit.cost) else self.trials.further(fit)
+        return self.all_without(now, [name], steps)[0]
 
-    def all_without(self, now: Fit, names: Sequence[str]) -> list[Fit]:
-        """The same without each of some terms or effects, side by side."""
-        return self.problem.workers.side_by_side([partial(self.without, now, name) for name in names])
+    def all_without(self, now: Fit, names: Sequence[str], steps: int = TRIAL_ITERATIONS) -> list[Fit]:
+        """The same without each of some terms or effects, side by side; what was fitted before is not fitted again."""
+        fits = self.problem.workers.side_by_side([partial(self._fitted_without, now, n, steps) for n in names])
+        return [self.trials.known.best(f) if np.isfinite(f.cost) else f for f in fits]
+
+    def _fitted_without(self, now: Fit, name: str, steps: int) -> Fit:
+        less = now.structure.minus(name)
+        fit = self.trials.known.of(less)
+        if fit is None:
+            fit = self.problem.fit(less, now.without(name), now.noise, steps, carry=now.shots, thorough=False)
+        return fit if fit.arrived or not np.isfinite(fit.cost) else self.trials.further(fit)
 
     def _others(self, now: Fit, name: str) -> tuple[Fit, dict[str, Fit]]:
         """A model without an effect, and with others in its place; from the round that added it, if that stands."""
@@ -198,7 +192,7 @@ class Stepwise:
                     if special not in tried or fit.cost < tried[special].cost:
                         tried[special] = fit
                 return r.now, tried
-        rest = self._lacking.get(without.parts) or self.without(now, name, FULL_ITERATIONS)
+        rest = self.without(now, name, FULL_ITERATIONS)
         return rest, self.trials.alternatives_to(now, rest, name, self._promising())
 
     def _promising(self) -> set[str]:
@@ -263,7 +257,7 @@ class Stepwise:
         """
         while len(now.structure.terms) + len(now.structure.effects) > 1:
             have = [n for n in names if n in (*now.structure.terms, *now.structure.effects)]
-            seen = self._needless(now, [n for n in have if self._is_in_doubt(now, n)])
+            seen = self._needless(now, [n for n in have if is_in_doubt(self, now, n)])
             if not seen:
                 break
             least, light = min(seen, key=lambda s: s[0].support)
@@ -271,7 +265,7 @@ class Stepwise:
             by_others = light and least.effect in TERMS
             self.dropped.append((least.effect, "the other terms already explain its torque" if by_others else why))
             self.say(f"dropped {plain(least.effect)}")
-            now = self._lacking[now.structure.minus(least.effect).parts]
+            now = self.without(now, least.effect)  # fitted to ask
         return now
 
     def _needless(self, now: Fit, doubted: Sequence[str]) -> list[tuple[Evidence, bool]]:
@@ -280,20 +274,9 @@ class Stepwise:
         for name, without in zip(doubted, self.all_without(now, doubted), strict=True):
             if not np.isfinite(without.cost):  # it runs away without
                 continue
-            self._lacking[without.structure.parts] = without
-            evidence = self.weigher.evidence(name, without, now)
-            soaks = name == "stiffness" and stiffness_may_absorb(self.problem, now)
-            light = evidence.weight < WEIGHT and (name not in TERMS or soaks)
+            # What was believed when it was added is not taken back because it cannot be proven beside the others.
+            evidence = self.weigher.evidence(name, without, now, in_doubt_for=name not in TERMS)
+            light = is_light(self, evidence, without, now)
             if evidence.support <= STRONG_SUPPORT or light:
                 found.append((evidence, light))
         return found
-
-    def _is_in_doubt(self, now: Fit, name: str) -> bool:
-        """Whether it is in doubt that a term or an effect is needed."""
-        if name == "inertia":
-            return False
-        if name == "stiffness" and stiffness_may_absorb(self.problem, now):
-            return True
-        if name in TERMS:
-            return abs(now.values[(name,)]) < NEEDED_TERM_SIGMAS * now.std_error((name,))
-        return self._needed.get(name, 0.0) < NEEDED_TERM_SIGMAS**2

@@ -6,13 +6,12 @@ Which of them are fitted only costs time; what is believed of them is decided el
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 
-from identify.likelihood.fit import Fit
+from identify.likelihood.fit import Fit, KnownFits
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
@@ -25,8 +24,6 @@ from identify.runs.observability import one_more, shows_a_period
 from identify.select.evidence import PREDICTS_TO_NOISE, WEIGHT, EvidenceModel
 from rig import effects
 from rig.effects.base import Place, Scale
-
-_Item = TypeVar("_Item")
 
 MIN_TRIAL_SCORE = 20.0  # of a score, parameters paid for: less would not be added when fitted
 TRIED = 4  # candidates of a round, by their scores, that are fitted
@@ -60,6 +57,7 @@ class TrialFits:
     declared: Structure
     allowed: Sequence[str]
     weigher: EvidenceModel
+    known: KnownFits = field(default_factory=KnownFits)
     _excess_with_lags: float = np.inf  # reduced chi-square above one, beside which lags were tried last
 
     def added(self, now: Fit) -> list[str]:
@@ -76,18 +74,21 @@ class TrialFits:
         more = one_more(have, now.values, self.problem.traces)
         return [n for n in (*self.allowed, *more) if n not in have]
 
-    def score_round(self, now: Fit) -> tuple[list[Score], dict[str, Fit]]:
-        """All candidates' scores on top of a model, and fits of the most promising."""
+    def score_round(self, now: Fit, asked: float = 0.0) -> tuple[list[Score], dict[str, Fit]]:
+        """All candidates' scores on top of a model, and fits of the most promising.
+
+        Of a candidate a fall of the cost may be ``asked``; one with a small part of that is not followed.
+        """
         names = self.names(now)
         looks = InnovationScores(self.problem, now, self.scale(now)).all(names)
         starts: dict[str, list[Mapping[Name, float] | CandidateTorque]] = {
-            v[0].effect: [v[0].start] for v in self.shortlist(now, looks)
+            v[0].effect: [v[0].start] for v in self.shortlist(now, looks) if v[0].gain >= COMPARABLE * asked
         }
         for name in self.unseen(now, names):
             starts.setdefault(name, []).append(about_a_sample(name, self.scale(now), self.problem.step_s))
         for look in self.largest_torques(now, names):
             starts.setdefault(look.effect, []).append(look)
-        fits = self.each_fitted(now, starts)
+        fits = self.each_fitted(now, starts, now.cost - BEHIND * asked if asked > 0.0 else np.inf)
         most = max((now.cost - f.cost for f in fits.values()), default=0.0)
         near = [n for n, f in fits.items() if now.cost - f.cost > FULL_FIT_RATIO * most]
         # A special case that is as good is taken in the place of what contains it.
@@ -129,17 +130,19 @@ class TrialFits:
         return lags
 
     def each_fitted(
-        self, now: Fit, starts: Mapping[str, Sequence[Mapping[Name, float] | CandidateTorque]]
+        self, now: Fit, starts: Mapping[str, Sequence[Mapping[Name, float] | CandidateTorque]], least: float = np.inf
     ) -> dict[str, Fit]:
         """Candidates fitted, two at a time; one that begins far behind the best so far is not followed."""
         fits: dict[str, Fit] = {}
-        workers, least = self.problem.workers, np.inf
-        for two in _batches(list(starts.items()), workers.AT_ONCE):
+        workers = self.problem.workers
+        tasks = list(starts.items())
+        for k in range(0, len(tasks), workers.AT_ONCE):
+            two = tasks[k : k + workers.AT_ONCE]
             found = workers.side_by_side([partial(self.fitted, now, name, begin, least) for name, begin in two])
             for (name, _), fit in zip(two, found, strict=True):
                 if fit is not None:
-                    fits[name] = fit
-                    least = min(least, now.cost - BEHIND * (now.cost - fit.cost))
+                    fits[name] = self.known.best(fit)
+                    least = min(least, now.cost - BEHIND * (now.cost - fits[name].cost))
         return fits
 
     def largest_torques(self, now: Fit, names: Sequence[str]) -> list[CandidateTorque]:
@@ -254,7 +257,8 @@ class TrialFits:
 
     def all_further(self, fits: Sequence[Fit]) -> list[Fit]:
         """Several fits with more steps, side by side."""
-        return self.problem.workers.side_by_side([partial(self.further, fit) for fit in fits])
+        found = self.problem.workers.side_by_side([partial(self.further, fit) for fit in fits])
+        return [self.known.best(fit) for fit in found]
 
     def special_cases(self, now: Fit, rest: Fit, name: str) -> dict[str, Fit]:
         """Fits with a special case of an effect in its place, from where the richer one stands.
@@ -291,7 +295,3 @@ class TrialFits:
             if found is not None and (other not in fits or found.cost < fits[other].cost):
                 fits[other] = found
         return {n: f for n, f in fits.items() if np.isfinite(f.cost)}
-
-
-def _batches(items: Sequence[_Item], size: int) -> list[Sequence[_Item]]:
-    return [items[k : k + size] for k in range(0, len(items), size)]

@@ -35,13 +35,13 @@ def search(supports: Supports, weight: float = 1.0) -> tuple[Stepwise, list[str]
     """A search over effects whose support is known, and the names that were asked for, in turn."""
     asked: list[str] = []
 
-    def evidence(name: str, less: Any, more: Any) -> Evidence:
+    def evidence(name: str, less: Any, more: Any, **_: bool) -> Evidence:
         asked.append(name)
         return Evidence(name, more, supports[frozenset(more.structure.effects)][name], 1.0, 0.0, weight)
 
     problem: Any = SimpleNamespace(angle_rad=1.0, torque_nm=1.0)
     out = Stepwise(problem, fit(Structure(JCK)), (), SimpleNamespace(evidence=evidence))  # type: ignore[arg-type]
-    out.all_without = lambda now, names: [fit(now.structure.minus(n)) for n in names]  # type: ignore[method-assign]
+    out.all_without = lambda now, names, steps=0: [fit(now.structure.minus(n)) for n in names]  # type: ignore[method-assign]
     return out, asked
 
 
@@ -57,7 +57,7 @@ def test_the_least_needed_goes_first_whatever_the_order(first: str) -> None:
 
 def test_what_is_not_in_doubt_is_not_asked() -> None:
     found, asked = search(SUPPORT)
-    found._needed = {"presliding_friction": 1e4, "quadratic_stiffness": 1e4}
+    found.needed = {"presliding_friction": 1e4, "quadratic_stiffness": 1e4}
     found.backward_elimination(fit(Structure(JCK, tuple(next(iter(SUPPORT))))), [*JCK, *next(iter(SUPPORT))])
     assert set(asked) == {"sensor_lag"}
 

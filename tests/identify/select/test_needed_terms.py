@@ -10,7 +10,7 @@ import pytest
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
-from identify.select.replaced_terms import _needless_beside
+from identify.select.needed_terms import _needless_beside
 from identify.signals.prepare import one_noise, prepare
 from tests.identify.simulated import sine_run
 

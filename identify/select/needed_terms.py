@@ -1,4 +1,4 @@
-"""An effect in place of damping or stiffness, where that is likelier: a drag is no viscous friction."""
+"""Whether a term or an effect is needed, and an effect in place of damping or stiffness where that is likelier."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ import numpy as np
 from identify.bounds.separation import support_difference
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
-from identify.select.evidence import PREDICTS_TO_NOISE, STRONG_SUPPORT, WEIGHT
+from identify.select.evidence import PREDICTS_TO_NOISE, STRONG_SUPPORT, WEIGHT, Evidence
+from identify.select.lags import takes_damping
 from identify.select.preference import simplest
 from identify.select.trial_fits import FULL_ITERATIONS, TRIAL_ITERATIONS
 from identify.wording import plain
+from rig import effects
+from rig.effects.base import Place
 from rig.platform import TERMS
 
 if TYPE_CHECKING:
@@ -31,7 +34,7 @@ def replace_linear_terms(search: Stepwise, now: Fit) -> Fit:
         if term not in now.structure.terms or abs(now.values[(term,)]) >= NEEDED_TERM_SIGMAS * now.std_error((term,)):
             continue
         rest = search.without(now, term)
-        fits = search.trials.score_round(rest)[1]
+        fits = search.trials.score_round(rest, rest.cost - now.cost)[1]
         fits = {
             n: f for n, f in fits.items()
             if len(f.names) <= len(now.names) and support_difference(now, f) > STRONG_SUPPORT
@@ -94,3 +97,28 @@ def without_absorbing_stiffness(search: Stepwise, now: Fit) -> Fit:
     without = search.without(now, "stiffness")
     evidence = search.weigher.evidence("stiffness", without, now)
     return without if evidence.support < STRONG_SUPPORT or evidence.weight < WEIGHT else now
+
+
+def is_in_doubt(search: Stepwise, now: Fit, name: str) -> bool:
+    """Whether it is in doubt that a term or an effect is needed."""
+    if name == "inertia":
+        return False
+    if name == "stiffness" and stiffness_may_absorb(search.problem, now):
+        return True
+    if name in TERMS:
+        return abs(now.values[(name,)]) < NEEDED_TERM_SIGMAS * now.std_error((name,))
+    return search.needed.get(name, 0.0) < NEEDED_TERM_SIGMAS**2
+
+
+def is_light(search: Stepwise, evidence: Evidence, without: Fit, now: Fit) -> bool:
+    """Whether a term or an effect carries too little torque.
+
+    A gyro's lag is asked when it is added: what was found since may hide it in torque, never in the likelihood.
+    """
+    name = evidence.effect
+    if name in TERMS:
+        soaks = name == "stiffness" and stiffness_may_absorb(search.problem, now)
+        return soaks and evidence.weight < WEIGHT
+    if effects.get(name).place is Place.SENSOR:
+        return takes_damping(name, without, now)
+    return evidence.weight < WEIGHT
