@@ -271,11 +271,12 @@ class Stepwise:
     def _needless(self, now: Fit, doubted: Sequence[str]) -> list[tuple[Evidence, bool]]:
         """What speaks for each of those that the data do as well without, and whether it carries little torque."""
         found = []
+        lags = any(effects.get(e).lag is not None for e in now.structure.effects)
         for name, without in zip(doubted, self.all_without(now, doubted), strict=True):
             if not np.isfinite(without.cost):  # it runs away without
                 continue
-            # What was believed when it was added is not taken back because it cannot be proven beside the others.
-            evidence = self.weigher.evidence(name, without, now, in_doubt_for=name not in TERMS)
+            # Beside a lag of the gyro a residual in torque hides what was believed when it was added.
+            evidence = self.weigher.evidence(name, without, now, in_doubt_for=lags and name not in TERMS)
             light = is_light(self, evidence, without, now)
             if evidence.support <= STRONG_SUPPORT or light:
                 found.append((evidence, light))
