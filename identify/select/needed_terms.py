@@ -113,12 +113,14 @@ def is_in_doubt(search: Stepwise, now: Fit, name: str) -> bool:
 def is_light(search: Stepwise, evidence: Evidence, without: Fit, now: Fit) -> bool:
     """Whether a term or an effect carries too little torque.
 
-    A gyro's lag is asked when it is added: what was found since may hide it in torque, never in the likelihood.
+    A lag or a delay is asked when it is added: what was found since, or the damping, may hide it in torque, and never
+    in the likelihood.
     """
     name = evidence.effect
     if name in TERMS:
         soaks = name == "stiffness" and stiffness_may_absorb(search.problem, now)
         return soaks and evidence.weight < WEIGHT
-    if effects.get(name).place is Place.SENSOR:
+    effect = effects.get(name)
+    if effect.place is Place.SENSOR or effect.delay_s is not None:
         return takes_damping(name, without, now)
     return evidence.weight < WEIGHT

@@ -73,14 +73,22 @@ def test_of_two_that_stand_for_each_other_one_stays() -> None:
 
 @pytest.mark.parametrize(
     ("name", "weight", "light"),
-    [("cogging", 0.1, True), ("cogging", 0.3, False), ("sensor_lag", 0.1, False), ("damping", 0.1, False)],
+    [
+        ("cogging", 0.1, True),
+        ("cogging", 0.3, False),
+        ("sensor_lag", 0.1, False),
+        ("torque_delay", 0.1, False),
+        ("damping", 0.1, False),
+    ],
 )
-def test_a_gyros_lag_is_not_asked_for_its_weight_again(name: str, weight: float, light: bool) -> None:
+def test_what_is_late_is_not_asked_for_its_weight_again(name: str, weight: float, light: bool) -> None:
     """A torque residual hid a lag beside a friction: worth 6,853 of the cost, it was dropped."""
     found, _ = search({})
-    values = {("sensor_lag", "time"): 1e-3}
+    values = {("sensor_lag", "time"): 1e-3, ("torque_delay", "delay"): 1e-3}
     less: Any = SimpleNamespace(structure=Structure(JCK), values={}, names=())
-    more: Any = SimpleNamespace(structure=Structure(JCK, ("sensor_lag",)), values=values, names=tuple(values))
+    more: Any = SimpleNamespace(
+        structure=Structure(JCK, ("sensor_lag", "torque_delay")), values=values, names=tuple(values)
+    )
     assert is_light(found, Evidence(name, more, 5e3, 1.0, 9.0, weight), less, more) is light
 
 
