@@ -157,10 +157,9 @@ class EvidenceModel:
         """Power of the held-out residual in torque, the sensor's part taken off."""
         return fit.power_above(self.floor_nm)
 
-    def is_the_sensors(self, fit: Fit, there: TorqueFit) -> bool:
-        """Whether a model, ``there`` in torque, leaves no more than the sensor's noise does, by either measure."""
-        power = in_band(fit.noise, self.regression.cutoff_hz) * fit.variance
-        return min(power, there.held_nm**2) <= self.floor_nm**2
+    def is_the_sensors(self, fit: Fit) -> bool:
+        """Whether a model leaves less of a disturbance in the band, by the likelihood, than the sensor makes there."""
+        return in_band(fit.noise, self.regression.cutoff_hz) * fit.variance <= self.floor_nm**2
 
     def in_torque(self, fit: Fit) -> TorqueFit:
         """A model along the measured motion, its gains fitted there."""

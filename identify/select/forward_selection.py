@@ -85,9 +85,11 @@ def _share_of_disturbance(new: Evidence, beside_others: bool) -> str:
 def _arrived(search: Stepwise, now: Fit, tried: dict[str, Evidence]) -> dict[str, Evidence]:
     """The same with candidates that are likelier but not believed followed to their minimum.
 
-    Short of it their scores scatter because they have not arrived, and that passes for a likelihood that is wrong.
+    Short of it their scores scatter because they have not arrived, and that passes for a likelihood that is wrong. One
+    that is less likely than the model it contains has not arrived either.
     """
-    doubted = [n for n, e in tried.items() if e.gain - e.price > ADDED_SUPPORT > e.support and e.weight > WEIGHT]
+    short = [n for n, e in tried.items() if e.gain < 0.0 or e.gain - e.price > ADDED_SUPPORT > e.support]
+    doubted = [n for n in short if tried[n].weight > WEIGHT]
     if not doubted:
         return tried
     ends = dict(zip(doubted, search.trials.all_further([tried[n].fit for n in doubted]), strict=True))

@@ -147,9 +147,9 @@ class TrialFits:
 
     def largest_torques(self, now: Fit, names: Sequence[str]) -> list[CandidateTorque]:
         """Candidates that carry much of the disturbance along the measured motion; none of what is the sensor's."""
-        there = self.weigher.in_torque(now)
-        if self.weigher.is_the_sensors(now, there):
+        if self.weigher.is_the_sensors(now):
             return []
+        there = self.weigher.in_torque(now)
         left = self.weigher.left(there)
         nested = {s for e in now.structure.effects for s in effects.get(e).nests}
         have = set(there.structure.effects)
