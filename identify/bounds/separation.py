@@ -24,7 +24,7 @@ def support_difference(one: Fit, other: Fit) -> float:
     fall = one.penalised - other.penalised
     if fall <= 0.0:
         return 0.0
-    if all(s.trace.torque is None for s in one.shots):
+    if all(s.trace.torque is None for s in one.shots) or not np.isfinite(fall):  # the one runs away
         return fall
     price = (one.penalised - one.cost) - (other.penalised - other.cost)
     return min(fall, agreement(block_costs(one) - block_costs(other), block_divergences(one, other), price) ** 2)

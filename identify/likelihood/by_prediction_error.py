@@ -19,7 +19,7 @@ from identify.estimate.own_delays import beside_own_delay, freed, have_own_delay
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameter_fit import MIN_EIGENVALUE_RATIO, ZERO_INFORMATION
-from identify.model.parameters import Name, names_of
+from identify.model.parameters import Name, bounds_of, names_of
 from identify.model.structure import Structure
 from identify.runs.reduced import thinned
 from identify.signals.trace import Trace
@@ -63,7 +63,8 @@ def as_final(problem: PredictionError, fit: Fit, traces: Sequence[Trace], everyt
     """The same as a final fit: the runs simulated freely, and what the likelihood knows of each number."""
     structure = fit.structure
     moved, spread = _beside_shift(problem, fit)
-    values = dict(zip(fit.names, (fit.vector + moved).tolist(), strict=True))
+    low, high = np.array([bounds_of(n, fit.names) for n in fit.names]).T
+    values = dict(zip(fit.names, np.clip(fit.vector + moved, low, high).tolist(), strict=True))
     held = free_run_of(traces, structure, values, everything)
     reported = [i for i, n in enumerate(fit.names) if n != ("inertia",) or not problem.torque_free]
     determined = tuple(bool(x > ZERO_INFORMATION) for x in np.diag(fit.information)[reported])

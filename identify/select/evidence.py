@@ -97,10 +97,10 @@ class EvidenceModel:
         self.problem, self.regression, self.floor_nm = problem, regression, floor_nm
         self._delays = KnownDelays()
 
-    def evidence(self, effect: str, now: Fit, new: Fit, in_doubt_for: bool = False) -> Evidence:
+    def evidence(self, effect: str, now: Fit, new: Fit, benefit_of_doubt: bool = False) -> Evidence:
         """A model with more against the one without it; ``effect`` is the effect or term that is judged.
 
-        Its weight is at least what can be believed of it; ``in_doubt_for`` it, at most what anything says of it.
+        With the ``benefit_of_doubt`` the likelihood's own share counts for its weight though it cannot be trusted.
         """
         added = [n for n in new.names if n not in now.names]
         inflated = inflation(self.problem.columns_at(new, with_variance=True), new, added)
@@ -108,7 +108,7 @@ class EvidenceModel:
         if torqueless and (self.problem.both or not self.regression.by_gyro):
             weight = 1.0  # two sensors of one motion show by themselves which is late
         else:
-            weight = self.explained_share(now, new, in_doubt_for or is_trusted(inflated), torqueless)
+            weight = self.explained_share(now, new, benefit_of_doubt or is_trusted(inflated), torqueless)
             weight = max(weight, self._delays.weight_of(effect, new)) if torqueless else weight
         if effect not in TERMS and takes_damping(effect, now, new):
             weight = 0.0

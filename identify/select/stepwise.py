@@ -276,7 +276,7 @@ class Stepwise:
             if not np.isfinite(without.cost):  # it runs away without
                 continue
             # Beside a lag of the gyro a residual in torque hides what was believed when it was added.
-            evidence = self.weigher.evidence(name, without, now, in_doubt_for=lags and name not in TERMS)
+            evidence = self.weigher.evidence(name, without, now, benefit_of_doubt=lags and name not in TERMS)
             light = is_light(self, evidence, without, now)
             if evidence.support <= STRONG_SUPPORT or light:
                 found.append((evidence, light))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -109,3 +111,9 @@ def test_predictions_lie_apart_where_the_models_differ(fits: dict[str, Fit]) -> 
 def test_one_run_that_shows_it_is_enough(fits: dict[str, Fit]) -> None:
     assert support_difference(fits["quadratic_stiffness"], fits["cubic_stiffness"]) > 10.0
     assert support_difference(fits["cubic_stiffness"], fits["quadratic_stiffness"]) == 0.0
+
+
+def test_a_model_that_runs_away_is_behind_any_other(fits: dict[str, Fit]) -> None:
+    astray = replace(fits["cubic_stiffness"], cost=np.inf)
+    assert support_difference(astray, fits[""]) == np.inf
+    assert support_difference(fits[""], astray) == 0.0

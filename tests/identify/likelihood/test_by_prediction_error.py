@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from identify.estimate.final_fit import FinalFit
+from identify.likelihood import by_prediction_error
 from identify.likelihood.by_prediction_error import _beside_shift, as_final, fitted_on_all
 from identify.model.structure import Structure
 from identify.signals.prepare import one_noise, prepare
@@ -97,3 +98,14 @@ def test_a_motion_that_tells_nothing_of_it_leaves_half_a_sample_open() -> None:
     _, spread = _beside_shift(problem, fit)
     late = JCK[2] - JCK[0] * (2.0 * np.pi * 0.8) ** 2  # what a delay of a second does to the damping at this tone
     assert np.sqrt(spread[1, 1]) == pytest.approx(abs(late) * STEP_S / np.sqrt(12.0), rel=0.3)
+
+
+def test_no_number_is_moved_out_of_its_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A friction that is nearly none would become negative, and no platform has that."""
+    traces = runs(0.0)
+    every = [t.keep for t in traces]
+    start = {**{(k,): v for k, v in zip(TERMS, JCK, strict=True)}, ("coulomb_friction", "level"): 1e-3}
+    problem, fit = fitted_on_all(traces, Structure().plus("coulomb_friction"), start, every)
+    far = np.where([n == ("coulomb_friction", "level") for n in fit.names], -1.0, 0.0)
+    monkeypatch.setattr(by_prediction_error, "_beside_shift", lambda *_: (far, np.zeros((len(far), len(far)))))
+    assert as_final(problem, fit, traces, every).values["coulomb_friction", "level"] == 0.0
