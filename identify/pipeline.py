@@ -206,7 +206,7 @@ class _Identifier:
         if not taken_back and (disturbed or fails_whiteness_test(after, self.structure.effects)):
             if not self.torque_free:
                 return in_torque()
-            self.say("no effect is named: three flexible effects still leave more than noise")
+            self.say("no effect is named: even with three effects that fit almost any curve, the residual is not white")
             search.reject_all()
             taken_back = True
         if taken_back:

@@ -19,8 +19,8 @@ from rig.errors import UsageError
 from rig.platform import Platform
 
 NOT_CONFIRMED = (  # the same whether it was asked, could not be, or is a replay: results are compared
-    "it was not played: identify.follow_up is ask, and the question was not answered with yes (without a terminal "
-    "it is not asked). To play it without the question, set identify.follow_up: auto (real torque also needs --yes)"
+    "it was not played: identify.follow_up is ask, and nobody answered the question with yes (it is asked on a "
+    "terminal only). To play it without the question, set identify.follow_up: auto (real torque also needs --yes)"
 )
 QUESTION = "Play this follow-up now? Type yes to play it: "
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 QUESTION = "Play the proof now? Type yes to play it: "
 NOT_CONFIRMED = (
-    "the proof was not played: identify.prove is ask, and the question was not answered with yes (without a terminal "
-    "it is not asked). To play it later: rig prove DIR"
+    "the proof was not played: identify.prove is ask, and nobody answered the question with yes (it is asked on a "
+    "terminal only). To play it later: rig prove DIR"
 )
 
 

@@ -144,4 +144,6 @@ class RemoteObjects:
         except SdoAbortedError as refusal:
             raise DeviceFault(f"{self.label} refuses the mapping of {what}: {refusal}") from None
         except SdoCommunicationError:
-            raise DeviceFault(f"{self.label} stopped answering while {what} was mapped") from None
+            raise DeviceFault(
+                f"{self.label} stopped answering while {what} was mapped: check its supply and the CAN cable"
+            ) from None

@@ -121,7 +121,10 @@ class Cia402(Amplifier):
         self._walk(link, self.settings.state_timeout_ms * 1e-3)
         shown = agreed.objects.read(cia402.MODE_DISPLAY, signed=True)
         if shown & 0xFF != agreed.plan.mode:
-            raise DeviceFault(f"{self.label} is in mode {shown} (0x6061) instead of {agreed.plan.mode_name}")
+            raise DeviceFault(
+                f"{self.label} is in mode {shown} (0x6061) instead of {agreed.plan.mode_name}: end what else commands "
+                "it (its own program, another master)"
+            )
         status.begin(link.clock())
         self._armed = True
 

@@ -63,7 +63,10 @@ class DriveStatus:
             raise DeviceFault(f"{self._label}: {self.new_emergency}")
         if self.state is not State.ENABLED:
             name = self.state.value if self.state else f"statusword 0x{self.statusword:04X}"
-            raise DeviceFault(f"{self._label} left 'operation enabled' by itself and is in '{name}'")
+            raise DeviceFault(
+                f"{self._label} left 'operation enabled' by itself and is in '{name}': look into its error history "
+                "(0x1003) and at its enable and emergency-stop inputs"
+            )
         if self._nmt_state is not None and self._nmt_state != NMT_OPERATIONAL:
             raise DeviceFault(
                 f"{self._label} left NMT state operational (now {self._nmt_state}): it was reset or lost its supply"

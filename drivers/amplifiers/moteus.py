@@ -213,10 +213,16 @@ class Moteus(Amplifier):
         if not self._armed:
             return
         if self.mode != MODE_POSITION:
-            why = {MODE_TIMEOUT: "its watchdog expired", MODE_FAULT: "it is in fault"}.get(self.mode or 0, "")
-            raise DeviceFault(f"{self.label} left position mode (mode {self.mode}) {why}".rstrip())
+            why = {
+                MODE_TIMEOUT: "its watchdog expired: check the CAN cable and the load of this computer",
+                MODE_FAULT: "it is in fault: read its fault register, remove the cause, then power-cycle it",
+            }.get(self.mode or 0, "something else commands it: disconnect other hosts")
+            raise DeviceFault(f"{self.label} left position mode (mode {self.mode}): {why}")
         if self._heard_s is not None and now_s - self._heard_s > SILENT_S:
-            raise DeviceFault(f"{self.label} is silent for {(now_s - self._heard_s) * 1e3:.0f} ms")
+            raise DeviceFault(
+                f"{self.label} is silent for {(now_s - self._heard_s) * 1e3:.0f} ms (limit {SILENT_S * 1e3:.0f} ms): "
+                "check its supply and the CAN cable"
+            )
 
     def off_frames(self) -> Sequence[CanFrame]:
         """Stop: the motor is free."""

@@ -166,9 +166,15 @@ class Odrive(Amplifier):
         if not self._armed or self._beat is None:
             return
         if self._beat.axis_error or self._beat.axis_state != wire.AXIS_CLOSED_LOOP:
-            raise DeviceFault(f"{self.label} left closed loop: {self._describe_state()}")
+            raise DeviceFault(
+                f"{self.label} left closed loop: {self._describe_state()}. Remove the cause, clear the errors in "
+                "odrivetool, then start again"
+            )
         if self._beat_at_s is not None and now_s - self._beat_at_s > 3 * HEARTBEAT_S:
-            raise DeviceFault(f"{self.label} is silent: no heartbeat for {(now_s - self._beat_at_s) * 1e3:.0f} ms")
+            raise DeviceFault(
+                f"{self.label} is silent: no heartbeat for {(now_s - self._beat_at_s) * 1e3:.0f} ms "
+                f"(limit {3 * HEARTBEAT_S * 1e3:.0f} ms): check its supply and the CAN cable"
+            )
 
     def off_frames(self) -> Sequence[CanFrame]:
         """Zero torque, then idle."""

@@ -156,7 +156,10 @@ class Vesc(Amplifier):
     def check(self, now_s: float) -> None:
         """Silence; a VESC reports no faults on CAN."""
         if self._armed and self._heard_s is not None and now_s - self._heard_s > SILENT_S:
-            raise DeviceFault(f"{self.label} is silent for {(now_s - self._heard_s) * 1e3:.0f} ms: check its supply")
+            raise DeviceFault(
+                f"{self.label} is silent for {(now_s - self._heard_s) * 1e3:.0f} ms (limit {SILENT_S * 1e3:.0f} ms): "
+                "check its supply and the CAN cable"
+            )
 
     def off_frames(self) -> Sequence[CanFrame]:
         """Zero current."""

@@ -169,7 +169,7 @@ def _figures(total: Information) -> str:
     p = len(total.names)
     condition = f"condition number {number(total.condition, 2)}; above {POOR_CONDITION:g} is poor"
     if weak(total):
-        figures = f"the data show {total.rank} of {p} combinations of the parameters ({condition})"
+        figures = f"the data determine {total.rank} of {p} independent combinations of the parameters ({condition})"
     else:
         figures = f"{f'all {p} parameters are' if p > 1 else 'the parameter is'} determined ({condition})"
     if p < 2:

@@ -115,7 +115,7 @@ def _sentence(
         return advice.cure(information) if whole else advice.of_weak_set(information, others)
     lost = [symbols[n] for n in expected if n not in achieved]
     if lost:
-        return f"the data would determine {joined(lost)} but for the unexplained residual: find its cause first"
+        return f"the data are enough for {joined(lost)}, but the unexplained residual is not: find its cause first"
     far = {
         n: achieved[n] / expected[n]
         for n in achieved

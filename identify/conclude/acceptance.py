@@ -16,7 +16,7 @@ from rig.platform import TERMS
 
 INTERRUPTED = "the search was interrupted"
 REJECTED_TOGETHER = (
-    "rejected: together the effects found still do not explain the data, and neither does the declared model"
+    "rejected: together the effects that were found leave too much of the residual, and so does the declared model"
 )
 INTERRUPTED_NOTE = (
     "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
@@ -59,8 +59,8 @@ def _against_negative_damping(final: ModelResult) -> list[str]:
     if damping is None or not damping.value < -PASSIVE_SIGMAS * damping.std_error:
         return []
     return [
-        f"damping C is negative ({number(damping.value, 3)} {damping.unit}), which no platform's is: the model takes "
-        "something else for damping, often a delay"
+        f"damping C is negative ({number(damping.value, 3)} {damping.unit}), and no passive platform's is: the model "
+        "takes something else for damping, often a delay between torque and rate"
     ]
 
 
@@ -69,9 +69,8 @@ def reasons_against_disturbance(left: Disturbance, accept: AcceptConfig, axis: s
     torque = "force" if axis == "linear" else "torque"
     if not left.depends_on:
         return [
-            f"without {plain(effect)} the fit would change {changes}, more than is allowed ({keys}), and what is held "
-            "out is explained as well: whether it is there has to be known before the parameters are; record more "
-            "where it shows"
+            f"without {plain(effect)} the fit would change {changes}, more than is allowed ({keys}), and held-out data "
+            "are explained as well without it: the parameters are known once it is known whether this effect is there"
             for effect, changes, keys in _beyond(left, accept)
         ]
     on = quantities_of(left.depends_on, axis)
@@ -91,8 +90,8 @@ def reasons_against_disturbance(left: Disturbance, accept: AcceptConfig, axis: s
                 f"{number(most, 2)} % is allowed (identify.accept.{name}_percent)"
             )
     out += [
-        f"{plain(effect)} would change {changes}, more than is allowed ({keys}), and how much of the {torque} that "
-        f"depends on the {on} belongs to that is not known"
+        f"{plain(effect)} would change {changes}, more than is allowed ({keys}), and the data do not tell how much of "
+        f"the {torque} that depends on the {on} is due to it"
         for effect, changes, keys in _beyond(left, accept)
     ]
     return out

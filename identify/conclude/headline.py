@@ -39,7 +39,7 @@ def _found(found: Identification) -> str:
         return sentence(capital(SENTENCE))
     named = [_with_first_number(found, name) for name in found.verdict.effects]
     if named:
-        more = ", and something that these data do not determine" if found.verdict.left_open else ""
+        more = ", and one more effect that these data do not determine" if found.verdict.left_open else ""
         return f"The declared model lacks {joined(named)}{more}."
     if found.verdict.left_open:
         return "Something is missing from the declared model, and these data do not determine what."

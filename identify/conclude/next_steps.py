@@ -48,8 +48,8 @@ RUN = {
 RUN["direction"] = RUN["rate"]
 BETWEEN_RUNS = (
     "J, C and K of the runs differ, and no effect here explains why: play the same frequency at half and at twice the "
-    "torque, and then once more as before. Where the numbers follow the travel, something is nonlinear (also a sensor "
-    "may be: compare its scale at small and large rates); where they do not return, the rig changes between runs."
+    "torque, and then once more as before. If the numbers follow the travel, the platform or a sensor is nonlinear "
+    "(compare a sensor's scale at small and large rates); if they do not return, the rig changed between the runs."
 )
 CHANGING = {
     "inertia": "a crank, a linkage, a load that shifts or a second axis that stands elsewhere",
@@ -234,8 +234,8 @@ def _changing(found: Identification) -> str:
         return ""
     position = "position" if found.axis == "linear" else "angle"
     return (
-        f"The {most.changes} changes with the {position}: look for {CHANGING[most.changes]}. Record runs about "
-        f"several {position}s with a small travel: J, C and K of each are those there."
+        f"The {most.changes} changes with the {position}: look for {CHANGING[most.changes]}. Record runs with a "
+        f"small travel about several {position}s: each gives J, C and K at its {position}."
     )
 
 

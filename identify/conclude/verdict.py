@@ -106,7 +106,8 @@ def _nothing_named(found: Identification) -> str:
     back = list(dict.fromkeys(plain(c.effect) for c in found.verdict.candidates if c.status == TAKEN_BACK))
     if back and (_decided_in_torque(found) or found.verdict.unexplained):
         return (
-            f"{joined(back)} explained part of the residual, but not better than an arbitrary curve or fewer terms do."
+            f"{joined(back)} explained part of the residual, but no better than an arbitrary curve or a model with "
+            "fewer terms."
         )
     if _decided_in_torque(found):
         torque = "force" if found.axis == "linear" else "torque"
@@ -176,9 +177,11 @@ def _exchangeable(found: Identification) -> list[str]:
     if late_s < inertia.value / damping.value:
         return []
     return [
-        f"Without a spring, platform and {plain(lags[0])} may have changed places: {title('inertia', found.axis)} of "
+        f"Without a spring, inertia over damping and the time of {plain(lags[0])} may be exchanged: "
+        f"{title('inertia', found.axis)} of "
         f"{number(damping.value * late_s, 3)} {unit(inertia.unit)} beside a lag of "
-        f"{number(1e3 * inertia.value / damping.value, 3)} ms fits as well. Only the declared inertia tells which."
+        f"{number(1e3 * inertia.value / damping.value, 3)} ms fits as well. Check the declared inertia: nothing "
+        "else tells which."
     ]
 
 

@@ -69,7 +69,7 @@ def follow_up_yaml(plan: FollowUpPlan) -> str:
     """The text of follow_up.yaml: an `excitation:` section that a rig.yaml may hold or name."""
     head = [
         plan.why,
-        f"{plan.duration_s:.0f} s of torque, rests apart. Play it on the same rig: `excitation:` of its rig.yaml takes",
+        f"{plan.duration_s:.0f} s of torque, plus rests. Play it on the same rig: `excitation:` of its rig.yaml takes",
         "the path of this file (or --set excitation=PATH), then give all recordings to identify-run together.",
     ]
     text = yaml.safe_dump({"excitation": dict(plan.excitation)}, sort_keys=False, default_flow_style=None, width=110)

@@ -15,6 +15,7 @@ from identify.rivals.tone_origin import TONE, describe, standing_line
 from identify.rivals.whole_runs import FreeRunFitter
 from identify.select.search_state import Search
 from identify.signals.trace import Trace
+from identify.wording import plain
 from rig.platform import TERMS
 
 
@@ -52,7 +53,7 @@ class AlternativeCauses:
         elif line is not None:
             words = describe(line, self.axis, self.traces[0].channel)
             search.mark_undetermined(TONE, words, self._until(search, TONE))
-            self.say(f"not named: {TONE}; the line may come from the sensor itself")
+            self.say(f"not named: {plain(TONE)}; the line may come from the sensor itself")
         else:
             return False
         return True

@@ -198,9 +198,9 @@ def describe_colour(colour: Colour | None, axis: str, channel: str) -> str:
         f"{number(size if linear else math.degrees(size), 3)} {unit}" for size in (colour.level, colour.rms)
     )
     return (
-        f"What is left is noise, alike in all runs and coloured: up to about {frequency(round(colour.flat_to_hz))} it "
-        f"is as dense as white noise of {dense}, above that less, {whole} in all. Effects are weighed by that density, "
-        "the residual by the total"
+        "What is left is noise, alike in all runs and coloured: flat up to about "
+        f"{frequency(round(colour.flat_to_hz))}, where it is that of white noise of {dense} rms, and falling above; "
+        f"{whole} rms in all. Effects are judged by the first number, the residual by the second"
     )
 
 

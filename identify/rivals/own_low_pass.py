@@ -128,6 +128,6 @@ def _price(richer: Fit, less: Fit) -> float:
 def _note(beside: FinalFit, name: Name) -> str:
     late = f"{number(1e3 * beside.values[name], 3)} ms"
     return (
-        f"The rate sensor's own low-pass delays its readings by {late}. That is too little to be named as an effect, "
-        "but the final fit includes it."
+        f"The rate sensor's own low-pass delays its readings by {late}. It explains too little of the residual to "
+        "be named as an effect, but the final fit includes it."
     )

@@ -88,8 +88,8 @@ def told(given: Sequence[Trace], moved: Sequence[Trace]) -> str:
     both = [(a.torque, b.torque) for a, b in zip(given, moved, strict=True)]
     late_s = [float(np.max(np.abs(b.time_s - a.time_s))) for a, b in both if a is not None and b is not None]
     return (
-        f"The clocks of torque and rate agree to {number(1e6 * max(late_s), 2)} us: every run is fitted "
-        "with the delay that it shows, and the intervals include that."
+        f"The delay between torque and rate differs from run to run, by up to {number(1e6 * max(late_s), 2)} us (two "
+        "clocks): every run is fitted with its own, and the intervals include that."
     )
 
 

@@ -38,7 +38,7 @@ FOLDS_BACK = (
     "for pickup on the cable."
 )
 MOUNT = "Repeat a set with a known mass on the platform (added_inertia_kg_m2)"
-HEAVIER = "The known mass does not decide it: the line has to be as strong in every run, and the mass heavier"
+HEAVIER = "The known mass did not decide it: use a heavier one, and keep the line's source equally strong in all runs"
 DIFFERS = (
     "Compare {runs} with the others: the amplifier's gain and limits, and the time stamps of torque and rate. "
     "Play that set again, with one of the others at its frequency; leave the run out if it does not repeat."
@@ -147,7 +147,7 @@ def describe(line: SpectralLine, axis: str, channel: str = "rate") -> tuple[str,
         return (
             f"{name} is no disturbance: {'that run has' if one else 'those runs have'} a {what} of that frequency, and "
             f"the others are silent there. There the applied {what} differed from the recorded one by {torque}, or "
-            "came at another moment."
+            "was shifted in time."
         ), DIFFERS.format(runs=joined(line.only))
     why = (
         "The platform already moved steadily with it when the runs began, so the two look the same."

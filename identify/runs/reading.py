@@ -21,7 +21,7 @@ def describe_turns(runs: Sequence[Run], say: Callable[[str], None]) -> tuple[str
     if not each:
         return ()
     sentence = (
-        "The angle begins anew after a whole turn and was made to go on, all runs counted from the same zero: "
+        "The angle starts again at zero after a whole turn and was unwrapped, all runs counted from the same zero: "
         + ", ".join(each)
     )
     say(sentence)
@@ -37,8 +37,8 @@ def describe_missing(runs: Sequence[Run], say: Callable[[str], None]) -> tuple[s
         said.append(f"Rows in which a column has no value are left out: {', '.join(left)}")
     if laid:
         said.append(
-            "Columns that stand in rows of their own are read at the times of the slowest, the others between theirs "
-            f"by straight lines: {', '.join(laid)}"
+            "Columns with rows of their own are read at the times of the slowest, the others interpolated linearly: "
+            f"{', '.join(laid)}"
         )
     for sentence in said:
         say(sentence)

@@ -28,6 +28,7 @@ from identify.select.preference import follows_nothing_freely, is_more_flexible,
 from identify.select.search_state import Found, Search, describes
 from identify.select.torque_search import TorqueSearch
 from identify.signals.trace import Trace
+from identify.wording import joined, plain
 from rig import effects
 from rig.effects.base import Place
 
@@ -128,7 +129,7 @@ def search_in_torque(
         best = search.run()
     regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
     final = by_likelihood.fit.structure if by_likelihood else best.structure
-    say(f"final fit with {', '.join(final.effects) or 'fewer terms'}")
+    say(f"final fit with {joined([plain(e) for e in final.effects]) or 'fewer terms'}")
     before = _final(regression, base, fitted_on_all(traces, structure, base.values, split.final), traces, split)
 
     def fitted(final: Structure) -> FinalFit:
@@ -140,7 +141,7 @@ def search_in_torque(
 
     after, found_so_far = fitted(final), final
     while name := _unsupported(after, structure, bool(by_likelihood)):
-        say(f"dropped {name}: in the final fit it does not differ significantly from zero")
+        say(f"dropped {plain(name)}: in the final fit its size does not differ significantly from zero")
         final, best = final.minus(name), search.without(best, name)
         after = fitted(final)
     disturbance = disturbance_of(regression, best, floor, unit)

@@ -144,7 +144,7 @@ class LikelihoodSearch:
         looks = less.trials.shortlist(best, _scores(problem, best, names))
         if all(v[0].gain < seen.get(v[0].effect, 0.0) for v in looks):
             return None
-        less.say("more of the recording shows what its most informative part does not: the search goes on with that")
+        less.say(f"searching on with {best.count} samples: they show an effect that the first {less.best.count} do not")
         base = problem.fit(less.base.structure, less.base.values, problem.noise_of(less.base))
         out = replace(  # with lists of its own: what it takes back is not taken from the part's model
             less, problem=problem, base=base, weigher=_weigher(problem, traces, parts, self.start, base), whole=None,

@@ -67,8 +67,8 @@ class IdentifyConfig(Section):
     accept: AcceptConfig = AcceptConfig()
     """When a residual torque that depends on something is small enough."""
     j_dec: Positive | None = None
-    """Objective below which a result is accepted (Eq. 14); if left out, from the noise floor, and only a search that
-    stays above its own minimum refuses the result."""
+    """Objective below which a result is accepted (Eq. 14). If left out, it follows from the noise floor, and a result
+    is refused only where the genetic search does not reach the minimum of its own objective."""
     reference: ReferenceConfig | None = None
     """Known J, C, K, for Max_Error (Eq. 15); the identifier never sees them."""
     channels: Annotated[Mapping[str, ChannelConfig], AfterValidator(check_channels)] = Field(default_factory=dict)

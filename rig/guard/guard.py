@@ -192,9 +192,12 @@ class MeasuredTorque(Check):
         allowed = self._limits.torque_nm
         for time_s, torque_nm in tick.torque:
             if not abs(torque_nm) <= allowed * MEASURED_TORQUE_EXCESS:
+                more_percent = 100.0 * (MEASURED_TORQUE_EXCESS - 1.0)
                 return self._trip(
-                    "applied torque (limits.torque_nm)", abs(torque_nm), allowed, "N m", time_s,
-                    "The drive applied more torque than commanded: check its torque units and rated torque.",
+                    f"applied torque (limits.torque_nm, and {more_percent:.0f} % more)", abs(torque_nm),
+                    allowed * MEASURED_TORQUE_EXCESS, "N m", time_s,
+                    "The drive applied more torque than commanded: check the torque constant, the rated torque and "
+                    "the gear under bench.amplifier.",
                 )  # fmt: skip
         return None
 

@@ -158,8 +158,11 @@ def candidate_table(candidates: Sequence[Candidate], floor: float) -> Markup:
         for c in order[:ROWS]
     ]
     more = f" The best {ROWS} of {len(order)}; result.json has all." if len(order) > ROWS else ""
-    head = ["effect", "round", "delta BIC", "held-out error", "times the floor", "outcome"]
-    caption = "Candidates tried, each added to the model of that round. Delta BIC: negative is better."
+    head = ["effect", "round", "evidence", "held-out error", "times the floor", "outcome"]
+    caption = (
+        "Candidates tried, each added to the model of that round. Evidence: change of the Bayesian information "
+        "criterion, scaled down where the data scatter more than the model expects; negative is better."
+    )
     if all(c.holdout_rate_rms is None for c in order):  # a search by likelihood has no error of its own a candidate
         head, rows = [*head[:3], head[-1]], [[*row[:3], row[-1]] for row in rows]
         tried = table(head, rows, f"{caption}{more}", words=(3,))

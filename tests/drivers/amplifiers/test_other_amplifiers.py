@@ -147,7 +147,7 @@ def test_moteus_clears_a_latched_timeout_and_runs():
     frames = bench.amplifier.frames(1.25, bench.time())
     assert bench.amplifier.sent_torque_nm(frames[0]) == pytest.approx(1.25)
     bench.drive.mode = moteus.MODE_TIMEOUT
-    with pytest.raises(DeviceFault, match=r"mode 11\) its watchdog expired"):
+    with pytest.raises(DeviceFault, match=r"mode 11\): its watchdog expired"):
         bench.tick(1.0)
     bench.amplifier.disarm(bench.link)
 

@@ -21,7 +21,7 @@ def test_what_was_found_what_it_changes_and_why_it_is_accepted_are_three_sentenc
 
 def test_beside_what_is_named_the_first_screen_says_that_something_is_left_open() -> None:
     more = replace(FOUND, verdict=replace(FOUND.verdict, left_open="Creep would explain part of what is missing."))
-    assert headline(more)[0].endswith(", and something that these data do not determine.")
+    assert headline(more)[0].endswith(", and one more effect that these data do not determine.")
 
 
 def test_an_error_that_reads_the_same_before_and_after_does_not_fall() -> None:

@@ -83,8 +83,8 @@ def test_of_what_was_found_and_taken_back_it_is_not_said_that_it_explains_little
     empty = replace(FOUND.verdict, effects=(), unexplained=True, candidates=(back,))
     said = sentences_of(replace(FOUND, verdict=empty, after=None))[0]
     assert said == (
-        "No effect is named: cubic stiffness explained part of the residual, but not better than an arbitrary curve or "
-        "fewer terms do."
+        "No effect is named: cubic stiffness explained part of the residual, but no better than an arbitrary curve or "
+        "a model with fewer terms."
     )
 
 
@@ -109,11 +109,11 @@ def test_gravity_and_a_bent_spring_are_inseparable_in_small_swings_alone(travel_
     assert "actuator_lag / sensor_lag" in never
 
 
-def test_without_a_spring_a_lag_and_the_platform_may_have_changed_places() -> None:
+def test_without_a_spring_a_lag_and_the_platform_may_be_exchanged() -> None:
     numbers = {"inertia": estimate(4e-4, 1e-6), "damping": estimate(0.02, 1e-4, "N*m*s/rad")}
     lag = {"sensor_lag": {"time": estimate(0.4, 1e-3, "s")}}
     after = replace(FOUND.after, parameters=numbers, effect_parameters=lag)
-    (said,) = [s for s in sentences_of(replace(FOUND, after=after)) if "changed places" in s]
+    (said,) = [s for s in sentences_of(replace(FOUND, after=after)) if "may be exchanged" in s]
     assert "rotary inertia J of 0.00800 kg·m² beside a lag of 20.0 ms fits as well" in said
     bent = {**lag, "coulomb_friction": {"level": estimate(1.0, 0.01, "N*m")}}
     short = {"sensor_lag": {"time": estimate(4e-4, 1e-6, "s")}}

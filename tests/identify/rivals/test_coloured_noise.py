@@ -70,7 +70,7 @@ def test_noise_that_the_gyro_filters_is_no_missing_effect(order: int, hertz: flo
         estimate = found.final.parameters[term]
         assert abs(estimate.value - truth) < 3.5 * estimate.std_error
     assert "What is left is noise" in found.holdout_note
-    dense = float(found.holdout_note.split("as dense as white noise of ")[1].split(" deg/s")[0])
+    dense = float(found.holdout_note.split("that of white noise of ")[1].split(" deg/s")[0])
     assert dense == pytest.approx(0.05, rel=0.25)
 
 

@@ -87,7 +87,7 @@ def test_what_was_found_stays_and_has_the_numbers_beside_the_low_pass(asked: dic
     assert asked["form"] == SECOND
     assert less.after.structure.effects == ("torque_delay",)
     assert less.after.values["inertia",] == 0.9
-    assert "1.00 ms" in note and "too little to be named" in note
+    assert "1.00 ms" in note and "too little of the residual to be named" in note
 
 
 def test_one_that_takes_the_place_of_an_effect_is_no_property_of_the_gyro(

@@ -64,7 +64,7 @@ def test_every_run_is_moved_to_the_delay_that_it_shows() -> None:
     best = PredictionError(traces).fit(STRUCTURE, START)
     moved = aligned(traces, [t.keep for t in traces], best)
     assert moved is not None
-    assert re.search(r"agree to [67](\.\d)? us", told(traces, moved.traces))
+    assert re.search(r"by up to [67](\.\d)? us", told(traces, moved.traces))
     found = offsets_of(moved.traces)
     assert found - found[-1] == pytest.approx(LATE_S - LATE_S[-1], abs=1e-6)
 

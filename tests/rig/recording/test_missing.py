@@ -69,7 +69,7 @@ def test_columns_that_stand_in_rows_of_their_own_are_read_at_the_slowest(tmp_pat
     np.testing.assert_allclose(run.torque_nm, 3 * np.sin(20 * run.torque_time_s), atol=1e-3)
     np.testing.assert_allclose(run.rate_rad_s[run.valid], 2 * np.cos(40 * run.time_s[run.valid]), atol=2e-3)
     assert not np.any(run.valid & (run.time_s > 1.001) & (run.time_s < 1.499))
-    assert any("straight lines: run.csv (torque)" in s for s in describe_missing([run], lambda _: None))
+    assert any("interpolated linearly: run.csv (torque)" in s for s in describe_missing([run], lambda _: None))
 
 
 def test_columns_that_never_have_a_value_together_are_refused(tmp_path: Path) -> None:
