@@ -51,16 +51,12 @@ class CandidateTorque:
 
 
 def candidate_torques(
-    regression: TorqueRegression, now: TorqueFit, names: Sequence[str], most: int, polish: bool = False
-) -> list[CandidateTorque]:  # fmt: skip
+    regression: TorqueRegression, now: TorqueFit, names: Sequence[str], most: int
+) -> list[CandidateTorque]:
     """The candidates that leave least on top of a model, what leaves least first; none that was fitted to nothing.
 
-    Parameters
-    ----------
-    most
-        How many.
-    polish
-        Search for the best shapes beside those of the grid.
+    They are chosen at the shapes of their grid; the shapes of the ``most`` that leave least are then refined. A fit
+    that begins at a grid value beyond the right one may end in another valley (a torque limit that clips nothing).
     """
     lines_hz, orders = regression.lines(now)
     regression.scale = replace(regression.scale, lines_hz=lines_hz, orders=orders)
@@ -76,8 +72,8 @@ def candidate_torques(
             found.append((squares, name, shape))
     looks = []
     for _, name, shape in sorted(found)[:most]:
-        best = beside.polished(name, shape) if polish else shape
-        fit = regression.solve(now.structure.plus(name), {**now.shapes, name: best})
+        refined = beside.refined(name, shape)
+        fit = regression.solve(now.structure.plus(name), {**now.shapes, name: refined})
         whole = shows_a_period(name, fit.values, regression.traces)
         if whole and in_order(fit.values, name) and not gains_at_zero(fit.values, name):
             looks.append(CandidateTorque(name, fit))
@@ -110,7 +106,7 @@ class _Beside:
         left = self.rest - own @ x
         return float(left @ left)
 
-    def polished(self, name: str, shape: tuple[float, ...]) -> tuple[float, ...]:
+    def refined(self, name: str, shape: tuple[float, ...]) -> tuple[float, ...]:
         """The best shape of an effect near one of a grid."""
         axes = [p for p in effects.get(name).parameters if not p.linear]
         if not axes:

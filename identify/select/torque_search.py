@@ -27,7 +27,7 @@ EQUAL_WEIGHT_MARGIN = 0.05  # of what is left: candidates that differ by less ca
 RIVAL = 0.02  # of what is left: rivals carry as much as what was taken, to that
 INERTIA_MATTERS = 0.2  # of the torque: below, the motion hardly shows the inertia
 WORTH_EVIDENCE = 0.2  # of the weight that names: less is not worth working out how sure it is
-POLISHED = 8  # candidates whose shapes are searched for beside those of a grid
+REFINED = 8  # candidates whose shapes are searched for beside those of a grid
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ class TorqueSearch:
             and (answers or effects.get(n).place is not Place.DRIVE)  # a late torque shows in what it sets in motion
             and not set(effects.get(n).nests) & set(have)  # what holds one that is there is asked in its place
         ]  # fmt: skip
-        looks = candidate_torques(self.regression, now, names, POLISHED, polish=True)
+        looks = candidate_torques(self.regression, now, names, REFINED)
         return sorted((self.candidate(w.effect, now, w.fit) for w in looks), key=lambda w: -w.weight)
 
     @staticmethod

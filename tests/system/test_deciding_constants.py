@@ -55,7 +55,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "select/likelihood_search.py": "RIVAL_SAMPLES BEYOND_SAMPLES DECLARED_WITHIN MIN_MORE_SAMPLES_RATIO SAMPLES",
     "select/search_state.py": "ANOTHER",
     "select/stepwise.py": "MIN_RIVAL_SHARE PROMISING",
-    "select/torque_search.py": "POLISHED RIVAL WORTH_EVIDENCE",
+    "select/torque_search.py": "REFINED RIVAL WORTH_EVIDENCE",
     "select/trial_fits.py": "BEHIND COMPARABLE FAINT_SCORE FOLLOWS_LESS FULL_FIT_RATIO "
     "FULL_ITERATIONS HEAVIEST MIN_TRIAL_SCORE PAIRS TRIAL_ITERATIONS TRIED",
 }

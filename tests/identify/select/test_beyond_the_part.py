@@ -57,7 +57,7 @@ def searched(hidden: Effects, monkeypatch: pytest.MonkeyPatch) -> tuple[Likeliho
         ["coulomb_friction", "torque_saturation"], said.append,
     )  # fmt: skip
     search.run()
-    return search, [s for s in said if s.startswith("more of the recording")]
+    return search, [s for s in said if s.startswith("searching on with")]
 
 
 @pytest.mark.slow
