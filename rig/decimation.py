@@ -1,4 +1,4 @@
-"""The low-passes before a decimation, as weights around a sample."""
+"""The low-passes before a decimation, as weights around a sample, and how a recording is looked at to choose one."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from scipy import signal
 from rig.arrays import Array
 
 SAMPLES_A_PERIOD = 8.0  # of the fastest motion that stands above the noise: beyond, a sample tells nothing new
+SPAN_STARTS = 12  # where a span may begin
+NOISE_BAND = (0.5, 0.98)  # of the Nyquist frequency: where the noise is read
 REACH = 16  # new samples to either side
 # Of the new Nyquist frequency: flat to 2e-5 up to 0.65 of it, and as far down above 1.35. With a smaller one the filter
 # rings for longer than ``REACH``.

@@ -13,7 +13,7 @@ from pathlib import Path
 
 _PR_SET_TIMERSLACK = 29
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
-HAND_OVER_S = 50e-6  # how long the loop waits at most for another thread of ours to leave the interpreter to it
+MAX_THREAD_WAIT_S = 50e-6  # how long the loop waits at most for another thread of ours to leave the interpreter to it
 _usual_hand_over_s = sys.getswitchinterval()
 _lifted: list[int] = []
 
@@ -81,7 +81,7 @@ def acquire(priority: int, lock_memory: bool) -> RealTimeGrant:
     """
     gc.collect()
     gc.freeze()
-    sys.setswitchinterval(HAND_OVER_S)
+    sys.setswitchinterval(MAX_THREAD_WAIT_S)
     refused = []
     libc = _libc()
     fine_timers = bool(libc and hasattr(libc, "prctl") and libc.prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0) == 0)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 DEG = math.pi / 180.0
 TURN = 2.0 * math.pi
+NS = 1e-9
 G = 9.80665  # standard gravity, m/s^2
 LBF = 4.4482216152605  # N: 0.45359237 kg times G
 INCH = 0.0254

@@ -7,7 +7,7 @@ import numpy as np
 from rig.arrays import Array
 from rig.excitation import Sine
 from rig.platform import Platform
-from sim_backend.plant import RATE, Plant
+from sim_backend.plant import RATE_COLUMN, Plant
 
 TICK_S = 1e-3
 
@@ -26,7 +26,7 @@ def played_rate(platform: Platform, sine: Sine, parts: int, *, held: bool = Fals
         else:
             quarter_steps = np.arange(1, 4 * parts + 1) / (4 * parts)
             rows = plant.follow(sine.torque((k + quarter_steps) * TICK_S))
-        rate[k] = rows[parts - 1, RATE]
+        rate[k] = rows[parts - 1, RATE_COLUMN]
     return rate
 
 

@@ -20,7 +20,7 @@ from sim_backend.motor import motor_state
 if TYPE_CHECKING:
     from sim_backend.plant import Plant
 
-BLOCK = 1 << 15  # quarter steps of an excitation that are evaluated at a time
+MIN_QUARTER_STEPS = 1 << 15  # quarter steps of an excitation that are evaluated at a time
 
 
 class Amplifier(ABC):
@@ -78,7 +78,7 @@ class Ideal(Amplifier):
         at = 4 * (first - self._start) + 1  # counted in quarter steps since the start of the set
         if not self._block_first <= at <= at + 4 * n <= self._block_first + len(self._block):
             assert self._torque is not None
-            count = np.arange(at, at + max(BLOCK, 4 * n))
+            count = np.arange(at, at + max(MIN_QUARTER_STEPS, 4 * n))
             self._block = np.asarray(self._torque(0.25 * self._step_s * count), dtype=np.float64)
             self._block_first = at
         skip = at - self._block_first

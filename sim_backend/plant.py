@@ -18,7 +18,7 @@ from rig.errors import ConfigError
 from rig.platform import Platform
 from sim_backend.motor import MotorState, motor_torque
 
-ANGLE, RATE, SENSED, TORQUE = range(4)  # columns of what Plant.follow and its like return
+ANGLE_COLUMN, RATE_COLUMN, SENSED_COLUMN, TORQUE_COLUMN = range(4)  # columns of what Plant.follow and its like return
 RK4_PHASE_RAD = 0.03  # of the fastest motion in one fine step: leaves (0.03)^4 / 120, 7e-9, of a frequency
 MAX_PARTS = 4096  # fine steps in a tick: a minute at 1 kHz takes some minutes then, and beyond that has no end
 FOLLOW, HOLD, MOTOR = range(3)

@@ -17,7 +17,7 @@ from rig.interface import Exchange, GyroSample, Rig, Statement, Torque, TorqueOf
 from rig.signals import TorqueHold
 from sim_backend import amplifier
 from sim_backend.gyroscope import Gyroscope
-from sim_backend.plant import SENSED, Plant
+from sim_backend.plant import SENSED_COLUMN, Plant
 
 HIGHEST_COMMON_RATE_HZ = 100_000  # steps a second that are still simulated in seconds
 
@@ -120,7 +120,7 @@ class SimulatedRig(Rig):
         torque: list[TorqueSample] = []
         if n > 0:
             rows, torque = self._amplifier.advance(self._plant, self._at, n)
-            gyro = self._gyro.sense(rows[:, SENSED], self._at, n, (self._at + n) * self._step_s)
+            gyro = self._gyro.sense(rows[:, SENSED_COLUMN], self._at, n, (self._at + n) * self._step_s)
             self._at += n
         torque += self._amplifier.command(torque_nm, self._at)
         epoch = self._epoch_s

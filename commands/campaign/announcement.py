@@ -14,13 +14,13 @@ from rig.rounding import rounded_down
 from rig.sequencer import SETTLE_S, TAIL_S
 from rig.sequencer.probe import Probe
 
-RULE = "=" * 78
+SEPARATOR_LINE = "=" * 78
 
 
 def announcement(statement: Statement, config: Config, sets: Sequence[PlannedSet], folder: Path) -> str:
     """The opening statement of a campaign that is played."""
     limits = config.limits
-    lines = [RULE, f"  {plain(str(statement))}", RULE]
+    lines = [SEPARATOR_LINE, f"  {plain(str(statement))}", SEPARATOR_LINE]
     lines.append(
         f"limits    travel {limits.travel_deg:g} deg, rate {limits.rate_deg_s:g} deg/s, torque {limits.torque_nm:g} N m"
     )
@@ -34,7 +34,7 @@ def announcement(statement: Statement, config: Config, sets: Sequence[PlannedSet
 def recorded_announcement(files: int, runs: int, folder: Path) -> str:
     """The opening statement where nothing is played."""
     summary = f"Torque is RECORDED: nothing moves; {counted(runs, 'run')} read from {counted(files, 'file')}"
-    return "\n".join([RULE, f"  {summary}", RULE, f"results   {plain(str(folder))}"])
+    return "\n".join([SEPARATOR_LINE, f"  {summary}", SEPARATOR_LINE, f"results   {plain(str(folder))}"])
 
 
 def duration_s(config: Config, sets: Sequence[PlannedSet]) -> float:

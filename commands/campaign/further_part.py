@@ -11,7 +11,7 @@ from rig.config.load import LoadedConfig
 from rig.config.model import ModelConfig
 from rig.platform import Platform
 
-NEXT_SEED = 1_000_003  # a simulated gyro must not repeat its noise
+FURTHER_PART_SEED_STEP = 1_000_003  # a simulated gyro must not repeat its noise
 
 
 def further_config(
@@ -22,7 +22,7 @@ def further_config(
     ``number`` is that of the part, from 1: a simulated sensor draws other noise in each.
     """
     config = loaded.config
-    seed = (config.simulated.seed + number * NEXT_SEED) % 2**32
+    seed = (config.simulated.seed + number * FURTHER_PART_SEED_STEP) % 2**32
     changed: dict[str, Any] = {"simulated": config.simulated.model_copy(update={"seed": seed})}
     if excitation is not None:
         changed["excitation"] = excitation

@@ -22,7 +22,7 @@ from rig.recording.run import Recording, Run
 if TYPE_CHECKING:
     from rig.recording.journal_reader import JournalContents
 
-NEXT_SEED = 1_000_033  # a simulated gyro must not repeat its noise
+RESUMED_SEED_STEP = 1_000_033  # a simulated gyro must not repeat its noise
 # Sections that decide what a set is, by the backend it is played on.
 SECTIONS: Mapping[str, tuple[str, ...]] = {
     SIMULATED: ("excitation", "simulated"),
@@ -85,7 +85,7 @@ def play_campaign(context: CommandContext, loaded: LoadedConfig, folder: Results
 
 def _with_another_seed(loaded: LoadedConfig, number: int) -> LoadedConfig:
     simulated = loaded.config.simulated
-    seed = (simulated.seed + number * NEXT_SEED) % 2**32
+    seed = (simulated.seed + number * RESUMED_SEED_STEP) % 2**32
     config = loaded.config.model_copy(update={"simulated": simulated.model_copy(update={"seed": seed})})
     return replace(loaded, config=config)
 

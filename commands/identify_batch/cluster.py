@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 INSTALL = "pip install 'isp-rig[batch]'"
 CONNECT_S = 10.0  # until a scheduler that does not answer is given up
-START_S = 120.0  # in which a local worker comes back after a kill, on a busy machine
+MAX_WORKER_START_S = 120.0  # in which a local worker comes back after a kill, on a busy machine
 # One thread each: small matrices gain nothing from a second, and the processes fill the cores.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 SET_UP = "commands.identify_batch.worker_process"
@@ -84,8 +84,8 @@ class DaskPool:
         elif self._away_since is None:
             self._away_since = time.monotonic()
             self._say(f"waiting for workers at {self._where}")
-        elif self._most is not None and time.monotonic() - self._away_since > START_S:
-            raise Aborted(f"no worker process has started within {START_S:g} s: use fewer --workers.")
+        elif self._most is not None and time.monotonic() - self._away_since > MAX_WORKER_START_S:
+            raise Aborted(f"no worker process has started within {MAX_WORKER_START_S:g} s: use fewer --workers.")
 
 
 def _outcome(future: Future) -> Outcome:

@@ -11,7 +11,7 @@ from typing import Protocol
 from commands.identify_batch.campaigns import Job
 from commands.identify_batch.row import Row, failed_row
 
-LOOK_S = 1.0  # between two looks at whether the workers are still there
+WORKER_CHECK_S = 1.0  # between two looks at whether the workers are still there
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def run_jobs(
         if suspects and not waiting and not running:
             start(suspects.popleft())
         try:
-            path = ready.get(timeout=LOOK_S)
+            path = ready.get(timeout=WORKER_CHECK_S)
         except Empty:
             pool.check()
             continue

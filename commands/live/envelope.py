@@ -7,7 +7,7 @@ import math
 from rig.arrays import Array
 
 BIN_S = 0.02  # a 9 Hz tone still has five bins a period
-WINDOW_S = 6.0
+SHOWN_S = 6.0
 
 
 class Envelope:
@@ -26,7 +26,7 @@ class Envelope:
             low, high = self._bins.get(at, (value, value))
             self._bins[at] = (min(low, value), max(high, value))
             self._last = max(self._last, at)
-        first = self._last - int(WINDOW_S / BIN_S)
+        first = self._last - int(SHOWN_S / BIN_S)
         for at in [k for k in self._bins if k < first]:
             del self._bins[at]
 

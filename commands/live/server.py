@@ -25,7 +25,7 @@ from commands.live.fit import fit_worker
 from commands.live.state import LiveState
 from rig.recording.following import JournalFollower
 
-LOOK_S = 0.1  # between two looks at the journal
+JOURNAL_CHECK_S = 0.1  # between two looks at the journal
 SWITCH_S = 5e-4  # between threads: the stop button waits for none of the others (Python's default is 5 ms)
 LINGER_S = 3.0  # after the campaign: the page fetches the last state
 HOST = "127.0.0.1"
@@ -58,7 +58,7 @@ class LiveProcess:
                     self.state.take(*frame)
                 if len(self.state.complete) > known:
                     self._news.set()
-            time.sleep(LOOK_S)
+            time.sleep(JOURNAL_CHECK_S)
 
     def fit(self) -> None:
         """Have the sets fitted whenever a further one is complete, for ever."""

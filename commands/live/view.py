@@ -16,7 +16,7 @@ from typing import IO, Any
 from rig.errors import UsageError
 
 START_WITHIN_S = 20.0  # a cold start reads NumPy from a slow disk
-STOPPED = "Stopped from the live page"
+STOP_REASON = "Stopped from the live page"
 
 
 class NoLiveView:
@@ -96,7 +96,7 @@ def live_view(request_stop: Callable[[str], None], announce: Callable[[str], Non
             for line in lines:
                 said = json.loads(line)
                 if said.get("stop"):
-                    request_stop(STOPPED)
+                    request_stop(STOP_REASON)
                 elif "url" in said:
                     heard.append(said["url"])
                     answered.set()

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 Ask = Callable[[str], str]
 Answer = TypeVar("Answer")
 NONE = NO_COLUMN  # as an answer: there is no such column
-TRIES = 3
-LISTED = 40  # columns
+MAX_ANSWER_TRIES = 3
+MAX_COLUMNS_SHOWN = 40  # columns
 SAMPLE_RATE = "--sample-rate"
 _OF_A_TIME = f"--time COL, or {SAMPLE_RATE} HZ if the rows are evenly spaced"
 # What may be said besides a column: every recording has a time, and one without torque is another experiment.
@@ -61,7 +61,7 @@ def listing(table: Table, columns: tuple[Column, ...]) -> list[str]:
     import numpy as np
 
     lines = [f"{table.path}: {len(columns)} columns"]
-    for c in columns[:LISTED]:
+    for c in columns[:MAX_COLUMNS_SHOWN]:
         if c.values is None:
             lines.append(f"  {c.name!r}: not usable: {c.why_not}")
             continue
@@ -69,7 +69,7 @@ def listing(table: Table, columns: tuple[Column, ...]) -> list[str]:
         unit = f" {c.known_unit.text if c.known_unit else c.unit_text}".rstrip()
         instead = f", and {c.instead} for no reading" if c.instead else ""
         lines.append(f"  {c.name!r}: {np.nanmin(c.values):.6g} to {np.nanmax(c.values):.6g}{unit}{rising}{instead}")
-    return lines + ([f"  ... and {len(columns) - LISTED} more"] if len(columns) > LISTED else [])
+    return lines + ([f"  ... and {len(columns) - MAX_COLUMNS_SHOWN} more"] if len(columns) > MAX_COLUMNS_SHOWN else [])
 
 
 def column_named(columns: tuple[Column, ...], quantity: str, name: str) -> Column | None:
@@ -77,7 +77,7 @@ def column_named(columns: tuple[Column, ...], quantity: str, name: str) -> Colum
     found = next((c for c in columns if c.name == name and c.values is not None), None)
     if found is not None or (name == NONE and quantity != "time"):
         return found
-    usable = ", ".join(repr(c.name) for c in columns[:LISTED] if c.values is not None)
+    usable = ", ".join(repr(c.name) for c in columns[:MAX_COLUMNS_SHOWN] if c.values is not None)
     none = "" if quantity == "time" else f", or {NONE}"
     raise UsageError(f"--{quantity} {name[:60]!r} is no column of numbers: choose one of {usable}{none}")
 
@@ -197,12 +197,14 @@ class Questions:
 
     def _answer(self, question: str, guess: str, read: Callable[[str], Answer]) -> Answer:
         assert self._ask is not None
-        for _ in range(TRIES):
+        for _ in range(MAX_ANSWER_TRIES):
             try:
                 return read(self._ask(question).strip() or guess)
             except UsageError as error:
                 say(str(error))
-        raise UsageError(f"no answer that could be used in {TRIES} tries: give it as an option (rig init --help)")
+        raise UsageError(
+            f"no answer that could be used in {MAX_ANSWER_TRIES} tries: give it as an option (rig init --help)"
+        )
 
     def _miss(self, line: str) -> None:
         """Something that nobody can guess."""

@@ -22,7 +22,7 @@ from rig.sequencer.recorder import SetStatistics
 
 BAR_WIDTH, MIN_BAR_WIDTH = 24, 6  # characters; a narrow terminal gets a shorter bar, or none
 NO_TERMINAL_COLUMNS = 120  # of a line where there is no terminal
-MAX_WAITING = 50  # lines; a terminal that takes none loses bars, not memory
+MAX_WAITING_LINES = 50  # lines; a terminal that takes none loses bars, not memory
 DRAIN_TIMEOUT_S = 1.0  # how long a slow terminal is waited for at the end
 LOST = "Stopped because the terminal was closed"
 
@@ -126,7 +126,7 @@ class Terminal:
 
     def overwrite(self, text: str) -> None:
         """Put ``text`` in the place of the line that was put here last, cut to one line: only that can be replaced."""
-        if self.has_bars and self._lines.qsize() < MAX_WAITING:
+        if self.has_bars and self._lines.qsize() < MAX_WAITING_LINES:
             self._is_open_line = True
             self._lines.put(f"\r\x1b[K{text[: self.columns() - 1]}")
 

@@ -12,10 +12,10 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-from commands.terminal.early_signals import accepting_aborts, fix_exit_code
+from commands.terminal.early_signals import STOPPED, accepting_aborts, fix_exit_code
 from rig.errors import Aborted, DeviceFault, RigError, SafetyTrip, UsageError
 
-OK, NOT_ACCEPTED, USAGE, INTERNAL, STOPPED = 0, 1, 2, 70, 130
+OK, NOT_ACCEPTED, USAGE, INTERNAL = 0, 1, 2, 70  # and STOPPED, which an early signal needs
 TRACEBACK_FILE = "traceback.txt"
 # What the message opens with, the most particular kind first.
 HEADINGS: tuple[tuple[type[BaseException], str], ...] = (
@@ -26,8 +26,8 @@ HEADINGS: tuple[tuple[type[BaseException], str], ...] = (
     (RigError, "Error"),
     (KeyboardInterrupt, "Stopped"),
 )
-LONGEST_WORD, LONGEST_LINE = 200, 2000  # of what is said; a file may hold a line of any length
-_LONG_WORD = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
+LONGEST_SAID_WORD, LONGEST_SAID_LINE = 200, 2000  # of what is said; a file may hold a line of any length
+_LONG_WORD = re.compile(rf"\S{{{LONGEST_SAID_WORD + 1},}}")
 _DISK_FULL_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EFBIG}
 Evidence = Callable[[], Path | None]  # the results folder as far as there is one
 
@@ -119,8 +119,8 @@ def say(text: str) -> None:
 
     Messages quote names and paths from outside, which must not steer the terminal, turn its text around or fill it.
     """
-    lines = (_LONG_WORD.sub(lambda word: _cut(word.group(), LONGEST_WORD), line) for line in text.split("\n"))
-    short = "\n".join(_cut(line, LONGEST_LINE) for line in lines)
+    lines = (_LONG_WORD.sub(lambda word: _cut(word.group(), LONGEST_SAID_WORD), line) for line in text.split("\n"))
+    short = "\n".join(_cut(line, LONGEST_SAID_LINE) for line in lines)
     shown = "".join(c if c.isprintable() or c == "\n" else "?" for c in short)
     with contextlib.suppress(OSError, ValueError):
         sys.stderr.write(shown + "\n")

@@ -13,6 +13,8 @@ from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import AmplifierConfig
 from rig.interface import TorqueSample
 
+PROOF_FACTOR = 1.5  # of the watchdog, before the drive must have tripped
+
 
 class Amplifier(ABC):
     """A servo amplifier on CAN that takes torque.

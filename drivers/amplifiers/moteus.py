@@ -15,7 +15,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from drivers.amplifiers.base import Amplifier
+from drivers.amplifiers.base import PROOF_FACTOR, Amplifier
 from drivers.codecs.lawicel import CanFrame
 from drivers.settings import Settings, read_settings
 from drivers.transport.can_link import CanLink, ReceivedFrame
@@ -24,8 +24,7 @@ from rig.errors import ConfigError, DeviceFault
 
 MODE_STOPPED, MODE_FAULT, MODE_POSITION, MODE_TIMEOUT = 0, 1, 10, 11
 ANSWER_TIMEOUT_S = 0.1  # s, far beyond a round trip on the bus; chosen, not derived
-SILENT_S = 0.05  # fifty ticks at 1 kHz without an answer
-PROOF_FACTOR = 1.5  # of the watchdog, before the drive must have tripped
+MAX_UNANSWERED_S = 0.05  # fifty ticks at 1 kHz without an answer
 
 _WRITE_I8_1 = 0x01  # write one int8 register
 _WRITE_F32_1, _WRITE_F32_2 = 0x0D, 0x0E
@@ -218,10 +217,10 @@ class Moteus(Amplifier):
                 MODE_FAULT: "it is in fault: read its fault register, remove the cause, then power-cycle it",
             }.get(self.mode or 0, "something else commands it: disconnect other hosts")
             raise DeviceFault(f"{self.label} left position mode (mode {self.mode}): {why}")
-        if self._heard_s is not None and now_s - self._heard_s > SILENT_S:
+        if self._heard_s is not None and now_s - self._heard_s > MAX_UNANSWERED_S:
             raise DeviceFault(
-                f"{self.label} is silent for {(now_s - self._heard_s) * 1e3:.0f} ms (limit {SILENT_S * 1e3:.0f} ms): "
-                "check its supply and the CAN cable"
+                f"{self.label} is silent for {(now_s - self._heard_s) * 1e3:.0f} ms "
+                f"(limit {MAX_UNANSWERED_S * 1e3:.0f} ms): check its supply and the CAN cable"
             )
 
     def off_frames(self) -> Sequence[CanFrame]:

@@ -12,18 +12,14 @@ from typing import Annotated
 
 from pydantic import Field
 
-from drivers.amplifiers.base import Amplifier
+from drivers.amplifiers.base import PROOF_FACTOR, Amplifier
 from drivers.codecs import odrive_cansimple as wire
 from drivers.codecs.lawicel import CanFrame
-from drivers.codecs.odrive_cansimple import Command
+from drivers.codecs.odrive_cansimple import HEARTBEAT_S, WATCHDOG_EXPIRED, Command
 from drivers.settings import Settings, read_settings
 from drivers.transport.can_link import CanLink, ReceivedFrame
 from rig.config.bench import AmplifierConfig
 from rig.errors import ConfigError, DeviceFault
-
-WATCHDOG_EXPIRED = 0x800
-HEARTBEAT_S = 0.1  # CANSimple as delivered (heartbeat_msg_rate_ms)
-PROOF_FACTOR = 1.5  # of the watchdog, before the drive must have tripped
 
 
 class OdriveSettings(Settings):

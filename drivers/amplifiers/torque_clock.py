@@ -13,10 +13,9 @@ import statistics
 from collections import deque
 
 from drivers.timing.retiming import OWN_LINE, ClockRetiming
-from drivers.timing.source_clock import SourceClock
+from drivers.timing.source_clock import BLOCK_S, SourceClock
 
-BLOCK_S = 0.25  # as in drivers.timing.source_clock
-BLOCKS_KEPT = 240  # a minute
+MAX_ANSWER_BLOCKS = 240  # a minute
 MAX_UNANSWERED = 16  # requests that wait for an answer
 FAST_SHARE = 0.1  # of the answers of a block; the fastest one may be a slip
 
@@ -39,7 +38,7 @@ class TorqueClock:
         self._stamp: int | None = None
         self._asked_s: deque[float] = deque(maxlen=MAX_UNANSWERED)
         self._ways_s: list[float] = []
-        self._blocks_s: deque[float] = deque(maxlen=BLOCKS_KEPT)
+        self._blocks_s: deque[float] = deque(maxlen=MAX_ANSWER_BLOCKS)
         self._block_end_s = 0.0
         self._last_s = -math.inf
         self.way_s = 0.0

@@ -22,7 +22,7 @@ from rig.errors import ConfigError, DeviceFault
 
 SET_CURRENT, STATUS, STATUS_4 = 1, 9, 16
 STATUS_TIMEOUT_S = 0.5  # s, chosen, not derived
-SILENT_S = 0.25  # s without a status message; chosen, not derived
+MAX_STATUS_SPACING_S = 0.25  # s without a status message; chosen, not derived
 ZERO_CURRENT_A = 0.5  # A; what counts as zero; chosen, not derived
 
 
@@ -155,10 +155,10 @@ class Vesc(Amplifier):
 
     def check(self, now_s: float) -> None:
         """Silence; a VESC reports no faults on CAN."""
-        if self._armed and self._heard_s is not None and now_s - self._heard_s > SILENT_S:
+        if self._armed and self._heard_s is not None and now_s - self._heard_s > MAX_STATUS_SPACING_S:
             raise DeviceFault(
-                f"{self.label} is silent for {(now_s - self._heard_s) * 1e3:.0f} ms (limit {SILENT_S * 1e3:.0f} ms): "
-                "check its supply and the CAN cable"
+                f"{self.label} is silent for {(now_s - self._heard_s) * 1e3:.0f} ms "
+                f"(limit {MAX_STATUS_SPACING_S * 1e3:.0f} ms): check its supply and the CAN cable"
             )
 
     def off_frames(self) -> Sequence[CanFrame]:

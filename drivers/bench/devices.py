@@ -19,7 +19,7 @@ from rig.errors import Aborted, ConfigError, DeviceFault, RigError
 from rig.interface import GyroSample
 
 CONTACT_TIME_S = 0.002  # between two looks at both devices
-MAX_WAITING, NEWEST_KEPT = 2000, 1000  # samples, while nothing is played and only the newest matter
+MAX_WAITING_SAMPLES, NEWEST_SAMPLES_KEPT = 2000, 1000  # samples, while nothing is played and only the newest matter
 
 
 class BenchDevices:
@@ -118,8 +118,8 @@ class BenchDevices:
             return
         with contextlib.suppress(DeviceFault):
             self.waiting += self.line.collect()
-        if len(self.waiting) > MAX_WAITING:
-            del self.waiting[:-NEWEST_KEPT]
+        if len(self.waiting) > MAX_WAITING_SAMPLES:
+            del self.waiting[:-NEWEST_SAMPLES_KEPT]
 
     def listen(self, timeout_s: float) -> bool:
         """Wait for a bus that has no ear of its own, and stamp its frames as they arrive; False if none came."""

@@ -38,8 +38,8 @@ _HEAD = struct.Struct("<BdI")
 RECORD_HEAD_BYTES = _HEAD.size
 RECORD_HEAD_BYTES = _HEAD.size
 _CAN_HEAD = struct.Struct("<IBB")
-_TORQUE = struct.Struct("<d")
-_EXTENDED, _REMOTE, _FD = 1, 2, 4
+_TORQUE_PAYLOAD = struct.Struct("<d")
+_EXTENDED_FLAG, _REMOTE_FLAG, _FD_FLAG = 1, 2, 4
 
 
 class Entry(NamedTuple):
@@ -52,7 +52,7 @@ class Entry(NamedTuple):
 
 def pack_frame(frame: CanFrame) -> bytes:
     """A CAN frame as the payload of a record."""
-    flags = _EXTENDED * frame.extended | _REMOTE * frame.remote | _FD * frame.fd
+    flags = _EXTENDED_FLAG * frame.extended | _REMOTE_FLAG * frame.remote | _FD_FLAG * frame.fd
     length = frame.length if frame.remote else len(frame.data)
     return _CAN_HEAD.pack(frame.identifier, flags, length) + frame.data
 
@@ -61,12 +61,14 @@ def unpack_frame(payload: bytes) -> CanFrame:
     """The CAN frame in a record."""
     identifier, flags, length = _CAN_HEAD.unpack_from(payload)
     data = payload[_CAN_HEAD.size :]
-    return CanFrame(identifier, data, bool(flags & _EXTENDED), bool(flags & _REMOTE), length, -1, bool(flags & _FD))
+    return CanFrame(
+        identifier, data, bool(flags & _EXTENDED_FLAG), bool(flags & _REMOTE_FLAG), length, -1, bool(flags & _FD_FLAG)
+    )
 
 
 def unpack_torque(payload: bytes) -> float:
     """The torque that a tick asked for, in N m."""
-    return float(_TORQUE.unpack(payload)[0])
+    return float(_TORQUE_PAYLOAD.unpack(payload)[0])
 
 
 class Capture:
@@ -136,7 +138,7 @@ class Capture:
 
     def tick(self, now_s: float, torque_nm: float) -> None:
         """An exchange is complete: what stands before belongs to it."""
-        self._add(TICK, now_s, _TORQUE.pack(torque_nm))
+        self._add(TICK, now_s, _TORQUE_PAYLOAD.pack(torque_nm))
 
     def clock(self, time_s: float) -> None:
         """What the clock said to the sequencer."""
@@ -230,7 +232,7 @@ def _is_whole(kind: int, payload: bytes) -> bool:
     if kind in (CAN_READ, CAN_SENT):
         return _CAN_HEAD.size <= len(payload) <= _CAN_HEAD.size + LONGEST_FRAME
     if kind == TICK:
-        return len(payload) == _TORQUE.size
+        return len(payload) == _TORQUE_PAYLOAD.size
     if kind == MARK:
         try:
             values = json.loads(payload)

@@ -13,7 +13,7 @@ from binascii import hexlify, unhexlify
 from dataclasses import dataclass
 from typing import NamedTuple
 
-OK, ERROR = b"\r", b"\a"
+ANSWER_OK, ANSWER_ERROR = b"\r", b"\a"
 TIMESTAMP_MODULO_MS = 60_000
 
 BIT_RATE_CODES = {
@@ -32,13 +32,13 @@ FLAG_BITS = {
 }
 """Bits of the answer to F (Lawicel CANUSB manual)."""
 
-_LONGEST_LINE = 40
+_MAX_FRAME_CHARACTERS = 40
 _ID_DIGITS = {0x74: 3, 0x72: 3, 0x54: 8, 0x52: 8}  # t r T R
-_REMOTE = frozenset((0x72, 0x52))
-_EXTENDED = frozenset((0x54, 0x52))
+_REMOTE_HEADS = frozenset((0x72, 0x52))
+_EXTENDED_HEADS = frozenset((0x54, 0x52))
 _HEX = frozenset(b"0123456789abcdefABCDEF")
 _FD_HEADS = frozenset(b"dDbB")
-_FD_LENGTHS = {9: 12, 10: 16, 11: 20, 12: 24, 13: 32, 14: 48, 15: 64}
+_FD_LENGTH_OF_CODE = {9: 12, 10: 16, 11: 20, 12: 24, 13: 32, 14: 48, 15: 64}
 
 
 class CanFrame(NamedTuple):
@@ -75,9 +75,9 @@ class LawicelDecoder:
     def feed(self, data: bytes) -> list[CanFrame | Answer]:
         """Add bytes; return what is complete, in order."""
         buffer = self._rest + data
-        if ERROR in buffer:
+        if ANSWER_ERROR in buffer:
             # BEL ends an answer as CR does; after this every line stands alone.
-            buffer = buffer.replace(ERROR, b"\a\r")
+            buffer = buffer.replace(ANSWER_ERROR, b"\a\r")
         *lines, self._rest = buffer.split(b"\r")
         out: list[CanFrame | Answer] = []
         for line in lines:
@@ -86,7 +86,7 @@ class LawicelDecoder:
                 self._drop(line, item)
             else:
                 out.append(item)
-        if len(self._rest) > _LONGEST_LINE * 4:
+        if len(self._rest) > _MAX_FRAME_CHARACTERS * 4:
             self._drop(self._rest, "no line end")
             self._rest = b""
         return out
@@ -108,7 +108,7 @@ def decode_line(line: bytes) -> CanFrame | Answer | str:
 
 
 def _decode_answer(line: bytes, head: int) -> Answer | str:
-    if line.endswith(ERROR):
+    if line.endswith(ANSWER_ERROR):
         return Answer("error", line[:-1].decode("ascii", errors="replace"))
     if line in (b"z", b"Z"):
         return Answer("sent")
@@ -128,7 +128,7 @@ def _decode_frame(line: bytes, head: int, digits: int) -> CanFrame | str:
         if not 0 <= length <= 8:
             return "length above 8"
         start = 2 + digits
-        remote = head in _REMOTE
+        remote = head in _REMOTE_HEADS
         stop = start if remote else start + 2 * length
         data = unhexlify(line[start:stop])
         stamp = line[stop:]
@@ -139,14 +139,14 @@ def _decode_frame(line: bytes, head: int, digits: int) -> CanFrame | str:
         return "frame cut or run together"
     if identifier > (0x1FFFFFFF if digits == 8 else 0x7FF):
         return "identifier out of range"
-    return CanFrame(identifier, data, head in _EXTENDED, remote, length, timestamp)
+    return CanFrame(identifier, data, head in _EXTENDED_HEADS, remote, length, timestamp)
 
 
 def _decode_fd(line: bytes, head: int) -> CanFrame | str:
     digits = 8 if head in b"DB" else 3
     try:
         code = int.from_bytes(unhexlify(line[1 + digits : 2 + digits].rjust(2, b"0")))
-        length = _FD_LENGTHS.get(code, code)
+        length = _FD_LENGTH_OF_CODE.get(code, code)
         data = unhexlify(line[2 + digits :])
         identifier = int.from_bytes(unhexlify(line[1 : 1 + digits].rjust(8, b"0")))
     except ValueError:

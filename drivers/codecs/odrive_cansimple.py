@@ -30,6 +30,8 @@ class Command(IntEnum):
 
 AXIS_IDLE, AXIS_CLOSED_LOOP = 1, 8
 CONTROL_TORQUE, INPUT_PASSTHROUGH = 1, 1
+WATCHDOG_EXPIRED = 0x800
+HEARTBEAT_S = 0.1  # as delivered (heartbeat_msg_rate_ms)
 
 AXIS_STATES = {
     0: "undefined", 1: "idle", 2: "start-up sequence", 3: "full calibration", 4: "motor calibration",

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from drivers.codecs.checksums import crc16_xmodem, xor8
 from drivers.codecs.framing import BAD_CHECKSUM, NEED_MORE, NOT_A_HEAD, TOO_LONG
 
-_LONGEST_LINE = 256
+_MAX_MESSAGE_BYTES = 256
 _HEX = frozenset(b"0123456789ABCDEFabcdef")
 _LONGEST_BINARY = 600
 
@@ -62,9 +62,9 @@ def match_vectornav(buffer: bytes, position: int) -> int:
 def _match_line(buffer: bytes, position: int) -> int:
     if buffer[position : position + 3] not in (b"$", b"$V", b"$VN"):
         return NOT_A_HEAD
-    end = buffer.find(b"\n", position, position + _LONGEST_LINE)
+    end = buffer.find(b"\n", position, position + _MAX_MESSAGE_BYTES)
     if end < 0:
-        return NEED_MORE if len(buffer) - position < _LONGEST_LINE else TOO_LONG
+        return NEED_MORE if len(buffer) - position < _MAX_MESSAGE_BYTES else TOO_LONG
     line = buffer[position : end + 1]
     return len(line) if line_checksum_is_right(line) else BAD_CHECKSUM
 

@@ -22,10 +22,10 @@ from drivers.timing.line_fit import lower_line, middle_line
 from drivers.timing.source_clock import BLOCK_S, SourceClock
 from rig.arrays import Array
 
-WINDOW_S = 60.0  # on either side of a set
+MARGIN_BESIDE_SET_S = 60.0  # on either side of a set
 LONGEST_LINE_S = 60.0  # longer sets get a line a minute, joined: no crystal runs straight for ever
-BLOCKS_KEPT = int(24 * 3600 / BLOCK_S)
-MIN_BLOCKS = 12  # blocks: 3 s of readings
+MAX_STORED_BLOCKS = int(24 * 3600 / BLOCK_S)
+MIN_LINE_BLOCKS = 12  # blocks: 3 s of readings
 # Of the readings of a block; the fastest one may be a slip. The more of them count, the less they scatter and the more
 # they follow how busy the machine is, which cancels where both ways are known.
 FAST_TWO_WAY, FAST_ONE_WAY = 0.05, 0.01
@@ -112,8 +112,8 @@ class ClockRetiming:
             early = float(early_s[quick] + drifted_s[fast] - drifted_s[quick])
         for kept, value in ((self._source_s, source_s[fast]), (self._late_s, late_s[fast]), (self._early_s, early)):
             kept.append(float(value))
-            if len(kept) > BLOCKS_KEPT:
-                del kept[: BLOCKS_KEPT // 2]
+            if len(kept) > MAX_STORED_BLOCKS:
+                del kept[: MAX_STORED_BLOCKS // 2]
 
     # -- the sets --------------------------------------------------------------------------------
 
@@ -168,7 +168,7 @@ class ClockRetiming:
         """
         source_s, late_s, early_s = (np.array(kept[: self._whole]) for kept in self._kept())
         two_sided = np.isfinite(early_s)
-        if 2 * int(two_sided.sum()) >= max(len(source_s), 2 * MIN_BLOCKS):
+        if 2 * int(two_sided.sum()) >= max(len(source_s), 2 * MIN_LINE_BLOCKS):
             known = _Readings(source_s[two_sided], late_s[two_sided], late_s[two_sided] - early_s[two_sided])
         else:
             known = _Readings(source_s, late_s, None)
@@ -217,8 +217,8 @@ class _Readings:
 
     def _line(self, first_s: float, last_s: float) -> tuple[float, float] | None:
         """Slope, and value at ``first_s``."""
-        near = (self.source_s >= first_s - WINDOW_S) & (self.source_s <= last_s + WINDOW_S)
-        if int(near.sum()) < MIN_BLOCKS:
+        near = (self.source_s >= first_s - MARGIN_BESIDE_SET_S) & (self.source_s <= last_s + MARGIN_BESIDE_SET_S)
+        if int(near.sum()) < MIN_LINE_BLOCKS:
             return None
         x, late_s = self.source_s[near] - first_s, self.late_s[near]
         if self.way_s is None:

@@ -15,7 +15,7 @@ import numpy as np
 from drivers.timing.line_fit import lower_line
 
 BLOCK_S = 0.25  # s
-BLOCKS_KEPT = 240  # a minute, over which a crystal runs straight
+MAX_FIT_BLOCKS = 240  # a minute, over which a crystal runs straight
 MIN_BLOCKS_FOR_DRIFT = 6  # 1.5 s
 
 
@@ -30,8 +30,8 @@ class SourceClock:
 
     def __init__(self, period_s: float) -> None:
         self.period_s = period_s
-        self._source_s = np.empty(BLOCKS_KEPT)
-        self._excess_s = np.empty(BLOCKS_KEPT)  # host minus source time, relative to the first offset
+        self._source_s = np.empty(MAX_FIT_BLOCKS)
+        self._excess_s = np.empty(MAX_FIT_BLOCKS)  # host minus source time, relative to the first offset
         self._blocks = 0
         self._block_end_s: float | None = None
         self._best_s = np.inf
@@ -80,7 +80,7 @@ class SourceClock:
             self._close_block(source_s)
 
     def _close_block(self, source_s: float) -> None:
-        slot = self._blocks % BLOCKS_KEPT
+        slot = self._blocks % MAX_FIT_BLOCKS
         self._source_s[slot] = self._best_at_s - self._origin_s
         self._excess_s[slot] = self._best_s + self._drift * (self._best_at_s - self._origin_s)
         self._blocks += 1
@@ -90,7 +90,7 @@ class SourceClock:
 
     def _fit(self) -> None:
         self.fits += 1
-        n = min(self._blocks, BLOCKS_KEPT)
+        n = min(self._blocks, MAX_FIT_BLOCKS)
         x, y = self._source_s[:n], self._excess_s[:n]
         if n < MIN_BLOCKS_FOR_DRIFT:
             self._offset_s = self._base_s + float(y.min())

@@ -20,7 +20,7 @@ from rig.errors import DeviceFault
 POSIX = sys.platform != "win32"
 URL_SIGN = "://"  # anywhere: pyserial splits at the first one
 MAX_QUOTED = 200
-_BULK = 65_536
+BULK_BYTES = 65_536
 _ONE_READ = 2048
 
 
@@ -103,7 +103,7 @@ class SerialPort:
 
     def _read_once(self, fd: int) -> bytes:
         try:
-            data = os.read(fd, _BULK)
+            data = os.read(fd, BULK_BYTES)
         except BlockingIOError:
             return b""
         except OSError as problem:

@@ -23,7 +23,7 @@ from drivers.transport.listening import arrivals
 from drivers.transport.ports import BytePort, SerialPort
 from rig.errors import DeviceFault
 
-LATE_S = 0.06  # an answer to a frame that takes longer: what is sent does not reach the bus in time
+MAX_ANSWER_S = 0.06  # an answer to a frame that takes longer: what is sent does not reach the bus in time
 LONGEST_FLUSH_S = 1.0  # for frames that were on their way when the channel was closed
 QUIET_S = 0.05  # of silence, after which an adapter has sent everything
 
@@ -106,7 +106,7 @@ class SlcanBulkBus(can.BusABC):
     def _ask(self, command: str, may_refuse: bool = False) -> Answer:
         """Send a command and return the adapter's answer; frames that come in between are kept."""
         self._answers.clear()
-        self._port.write(command.encode("ascii") + lawicel.OK)
+        self._port.write(command.encode("ascii") + lawicel.ANSWER_OK)
         deadline = time.monotonic() + self._answer_timeout_s
         while True:
             while self._answers:
@@ -198,7 +198,7 @@ class SlcanBulkBus(can.BusABC):
         lines = b"".join(map(lawicel.encode_frame, frames))
         self._count_unanswered(len(frames), urgent)  # before the write: a fast adapter answers during it
         try:
-            self._port.write(lawicel.OK + lines if urgent else lines, timeout)
+            self._port.write(lawicel.ANSWER_OK + lines if urgent else lines, timeout)
             self._take()
         except DeviceFault as problem:
             raise CanOperationError(str(problem)) from None
@@ -209,11 +209,11 @@ class SlcanBulkBus(can.BusABC):
         What is urgent is sent all the same; and answers that nobody fetched meanwhile are not the adapter's fault.
         """
         now, waiting = time.monotonic(), self._unanswered
-        late = bool(waiting) and now - waiting[0] > LATE_S and now - self._looked_s < LATE_S
+        late = bool(waiting) and now - waiting[0] > MAX_ANSWER_S and now - self._looked_s < MAX_ANSWER_S
         if late and self._answers_frames and not urgent:
             raise CanOperationError(
                 f"{self._port.name}: {len(waiting)} frames unanswered for {(now - waiting[0]) * 1e3:.0f} ms (limit "
-                f"{LATE_S * 1e3:.0f} ms): the adapter has stalled, is too slow, or loses frames"
+                f"{MAX_ANSWER_S * 1e3:.0f} ms): the adapter has stalled, is too slow, or loses frames"
             )
         self._looked_s = now
         waiting.extend([now] * frames)

@@ -10,11 +10,10 @@ import select
 import socket
 import time
 
-from drivers.transport.ports import BytePort, SerialPort, gone, stalled, url_fault
+from drivers.transport.ports import BULK_BYTES, BytePort, SerialPort, gone, stalled, url_fault
 from rig.errors import ConfigError, DeviceFault
 
 SCHEME = "unix:"
-_BULK = 65_536
 
 
 class SocketPort:
@@ -48,7 +47,7 @@ class SocketPort:
     def read(self) -> bytes:
         """Everything that has arrived; never waits."""
         try:
-            data = self._socket.recv(_BULK)
+            data = self._socket.recv(BULK_BYTES)
         except BlockingIOError:
             return b""
         except OSError as problem:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.bounds.cramer_rao import DELAY, Information, together
+from identify.estimate.own_delays import DELAY_NAME
 from identify.model.parameters import Name
 from identify.results import NORMAL_95
 from identify.wording import SYMBOLS, joined, number, plain
@@ -15,9 +16,8 @@ from rig.platform import TERMS
 
 DETERMINED_RELATIVE_ERROR = 0.05  # relative standard error up to which a parameter counts as determined
 POOR_CONDITION = 100.0  # condition number of the scaled sensitivities, 1 at best; set by hand
-AIM = 0.01  # relative standard error that advice on the torque aims at
+AIMED_STD_ERROR = 0.01  # relative standard error that advice on the torque aims at
 SEPARATE = 200.0  # amplification of the model's errors beyond which inertia and stiffness cannot be separated
-DELAY_NAME: Name = (DELAY, "delay")
 _RATIOS = {("damping",): "C/J", ("stiffness",): "K/J"}
 
 
@@ -103,7 +103,7 @@ def of_set(information: Information, others: Sequence[Information] = ()) -> str:
         worst = max(i.relative(n) for k, n in enumerate(i.names) if i.values[k] != 0.0)
         motion = f"the motion is {number(i.loudness, 2)} times the sensor's noise: too small to determine anything"
         cure = (
-            f"about {number(worst / AIM, 2)} times the torque would give {100 * AIM:g} %"
+            f"about {number(worst / AIMED_STD_ERROR, 2)} times the torque would give {100 * AIMED_STD_ERROR:g} %"
             if worst < 1e6
             else "raise the torque"
         )

@@ -17,7 +17,7 @@ from rig.platform import Platform
 
 SLOW_SET_RATIO = 0.5  # of the natural frequency: faster sets tell one from the other
 LAGS = ("torque_delay", "actuator_lag", "sensor_lag")
-LATE_S = 1e-3  # the example in the sentence
+EXAMPLE_LAG_S = 1e-3  # the example in the sentence
 # Relative standard error of the inertia: what tells that so well tells damping from a delay as well.
 WELL_KNOWN_INERTIA = 1e-4
 MIN_RELATIVE_ERROR = 0.02  # relative standard error of C beside an unknown delay
@@ -51,7 +51,7 @@ def lag_for_damping(platform: Platform, inertia_std_error: float, traces: Sequen
     unit = "N s/m" if axis == "linear" else "N m s/rad"
     return (
         "These sets are too slow to separate damping from a delay or lag of the drive or the gyro: each undeclared "
-        f"{1e3 * LATE_S:g} ms adds {number(stiffness * LATE_S, 2)} {unit} to the identified C of "
+        f"{1e3 * EXAMPLE_LAG_S:g} ms adds {number(stiffness * EXAMPLE_LAG_S, 2)} {unit} to the identified C of "
         f"{number(platform.damping_nm_s_rad, 3)} {unit}. Add a set near the resonance at {number(natural_hz, 2)} Hz, "
         "or one that starts abruptly."
     )

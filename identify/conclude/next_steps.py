@@ -17,8 +17,8 @@ from identify.results import GeneticRun, Identification, ResidualDiagnosis, RunT
 from identify.runs.sign_convention import SENTENCE
 from identify.wording import PULSATING, capital, joined, number, plain
 
-MIN_SHARE = 0.1  # share of the residual's power from which it is said to depend on a quantity
-RUN = {
+MIN_DEPENDENT_SHARE = 0.1  # share of the residual's power from which it is said to depend on a quantity
+DRIVEN_RUN = {
     "rate": (
         "To separate friction from damping, vary the speed: add a slow ramp to a torque that is held and released, and "
         "repeat one set at a quarter and at half of its torque."
@@ -45,7 +45,7 @@ RUN = {
         "in steps, a gap); lines that stay come from the surroundings or the sensor."
     ),
 }
-RUN["direction"] = RUN["rate"]
+DRIVEN_RUN["direction"] = DRIVEN_RUN["rate"]
 BETWEEN_RUNS = (
     "J, C and K of the runs differ, and no effect here explains why: play the same frequency at half and at twice the "
     "torque, and then once more as before. If the numbers follow the travel, the platform or a sensor is nonlinear "
@@ -200,7 +200,7 @@ def _by_dependence(found: Identification) -> list[str]:
     if changing := _pulsating(found) or _changing(found):
         return [*late, changing]
     name, sentence = _dependence(found)
-    runs = DECAY_RUN if free else RUN
+    runs = DECAY_RUN if free else DRIVEN_RUN
     if name not in runs:
         line = _at_a_line(found)
         return [*late, line or (INDEPENDENT_DECAY if free else INDEPENDENT)]
@@ -245,11 +245,11 @@ def _dependence(found: Identification) -> tuple[str, str]:
         return max(found.disturbance.depends_on, key=lambda d: d.relative).on, ""
     shares = dependence(found.traces, found.final.error.lowpass_hz or USUAL_CUTOFF_HZ)
     name, share = next(iter(shares.items()), ("", 0.0))
-    if share >= MIN_SHARE:
+    if share >= MIN_DEPENDENT_SHARE:
         return name, f"{number(100.0 * share, 2)} % of the residual's power depends on the {name}. "
     left = _diagnosis(found)
     parts = {} if left is None else {"direction": left.direction, "history": left.memory}
-    seen = {on: s.share for on, s in parts.items() if s is not None and is_significant(s, MIN_SHARE)}
+    seen = {on: s.share for on, s in parts.items() if s is not None and is_significant(s, MIN_DEPENDENT_SHARE)}
     return (max(seen, key=seen.__getitem__), "") if seen else ("", "")
 
 

@@ -16,13 +16,14 @@ from identify.conclude.acceptance import opposite_signs
 from identify.results import Identification, Implausible
 from identify.wording import SYMBOLS, half_interval, joined, number
 from rig.platform import TERMS
+from rig.units import TURN
 
 DECLARED_TOLERANCE = math.log(1.15)  # of a factor, either way: what a declared number is good for
 # Of two declared numbers that share a factor: a computed inertia is good for a percent or two.
 COMMON_FACTOR_TOLERANCE = math.log(1.02)
 MIN_SCALE, MAX_SCALE = math.log(1.05), math.log(2.0)  # a torque constant's tolerance; beyond, it is no calibration
 MAX_RELATIVE_INTERVAL = 0.1  # half the 95 % interval over the value: worse says nothing of a factor
-DEGREES, TURN, RPM = 180.0 / math.pi, 2.0 * math.pi, 30.0 / math.pi  # deg in a rad, rad in a turn, rpm in a rad/s
+DEGREES, RPM = 180.0 / math.pi, 30.0 / math.pi  # deg in a rad, rpm in a rad/s
 GRAVITY, THOUSAND = 9.80665, 1e3  # newtons to a kgf; a prefix: milli, or kilo
 FREQUENCY = TURN**2  # (rad/s)^2 in a Hz^2: of K/J, where a frequency in Hz was taken for rad/s
 Channel = Literal["rate", "angle"]

@@ -14,7 +14,7 @@ from rig.arrays import Array
 AUTOREGRESSION_ORDER = 24  # of the autoregression: six periods of the cut-off, at four samples each
 AUTOREGRESSION_ROUNDS = 3  # of fitting the autoregression and the parameters in turn
 MIN_ERROR_RATE = 1e-12  # below it a rate of error tells nothing: neither test is exact that far out
-LINES = 4  # that are looked for in a run
+MAX_LINES_IN_RUN = 4  # that are looked for in a run
 
 
 def lines(x: Array, values: Array, highest: float) -> list[tuple[float, float]]:
@@ -25,11 +25,11 @@ def lines(x: Array, values: Array, highest: float) -> list[tuple[float, float]]:
     f = np.arange(len(size)) / (4.0 * len(x)) * (len(x) - 1) / max(float(x[-1] - x[0]), 1e-300)
     inside = (f > 1.5 / max(float(x[-1] - x[0]), 1e-300)) & (f < highest)
     peaks = find_peaks(size * inside)[0]
-    return [(float(size[k]), float(f[k])) for k in peaks[np.argsort(size[peaks])[-LINES:]]]
+    return [(float(size[k]), float(f[k])) for k in peaks[np.argsort(size[peaks])[-MAX_LINES_IN_RUN:]]]
 
 
 def strongest(found: list[tuple[float, float]]) -> tuple[float, ...]:
-    return tuple(f for _, f in sorted(found, reverse=True)[: 2 * LINES])
+    return tuple(f for _, f in sorted(found, reverse=True)[: 2 * MAX_LINES_IN_RUN])
 
 
 def standard_errors(values: Sequence[float] | Array) -> float:

@@ -23,7 +23,7 @@ from rig.platform import Platform
 from rig.recording.run import Array
 
 DRAWS = 8  # of white noise, for what the sensor alone would leave
-SURE = 8.0  # standard deviations above what the draws show on average
+CHANCE_SIGMAS = 8.0  # standard deviations above what the draws show on average
 MIN_DIAGNOSED_SAMPLES = 500  # samples of all runs: of fewer nothing is told
 OVERSAMPLED = 8.0  # samples in a period of the low-pass's cut-off: more tell nothing more
 MIN_HARMONIC_SHARE = 0.01  # of the residual's power: a single multiple with less is not told
@@ -165,7 +165,7 @@ def _natural_hz(sensor: Sensor) -> float:
 def _shares(power: Array, total: Array) -> tuple[Share, Share]:
     """Shares of both models from powers (2 + draws,), each with what the draws show at most."""
     draws = power[2:]
-    chance = float(np.mean(draws) + SURE * np.std(draws))
+    chance = float(np.mean(draws) + CHANCE_SIGMAS * np.std(draws))
     first, second = (Share(float(np.clip(power[i] / total[i], 0.0, 1.0)), max(chance, 0.0) / total[i]) for i in (0, 1))
     return first, second
 

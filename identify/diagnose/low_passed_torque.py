@@ -25,7 +25,7 @@ from rig.arrays import Array
 from rig.effects.base import Effect, Place, Scale
 from rig.platform import TERMS
 
-SAMPLES_A_PERIOD = 4.0  # of the cut-off: what the low-pass passed needs no more
+SAMPLES_A_CUTOFF_PERIOD = 4.0  # of the cut-off: what the low-pass passed needs no more
 FOLDS, FOLD_BLOCKS = 3, 9  # a third of the runs, or of the blocks of each run, is held out in turn
 STILL_SIGMAS, STILL_PERIODS = 5.0, 0.5  # standard deviations of the smoothed rate, for so many periods of the cut-off
 MOST_BIAS_SHARE = 0.25  # of a run's rate: what stays and is more is a steady motion
@@ -54,7 +54,7 @@ class LowPassedTorque:
         self.torque_free = all(t.torque is None for t in traces)
         self.by_gyro = all(t.channel == "rate" for t in traces)  # whose low-pass delays the motion that is seen here
         self.runs = 1 + max(t.number for t in traces)
-        step = max(1, int(1.0 / (SAMPLES_A_PERIOD * cutoff_hz * traces[0].step_s)))
+        step = max(1, int(1.0 / (SAMPLES_A_CUTOFF_PERIOD * cutoff_hz * traces[0].step_s)))
         self._rows = [self._rows_of(t, step, t.keep & ~self._standing(t)) for t in traces]
         if sum(map(len, self._rows)) < SHORTEST_STRETCH:  # no motion stands out of the noise: rest cannot be told
             self._rows = [self._rows_of(t, step, t.keep) for t in traces]

@@ -23,7 +23,7 @@ MAX_MEMORY_ROWS = 16_000  # of all runs together: enough for some fifty columns
 MEMORY_TIMES_S = (0.004, 0.02, 0.1, 0.5)  # time constants of first-order lags
 PAST_TRAVEL = (0.02, 0.1, 0.4)  # of the travel
 ALTERNATING_BLOCKS = 16  # a run; two folds take them in turn
-LONGEST = 400_000  # steps along the path of one run
+MAX_PATH_STEPS = 400_000  # steps along the path of one run
 MEMORY_RIDGE = 1e-7  # a sample, on columns scaled to a mean square of one
 ANGLES = 16  # bins in which the two directions are compared
 MIN_DIRECTION_BIN_SAMPLES = 8  # samples of either direction in a bin
@@ -123,7 +123,7 @@ def came_from(angle: Array, length: float) -> Array:
     path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(angle)))])
     if path[-1] < length or length <= 0.0:
         return np.zeros_like(angle)
-    step = max(length / 12.0, float(path[-1]) / LONGEST)
+    step = max(length / 12.0, float(path[-1]) / MAX_PATH_STEPS)
     even = np.arange(0.0, path[-1] + step, step)
     where = np.interp(even, path, angle)
     keep = float(np.exp(-step / length))

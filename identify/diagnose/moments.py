@@ -20,7 +20,7 @@ from identify.diagnose.memory import RunResiduals
 from identify.results import Moment
 from rig.recording.run import Array
 
-WINDOW_S = 0.25  # length of a window
+MOMENT_WINDOW_S = 0.25  # length of a window
 MIN_WINDOWS = 12  # windows in a run: of fewer none is a moment
 EVENT_POWER_RATIO = 10.0  # times the median power of the run's windows
 MIN_TOTAL_SHARE = 0.5  # of the residual's power of all runs that they hold together
@@ -84,7 +84,7 @@ def moments(
 
 
 def _windows(run: RunResiduals, model: int) -> _Windows:
-    length = max(1, round(WINDOW_S / run.step_s))
+    length = max(1, round(MOMENT_WINDOW_S / run.step_s))
     at = np.arange(0, len(run.use), length)
     squares = np.where(run.use, run.left[:, model], 0.0) ** 2
     counts = np.add.reduceat(run.use.astype(int), at)

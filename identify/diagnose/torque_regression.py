@@ -25,7 +25,8 @@ from identify.model.structure import Shapes, Structure
 from rig import effects
 from rig.arrays import Array
 
-BLOCK_SAMPLES, BLOCKS_A_RUN, MIN_BLOCKS = 8, 24, 8  # samples behind the low-pass in a block, and how many blocks
+# Samples behind the low-pass in a block, and how many blocks.
+BLOCK_SAMPLES, BLOCKS_A_RUN, MIN_HELD_OUT_BLOCKS = 8, 24, 8
 LEAST_PASSED_ON = 1e6  # times: a drive that passes on less passes on nothing
 MIN_FOR_LINES, MIN_TRAVEL_RAD = 64, 0.5  # samples, and travel to show a line against the angle
 
@@ -267,7 +268,7 @@ class TorqueRegression(LowPassedTorque):
         do: the error rates of all runs are combined (Fisher 1925).
         """
         by_run = [falls for falls in self._falls(base, richer) if len(falls[0])]
-        if sum(len(fall) for fall, _ in by_run) < MIN_BLOCKS:
+        if sum(len(fall) for fall, _ in by_run) < MIN_HELD_OUT_BLOCKS:
             return 0.0, 0.0
         fall, ratio = zip(*by_run, strict=True)
         if np.mean(np.concatenate(fall)) <= 0.0:

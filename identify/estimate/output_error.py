@@ -25,7 +25,7 @@ from rig import effects
 from rig.dynamics import Equations
 from rig.recording.run import Array
 
-KEPT = 3  # steps with the same sensitivities
+MAX_STEPS_ON_ONE_SENSITIVITY = 3  # steps with the same sensitivities
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ def _levenberg(
         if step is not None and d.fresh and arrived:
             d.keep() if coarse else d.renew()
             break
-        if step is not None and step.foretold and not arrived and age <= KEPT:
+        if step is not None and step.foretold and not arrived and age <= MAX_STEPS_ON_ONE_SENSITIVITY:
             d.keep()
             continue
         age = 0

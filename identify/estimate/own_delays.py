@@ -16,12 +16,12 @@ from identify.model.parameters import Name
 from identify.signals.trace import Trace
 from rig.arrays import Array
 
-DELAY: Name = ("torque_delay", "delay")
+DELAY_NAME: Name = ("torque_delay", "delay")
 
 
 def have_own_delays(traces: Sequence[Trace], names: Sequence[Name]) -> bool:
     """Whether every run may have a delay of its own: one is fitted, and clocks differ in all of several runs."""
-    return DELAY in names and len(traces) > 1 and all(_two_clocks(t) for t in traces)
+    return DELAY_NAME in names and len(traces) > 1 and all(_two_clocks(t) for t in traces)
 
 
 def _two_clocks(trace: Trace) -> bool:
@@ -46,13 +46,13 @@ def of_own_clock(columns: Array, names: Sequence[Name], along: Array) -> Array:
     along
         Where in the run each row lies, (n,), as from ``position``.
     """
-    late = columns[:, list(names).index(DELAY)]
+    late = columns[:, list(names).index(DELAY_NAME)]
     return np.column_stack([late, along * late])
 
 
 def beside_own_delay(columns: Array, names: Sequence[Name], along: Array) -> Array:
     """What the parameters do to one run, (n, p), without what such a delay can follow; the delay itself stays."""
-    at = list(names).index(DELAY)
+    at = list(names).index(DELAY_NAME)
     rest = np.array(orthogonal_part(of_own_clock(columns, names, along), columns))
     rest[:, at] = columns[:, at]
     return rest
@@ -60,7 +60,7 @@ def beside_own_delay(columns: Array, names: Sequence[Name], along: Array) -> Arr
 
 def freed(covariance: Array, held: Array, names: Sequence[Name]) -> Array:
     """Covariance beside delays of the runs' own, (p, p), and with one for all; of the delay the latter holds."""
-    at = list(names).index(DELAY)
+    at = list(names).index(DELAY_NAME)
     out = covariance.copy()
     out[at], out[:, at] = held[at], held[:, at]
     return out

@@ -20,10 +20,10 @@ MIN_CHI_SQUARE = 25.0  # chi square that a plan has to promise: five standard er
 GOOD = 400.0  # from which more sets are not worth their time
 BEST = 1e4  # from which more of it proves nothing more
 EQUIVALENT_SCORE_RATIO = 0.5  # of the best score: the shorter of two such sets is played
-MAX_SETS = 4  # of a plan
+MAX_PLANNED_SETS = 4  # of a plan
 PROOFS = 3  # sets that are put to the proof in a round
 PARALLEL_PROOFS = 2  # of them: the compiled simulations run side by side
-LOOKED_AT = 14  # candidates of a pair whose sensitivities are taken
+MAX_CANDIDATES_OF_PAIR = 14  # candidates of a pair whose sensitivities are taken
 
 
 class PairSeparations:
@@ -45,7 +45,7 @@ class PairSeparations:
         scale = self._weight / self._sensor.noise**2
         size = [scale * float(np.sum((c.seen[one] - c.seen[other]) ** 2)) for c in self.choice]
         shares = sorted({c.share for c in self.choice}, reverse=True)
-        per = max(1, LOOKED_AT // len(shares))
+        per = max(1, MAX_CANDIDATES_OF_PAIR // len(shares))
         out = []
         for share in shares:
             mine = [i for i, c in enumerate(self.choice) if c.share == share and size[i] > MIN_CHI_SQUARE]
@@ -115,7 +115,7 @@ def choose(separations: PairSeparations) -> list[int]:
     """
     chosen: list[int] = []
     reached, stands = 0.0, [0.0] * len(separations.pairs)
-    while separations.shortlist and len(chosen) < MAX_SETS:
+    while separations.shortlist and len(chosen) < MAX_PLANNED_SETS:
         gains = {i: separations.score([*chosen, i]) for i in separations.shortlist}
         best = max(gains.values())
         alike = sorted(

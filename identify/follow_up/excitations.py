@@ -17,7 +17,7 @@ from rig.preflight import Peaks, predict
 from rig.recording.run import Array
 
 AMPLITUDES = (1.0, 0.3, 0.1, 0.03)  # of what the limits allow
-SHORTEST_S, LONGEST_S = 5.0, 15.0  # of a set
+MIN_SET_S, MAX_SET_S = 5.0, 15.0  # of a set
 SET_PERIODS = 100.0  # of the platform's own oscillation in a set
 DRIFT_SET_S = 40.0  # a set long enough for what drifts
 MAX_SINE_FREQUENCY_SHARE = 0.08  # of the sample rate: beyond, what happens between the samples is part of the answer
@@ -73,7 +73,7 @@ class Candidate:
 
 def shapes(natural_hz: float, sample_rate_hz: float) -> tuple[Shape, ...]:
     """What to choose from, for a platform that swings at ``natural_hz`` and a sensor read at ``sample_rate_hz``."""
-    length = float(np.clip(math.ceil(SET_PERIODS / natural_hz), SHORTEST_S, LONGEST_S))
+    length = float(np.clip(math.ceil(SET_PERIODS / natural_hz), MIN_SET_S, MAX_SET_S))
     top = MAX_SINE_FREQUENCY_SHARE * sample_rate_hz
     out = [_sine(f * natural_hz, length, words) for f, words in (*TONES, *HIGH_TONES) if f * natural_hz < top]
     out.append(_sine(0.31 * natural_hz, DRIFT_SET_S, "a long sine", (1.0,)))

@@ -25,7 +25,7 @@ from rig.platform import Platform
 from rig.recording.run import Array
 
 SEPARATION_ROUNDS = 8  # rounds in which a model is fitted to what the other would have shown
-TRIES = 5  # of a step, each shorter than the one before
+MAX_SHORTER_STEPS = 5  # of a step, each shorter than the one before
 MIN_ROUND_GAIN = 0.05  # of chi square by which a round has to gain
 STARTS = (1.0, 0.1, 0.0)  # of the gains of the model's own effects
 
@@ -171,7 +171,7 @@ def _descend(imitation: Imitation, several: Sequence[Shots], start: Array) -> fl
     damping = 0.0
     for _ in range(SEPARATION_ROUNDS):
         before = cost
-        for _try in range(TRIES):
+        for _try in range(MAX_SHORTER_STEPS):
             trial = values.copy()
             trial[kept] += total.step(imitation.prior, (values - origin)[kept], damping)
             trial = ordered(names, np.clip(trial, low, high))

@@ -14,7 +14,7 @@ from scipy import fft, signal
 from identify.frequency.spectra import Complex, Record, Response, chosen, excited, stands_apart
 from rig.recording.run import Array
 
-NEIGHBOURS = 5  # bins either way behind a local polynomial
+NEIGHBOUR_BINS = 5  # bins either way behind a local polynomial
 POLYNOMIAL_ORDER = 2  # degree of that polynomial
 DISTINCT = 0.3  # share of a line's torque that no parabola over the bins takes for a transient
 
@@ -34,7 +34,7 @@ def by_local_polynomial(records: Sequence[Record]) -> Response:
     if stands_apart(records[0].torque_nm[:n]):
         peaks = signal.find_peaks(power)[0]
         power = np.where(np.isin(np.arange(len(f)), peaks), power, 0.0)
-    at = chosen(f, power) if last > 2 * NEIGHBOURS else np.empty(0, dtype=np.int_)
+    at = chosen(f, power) if last > 2 * NEIGHBOUR_BINS else np.empty(0, dtype=np.int_)
     lines = [(f[k], *line) for k in at if (line := _local(spectra, int(k), last)) is not None]
     columns = np.array(lines, dtype=complex).reshape(-1, 5).T
     hertz, coherence, error, freedom = columns[[0, 2, 3, 4]].real
@@ -49,9 +49,9 @@ def _length(torque: Array) -> int:
 
 def _local(spectra: Sequence[tuple[Complex, ...]], k: int, last: int) -> tuple[complex, float, float, float] | None:
     """Response, coherence, relative error and degrees of freedom at one bin; None where U passes for a transient."""
-    begin = int(np.clip(k - NEIGHBOURS, 1, last - 2 * NEIGHBOURS))
-    bins = np.arange(begin, begin + 2 * NEIGHBOURS + 1)
-    powers = np.vander((bins - k) / NEIGHBOURS, POLYNOMIAL_ORDER + 1, increasing=True)
+    begin = int(np.clip(k - NEIGHBOUR_BINS, 1, last - 2 * NEIGHBOUR_BINS))
+    bins = np.arange(begin, begin + 2 * NEIGHBOUR_BINS + 1)
+    powers = np.vander((bins - k) / NEIGHBOUR_BINS, POLYNOMIAL_ORDER + 1, increasing=True)
     scale = max(float(np.max(np.abs(u[bins]))) for u, _ in spectra)
     through = np.concatenate([powers * (u[bins] / scale)[:, None] for u, _ in spectra])
     starts = np.kron(np.eye(len(spectra)), powers)

@@ -18,7 +18,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 MIN_COHERENCE = 0.8  # coherence below which a line is drawn pale
 MAX_GAIN_ERROR = 0.25  # relative error of the gain (2 dB) above which it is drawn pale as well
 EXCITED = 1e-4  # of the strongest line's power (-40 dB): what lies below is not excited
-MAX_LINES = 240  # lines of one response
+MAX_RESPONSE_LINES = 240  # lines of one response
 SPARSE = 0.5  # share of the bins of a band below which its lines stand apart
 
 
@@ -108,12 +108,12 @@ def relative_error_of(coherence: Array, averages: Array) -> Array:
 
 
 def chosen(frequency_hz: Array, power: Array) -> NDArray[np.int_]:
-    """Excited lines above zero, at most ``MAX_LINES`` of them, evenly over the logarithm of frequency."""
+    """Excited lines above zero, at most ``MAX_RESPONSE_LINES`` of them, evenly over the logarithm of frequency."""
     inside = frequency_hz > 0.0
     at = np.flatnonzero(inside & (power > EXCITED * np.max(power, where=inside, initial=0.0)))
-    if len(at) <= MAX_LINES:
+    if len(at) <= MAX_RESPONSE_LINES:
         return at
-    wanted = np.geomspace(frequency_hz[at[0]], frequency_hz[at[-1]], MAX_LINES)
+    wanted = np.geomspace(frequency_hz[at[0]], frequency_hz[at[-1]], MAX_RESPONSE_LINES)
     return np.unique(at[np.clip(np.searchsorted(frequency_hz[at], wanted), 0, len(at) - 1)])
 
 

@@ -34,7 +34,7 @@ ALLOWANCE = 1.2  # J_dec over the objective that the sensor's noise alone makes
 # The same over the closed form's, where that lies higher and yet is near the noise: no search gets lower.
 ARRIVED = 1.02
 NEAR_NOISE = 2.0  # times the objective that the noise makes
-SIMULATED = 8  # iterations of the fit that a set's values are held against
+SIMULATION_ITERATIONS = 8  # iterations of the fit that a set's values are held against
 MAX_SIGMAS = 3.0  # standard errors from it: further off, the distance is the error
 SET_DETERMINED_RELATIVE_ERROR = 0.05  # relative standard error up to which a set alone determines a parameter
 KEYS = {"inertia": "inertia_kg_m2", "damping": "damping_nm_s_rad", "stiffness": "stiffness_nm_rad"}
@@ -179,7 +179,7 @@ def _by_motion(trace: Trace, values: Mapping[str, float], labels: Sequence[Name]
     if values.get("inertia", 1.0) <= 0.0:
         return lost
     start: dict[Name, float] = {(term,): values[term] for (term,) in labels}
-    found = refine([replace(trace, number=0)], structure, start, None, SIMULATED, coarse=True)
+    found = refine([replace(trace, number=0)], structure, start, None, SIMULATION_ITERATIONS, coarse=True)
     if not np.isfinite(found.sigma):
         return lost
     errors = least_std_errors(found.shots[0], found, labels, trace.noise)

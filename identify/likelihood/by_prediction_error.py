@@ -26,7 +26,7 @@ from identify.signals.trace import Trace
 from rig import effects
 from rig.arrays import Array
 
-MAX_SAMPLES = 60_000  # of the final fit: longer recordings are filtered and decimated, all of them
+MAX_FINAL_FIT_SAMPLES = 60_000  # of the final fit: longer recordings are filtered and decimated, all of them
 FINAL_FIT_ITERATIONS = 25  # steps of that fit
 SHIFT_STEP = 0.01  # of a sample: for the slope over a shift of the torque
 UNIFORM_VARIANCE = 12.0  # one over the variance of what lies anywhere within a unit
@@ -54,7 +54,7 @@ def fitted_on_all(
     like: Fit | None = None,
 ) -> tuple[PredictionError, Fit]:  # fmt: skip
     """The likelihood on all samples that fit, and the model fitted by it."""
-    few, masks = thinned(traces, use, MAX_SAMPLES)
+    few, masks = thinned(traces, use, MAX_FINAL_FIT_SAMPLES)
     problem = PredictionError(few, masks)
     return problem, problem.fit(structure, start, problem.noise_of(like) if like else None, FINAL_FIT_ITERATIONS)
 

@@ -23,7 +23,7 @@ from rig import effects
 from rig.effects.base import Place
 
 EVALUATIONS = 30  # of a shape search
-BEYOND = 4.0  # times the outermost starting values: how far a shape may wander
+MAX_SHAPE_RATIO = 4.0  # times the outermost starting values: how far a shape may wander
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class _Beside:
             return shape
         starts = [p.start(self.regression.scale) if p.start else (1.0,) for p in axes]
         bounds = [
-            (max(p.low, min(s) / BEYOND, 1e-12), min(p.high, BEYOND * max(s)))
+            (max(p.low, min(s) / MAX_SHAPE_RATIO, 1e-12), min(p.high, MAX_SHAPE_RATIO * max(s)))
             for p, s in zip(axes, starts, strict=True)
         ]
 

@@ -24,9 +24,9 @@ from rig.recording.memory import at_most
 
 FILE = "report_data.h5"
 FORMAT = "isp-rig report data"
-VERSION = 1  # of the format of this file
-MAX_VALUES = 60_000_000  # half a gigabyte; a longer campaign keeps no report data
-MAX_BYTES = 2 << 30  # of memory that reading may take
+REPORT_DATA_VERSION = 1  # of the format of this file
+MAX_REPORT_VALUES = 60_000_000  # half a gigabyte; a longer campaign keeps no report data
+MAX_REPORT_BYTES = 2 << 30  # of memory that reading may take
 # What h5py and json raise over a damaged file; a link that leads nowhere reads as None.
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, MemoryError, RecursionError)
 
@@ -68,11 +68,11 @@ def image_of(data: ReportData) -> bytes | None:
     """The bytes of report_data.h5; None where the campaign is too long for it to be read back."""
     arrays = Arrays()
     text = json.dumps(encode(data, arrays))
-    if sum(array.size for array in arrays.kept) > MAX_VALUES:
+    if sum(array.size for array in arrays.kept) > MAX_REPORT_VALUES:
         return None
     # Made in memory: on a full disk the HDF5 library crashes instead of raising.
     with h5py.File(FILE, "w", driver="core", backing_store=False) as file:
-        file.attrs.update({"format": FORMAT, "version": VERSION})
+        file.attrs.update({"format": FORMAT, "version": REPORT_DATA_VERSION})
         file["identification"] = text
         group = file.create_group("arrays")
         for number, array in enumerate(arrays.kept):
@@ -92,7 +92,7 @@ def read_report_data(path: Path) -> ReportData:
     """
     try:
         check_heaps(path)
-        with h5py.File(path, "r") as file, at_most(MAX_BYTES):
+        with h5py.File(path, "r") as file, at_most(MAX_REPORT_BYTES):
             _check_format(path, file)
             text = _plain(path, file, "identification")[()]
             arrays = _arrays(path, file)
@@ -109,14 +109,15 @@ def _check_format(path: Path, file: h5py.File) -> None:
     if file.attrs.get("format") != FORMAT:
         raise RecordingError(f"{path}: holds no report data: restore the file, or identify again")
     version = int(file.attrs["version"])
-    if version != VERSION:
+    if version != REPORT_DATA_VERSION:
         raise RecordingError(
-            f"{path}: has version {version}, this program reads version {VERSION}: use the version that wrote it"
+            f"{path}: has version {version}, this program reads version {REPORT_DATA_VERSION}: "
+            "use the version that wrote it"
         )
 
 
 def _arrays(path: Path, file: h5py.File) -> list[AnyArray]:
-    group, found, left = file["arrays"], [], MAX_VALUES
+    group, found, left = file["arrays"], [], MAX_REPORT_VALUES
     for name in sorted(group, key=int):
         dataset = _plain(path, group, name)
         left -= dataset.size

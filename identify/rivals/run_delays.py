@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from identify.estimate.covariance import orthogonal_part
-from identify.estimate.own_delays import DELAY, have_own_delays, of_own_clock, position
+from identify.estimate.own_delays import DELAY_NAME, have_own_delays, of_own_clock, position
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.runs.reduced import thinned
@@ -99,7 +99,7 @@ def _own_delays(problem: PredictionError, fit: Fit) -> tuple[Array, float]:
     A run's delay is a line: in the middle of the run, and half its change along it. What it brings is by how much minus
     twice the log-likelihood falls, all other parameters free.
     """
-    parts, at, shared = problem.columns_at(fit), fit.names.index(DELAY), len(fit.names) - 1
+    parts, at, shared = problem.columns_at(fit), fit.names.index(DELAY_NAME), len(fit.names) - 1
     size = shared + 2 * len(parts)
     matrix, right = np.zeros((size, size)), np.zeros(size)
     rest = [k for k in range(shared + 1) if k != at]

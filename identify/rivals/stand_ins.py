@@ -27,9 +27,11 @@ from rig import effects
 from rig.effects.base import Effect, Place
 from rig.platform import TERMS
 
-MOSTLY = 0.5  # of the torque, that is left: then what goes with that is looked for, however freely it follows
+# Of the torque, that is left: then what goes with that is looked for, however freely it follows.
+MOSTLY_LEFT_SHARE = 0.5
 MORE = 0.5  # of what an effect takes, that is left: with more it does not help that it is needed, too
-KEPT = 0.1  # of what an effect takes, that it takes beside a curve too, and is no stand-in for that
+# Of what an effect takes, that it takes beside a curve too, and is no stand-in for that.
+MIN_SHARE_KEPT_BESIDE_CURVE = 0.1
 
 
 def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callable[[str], None]) -> Found:
@@ -91,7 +93,7 @@ def _is_needed_beside(name: str, found: Found) -> bool:
         and not part.changes
         and (not effect.is_flexible or bool(effect.repeats_over_angle))
     )
-    return asked and found.taken_by(name, part) > KEPT * found.taken_by(name)
+    return asked and found.taken_by(name, part) > MIN_SHARE_KEPT_BESIDE_CURVE * found.taken_by(name)
 
 
 def _is_bound(effect: Effect) -> bool:
@@ -171,7 +173,7 @@ def _taken_back(found: Found, names: Sequence[str], axis: str) -> Found:
     """
     depends = found.disturbance.depends_on
     flexible = any(effects.get(n).is_flexible for n in names)
-    goes_with = depends[0].on if depends[0].relative > MOSTLY else ""
+    goes_with = depends[0].on if depends[0].relative > MOSTLY_LEFT_SHARE else ""
     less = found.without(*names, others=goes_with if flexible else None)
     search = less.search
     follows = " but can follow almost any torque," if flexible else ""

@@ -10,9 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.signals.noise import NOISE_SCATTER, UPPER, least_of, noise_of
+from identify.signals.noise import NOISE_SCATTER, least_of, noise_of
 from identify.signals.trace import Trace
 from identify.wording import number
+from rig.decimation import NOISE_BAND
 
 NOISY_RATIO = 1.2  # times the noise of the other runs: less is fitted with them and hardly shows
 NOISY_SIGMAS = 5.0  # standard errors of a reading of the noise: what differs by less is alike
@@ -50,7 +51,7 @@ def _is_louder(trace: Trace, quiet: float) -> bool:
 def _is_white(trace: Trace) -> bool:
     """Whether both halves of the band in which the noise is read hold the same: motion falls off, or rings."""
     first, last = max(trace.stretches, key=lambda ab: ab[1] - ab[0])
-    values, middle = trace.measured[first : last + 1], 0.5 * (UPPER[0] + UPPER[1])
-    low, high = noise_of(values, (UPPER[0], middle)), noise_of(values, (middle, UPPER[1]))
+    values, middle = trace.measured[first : last + 1], 0.5 * (NOISE_BAND[0] + NOISE_BAND[1])
+    low, high = noise_of(values, (NOISE_BAND[0], middle)), noise_of(values, (middle, NOISE_BAND[1]))
     chance = NOISE_SCATTER * float(np.sqrt(2.0 / len(values)))  # of either half
     return abs(low - high) < NOISY_SIGMAS * chance * (low + high) / np.sqrt(2.0)

@@ -11,16 +11,16 @@ import numpy as np
 from identify.runs.holdout import Split
 from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace
 from rig.arrays import Array
-from rig.decimation import REACH, SAMPLES_A_PERIOD, keeps_white, sharp
+from rig.decimation import REACH, SAMPLES_A_PERIOD, SPAN_STARTS, keeps_white, sharp
 
 DEFAULT_REDUCED_SAMPLES = 20_000  # samples, where nothing else is asked for
 HARMONICS = 5.0  # of a decay's swing: it moves no faster, whatever its noise does
 TURNS = 0.02  # of the largest rate, below which a turn may be noise
 SHORTEST_SPAN = 1_500  # samples: slow effects need a span to show in
-COLUMNS = 8  # acceleration, rate, angle, direction, constant; and where torque, rate and angle reach farthest
+# Acceleration, rate, angle, direction, constant; and where torque, rate and angle reach farthest.
+INFORMATION_COLUMNS = 8
 # Power that leaves of a quantity little but its peaks: what sets in there (a limit, a stop) shows nowhere else.
 OUTERMOST = 5
-PLACES = 12  # where a span may begin
 LEAD = 0.25  # of a span, that is measured ahead of it: ``identify.likelihood.settling`` leaves it out again
 
 
@@ -46,7 +46,7 @@ def reduced(traces: Sequence[Trace], split: Split, enough: int = DEFAULT_REDUCED
         picked = {*_chosen(few, fitting, count), *_chosen(few, judging, max(1, count // 3))}
         chosen = sorted(picked)  # type: ignore[assignment]
     out, fits, judges = [], [], []
-    information: Array = 1e-6 * np.eye(COLUMNS)
+    information: Array = 1e-6 * np.eye(INFORMATION_COLUMNS)
     for i in chosen:
         t = few[i]
         first, last, information = _span(t, wanted, information)
@@ -158,6 +158,6 @@ def _span(trace: Trace, wanted: int, information: Array) -> tuple[int, int, Arra
 
     if n <= 1.25 * wanted:
         return 0, n - 1, information + columns.T @ columns / wanted
-    places = np.linspace(0, n - wanted, PLACES).astype(int).tolist()
+    places = np.linspace(0, n - wanted, SPAN_STARTS).astype(int).tolist()
     first = max(places, key=lambda at: float(np.linalg.slogdet(with_span(at))[1]))
     return first, first + wanted - 1, with_span(first)

@@ -27,7 +27,8 @@ from rig import effects
 if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
 
-NEAR = 0.5  # of what the effect explains, that a curve has after a few steps: with less it is not followed
+# Of what the effect explains, that a curve has after a few steps: with less it is not followed.
+MIN_EARLY_CURVE_SHARE = 0.5
 CURVES: Mapping[str, Sequence[str]] = {
     "restoring torque": ("free_angle",), "position-dependent torque": ("free_angle",), "friction": ("free_rate",),
     "drive": ("free_torque",), "surroundings": ("free_time",),
@@ -124,7 +125,7 @@ def _in_place(
     best = max((s for s in found if s is not None), key=lambda s: s.gain, default=None)
     if best is None or best.gain < COMPARABLE * score:
         return None
-    fit = fitted(problem, rest, best, CURVE_STEPS, rest.cost - NEAR * (rest.cost - now.cost))
+    fit = fitted(problem, rest, best, CURVE_STEPS, rest.cost - MIN_EARLY_CURVE_SHARE * (rest.cost - now.cost))
     return (best.effect, fit) if np.isfinite(fit.cost) else None
 
 

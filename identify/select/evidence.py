@@ -36,7 +36,7 @@ from rig.platform import TERMS
 
 CHANCE = 0.95  # quantile of a ratio of variances: what chance alone reaches is no sign of a wrong likelihood
 MIN_RUNS = 4  # whose scores show whether runs differ
-ALONE = 1e-3  # of a parameter's influence, that the others leave: of less only rounding is seen
+MIN_OWN_INFLUENCE_SHARE = 1e-3  # of a parameter's influence, that the others leave: of less only rounding is seen
 ADDED_SUPPORT = 20.0  # support of an effect that is added: no chance among all candidates and their shapes makes it
 STRONG_SUPPORT = 10.0  # support that parts two models (Kass and Raftery 1995: very strong)
 WEIGHT = 0.20  # share of the disturbance that an effect takes away to be named: below, it is true but small
@@ -232,9 +232,11 @@ def inflation(parts: Sequence[Columns], fit: Fit, names: Sequence[Name]) -> floa
     taken = np.linalg.pinv(information[np.ix_(others, others)], rcond=1e-12, hermitian=True) @ across
     own = [x[:, mine] - x[:, others] @ taken for x in columns]
     size = np.sqrt(np.sum([np.sum(x * x, axis=0) for x in own], axis=0))
-    known = size > ALONE * np.sqrt(np.diag(information)[mine])
+    known = size > MIN_OWN_INFLUENCE_SHARE * np.sqrt(np.diag(information)[mine])
     own = [x[:, known] / size[known] for x in own]
-    expected = np.linalg.pinv(np.sum([x.T @ x for x in own], axis=0) * fit.variance, rcond=ALONE, hermitian=True)
+    expected = np.linalg.pinv(
+        np.sum([x.T @ x for x in own], axis=0) * fit.variance, rcond=MIN_OWN_INFLUENCE_SHARE, hermitian=True
+    )
 
     def ratio(scores: Sequence[Array]) -> float:
         s = np.array(scores)

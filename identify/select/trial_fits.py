@@ -27,7 +27,7 @@ from rig.effects.base import Place, Scale
 
 MIN_TRIAL_SCORE = 20.0  # of a score, parameters paid for: less would not be added when fitted
 TRIED = 4  # candidates of a round, by their scores, that are fitted
-PAIRS = 2  # pairs of a round, by their scores, that are fitted
+MAX_PAIRS_FITTED = 2  # pairs of a round, by their scores, that are fitted
 HEAVIEST = 3  # candidates by their weight in torque that are fitted beside those
 FAINT_SCORE = 0.02  # of the best score: what promises so little is not what the round is about
 TRIAL_ITERATIONS, FULL_ITERATIONS = 14, 25  # steps of a fit that is compared, and of one that is kept
@@ -103,7 +103,7 @@ class TrialFits:
         worth = [
             (one, other) for one, other, gain in InnovationScores(self.problem, now, self.scale(now)).pairs(torque)
             if gain > MIN_TRIAL_SCORE + price * sum(len(effects.get(s.effect).parameters) for s in (one, other))
-        ][:PAIRS]  # fmt: skip
+        ][:MAX_PAIRS_FITTED]  # fmt: skip
 
         def fitted(one: Score, other: Score) -> Fit:
             both = self.problem.fit(

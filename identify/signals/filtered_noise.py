@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.linalg import expm
 
-from identify.signals.noise import UPPER
+from rig.decimation import NOISE_BAND
 
 NOISE_POINTS = 24  # of the band: the density is smooth
 
@@ -32,6 +32,6 @@ def filtered_density(lag: tuple[float, float], step_s: float) -> float:
     else:
         phi, p = np.exp(np.array([[-step_s / first]])), np.eye(1)
     driven, one = p - phi @ p @ phi.T, np.eye(len(p))
-    middles = UPPER[0] + (UPPER[1] - UPPER[0]) * (np.arange(NOISE_POINTS) + 0.5) / NOISE_POINTS
+    middles = NOISE_BAND[0] + (NOISE_BAND[1] - NOISE_BAND[0]) * (np.arange(NOISE_POINTS) + 0.5) / NOISE_POINTS
     rows = [np.linalg.inv(one - np.exp(-1j * np.pi * f) * phi)[0] for f in middles]
     return float(np.mean([np.real(row @ driven @ row.conj()) for row in rows]))

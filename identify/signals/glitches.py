@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from rig.recording.run import Array
+from rig.recording.turns import MEDIAN_SIGMAS
 
 MAX_GLITCHES = 8  # in one run; more of them are something that the platform or its surroundings do
 GLITCH_SIGMAS = 30.0  # times the noise
@@ -19,7 +20,6 @@ GLITCH_STEP_RATIO = 4.0  # times the largest of what the run does more often
 INSIDE = np.array([1.0, -6.0, 15.0, 0.0, 15.0, -6.0, 1.0]) / 20.0  # a quintic through three neighbours on each side
 ENDS = np.array([4.0, -6.0, 4.0, -1.0])  # a cubic through the four before, the latest first
 ENDS_SPREAD = 8.4  # times as much noise in what the cubic foretells
-MEDIAN = 0.6745  # of the size of a normal variable, in standard deviations
 STEEPEST = 7.0  # times a glitch beside the end moves what the cubic foretells
 
 
@@ -42,7 +42,7 @@ def glitches(values: Array, usable: Any, noise: float | None = None) -> Any:
         return out
     values = np.array(values)
     if noise is None:
-        noise = float(np.median(np.abs(np.diff(values, 4)))) / (MEDIAN * np.sqrt(70.0))
+        noise = float(np.median(np.abs(np.diff(values, 4)))) / (MEDIAN_SIGMAS * np.sqrt(70.0))
     ends = _torn_end(values, usable, noise), _torn_end(values[::-1], usable[::-1], noise)
     for torn, end, beside in ((ends[0], n - 1, values[-5:-1]), (ends[1], 0, values[4:0:-1])):
         if torn:

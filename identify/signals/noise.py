@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy import signal
 
+from rig.decimation import NOISE_BAND
 from rig.recording.run import Array
 
 LOWER = 0.8  # of the periodogram's values
@@ -23,11 +24,10 @@ WINDOW, TINY = 40, 1e-12  # bins of a spectrum; of their mean, what a bin withou
 MAX_LOG_FLATNESS = 1.0  # of a window; 0.58 +- 0.13 for noise, 3.6 to 5.4 for sines bent by friction
 
 
-UPPER = (0.5, 0.98)  # of Nyquist: where the noise is read
 MIN_SPECTRUM_SAMPLES = 64  # samples whose spectrum is looked at
 
 
-def noise_of(values: Array, band: tuple[float, float] = UPPER) -> float:
+def noise_of(values: Array, band: tuple[float, float] = NOISE_BAND) -> float:
     """One standard deviation of the white part of a signal, from the upper half of its spectrum or another ``band``.
 
     The mean of the lower four fifths of the periodogram there is blind to lines and to a signal below, and scatters
@@ -38,7 +38,7 @@ def noise_of(values: Array, band: tuple[float, float] = UPPER) -> float:
     return float(np.sqrt(_mean_of_lower(_power_in(values, band))))
 
 
-def is_noise(values: Array, band: tuple[float, float] = UPPER) -> bool:
+def is_noise(values: Array, band: tuple[float, float] = NOISE_BAND) -> bool:
     """Whether what ``noise_of`` reads in a band is noise, and not motion that reaches up there.
 
     The periodogram of noise scatters exponentially about its density, whatever colour that has; of motion, played by

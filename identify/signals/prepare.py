@@ -12,7 +12,7 @@ from scipy import signal
 from identify.signals.channel_readings import lost
 from identify.signals.glitches import glitches
 from identify.signals.noise import bandwidth_of, least_of, noise_of, rounding_of
-from identify.signals.resampling import HOLE, beat_of, sampled, torque_instants
+from identify.signals.resampling import MAX_SPACING_PERIODS, beat_of, sampled, torque_instants
 from identify.signals.trace import SHORTEST_STRETCH, UPSAMPLING, Trace, _gaps, drop_samples_at_seam
 from rig.dynamics import TorqueSignal
 from rig.recording.run import Array, Run
@@ -21,7 +21,7 @@ LEAD_IN_S = 0.01  # at the start of a run that carry no weight
 LONGEST_FILL = 25  # missing samples that a spline may bridge
 # Coherence with the differenced encoder above which a rate was made from it (16 segments show a sixteenth by chance),
 # in bins of which at least this many hold no more than so many times the encoder's noise.
-REPEATED, FEW_BINS, MOSTLY = 0.3, 8, 2.0
+REPEATED, FEW_BINS, MAX_NOISE_POWER_RATIO = 0.3, 8, 2.0
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def _noise_in_common(run: Run) -> float | None:
     of_noise = 2.0 * (noise * 2.0 * np.sin(np.pi * f) / step) ** 2
     with np.errstate(all="ignore"):
         _, alike = signal.coherence(rate, differenced, nperseg=length)
-    blind = np.isfinite(alike) & (power < MOSTLY * of_noise) & (f > 0.05) & (f < 0.48)
+    blind = np.isfinite(alike) & (power < MAX_NOISE_POWER_RATIO * of_noise) & (f > 0.05) & (f < 0.48)
     return float(np.mean(alike[blind])) if np.sum(blind) >= FEW_BINS else None
 
 
@@ -89,7 +89,7 @@ def bias_beside(run: Run, time: Array, values: Array, good: Any) -> float:
     spacing = np.diff(t)
     ahead = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * spacing)]) - run.angle_rad[both]
     upper = lower = 0.0
-    for piece in np.split(np.arange(len(t)), 1 + np.flatnonzero(spacing > HOLE * np.median(spacing))):
+    for piece in np.split(np.arange(len(t)), 1 + np.flatnonzero(spacing > MAX_SPACING_PERIODS * np.median(spacing))):
         x = t[piece] - np.mean(t[piece])
         upper, lower = upper + float(x @ ahead[piece]), lower + float(x @ x)
     return upper / lower if lower > 0.0 else 0.0

@@ -22,7 +22,7 @@ from rig.recording.run import Array
 
 BEAT_TOLERANCE = 0.02  # of a period: samples so close to the beat are on it
 MAX_BEAT_SCATTER = 0.9  # of a period: stamps that scatter by more have no beat
-HOLE = 1.9  # periods between two samples beyond which one is missing
+MAX_SPACING_PERIODS = 1.9  # periods between two samples beyond which one is missing
 WANDERING = 0.3  # of a period: spacings that scatter by more belong to no beat, however slow its wander
 MAX_SAMPLE_DISTANCE = 1.5  # periods: instants that lie no farther from samples on both sides are read off a spline
 MAX_MISSING_RATIO = 20  # times as many missing samples as there are
@@ -100,7 +100,7 @@ def beat_of(name: str, time_s: Array) -> Beat:
         return Beat(float(time_s[-1] / index[-1]), 0.0, index)
     beat = _scattered(time_s, step)
     if beat is None:  # stamps of a software loop that wander: samples lie anywhere, and none is missing but in holes
-        near = spacing[spacing < HOLE * step]
+        near = spacing[spacing < MAX_SPACING_PERIODS * step]
         step = float(np.mean(near)) if np.std(near) < WANDERING * step else step
         beat = Beat(step, 0.0, np.rint(time_s / step).astype(np.int64))
     return beat

@@ -12,7 +12,7 @@ from rig.recording.run import Array
 
 RESONANCE_BAND_SHARE = 0.03  # of the natural frequency: a line that near is the platform's own ring
 TONE_POWER_SHARE = 0.8  # of the torque's power in one line
-START_S = 0.5  # in which a sharp mode that nothing excites later has rung
+RUN_START_S = 0.5  # in which a sharp mode that nothing excites later has rung
 RING_POWER_RATIO = 5.0  # times the median power
 MAX_RINGS = 2  # frequencies, the strongest
 LINE = 4.0  # times the noise at which a spectral line is one: e^-16 is the chance of a bin
@@ -54,7 +54,7 @@ def foreign_lines_hz(
 
 def rings_hz(traces: Sequence[Trace], residuals: Sequence[Array], natural_hz: float) -> tuple[float, ...]:
     """Frequencies in Hz at which most is left where runs begin, the strongest first; not the natural frequency."""
-    length = min(round(START_S / traces[0].step_s), *(len(r) for r in residuals))
+    length = min(round(RUN_START_S / traces[0].step_s), *(len(r) for r in residuals))
     window = 0.5 + 0.5 * np.cos(np.pi * np.arange(length) / length)  # all of the beginning
     power = np.zeros(2 * length + 1)
     for trace, r in zip(traces, residuals, strict=True):
@@ -63,7 +63,7 @@ def rings_hz(traces: Sequence[Trace], residuals: Sequence[Array], natural_hz: fl
         if len(x) == length:
             power += np.abs(np.fft.rfft(x * window, 4 * length)) ** 2
     f = np.fft.rfftfreq(4 * length, traces[0].step_s)
-    power[(np.abs(f - natural_hz) < 2.0 / START_S) | (f < 2.0 / START_S)] = 0.0
+    power[(np.abs(f - natural_hz) < 2.0 / RUN_START_S) | (f < 2.0 / RUN_START_S)] = 0.0
     peaks = signal.find_peaks(power, height=RING_POWER_RATIO * float(np.median(power)))[0]
     return tuple(float(f[k]) for k in peaks[np.argsort(-power[peaks])][:MAX_RINGS])
 

@@ -20,7 +20,7 @@ from rig.dynamics import TorqueSignal
 TORQUE_SEGMENT_SAMPLES = 1024  # samples of a stretch whose spectrum is averaged
 FLOOR_START_SHARE = 0.7  # of the Nyquist frequency: above it stands the floor
 SIGNAL_POWER_RATIO = 8.0  # times the floor's power: a torque that is no noise
-MARGIN = 1.5  # times the highest frequency of such a torque: above it there is none
+CUTOFF_RATIO = 1.5  # times the highest frequency of such a torque: above it there is none
 MAX_FLOOR_START_SHARE = 0.6  # of the Nyquist frequency: a floor that begins higher is no matter
 MIN_NOISE_RATIO = 1e-4  # of the torque: less noise is none
 DENSITY_SMOOTHING_BINS = 6  # of the spectrum to either side over which it is averaged
@@ -46,7 +46,7 @@ def quieter(traces: Sequence[Trace]) -> tuple[list[Trace], float] | None:
         floors.append(floor)
         over = f[power > SIGNAL_POWER_RATIO * floor]
         highest, nyquist = max(highest, float(over[-1]) if len(over) else 0.0), min(nyquist, half)
-    cutoff_hz = MARGIN * highest
+    cutoff_hz = CUTOFF_RATIO * highest
     if not 0.0 < cutoff_hz < MAX_FLOOR_START_SHARE * nyquist:
         return None
     pairs = zip(traces, floors, strict=True)

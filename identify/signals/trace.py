@@ -32,7 +32,7 @@ KEPT_SAMPLES = 4_000_000  # of the torques that a run keeps: 64 bytes each
 RUNAWAY_TORQUE = 1e100  # torque of an effect along a noisy motion, in any unit: it was integrated beyond all bounds
 MOST_WALK = 0.01  # of the rate, that a gyro's bias walks over a run
 MOST_BIAS_RAD_S = 0.05  # of a gyro: what its integral runs away faster with is the motion itself
-STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
+COARSE_STEP_PHASE_RAD = 0.1  # coarser than the simulator's: these torques only start a search
 
 
 @dataclass
@@ -259,7 +259,7 @@ class Trace:
         fine, substeps = self.step_s / UPSAMPLING, 1
         if effect.states and effect.fastest_rad_s:
             full = (1.0, 0.0, 0.0, *(v if v else 1e-12 for v in p[3 : 3 + len(effect.parameters)]))
-            substeps = int(np.clip(np.ceil(fine * effect.fastest_rad_s(full) / STEP_PHASE_RAD), 1, 8))
+            substeps = int(np.clip(np.ceil(fine * effect.fastest_rad_s(full) / COARSE_STEP_PHASE_RAD), 1, 8))
         out = np.empty_like(angle)
         torque_along(
             effect.kernel.address, angle, rate, time, torque, fine, z, substeps, p,

@@ -17,7 +17,7 @@ from rig.dynamics.low_pass import low_pass_kernel, mean_rate, smoothed
 from rig.recording.run import Array
 
 LATEST_FIRST_STRETCH_S = 0.02  # a first stretch that begins by then is simulated from the beginning of the run
-AT_REST = 5e-3  # of the run's highest rate: below it, a gyro's bias included, a run begins at rest
+MAX_RATE_SHARE_AT_REST = 5e-3  # of the run's highest rate: below it, a gyro's bias included, a run begins at rest
 SENSOR_LEAD_S = 0.02  # longer than a gyro's filter remembers
 RUNAWAY = np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a simulation may; its error is then infinite
 
@@ -117,7 +117,7 @@ def _begins_with_the_run(equations: Equations, trace: Trace) -> bool:
 def begins_at_rest(trace: Trace) -> bool:
     """Whether the first sample shows no motion beyond the noise and a gyro's bias."""
     rate = trace.measured if trace.channel == "rate" else trace.fine[1][::UPSAMPLING]  # smoothing looks ahead
-    return bool(abs(rate[0]) < max(AT_REST * float(np.max(np.abs(rate))), 5.0 * trace.noise))
+    return bool(abs(rate[0]) < max(MAX_RATE_SHARE_AT_REST * float(np.max(np.abs(rate))), 5.0 * trace.noise))
 
 
 def may_rest(trace: Trace, equations: Equations) -> bool:

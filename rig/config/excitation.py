@@ -10,7 +10,7 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from rig.config.base import Section
 from rig.excitation import Chirp, FreeDecay, Multisine, RampHoldRelease, Sine
 
-MIN_SAMPLES = 40  # of a set; an arbitrary floor
+MIN_SET_SAMPLES = 40  # of a set; an arbitrary floor
 MAX_SETS = 200
 PAPER_SETS: tuple[tuple[float, float], ...] = ((300, 0.5), (300, 1.0), (250, 3.0), (200, 6.0), (150, 9.0))
 
@@ -71,11 +71,11 @@ class ExcitationConfig(Section):
                     f"sets.{number}: {highest_hz:g} Hz cannot be played at {self.sample_rate_hz:g} ticks a second: "
                     f"at most {self.sample_rate_hz / 2:g} Hz, or raise sample_rate_hz"
                 )
-            if planned.duration_s * self.sample_rate_hz < MIN_SAMPLES:
+            if planned.duration_s * self.sample_rate_hz < MIN_SET_SAMPLES:
                 count = planned.duration_s * self.sample_rate_hz
                 raise ValueError(
                     f"sets.{number}: {planned.duration_s:g} s are {count:.3g} samples at {self.sample_rate_hz:g} Hz, "
                     "too few to identify from: duration_s has to be at least "
-                    f"{MIN_SAMPLES / self.sample_rate_hz:g} s"
+                    f"{MIN_SET_SAMPLES / self.sample_rate_hz:g} s"
                 )
         return self

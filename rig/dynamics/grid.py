@@ -41,7 +41,7 @@ _PROJECTION = _projection(_PARTS)
 FINE_SUBSTEPS = 16  # of a sample period: with so many, a corner needs no parts of a step
 
 
-KEPT = 3  # torques behind the drive: of all parameters only the drive's own change it
+MAX_TORQUES_KEPT = 3  # torques behind the drive: of all parameters only the drive's own change it
 QUARTERS = 4  # of a step, over each of which the mean of a held torque is known
 
 
@@ -87,7 +87,7 @@ class Smoothing(NamedTuple):
 
 
 def _kept(store: dict[Any, Any], key: Any, found: Any) -> Any:
-    while len(store) >= KEPT:  # simulations in other threads may be doing the same
+    while len(store) >= MAX_TORQUES_KEPT:  # simulations in other threads may be doing the same
         store.pop(next(iter(store), None), None)
     store[key] = found
     return found

@@ -11,7 +11,7 @@ import numpy as np
 from rig.dynamics.native import jit
 
 SHORT = 0.25  # of the largest row or column sum of f, in such a part of a sample: there the series end soon
-TERMS = 14  # of both series: 0.25^14 / 14! and 0.5^14 / 14! are below the rounding of a double
+SERIES_TERMS = 14  # of both series: 0.25^14 / 14! and 0.5^14 / 14! are below the rounding of a double
 BALANCING_ROUNDS = 20  # at most; a matrix of this size needs three to five
 
 
@@ -111,7 +111,7 @@ def over_a_sample(f, density, step_s, phi, q):  # type: ignore[no-untyped-def]
         for j in range(n):
             phi[i, j] = term[i, j] = 1.0 if i == j else 0.0
             q[i, j] = work[i, j] = density[i, j] * part_s
-    for k in range(1, TERMS + 1):
+    for k in range(1, SERIES_TERMS + 1):
         _product(f, term, other)
         for i in range(n):
             for j in range(n):

@@ -17,7 +17,7 @@ from rig.dynamics.integrator import jit, pointer, resisting, slowed
 if TYPE_CHECKING:
     from rig.dynamics.equations import Equations, Readings
 
-NEAR = 1e-6  # of the largest angle, rate and state: what the coefficients are read off over
+DIFFERENCE_SHARE = 1e-6  # of the largest angle, rate and state: what the coefficients are read off over
 
 
 @jit
@@ -186,7 +186,7 @@ class Tangent:
                 motion, self.middle, self.spans, offset_s, e.rest_states(*starts[0]), h, torque, *body, states
             )  # fmt: skip
         sizes = [np.max(np.abs(x), initial=0.0) for x in (angle, rate, *states.T)]
-        self._near = NEAR * np.array([s if 0.0 < s < np.inf else 1.0 for s in sizes])
+        self._near = DIFFERENCE_SHARE * np.array([s if 0.0 < s < np.inf else 1.0 for s in sizes])
         self._table = np.zeros((len(torque), self._n, self._n + 3))
         _coefficients(
             self.middle, states, self.spans, offset_s, h, torque, tuple(e.jck.tolist()), *body, self._near, self._table

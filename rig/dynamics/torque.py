@@ -13,7 +13,7 @@ from rig.dynamics.polynomials import Polynomials
 from rig.signals import TorqueHold
 
 ON_A_STEP = 1e-3  # of a step, by which an instant may be off and still be on the grid
-KEPT = 6  # readings between the samples: every fit to a run asks for one of a few
+MAX_READINGS_KEPT = 6  # readings between the samples: every fit to a run asks for one of a few
 KEPT_BYTES = 64 << 20  # of them; a long run that needs fine steps is read again
 AT_ONCE = 1 << 18  # instants: the times of millions would take as much memory as what is read at them
 
@@ -75,7 +75,9 @@ class TorqueSignal:
         if found is None:
             found = self._between(start_s, half_step_s, n)
             found.flags.writeable = False  # it is given out again
-            while self._read and (len(self._read) >= KEPT or self._kept_bytes() + found.nbytes > KEPT_BYTES):
+            while self._read and (
+                len(self._read) >= MAX_READINGS_KEPT or self._kept_bytes() + found.nbytes > KEPT_BYTES
+            ):
                 # simulations in other threads may be doing the same
                 self._read.pop(next(iter(self._read), key), None)
             self._read[key] = found

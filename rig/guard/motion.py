@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 from rig.config.limits import LimitsConfig
 from rig.guard.base import Check, Rest, Tick, TorqueHistory, Trip
-from rig.guard.sign import ReversedSign
+from rig.guard.sign import DELAYS_S, ReversedSign
 from rig.platform import Platform
 
 NOISE_SIGMAS = 8.0  # of a difference of samples: never by chance in a campaign of days
@@ -26,11 +26,10 @@ STEP_WINDOW_S = 0.003
 STEP_BLOCK_S, STEP_BLOCKS = 0.01, 6  # steps are remembered for as long as a drive and a filter may take
 # From the first to the third sample: 0.3 of a period of the paper's platform (29 Hz), in which its acceleration changes
 # without any step. Gyros below 200 samples per second are not checked. tests/rig/guard holds from 3 to 100 ms.
-LONGEST_GAP_S = 0.01
+MAX_THREE_SAMPLE_SPAN_S = 0.01
 MIN_NOISE_RAD_S = 2e-3  # a tenth of a degree a second, where the rest before told nothing
 
 REST_ENERGIES = 10.0  # a ring that is left over from before may give back what it has
-DELAYS_S = (0.0, 0.003, 0.006)  # of the torque behind its command, of which any may be the true one
 ENERGY_CREDIT = 0.3  # of all work done in either direction: covers 20 degrees of phase beyond those
 STORED_FACTOR = INERTIA_FACTOR  # of the energy stored by the declared model, which is proportional to J and K
 # Of the most energy stored: what may be missing. Less trips falsely (0.2: one of forty random platforms), more misses a
@@ -97,7 +96,7 @@ class Jump(Check):
 
     def _check_acceleration(self, time_s: float, rate: float, step_nm: float) -> Trip | None:
         """The acceleration before and after the middle sample differ by what a change of torque makes, no more."""
-        if self._older is None or self._last is None or time_s - self._older[0] > LONGEST_GAP_S:
+        if self._older is None or self._last is None or time_s - self._older[0] > MAX_THREE_SAMPLE_SPAN_S:
             return None
         first_s, second_s = self._last[0] - self._older[0], time_s - self._last[0]
         before, after = (self._last[1] - self._older[1]) / first_s, (rate - self._last[1]) / second_s

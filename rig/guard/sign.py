@@ -24,20 +24,20 @@ from rig.guard.base import Check, Rest, Tick, TorqueHistory, Trip
 from rig.platform import Platform
 
 CORNER_RAD_S = 2.0 * math.pi * 20.0  # of each of the three stages: little of what a lag of the drive turns is left
-DELAYS_S = (0.0, 0.003, 0.006)  # of the torque behind its command, as in rig.guard.motion
-FACTOR = 2.5  # J and K may be wrong by so much: two, and what effects that nobody declared do to them
+DELAYS_S = (0.0, 0.003, 0.006)  # of the torque behind its command, of which any may be the true one
+MAX_DECLARED_ERROR_RATIO = 2.5  # J and K may be wrong by so much: two, and what effects that nobody declared do to them
 # Between two fits: 20 samples of 1 kHz share the cost of one. Not critical: tests/rig/guard holds from 5 to 50 ms.
-BLOCK_S = 0.02
+FIT_EVERY_S = 0.02
 # Fading memory of the fits. Longer sees a reversed sign later (0.5 s: no longer within a second), shorter holds less
 # of a slow set from which to tell four coefficients apart. tests/rig/guard holds from 0.05 to 0.3 s.
 MEMORY_S = 0.2
-LONGEST_GAP_S = 0.006  # between samples: the filters are too coarse for slower gyros, which are not judged
+MAX_SAMPLE_SPACING_S = 0.006  # between samples: the filters are too coarse for slower gyros, which are not judged
 FADES_S = 0.1  # of the filters: after so long nothing is left of where they began
 SWEEPS = 6  # of the coordinate descent, which starts from the last fit
 TURNED_LEAVES = 0.3  # of the torque, at most
 LEAVES_MORE, TIMES_AS_MUCH = 0.2, 1.5  # what upright leaves at least, beside what turned round leaves
 PASSED_SHARE = 0.3  # of the torque's change that the filters let through: beyond some 18 Hz a second mode turns signs
-MIN_SHARE = 0.05  # of the most torque that there was in such moments of the set
+MIN_JUDGED_TORQUE_SHARE = 0.05  # of the most torque that there was in such moments of the set
 # 80 ms of the same verdict, so that a single fit (an impact, a stick) is none; as much is added until a reversed sign
 # is seen. Not critical: tests/rig/guard holds from 1 to 12.
 BLOCKS_IN_A_ROW = 4
@@ -81,7 +81,10 @@ class ReversedSign(Check):
         self._past = TorqueHistory()
         self._last_s: float | None = None
         self._restart(start_s)
-        low, high = (1.0 / FACTOR, 0.0, 1.0 / FACTOR, 0.0), (FACTOR, math.inf, FACTOR, math.inf)
+        low, high = (
+            (1.0 / MAX_DECLARED_ERROR_RATIO, 0.0, 1.0 / MAX_DECLARED_ERROR_RATIO, 0.0),
+            (MAX_DECLARED_ERROR_RATIO, math.inf, MAX_DECLARED_ERROR_RATIO, math.inf),
+        )
         self._fits = [[Fit(low, high) for _ in DELAYS_S] for _ in WAYS]
         self._most = 0.0
 
@@ -91,7 +94,7 @@ class ReversedSign(Check):
         self._stages = [0.0] * 9
         self._rows: list[tuple[float, ...]] = []
         self._torque: list[tuple[float, float, float]] = []  # a little longer than the block: it may act late
-        self._block_s = time_s + BLOCK_S
+        self._block_s = time_s + FIT_EVERY_S
         self._gram: Array = np.zeros((4, 4))
         self._along: Array = np.zeros((len(DELAYS_S), 4))
         self._whole: Array = np.zeros(len(DELAYS_S))
@@ -113,7 +116,7 @@ class ReversedSign(Check):
         """Three equal stages for rate, its direction and torque; differences of stages are derivatives."""
         nm = self._past.at(time_s)
         last_s, self._last_s = self._last_s, time_s
-        if last_s is None or time_s - last_s > LONGEST_GAP_S:
+        if last_s is None or time_s - last_s > MAX_SAMPLE_SPACING_S:
             self._restart(time_s)
             return
         share = 1.0 - math.exp(-CORNER_RAD_S * (time_s - last_s))
@@ -133,13 +136,13 @@ class ReversedSign(Check):
         self._torque.append((time_s, m2 - m3, nm - m1))
 
     def _judge(self, time_s: float) -> Trip | None:
-        self._block_s = time_s + BLOCK_S
+        self._block_s = time_s + FIT_EVERY_S
         if len(self._rows) < 2:
             return None
         self._remember(time_s)
         whole = float(self._whole[0])
         self._most = max(self._most, whole)
-        least = max(MIN_SHARE * self._most, PASSED_SHARE * self._given)
+        least = max(MIN_JUDGED_TORQUE_SHARE * self._most, PASSED_SHARE * self._given)
         if time_s - self._begun_s < FADES_S or whole <= least:
             return None
         turned = self._left(TURNED)

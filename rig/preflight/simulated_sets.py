@@ -17,7 +17,7 @@ from rig.excitation import PlannedSet
 from rig.platform import Platform
 
 PEAK_RATE_HZ = 4000.0  # the crest of a 29 Hz ring read at 4 kHz is low by 0.03 %
-SAMPLES_A_PERIOD = 138.0  # of a ring, for that: 4000 / 29
+MIN_SAMPLES_A_RING_PERIOD = 138.0  # of a ring, for that: 4000 / 29
 LONG_SAMPLES = 400_000  # 100 s at 4 kHz; a simulation with corners in its torque keeps about 500 bytes for each
 STRAIGHT = 1e-3  # of the largest torque: as far as a sine bends between 70 samples a period
 COAST_RATE_HZ = 200.0  # only the end of a rest is used, and the integrator chooses its own substeps
@@ -82,7 +82,7 @@ def _sampled(planned_set: PlannedSet, fastest_hz: float = math.inf) -> tuple[Arr
     while True:
         time_s: Array = np.arange(math.ceil(planned_set.duration_s * rate_hz) + 1) / rate_hz
         torque_nm = np.asarray(planned_set.torque(time_s), dtype=float)
-        slow = rate_hz >= 2.0 * SAMPLES_A_PERIOD * fastest_hz
+        slow = rate_hz >= 2.0 * MIN_SAMPLES_A_RING_PERIOD * fastest_hz
         if len(time_s) <= LONG_SAMPLES or not slow or not _is_straight(torque_nm):
             return time_s, torque_nm
         rate_hz *= 0.5

@@ -18,7 +18,7 @@ from rig.recording.table import Table
 from rig.recording.turns import check_jumps
 from rig.signals import TorqueHold, Use
 
-MIN_SAMPLES = 40  # in a row, fewer tell nothing of two states, three parameters and the noise
+MIN_VALID_SAMPLES = 40  # in a row, fewer tell nothing of two states, three parameters and the noise
 # No torque, rate, angle or time of a machine in SI units comes near; squares of it would overflow.
 MAX_VALUE = 1e12  # of any quantity in SI units: far beyond any platform
 SHORTEST_STEP_S = 1e-8  # 100 MHz: nothing samples a platform faster
@@ -121,9 +121,10 @@ def check_run(
     _check_order(run.time_s, path)
     _check_own_numbers(run, path)
     count = int(run.valid.sum())
-    if count < MIN_SAMPLES:
+    if count < MIN_VALID_SAMPLES:
         raise RecordingError(
-            f"{path}: {count} valid samples, at least {MIN_SAMPLES} are needed: record longer, or widen from_s and to_s"
+            f"{path}: {count} valid samples, at least {MIN_VALID_SAMPLES} are needed: "
+            "record longer, or widen from_s and to_s"
         )
     _check_motion(run, path)
     check_jumps(run, path, axis)

@@ -26,7 +26,7 @@ from rig.recording.memory import at_most
 from rig.recording.run import Recording, Run
 
 FORMAT = "isp-rig recording"
-VERSION = 1
+FORMAT_VERSION = 1
 _ARRAYS = ("time_s", "valid", "rate_rad_s", "angle_rad", "torque_time_s", "torque_nm")
 _NUMBERS = ("min_rate_rad_s", "added_inertia_kg_m2", "frequency_hz", "rate_corner_hz", "rate_delay_s")
 _VALUES = ("name", "torque_hold", "use", *_NUMBERS)
@@ -34,8 +34,8 @@ _VALUES = ("name", "torque_hold", "use", *_NUMBERS)
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, MemoryError, RecursionError)
 # The library takes what a damaged reference to a text says it is long, up to 4 GiB, before it looks for the text.
 MAX_TEXT_BYTES = 256 << 20
-MAX_BYTES = 2 << 30  # all that is read, twice
-MAX_VALUES = 60_000_000  # half a gigabyte of numbers: an hour of six channels at 2 kHz is a third of it
+MAX_READ_BYTES = 2 << 30  # all that is read, twice
+MAX_RECORDED_VALUES = 60_000_000  # half a gigabyte of numbers: an hour of six channels at 2 kHz is a third of it
 
 
 def write_recording_h5(path: str | Path, recording: Recording, journal: JournalContents | None = None) -> None:
@@ -67,7 +67,7 @@ def _image(recording: Recording, journal: JournalContents | None) -> bytes:
 
 
 def _write(file: h5py.File, recording: Recording, journal: JournalContents | None) -> None:
-    file.attrs.update({"format": FORMAT, "version": VERSION, "axis": recording.axis})
+    file.attrs.update({"format": FORMAT, "version": FORMAT_VERSION, "axis": recording.axis})
     if recording.noise is not None:
         file.attrs["noise"] = recording.noise
     file["info"] = json.dumps(recording.info, default=str)
@@ -118,13 +118,13 @@ def read_recording_h5(path: str | Path, *, with_info: bool = True) -> Recording:
     """
     try:
         check_heaps(path)
-        with h5py.File(path, "r") as file, at_most(MAX_BYTES):
+        with h5py.File(path, "r") as file, at_most(MAX_READ_BYTES):
             with at_most(MAX_TEXT_BYTES):
                 if file.attrs.get("format") != FORMAT:
                     raise RecordingError(
                         f"{path}: is not a recording of this program: map its columns under `recorded`"
                     )
-                if int(file.attrs["version"]) > VERSION:
+                if int(file.attrs["version"]) > FORMAT_VERSION:
                     raise RecordingError(f"{path}: written by a later version: read it with that one")
                 noise, axis = file.attrs.get("noise"), file.attrs["axis"]
                 info = json.loads(file["info"][()]) if with_info else {}
@@ -144,7 +144,7 @@ class _Reader:
 
     def __init__(self, path: str | Path) -> None:
         self._path = path
-        self._values_left = MAX_VALUES
+        self._values_left = MAX_RECORDED_VALUES
 
     def run(self, group: h5py.Group) -> Run:
         """One run. Raises RecordingError, or what _DAMAGE lists."""
@@ -169,7 +169,9 @@ class _Reader:
             raise RecordingError(f"{self._path}: {name!r} holds {data.dtype} values, not numbers")
         self._values_left -= data.size
         if self._values_left < 0:
-            raise RecordingError(f"{self._path}: holds more than {MAX_VALUES} values: cut it into several recordings")
+            raise RecordingError(
+                f"{self._path}: holds more than {MAX_RECORDED_VALUES} values: cut it into several recordings"
+            )
         return np.asarray(data[()], dtype=np.float64)
 
 

@@ -19,8 +19,8 @@ from rig.recording.table import Table
 
 WHOLE = 0.5  # of the rows have every value: fewer, and the columns were sampled on beats of their own
 MIN_READINGS = 10  # of a column that has a beat
-HOLE = 3.0  # times the usual spacing of a column's readings: nothing is read between such two
-MIN_RATE_RATIO = 0.1  # of the fastest column's readings: a slower one is joined, not followed
+MIN_HOLE_SPACING_RATIO = 3.0  # times the usual spacing of a column's readings: nothing is read between such two
+MIN_FOLLOWED_RATE_RATIO = 0.1  # of the fastest column's readings: a slower one is joined, not followed
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,11 @@ def read_between(time_s: Array, values: Array, at_s: Array) -> Array:
         return np.full(len(at_s), np.nan)
     spacing = np.diff(own_s)
     behind = np.clip(np.searchsorted(own_s, at_s, side="right"), 1, len(own) - 1)
-    hole = (spacing[behind - 1] > HOLE * np.median(spacing)) & (own_s[behind - 1] < at_s) & (at_s < own_s[behind])
+    hole = (
+        (spacing[behind - 1] > MIN_HOLE_SPACING_RATIO * np.median(spacing))
+        & (own_s[behind - 1] < at_s)
+        & (at_s < own_s[behind])
+    )
     found: Array = np.interp(at_s, own_s, own, left=np.nan, right=np.nan)
     return np.where(hole, np.nan, found)
 
@@ -134,7 +138,7 @@ def _on_the_slowest(rows: Rows, needed: Mapping[str, Mask]) -> Rows | None:
     counts = {q: len(at) for q, at in own.items()}
     if min(counts.values()) < MIN_READINGS or not np.all(np.diff(time[needed["time"]]) > 0.0):
         return None
-    base = min((n, q) for q, n in counts.items() if n >= MIN_RATE_RATIO * max(counts.values()))[1]
+    base = min((n, q) for q, n in counts.items() if n >= MIN_FOLLOWED_RATE_RATIO * max(counts.values()))[1]
     at = own[base]
     columns = {
         q: x[at] if q in ("time", base) else read_between(time, x, time[at]) for q, x in rows.columns.items()

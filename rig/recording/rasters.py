@@ -20,7 +20,7 @@ from rig.errors import RecordingError
 from rig.recording.table import MAX_SAMPLES, Table, read_each, too_long
 from rig.units import unit_of
 
-MIN_RATE_RATIO = 0.1  # of the fastest group's samples: below, a group is a thermometer or a state
+MIN_GROUP_RATE_RATIO = 0.1  # of the fastest group's samples: below, a group is a thermometer or a state
 MOTION = frozenset(
     {"torque", "force", "rate", "speed", "angle", "length", "current", "voltage"}
 )  # a drive's, a sensor's
@@ -96,7 +96,7 @@ def base_of(groups: Sequence[Group]) -> Group | None:
         return None
     timed = [g for g in timed if g.may_be_motion] or timed
     rates = [len(g.time_s) / _lasts_s(g) for g in timed if g.time_s is not None]
-    measured = [(rate, i) for i, rate in enumerate(rates) if rate >= MIN_RATE_RATIO * max(rates)]
+    measured = [(rate, i) for i, rate in enumerate(rates) if rate >= MIN_GROUP_RATE_RATIO * max(rates)]
     return timed[min(measured)[1]]
 
 

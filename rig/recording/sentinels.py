@@ -15,7 +15,7 @@ _OTHERS = [999.25, 6999.0, 7999.0, 9.9e37, 9.91e37, float(np.finfo(np.float32).m
 _POWERS = [10.0**power for power in (*range(20, 39), 99, 100, 300, 307, 308)]
 KNOWN = np.unique([*_NINES, *_WIDTHS, *_OTHERS, *_POWERS])
 SAME = 1e-6  # relative: some are kept in single precision
-BEYOND = 3.0  # times the largest of the other numbers: no reading
+MIN_SENTINEL_RATIO = 3.0  # times the largest of the other numbers: no reading
 MIN_OTHERS = 10  # of which that is known
 
 
@@ -38,7 +38,7 @@ def sentinels(values: Array) -> Mapping[float, int]:
     is_most = np.sum(known) > np.sum(others)
     if np.sum(others) < MIN_OTHERS or (is_most and len(np.unique(values[large[known]])) > 1):
         return {}
-    found = large[known][size[large[known]] / BEYOND > np.max(size[others])]
+    found = large[known][size[large[known]] / MIN_SENTINEL_RATIO > np.max(size[others])]
     return {
         float(value): int(count) for value, count in zip(*np.unique(values[found], return_counts=True), strict=True)
     }

@@ -22,12 +22,13 @@ from rig.units import TURN
 NEAR_TURN = 0.05  # of a turn: a jump that differs more from a whole turn, the motion aside, is none
 SLOW_STEP_RAD = TURN / 4  # from sample to sample, nearly always: four samples a turn
 NEARLY_ALWAYS = 0.9  # of the steps
-NEIGHBOURS = 7  # steps about one that tell the motion there
-LOST = 2.5  # times the usual spacing: samples that stand farther apart have lost more than one between them
+NEIGHBOUR_STEPS = 7  # steps about one that tell the motion there
+# Times the usual spacing: samples that stand farther apart have lost more than one between them.
+LOST_SPACING_RATIO = 2.5
 JUMP_RATIO = 4.0  # times the largest step that the run makes elsewhere: no inertia lets a rate come and go like that
 MOST_TOLD = 3  # jumps that a message names
 JUMP_SIGMAS = 30.0  # times the noise
-MEDIAN = 0.6745  # of the size of a normal variable, in standard deviations
+MEDIAN_SIGMAS = 0.6745  # of the size of a normal variable, in standard deviations
 
 
 def on_the_way(time_s: Array, angle_rad: Array, good: Any) -> Mask:
@@ -40,7 +41,7 @@ def on_the_way(time_s: Array, angle_rad: Array, good: Any) -> Mask:
     """
     out = np.zeros(len(angle_rad), dtype=bool)
     at = np.flatnonzero(good)
-    if len(at) <= NEIGHBOURS or not np.all(np.diff(time_s[at]) > 0.0):
+    if len(at) <= NEIGHBOUR_STEPS or not np.all(np.diff(time_s[at]) > 0.0):
         return out
     step, spacing = np.diff(angle_rad[at]), np.diff(time_s[at])
     within = _within_half_a_turn(step)
@@ -50,7 +51,7 @@ def on_the_way(time_s: Array, angle_rad: Array, good: Any) -> Mask:
     far = np.abs(_within_half_a_turn(off)) > NEAR_TURN * TURN
     both = off[1:] + off[:-1]
     turned = (np.rint(both / TURN) != 0.0) & (np.abs(_within_half_a_turn(both)) < NEAR_TURN * TURN)
-    together = spacing[1:] + spacing[:-1] < LOST * np.median(spacing)
+    together = spacing[1:] + spacing[:-1] < LOST_SPACING_RATIO * np.median(spacing)
     out[at[1:-1]] = far[1:] & far[:-1] & turned & together
     return out
 
@@ -69,7 +70,7 @@ def turns_missing(time_s: Array, angle_rad: Array, good: Any) -> Array:
     """
     out = np.zeros(len(angle_rad))
     at = np.flatnonzero(good)
-    if len(at) <= NEIGHBOURS:
+    if len(at) <= NEIGHBOUR_STEPS:
         return out
     spacing, step = np.diff(time_s[at]), np.diff(angle_rad[at])
     if not np.all(spacing > 0.0):
@@ -79,7 +80,7 @@ def turns_missing(time_s: Array, angle_rad: Array, good: Any) -> Array:
         return out
     foretold = spacing * _running_median(within / spacing)
     turns = -np.rint((step - foretold) / TURN)
-    together = spacing < LOST * np.median(spacing)
+    together = spacing < LOST_SPACING_RATIO * np.median(spacing)
     near = np.abs(step + TURN * turns - foretold) < NEAR_TURN * TURN
     sure = together & near & (turns != 0.0)
     if not np.any(sure):
@@ -115,7 +116,7 @@ def turns_along(rows: Callable[[int, int], Mapping[str, Array]], first: int, las
         Gives "time", "angle" and "valid" of some rows, each of shape (n,).
     """
     where, added, passing = [], [], []
-    lead = 2 * NEIGHBOURS  # rows that a block shares with the one before and the one behind
+    lead = 2 * NEIGHBOUR_STEPS  # rows that a block shares with the one before and the one behind
     for at in range(first, last, block):
         begin, end = max(first, at - lead), min(last, at + block + lead)
         columns = rows(begin, end)
@@ -200,7 +201,7 @@ def _check_turns(path: Path, time_s: Array, angle_rad: Array, good: Any) -> None
     """Raise RecordingError for an angle within one turn that moves too far between samples to be unwrapped."""
     at = np.flatnonzero(good)
     step = np.diff(angle_rad[at])
-    if len(step) <= NEIGHBOURS or np.ptp(angle_rad[at]) > (1.0 + NEAR_TURN) * TURN:
+    if len(step) <= NEIGHBOUR_STEPS or np.ptp(angle_rad[at]) > (1.0 + NEAR_TURN) * TURN:
         return
     within = float(np.quantile(np.abs(_within_half_a_turn(step)), NEARLY_ALWAYS))
     largest = int(np.argmax(np.abs(step)))
@@ -222,7 +223,7 @@ def _jumps(time_s: Array, angle: Array) -> list[tuple[int, int]]:
     if len(angle) < 50:
         return []
     y, step, spacing = angle, np.abs(np.diff(angle)), np.diff(time_s)
-    hole = spacing > LOST * np.median(spacing)
+    hole = spacing > LOST_SPACING_RATIO * np.median(spacing)
     step[hole] = 0.0  # what the platform did there nobody knows
     blind = np.max([np.roll(hole, k) for k in range(-3, 4)], axis=0)
     # How far lines through two samples on either side miss each other half way between samples i and i + 1: through the
@@ -231,7 +232,7 @@ def _jumps(time_s: Array, angle: Array) -> list[tuple[int, int]]:
     near[3:-3] = _missed(y[2:-5], y[3:-4], y[4:-3], y[5:-2], 0.5)
     middle[3:-3] = _missed(y[1:-6], y[2:-5], y[5:-2], y[6:-1], 1.5)
     far[3:-3] = _missed(y[0:-7], y[1:-6], y[6:-1], y[7:], 2.5)
-    noise = float(np.median(np.abs(np.diff(angle, 4)))) / (MEDIAN * np.sqrt(70.0))
+    noise = float(np.median(np.abs(np.diff(angle, 4)))) / (MEDIAN_SIGMAS * np.sqrt(70.0))
     resolution = float(np.min(step[step > 0.0], initial=np.inf))  # of an encoder that stands from time to time
     for beside, reach in ((near, 0), (middle, 1)):
         level = np.where(beside * far > 0.0, np.minimum(np.abs(beside), np.abs(far)), 0.0)
@@ -274,7 +275,7 @@ def _within_half_a_turn(step: Array) -> Array:
 
 
 def _running_median(values: Array) -> Array:
-    """Of ``NEIGHBOURS`` values about each, the first and last repeated at the ends, shape (n,)."""
-    half = NEIGHBOURS // 2
+    """Of ``NEIGHBOUR_STEPS`` values about each, the first and last repeated at the ends, shape (n,)."""
+    half = NEIGHBOUR_STEPS // 2
     padded = np.pad(values, half, mode="edge")
-    return np.median(np.lib.stride_tricks.sliding_window_view(padded, NEIGHBOURS), axis=1)
+    return np.median(np.lib.stride_tricks.sliding_window_view(padded, NEIGHBOUR_STEPS), axis=1)

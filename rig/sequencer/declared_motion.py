@@ -14,7 +14,7 @@ from rig.preflight.simulated_sets import Peaks, SetForecast, SetSequence, has_no
 from rig.sequencer.held_torque import Pulse
 
 CLEARLY = 0.8  # of the limit: a prediction above it is within what a declared model is good for
-FACTOR = 2.0  # by which each declared number is changed, to see which of them makes the motion larger
+DECLARED_CHANGE_RATIO = 2.0  # by which each declared number is changed, to see which of them makes the motion larger
 MIN_EXCESS_RATIO = 1.1  # times the predicted motion: less does not explain a trip
 NAMED = 2  # suspects in a sentence
 
@@ -71,10 +71,10 @@ def suspected_cause(
         )
     j, c, k = declared.inertia_kg_m2, declared.damping_nm_s_rad, declared.stiffness_nm_rad
     others = {
-        "the declared inertia may be too large": replace(declared, inertia_kg_m2=j / FACTOR),
-        "the declared inertia may be too small": replace(declared, inertia_kg_m2=j * FACTOR),
-        "the declared stiffness may be too large": replace(declared, stiffness_nm_rad=k / FACTOR),
-        "the declared damping may be too large": replace(declared, damping_nm_s_rad=c / FACTOR),
+        "the declared inertia may be too large": replace(declared, inertia_kg_m2=j / DECLARED_CHANGE_RATIO),
+        "the declared inertia may be too small": replace(declared, inertia_kg_m2=j * DECLARED_CHANGE_RATIO),
+        "the declared stiffness may be too large": replace(declared, stiffness_nm_rad=k / DECLARED_CHANGE_RATIO),
+        "the declared damping may be too large": replace(declared, damping_nm_s_rad=c / DECLARED_CHANGE_RATIO),
     }
     larger = {words: float(getattr(_peaks(p, sets, rest_s), quantity)) for words, p in others.items() if p != declared}
     suspects = [w for w in sorted(larger, key=lambda w: -larger[w]) if larger[w] > MIN_EXCESS_RATIO * predicted]

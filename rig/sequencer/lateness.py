@@ -7,9 +7,9 @@ from array import array
 from collections.abc import Iterable
 
 CLASS_RATIO = 1.01  # of the ends of a class: quantiles are right to within a per cent
-SHORTEST_S, LONGEST_S = 1e-7, 1e4  # range of the classes, s: the clock's resolution to some hours
+MIN_CLASS_S, MAX_CLASS_S = 1e-7, 1e4  # range of the classes, s: the clock's resolution to some hours
 _PER_LOG = 1.0 / math.log(CLASS_RATIO)
-_CLASSES = int(math.log(LONGEST_S / SHORTEST_S) * _PER_LOG) + 2
+_CLASSES = int(math.log(MAX_CLASS_S / MIN_CLASS_S) * _PER_LOG) + 2
 
 
 class Lateness:
@@ -32,8 +32,8 @@ class Lateness:
         """One more tick."""
         self.ticks += 1
         self.max_s = max(self.max_s, late_s)
-        if late_s > SHORTEST_S:
-            self._counts[min(1 + int(math.log(late_s / SHORTEST_S) * _PER_LOG), _CLASSES - 1)] += 1
+        if late_s > MIN_CLASS_S:
+            self._counts[min(1 + int(math.log(late_s / MIN_CLASS_S) * _PER_LOG), _CLASSES - 1)] += 1
         else:
             self._counts[0] += 1
 
@@ -46,5 +46,5 @@ class Lateness:
         for number, count in enumerate(self._counts):
             passed += count
             if passed >= wanted and passed:
-                return min(SHORTEST_S * CLASS_RATIO**number, self.max_s) if number < _CLASSES - 1 else self.max_s
+                return min(MIN_CLASS_S * CLASS_RATIO**number, self.max_s) if number < _CLASSES - 1 else self.max_s
         return self.max_s

@@ -20,19 +20,19 @@ from rig.errors import SafetyTrip
 from rig.excitation import PlannedSet
 from rig.guard.base import Rest, Tick
 from rig.platform import Platform
-from rig.sequencer.pulse_inertia import MIN_SAMPLES, InertiaRange, estimate_inertia, initial_direction
+from rig.sequencer.pulse_inertia import MIN_PULSE_SAMPLES, InertiaRange, estimate_inertia, initial_direction
 
-SHORTEST_S, LONGEST_S = 0.01, 0.1  # of a pulse: from ten samples at 1 kHz to what a campaign can wait for
+MIN_PULSE_S, MAX_PULSE_S = 0.01, 0.1  # of a pulse: from ten samples at 1 kHz to what a campaign can wait for
 PERIOD_SHARE = 0.5  # of the declared period of the ring: the length of a pulse
 LISTEN_PERIODS = 0.6  # of the ring, after a pulse: beyond the first swing back
-LATE_S = 0.05  # samples and torque may be so late
+MAX_LATENESS_S = 0.05  # samples and torque may be so late
 FIRST_RATE, MAX_RATE, MAX_TRAVEL = 0.05, 0.6, 0.3  # of the limits, by the declared model
 # Ratio of torques: a further pulse has to be harder by this. It decides how closely the largest torque allowed is tried
 # before a platform is called stuck: tests/rig/sequencer holds from 1.001 to 1.05.
 MIN_STEP = 1.02
 # Ratio to the first pulse: three doublings. By the declared model this is 8 FIRST_RATE = 0.4 of the rate limit.
 GENTLE_STEPS = 8.0
-MAX_TORQUE = 0.3  # of the campaign's
+MAX_PROBE_TORQUE_SHARE = 0.3  # of the campaign's
 # A response counts if its peak exceeds both: so many standard deviations of the noise (the peak is then known to 1 in
 # 40), and this rate. More of either takes harder pulses, less trusts a smaller motion. Calibration:
 # tests/rig/sequencer holds from 5 to 160 sigma and from 0.5 to 12 deg/s; above, a scale wrong by three is no longer
@@ -75,8 +75,8 @@ class Probe:
         self._config, self._platform = config, platform
         j, k = platform.inertia_kg_m2, platform.stiffness_nm_rad
         period_s = 2.0 * math.pi * math.sqrt(j / k) if k > 0.0 else math.inf
-        self.pulse_s = min(max(PERIOD_SHARE * period_s, SHORTEST_S), LONGEST_S)
-        self._listen_s = min(LISTEN_PERIODS * period_s, LONGEST_S)
+        self.pulse_s = min(max(PERIOD_SHARE * period_s, MIN_PULSE_S), MAX_PULSE_S)
+        self._listen_s = min(LISTEN_PERIODS * period_s, MAX_PULSE_S)
         peak_rate, peak_angle = _predicted_response(platform, self.pulse_s)
         rate = math.radians(limits.rate_deg_s)
         # What a harder pulse adds, were the inertia half of what is declared, has to stay below these.
@@ -86,7 +86,7 @@ class Probe:
         given = config.torque_nm
         first_nm = FIRST_RATE * rate / peak_rate
         # A campaign of little torque is probed with more of it, as far as that is little for the platform.
-        own_nm = max(MAX_TORQUE * campaign_nm, min(campaign_nm, GENTLE_STEPS * first_nm))
+        own_nm = max(MAX_PROBE_TORQUE_SHARE * campaign_nm, min(campaign_nm, GENTLE_STEPS * first_nm))
         self.largest_nm = min(own_nm if given is None else given, limits.torque_nm)
         self._torque_nm = min(first_nm, self.largest_nm)
         self._direction, self._sign = 1.0, 0.0
@@ -110,7 +110,7 @@ class Probe:
     def take(self, at_s: float, start_s: float, tick: Tick) -> None:
         """What a tick brought; ``start_s`` is when the probe began on the clock of the ticks."""
         self._samples += [(t - start_s, w - self._rest.bias_rad_s) for t, w, valid in tick.gyro if valid]
-        if at_s - self._pulse_at_s >= self.pulse_s + self._listen_s + LATE_S:
+        if at_s - self._pulse_at_s >= self.pulse_s + self._listen_s + MAX_LATENESS_S:
             self._end_pulse(at_s)
 
     def _end_pulse(self, at_s: float) -> None:
@@ -143,7 +143,7 @@ class Probe:
         peak = float(np.max(np.abs(data[:, 1]))) if len(data) else 0.0
         clear = max(CLEAR_SIGMAS * self._rest.noise_rad_s, CLEAR_MIN_RAD_S, clear_share * self._torque_nm)
         # An answer that is larger than foreseen is clear too: the inertia may be the one that is wrong.
-        if peak < clear or len(data) < MIN_SAMPLES:
+        if peak < clear or len(data) < MIN_PULSE_SAMPLES:
             return PulseResponse(self._torque_nm, peak, None)
         if self._sign == 0.0 or abs(data[0, 1]) < STILL_SHARE * peak:  # else it still rings from the pulse before
             self._sign = self._direction * initial_direction(data[:, 1])

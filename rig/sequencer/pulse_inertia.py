@@ -21,7 +21,7 @@ from rig.arrays import Array
 DELAY_SHARE, DELAY_STEP_S = 0.6, 0.001  # of the pulse: how late the torque may act
 NEAR_BEST_RATIO = 1.5  # ratio of residuals: fits "within half as much again" (decision 0016)
 POOR_FIT = 0.3  # of the scatter of the impulse: beyond it a pulse does not count
-MIN_SAMPLES = 8  # for five unknowns
+MIN_PULSE_SAMPLES = 8  # for five unknowns
 
 
 class InertiaRange(NamedTuple):
@@ -47,7 +47,7 @@ def estimate_inertia(
     """
     moving = _while_it_moves(rate_rad_s)
     t, w = time_s[moving], rate_rad_s[moving]
-    if len(t) < MIN_SAMPLES:
+    if len(t) < MIN_PULSE_SAMPLES:
         return None
     step = np.diff(t)
     angle = _integral(w, step)

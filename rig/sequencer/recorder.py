@@ -18,7 +18,7 @@ from rig.recording.run import Run
 from rig.sequencer.lateness import Lateness
 from rig.signals import TorqueHold
 
-HAND_OVER_S = 0.02  # between hand-overs to the journal, which buffers again: together far below 100 ms
+JOURNAL_EVERY_S = 0.02  # between hand-overs to the journal, which buffers again: together far below 100 ms
 EDGE_S = 1e-6  # rounding of time stamps at the ends of a set
 
 
@@ -109,7 +109,7 @@ class SetRecorder:
             self._late.add(late)
             if late >= tick.period_s:
                 self.missed_ticks += int(late / tick.period_s + 1e-9)
-        if self._journal is not None and tick.now_s - self._handed_s >= HAND_OVER_S:
+        if self._journal is not None and tick.now_s - self._handed_s >= JOURNAL_EVERY_S:
             self._handed_s = tick.now_s
             self.write()
 

@@ -38,12 +38,12 @@ TAIL_S = 0.05  # zero torque after a set, for samples still on their way
 REST_PERIOD_S = 0.01  # ticks of zero torque may be slower; they still feed the drive's watchdog
 BIAS_WINDOW_S = 1.0  # of a rest, at its end
 PROGRESS_S = 0.1  # between two reports to the observer: ten a second is what an eye follows
-LOOK_S = 0.25  # after the probe: how often to ask whether the ring has died out
-# Standstill after the probe: no sample of the last LOOK_S is faster than the larger of the two. Noise alone exceeds six
-# standard deviations in one of a million looks (500 samples). 0.5 deg/s is where the guard takes a platform to move
-# (MOVES_RAD_S); the paper's platform (29 Hz) then swings by 0.003 deg. More lets a set begin while the platform rings
-# (tests/rig/sequencer fails at 4 deg/s), less waits for longer, at most for a rest.
-STILL_SIGMAS, STILL_RAD_S = 6.0, math.radians(0.5)
+RING_CHECK_S = 0.25  # after the probe: how often to ask whether the ring has died out
+# Standstill after the probe: no sample of the last RING_CHECK_S is faster than the larger of the two. Noise alone
+# exceeds six standard deviations in one of a million looks (500 samples). 0.5 deg/s is where the guard takes a platform
+# to move (MOVES_RAD_S); the paper's platform (29 Hz) then swings by 0.003 deg. More lets a set begin while the platform
+# rings (tests/rig/sequencer fails at 4 deg/s), less waits for longer, at most for a rest.
+STANDSTILL_SIGMAS, STANDSTILL_RAD_S = 6.0, math.radians(0.5)
 
 
 @dataclass(frozen=True)
@@ -190,11 +190,11 @@ class Sequencer:
 
     def _until_still(self, rest: Rest) -> None:
         """Zero torque until nothing moves any more, at most as long as a rest."""
-        still_rad_s = max(STILL_SIGMAS * rest.noise_rad_s, STILL_RAD_S)
+        still_rad_s = max(STANDSTILL_SIGMAS * rest.noise_rad_s, STANDSTILL_RAD_S)
         left_s = max(self._rest_s, SETTLE_S)
         while left_s > 0.0:
-            self._hold_zero(min(LOOK_S, left_s), REST_PERIOD_S)
-            left_s -= LOOK_S
+            self._hold_zero(min(RING_CHECK_S, left_s), REST_PERIOD_S)
+            left_s -= RING_CHECK_S
             if all(abs(rate - rest.bias_rad_s) < still_rad_s for _, rate in self._still):
                 break
         self._hold_zero(SETTLE_S, REST_PERIOD_S)

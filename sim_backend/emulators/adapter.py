@@ -8,7 +8,7 @@ from collections.abc import Callable
 from drivers.codecs import lawicel
 from drivers.codecs.lawicel import CanFrame
 
-_LONGEST_LINE = 64
+_MAX_COMMAND_BYTES = 64
 _FRAME_HEADS = b"tTrR"
 VERSION, SERIAL = "V1013", "NE402"
 
@@ -39,7 +39,7 @@ class LawicelAdapter:
     def feed(self, data: bytes) -> bytes:
         """Bytes from the host; returns the adapter's answers."""
         *lines, self._rest = (self._rest + data).split(b"\r")
-        if len(self._rest) > _LONGEST_LINE:
+        if len(self._rest) > _MAX_COMMAND_BYTES:
             self._rest = b""
         return b"".join(self._answer(line) for line in lines)
 
@@ -52,7 +52,7 @@ class LawicelAdapter:
 
     def _answer(self, line: bytes) -> bytes:
         if not line:
-            return lawicel.OK
+            return lawicel.ANSWER_OK
         if line[:1] in (b"t", b"T", b"r", b"R"):
             return self._send(line)
         text = line.decode("ascii", errors="replace")
@@ -61,17 +61,17 @@ class LawicelAdapter:
     def _send(self, line: bytes) -> bytes:
         frame = lawicel.decode_line(line)
         if not isinstance(frame, CanFrame) or not self.is_open or self.listen_only:
-            return lawicel.ERROR
+            return lawicel.ANSWER_ERROR
         self._on_frame(frame)
         return b"Z\r" if frame.extended else b"z\r"
 
     def _command(self, text: str) -> bytes:
         known = {"V": VERSION, "N": SERIAL}
         if text in known:
-            return known[text].encode("ascii") + lawicel.OK
+            return known[text].encode("ascii") + lawicel.ANSWER_OK
         if text == "F" and self.is_open:
             return b"F%02X\r" % self.flags
-        return lawicel.OK if self._change(text) else lawicel.ERROR
+        return lawicel.ANSWER_OK if self._change(text) else lawicel.ANSWER_ERROR
 
     def _change(self, text: str) -> bool:
         """Carry out a command that changes the adapter; False where it is refused."""

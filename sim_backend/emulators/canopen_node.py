@@ -14,8 +14,8 @@ from sim_backend.emulators.object_dictionary import (
     SdoServer,
 )
 
-STOPPED, OPERATIONAL, PRE_OPERATIONAL = 4, 5, 127
-_NMT_STATES = {0x01: OPERATIONAL, 0x02: STOPPED, 0x80: PRE_OPERATIONAL}
+STATE_STOPPED, STATE_OPERATIONAL, STATE_PRE_OPERATIONAL = 4, 5, 127
+_NMT_STATES = {0x01: STATE_OPERATIONAL, 0x02: STATE_STOPPED, 0x80: STATE_PRE_OPERATIONAL}
 _NOT_VALID = 1 << 31
 _NO_REMOTE_REQUEST = 1 << 30
 _PDOS = 4
@@ -37,7 +37,7 @@ class CanopenNode:
         self.od = ObjectDictionary(eds, node)
         self._sdo = SdoServer(self.od)
         self._out: list[CanFrame] = []
-        self.state = PRE_OPERATIONAL
+        self.state = STATE_PRE_OPERATIONAL
         self._heartbeat_due_s = 0.0
         self._last_heard_s: float | None = None
         self._waiting_for_sync: dict[int, bytes] = {}
@@ -81,18 +81,18 @@ class CanopenNode:
             self._on_sync(now_s)
         elif 0x700 < can_id <= 0x77F and not frame.remote:
             self._heard(can_id - 0x700, now_s)
-        elif self.state == OPERATIONAL:
+        elif self.state == STATE_OPERATIONAL:
             self._receive_pdo(can_id, data, now_s)
 
     def _command(self, command: int, now_s: float) -> None:
         if command in (0x81, 0x82):
             self.on_reset(now_s)
             self._last_heard_s = None
-            self.state = PRE_OPERATIONAL
+            self.state = STATE_PRE_OPERATIONAL
             self._send(0x700 + self.node, b"\0")
             return
         before, self.state = self.state, _NMT_STATES.get(command, self.state)
-        if before == OPERATIONAL != self.state:
+        if before == STATE_OPERATIONAL != self.state:
             self.on_leaving_operational(now_s)
 
     def restart(self, now_s: float) -> None:
@@ -133,7 +133,7 @@ class CanopenNode:
         return [(entry >> 16, entry >> 8 & 0xFF, (entry & 0xFF) // 8) for entry in entries]
 
     def _on_sync(self, now_s: float) -> None:
-        if self.state != OPERATIONAL:
+        if self.state != STATE_OPERATIONAL:
             return
         for k, data in sorted(self._waiting_for_sync.items()):
             self._take_pdo(k, data, now_s)
@@ -159,7 +159,7 @@ class CanopenNode:
         if watched and limit_s and self._last_heard_s is not None and now_s - self._last_heard_s > limit_s:
             self._last_heard_s = None
             self.on_heartbeat_lost(now_s)
-        if self.state == OPERATIONAL:
+        if self.state == STATE_OPERATIONAL:
             self._event_timers(now_s)
 
     def _event_timers(self, now_s: float) -> None:

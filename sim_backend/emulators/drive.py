@@ -7,13 +7,13 @@ from pathlib import Path
 
 from drivers.codecs import cia402
 from drivers.codecs.cia402 import State
-from sim_backend.emulators.canopen_node import OPERATIONAL, CanopenNode
+from sim_backend.emulators.canopen_node import STATE_OPERATIONAL, CanopenNode
 from sim_backend.emulators.device import Event, TorqueOutput
 from sim_backend.emulators.object_dictionary import ABORT_COMMAND, SdoAbort
 
 EDS = Path(__file__).with_name("cia402_drive.eds")
 HEARTBEAT_LOST = 0x8130
-FAULT_SIGNAL, DISABLE_VOLTAGE, QUICK_STOP = 1, 2, 3  # codes of 0x6007
+ABORT_OPTION_FAULT_SIGNAL, ABORT_OPTION_DISABLE_VOLTAGE, ABORT_OPTION_QUICK_STOP = 1, 2, 3  # codes of 0x6007
 _COMMUNICATION_ERROR = 0x11
 _REMOTE_BIT = 1 << 9
 _TORQUE_OBJECTS = (cia402.CONTROLWORD, cia402.TARGET_TORQUE, cia402.MODE)
@@ -131,7 +131,7 @@ class Cia402Drive(CanopenNode):
         wanted = max(-limit, min(limit, self.od.get(cia402.TARGET_TORQUE)))
         follows = (
             self._drive_state is State.ENABLED
-            and self.state == OPERATIONAL
+            and self.state == STATE_OPERATIONAL
             and self.od.get(cia402.MODE_DISPLAY) in cia402.MODE_BITS
         )
         per_mille = wanted if follows else 0
@@ -161,7 +161,7 @@ class Cia402Drive(CanopenNode):
             return
         enabled = self._drive_state is State.ENABLED
         self._output.apply(0.0, now_s, "watchdog", "heartbeat of the host lost")
-        if reaction == FAULT_SIGNAL:
+        if reaction == ABORT_OPTION_FAULT_SIGNAL:
             self.fail(HEARTBEAT_LOST, now_s, announce=False)
         elif enabled:
             self._leave_to(State.SWITCH_ON_DISABLED, now_s, "watchdog")

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from drivers.codecs import odrive_cansimple as wire
 from drivers.codecs.lawicel import CanFrame
-from drivers.codecs.odrive_cansimple import Command
+from drivers.codecs.odrive_cansimple import HEARTBEAT_S, WATCHDOG_EXPIRED, Command
 from sim_backend.emulators.device import Event, TorqueOutput
 
-WATCHDOG_EXPIRED = 0x800
 ESTOP_REQUESTED = 0x4000
 INVALID_STATE = 0x1
-HEARTBEAT_S = 0.1  # CANSimple as delivered
 
 
 class OdriveAxis:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from rig.platform import Platform
-from sim_backend.plant import SENSED, Plant
+from sim_backend.plant import SENSED_COLUMN, Plant
 
 
 class World:
@@ -64,5 +64,5 @@ class World:
     def _hold(self, torque_nm: float, steps: int) -> list[float]:
         rows = self._plant.hold(torque_nm, steps * self._parts)
         self._at += steps
-        rates: list[float] = rows[self._parts - 1 : steps * self._parts : self._parts, SENSED].tolist()
+        rates: list[float] = rows[self._parts - 1 : steps * self._parts : self._parts, SENSED_COLUMN].tolist()
         return rates

@@ -10,7 +10,7 @@ import pytest
 from rig.excitation import Sine
 from rig.platform import Platform
 from sim_backend.accuracy import largest_error_rad_s, played_rate
-from sim_backend.plant import ANGLE, RATE, Plant
+from sim_backend.plant import ANGLE_COLUMN, RATE_COLUMN, Plant
 
 NOISE_RAD_S = math.radians(0.05)
 COULOMB = Platform(effects={"coulomb_friction": {"level": 1.2}})
@@ -22,7 +22,7 @@ FAST = Sine(torque_nm=40, frequency_hz=9, duration_s=2)
 def test_under_a_constant_torque_the_platform_rings_as_the_closed_form_says() -> None:
     p = Platform()
     plant = Plant(p, 1e-3)
-    rate = np.array([plant.hold(50.0, plant.parts)[plant.parts - 1, RATE] for _ in range(2000)])
+    rate = np.array([plant.hold(50.0, plant.parts)[plant.parts - 1, RATE_COLUMN] for _ in range(2000)])
     t = 1e-3 * np.arange(1, 2001)
     decay = p.damping_nm_s_rad / (2 * p.inertia_kg_m2)
     w = math.sqrt(p.stiffness_nm_rad / p.inertia_kg_m2 - decay**2)
@@ -33,7 +33,7 @@ def test_under_a_constant_torque_the_platform_rings_as_the_closed_form_says() ->
 def test_the_ring_of_a_platform_with_friction_shortens_by_four_levels_over_k_each_cycle() -> None:
     plant = Plant(Platform(damping_nm_s_rad=0.0, effects={"coulomb_friction": {"level": 2.0}}), 1e-3)
     plant.hold(60.0, 64 * plant.parts)
-    angle = np.array([plant.hold(0.0, plant.parts)[plant.parts - 1, ANGLE] for _ in range(500)])
+    angle = np.array([plant.hold(0.0, plant.parts)[plant.parts - 1, ANGLE_COLUMN] for _ in range(500)])
     crests = angle[1:-1][(angle[1:-1] > angle[:-2]) & (angle[1:-1] >= angle[2:]) & (angle[1:-1] > 0)]
     assert len(crests) >= 5
     np.testing.assert_allclose(np.diff(crests[:5]), -4 * 2.0 / 677.3, rtol=0.05)

@@ -20,7 +20,7 @@ ORIGINS = ("derivation: ", "reference: ", "calibration run: ", "set by hand")
 # Judged by hand: these cost time, guard the arithmetic, or shape what is shown. None of them gives another name.
 DECIDE_NOTHING: Mapping[str, str] = {
     "bounds/separation.py": "ROUNDING",
-    "likelihood/by_prediction_error.py": "FINAL_FIT_ITERATIONS MAX_SAMPLES SHIFT_STEP UNIFORM_VARIANCE",
+    "likelihood/by_prediction_error.py": "FINAL_FIT_ITERATIONS MAX_FINAL_FIT_SAMPLES SHIFT_STEP UNIFORM_VARIANCE",
     "likelihood/derivatives.py": "GAIN_STEP MOTION_STEP NOISE_STEP RUNAWAY_SIGMAS",
     "likelihood/damped_step.py": "LEAST_DAMPING LEVENBERG_DAMPING MAX_STEP_TRIALS",
     "likelihood/descent.py": "COARSE_TOLERANCE DIFFERENCE_STEP EARLY_STEPS STALLED_STEPS",
@@ -46,10 +46,10 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "rivals/run_delays.py": "FIT_STEPS MAX_DELAY_SAMPLES MAX_SHIFT_S RCOND ROUNDS SURE_RATIO",
     "rivals/run_heterogeneity.py": "RUN_CHANGE_ROUNDS",
     "rivals/whole_runs.py": "WHOLE_RUN_STEPS TOLERANCE",
-    "select/curve_rivals.py": "NEAR",
+    "select/curve_rivals.py": "MIN_EARLY_CURVE_SHARE",
     "select/forward_selection.py": "MOST_PASSES",
     "select/disturbance_lines.py": "FLOOR_BINS LOWEST_BIN MIN_LINE_SAMPLES",
-    "select/evidence.py": "ALONE",
+    "select/evidence.py": "MIN_OWN_INFLUENCE_SHARE",
     "select/field_search.py": "NO_WORSE",
     "select/free_form_residual.py": "MIN_CURVE_SCORE CURVE_STEPS CURVES_TRIED",
     "select/likelihood_search.py": "RIVAL_SAMPLES BEYOND_SAMPLES DECLARED_WITHIN MIN_MORE_SAMPLES_RATIO SAMPLES",
@@ -57,7 +57,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "select/stepwise.py": "MIN_RIVAL_SHARE PROMISING",
     "select/torque_search.py": "REFINED RIVAL WORTH_EVIDENCE",
     "select/trial_fits.py": "BEHIND COMPARABLE FAINT_SCORE FOLLOWS_LESS FULL_FIT_RATIO "
-    "FULL_ITERATIONS HEAVIEST MIN_TRIAL_SCORE PAIRS TRIAL_ITERATIONS TRIED",
+    "FULL_ITERATIONS HEAVIEST MAX_PAIRS_FITTED MIN_TRIAL_SCORE TRIAL_ITERATIONS TRIED",
 }
 
 

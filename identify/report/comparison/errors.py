@@ -8,7 +8,7 @@ from identify.report.comparison.saved import SavedDisturbance, SavedModel, Saved
 from identify.report.comparison.section import Section
 from identify.wording import SYMBOLS, number, percent, plain, unit
 
-TORQUE = {"rotary": ("torque", "N·m"), "linear": ("force", "N")}
+TORQUE_WITH_UNIT = {"rotary": ("torque", "N·m"), "linear": ("force", "N")}
 MEASURES = {
     "holdout_rate_rms": "the held-out error of the measured channel",
     "holdout_torque_relative": "the held-out torque residual",
@@ -19,7 +19,7 @@ PERCENT = {"residual_torque_relative": 100.0, "holdout_torque_relative": 100.0}
 
 def error_section(a: SavedResult, b: SavedResult) -> Section:
     """Each measure of error of the declared and of the final model."""
-    torque, torque_unit = TORQUE[a.axis]
+    torque, torque_unit = TORQUE_WITH_UNIT[a.axis]
     comparable = a.axis == b.axis
     kinds = (
         ("held-out error of the measured channel", "holdout_rate_rms", ""),

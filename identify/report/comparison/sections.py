@@ -10,9 +10,9 @@ from identify.report.comparison.numbers import ABSENT, Change, change_of, one_si
 from identify.report.comparison.saved import SavedNumber, SavedResult
 from identify.report.comparison.section import Section
 from identify.wording import capital, plain, sentence, title
+from rig.platform import TERMS
 
 RULE = "Beyond both: the change is larger than each 95 % interval, and the two intervals do not overlap."
-TERMS = ("inertia", "damping", "stiffness")
 
 
 @dataclass(frozen=True)

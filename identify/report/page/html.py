@@ -18,7 +18,7 @@ from identify.report.page.origin import origin
 from identify.report.page.plots.convergence import convergence_figure, convergence_table
 from identify.report.page.plots.disturbance import disturbance_table, shape_figure
 from identify.report.page.plots.estimates import estimates_figure
-from identify.report.page.plots.motion import RUNS, motion_figures
+from identify.report.page.plots.motion import MAX_RUNS_DRAWN, motion_figures
 from identify.report.page.plots.proof import proof_section
 from identify.report.page.plots.residual import residual_figures
 from identify.report.page.plots.response import response_figure
@@ -180,6 +180,10 @@ def _response(identification: Identification, recording: Recording, gallery: Gal
 def _motion(identification: Identification, gallery: Gallery) -> Markup:
     figures = [gallery.place(figure) for figure in motion_figures(identification)]
     total = len(identification.traces)
-    note = f"The {RUNS} of {total} runs with the largest error; recording.h5 has all." if total > RUNS else ""
+    note = (
+        f"The {MAX_RUNS_DRAWN} of {total} runs with the largest error; recording.h5 has all."
+        if total > MAX_RUNS_DRAWN
+        else ""
+    )
     hint = "Drag to zoom, double-click to see all, click a legend entry to hide or show it."
     return section("motion", "Measured and simulated", paragraph(f"{note} {hint}".strip(), class_="note"), *figures)

@@ -13,7 +13,7 @@ from identify.wording import number
 from rig.recording.run import Recording
 from rig.rounding import rounded_down
 
-LONG = 300  # characters of a value that gets a fold of its own
+MAX_UNFOLDED_CHARACTERS = 300  # characters of a value that gets a fold of its own
 DIGITS = 6  # significant digits of a measured number; a configuration is shown as it was written
 YAML_WIDTH = 110  # characters
 HEADINGS = {
@@ -54,7 +54,7 @@ def _values(info: Mapping[str, Any]) -> tuple[dict[str, str], dict[str, str]]:
     long: dict[str, str] = {}
     for key, words in _flat(info).items():
         name = HEADINGS.get(key, key)
-        (long if "\n" in words or len(words) > LONG else short)[name] = words
+        (long if "\n" in words or len(words) > MAX_UNFOLDED_CHARACTERS else short)[name] = words
     return short, long
 
 

@@ -38,10 +38,10 @@ RECORDINGS = frozenset(
         ".db3",
     )
 )
-MAX_FILE_BYTES = 256 * 1024
+MAX_CONFIG_BYTES = 256 * 1024
 MAX_NODES = 20_000
-MAX_CHARACTERS = 2_000_000
-MAX_DEPTH = 40
+MAX_EXPANDED_CHARACTERS = 2_000_000
+MAX_CONFIG_LEVELS = 40
 MAX_BRACKETS = 200  # open at once, those in quotes and comments counted too
 _BRACKETS = re.compile(r"[\[\]{}]")
 
@@ -120,13 +120,13 @@ def read_text(path: Path) -> str:
                 f"{path}: is a recording, not a configuration: `rig init {path}` writes one that reads it"
             )
         with path.open("rb") as file:
-            raw = file.read(MAX_FILE_BYTES + 1)
+            raw = file.read(MAX_CONFIG_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise ConfigError(f"{path}: cannot be read: {reason}; check the path and its permissions") from error
-    if len(raw) > MAX_FILE_BYTES:
+    if len(raw) > MAX_CONFIG_BYTES:
         raise ConfigError(
-            f"{path}: larger than {MAX_FILE_BYTES} bytes, so it is probably a recording: name recordings under "
+            f"{path}: larger than {MAX_CONFIG_BYTES} bytes, so it is probably a recording: name recordings under "
             "recorded.runs of a configuration"
         )
     try:
@@ -159,7 +159,9 @@ def parse(text: str, source: str, *, lines: bool = True) -> Document:
     except yaml.YAMLError as error:
         raise ConfigError(f"{source}: not YAML: {error}; save it as plain UTF-8 text") from error
     except RecursionError as error:
-        raise ConfigError(f"{source}: nested too deeply: a configuration has at most {MAX_DEPTH} levels") from error
+        raise ConfigError(
+            f"{source}: nested too deeply: a configuration has at most {MAX_CONFIG_LEVELS} levels"
+        ) from error
     finally:
         if loader is not None:
             loader.dispose()
@@ -173,7 +175,7 @@ def _refuse_deep_brackets(text: str, source: str) -> None:
     for bracket in _BRACKETS.finditer(text):
         depth = depth + 1 if bracket.group() in "[{" else max(0, depth - 1)
         if depth > MAX_BRACKETS:
-            raise ConfigError(f"{source}: nested too deeply: a configuration has at most {MAX_DEPTH} levels")
+            raise ConfigError(f"{source}: nested too deeply: a configuration has at most {MAX_CONFIG_LEVELS} levels")
 
 
 def _syntax_cure(problem: str) -> str:
@@ -217,9 +219,9 @@ class _Walk:
     def _count(self, node: Node, place: Place, depth: int) -> None:
         self._nodes += 1
         self._characters += len(node.value) if isinstance(node, ScalarNode) else 0
-        if self._nodes > MAX_NODES or self._characters > MAX_CHARACTERS or depth > MAX_DEPTH:
+        if self._nodes > MAX_NODES or self._characters > MAX_EXPANDED_CHARACTERS or depth > MAX_CONFIG_LEVELS:
             raise ConfigError(
-                f"{place}: the file expands to more than {MAX_NODES} values or {MAX_DEPTH} levels "
+                f"{place}: the file expands to more than {MAX_NODES} values or {MAX_CONFIG_LEVELS} levels "
                 "(aliases of aliases, or an alias inside itself?): write the values out"
             )
 

@@ -14,9 +14,9 @@ from rig.errors import RecordingError
 from rig.recording.extra_readers.packages import require
 from rig.recording.readers.status import MOST_WORDS, Status
 from rig.recording.table import MAX_SAMPLES, Table, read_each, too_long
+from rig.units import NS
 
 UNIT_KEYS = (b"unit", b"units", b"Unit")
-NS = 1e-9
 
 
 def read(path: Path) -> Sequence[Table]:

@@ -17,8 +17,8 @@ from rig.recording.extra_readers.packages import require
 from rig.recording.rasters import Group, one_table
 from rig.recording.readers.folder import ROS_METADATA
 from rig.recording.table import MAX_SAMPLES, Table, too_long
+from rig.units import NS
 
-NS = 1e-9
 MAX_ENTRIES = 12  # of an array in a message: joints and vectors, no images and point clouds
 SKIPPED = ("header", "orientation")  # a quaternion is no angle
 # By message type and field: the units that the ROS definitions fix (REP 103).

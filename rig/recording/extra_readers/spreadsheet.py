@@ -17,8 +17,8 @@ from rig.recording.table import Table, read_each
 from rig.units import bare, unit_of
 
 MOST_UNPACKED_BYTES = 1 << 30
-SURE = 3  # rows in a row that look like data
-LOOKED_AT = 400  # rows in which the data have to begin
+MIN_DATA_ROWS = 3  # rows in a row that look like data
+MAX_ROWS_BEFORE_DATA = 400  # rows in which the data have to begin
 _VALUES = (int, float, datetime, time, timedelta)
 
 Row = Sequence[Any]
@@ -59,8 +59,8 @@ def _check_size(path: Path) -> None:
 
 def _first_data(rows: Sequence[Row]) -> int | None:
     """The first of some rows of numbers; None where there are none."""
-    for at in range(min(len(rows) - SURE + 1, LOOKED_AT)):
-        if all(sum(_is_value(cell) for cell in row) > 1 for row in rows[at : at + SURE]):
+    for at in range(min(len(rows) - MIN_DATA_ROWS + 1, MAX_ROWS_BEFORE_DATA)):
+        if all(sum(_is_value(cell) for cell in row) > 1 for row in rows[at : at + MIN_DATA_ROWS]):
             return at
     return None
 

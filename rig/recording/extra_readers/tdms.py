@@ -12,8 +12,8 @@ from rig.errors import RecordingError
 from rig.recording.extra_readers.packages import require
 from rig.recording.rasters import Group, one_table
 from rig.recording.table import Table
+from rig.units import NS
 
-NS = 1e-9
 UNSET = np.datetime64("1904-01-02")  # LabVIEW's zero, and some hours of a time zone
 
 

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 
 from rig.recording.guessing.columns import Column
-from rig.recording.guessing.roles import CURRENT, WORDS, Quantity
+from rig.recording.guessing.roles import CURRENT_WORDS, WORDS, Quantity
 from rig.units import DIMENSIONS
 
 _AMPERES_OR_VOLTS = re.compile(r"_([AV])$")  # or one of several axes: so it only takes the guess away
@@ -52,6 +52,6 @@ def _doubtful(quantity: Quantity, column: Column, dimension: str) -> Factor | No
     if quantity != "time" and electrical is not None:
         what = {"A": "amperes", "V": "volts"}[electrical[1]]
         return Factor(None, f"its name ends in {electrical[0]}, which may be {what} and no unit of {dimension}", False)
-    if quantity == "torque" and set(column.words) & CURRENT and not set(column.words) & WORDS["torque"]:
+    if quantity == "torque" and set(column.words) & CURRENT_WORDS and not set(column.words) & WORDS["torque"]:
         return Factor(None, f"by its name it is a current, which is no {dimension}", False)
     return None

@@ -32,14 +32,15 @@ WORDS: dict[Quantity, frozenset[str]] = {
     ),
     "angle": _words("angle position pos theta th phi q winkel lage encoder enc ang weg θ φ"),
 }
-LONG = 5  # letters from which a word counts inside of another: motordrehmoment
-CURRENT = _words("current i iq strom amps")
-ONLY_CURRENT = CURRENT - {"current"}  # which, in "current position", means the present one
-PLAIN = {q: frozenset(w for w in WORDS[q] if len(w) >= LONG) for q in WORDS}  # and say a quantity beyond doubt
+MIN_LETTERS_INSIDE_WORD = 5  # letters from which a word counts inside of another: motordrehmoment
+CURRENT_WORDS = _words("current i iq strom amps")
+ONLY_CURRENT_WORDS = CURRENT_WORDS - {"current"}  # which, in "current position", means the present one
+# Which say a quantity beyond doubt besides.
+PLAIN = {q: frozenset(w for w in WORDS[q] if len(w) >= MIN_LETTERS_INSIDE_WORD) for q in WORDS}
 NOT_MEASURED = _words("ref reference cmd command set setpoint soll target demand desired error err limit")
 COUNTERS = _words("index sample samples n nr no count counter row id zeile")
-LISTED = 8  # columns in a sentence
-SAME_MOTION = 0.99  # correlation of an angle and an integrated rate
+MAX_COLUMNS_IN_SENTENCE = 8  # columns in a sentence
+MIN_ROLE_CORRELATION = 0.99  # correlation of an angle and an integrated rate
 
 
 @dataclass(frozen=True)
@@ -93,9 +94,9 @@ def _score(column: Column, quantity: Quantity) -> float:
         is_current = quantity == "torque" and unit.dimension == "current"
         score += 2.0 if unit.dimension in fitting else 0.5 if is_current else -4.0
     score += 2.0 if _has_word(column, WORDS[quantity]) else 0.0
-    if quantity == "torque" and _has_word(column, CURRENT):
+    if quantity == "torque" and _has_word(column, CURRENT_WORDS):
         score += 0.5
-    elif _has_word(column, ONLY_CURRENT):
+    elif _has_word(column, ONLY_CURRENT_WORDS):
         score -= 4.0  # the q of i_q is no angle
     if quantity == "angle" and _has_word(column, WORDS["rate"]):
         score -= 1.5  # angular velocity, angle rate
@@ -119,7 +120,7 @@ def unread(columns: Sequence[Column], quantity: Quantity) -> Column | None:
 
 
 def _has_word(column: Column, words: frozenset[str]) -> bool:
-    return any(w in words or any(len(k) >= LONG and k in w for k in words) for w in column.words)
+    return any(w in words or any(len(k) >= MIN_LETTERS_INSIDE_WORD and k in w for k in words) for w in column.words)
 
 
 def _by_words(quantity: Quantity, left: Sequence[Column]) -> Choice:
@@ -186,7 +187,7 @@ def _by_motion(chosen: dict[Quantity, Choice], left: Sequence[Column]) -> dict[Q
     pairs = [(found[1], a, w) for a, w in permutations(among[:8], 2) if (found := relation(time.values, a, w))]
     if pairs:
         strength, angle, rate = max(pairs, key=lambda pair: pair[0])
-        if strength > SAME_MOTION:
+        if strength > MIN_ROLE_CORRELATION:
             return {
                 "angle": Choice(angle, f"{rate.name!r} is its derivative", bool(named)),
                 "rate": Choice(rate, f"it is the derivative of {angle.name!r}", bool(named)),
@@ -228,8 +229,8 @@ def _remaining_torque(left: Sequence[Column]) -> Choice:
 
 def _unused(moving: Sequence[Column]) -> str:
     """The columns that somebody may have to choose from, in words."""
-    more = f" and {len(moving) - LISTED} more" if len(moving) > LISTED else ""
-    listed = ", ".join(repr(c.name) for c in moving[:LISTED]) + more
+    more = f" and {len(moving) - MAX_COLUMNS_IN_SENTENCE} more" if len(moving) > MAX_COLUMNS_IN_SENTENCE else ""
+    listed = ", ".join(repr(c.name) for c in moving[:MAX_COLUMNS_IN_SENTENCE]) + more
     return f"not used, but they move: {listed}" if moving else "and no other column moves"
 
 

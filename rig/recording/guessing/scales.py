@@ -11,7 +11,7 @@ from rig.recording.guessing.time_unit import time_factor
 from rig.units import DEG, DIMENSIONS, SI, TURN
 
 FACTOR_TOLERANCE = 0.03  # relative, of a factor between angle and rate
-SAME_MOTION = 0.95
+MIN_SCALE_CORRELATION = 0.95
 # Where nobody says the unit: above this a number is rather degrees than radians.
 DEGREES_FROM = {"rate": 100.0, "angle": TURN}
 # (angle, rate) in units that go together, by the factor between the angle's derivative and the rate.
@@ -73,7 +73,7 @@ def _together(roles: dict[Quantity, Choice], found: dict[Quantity, Factor]) -> d
         return {}
     per_s = (time.known_unit.factor if time.known_unit else found["time"].value) or 1.0
     seen = relation(per_s * time.values, angle, rate)
-    if seen is None or abs(seen[1]) < SAME_MOTION:
+    if seen is None or abs(seen[1]) < MIN_SCALE_CORRELATION:
         return {}
     if found["angle"].sure:
         return {"rate": _snapped(seen[0] * _known(angle, found["angle"]), "rate")}

@@ -16,7 +16,7 @@ from rig.errors import RecordingError
 from rig.recording.memory import at_most
 from rig.recording.table import Table, index_label, plain_column
 
-BLOCK = 1 << 18  # rows that are read at once
+BLOCK_ROWS = 1 << 18  # rows that are read at once
 MOST_CHUNK_BYTES = 64 << 20  # of a file: a chunk is unpacked as a whole
 MOST_GROUP_ROWS = 4 << 20  # of a row group, which is
 SHORT_BYTES = 1 << 18  # a smaller file holds nothing long, packed or not as recordings are

@@ -11,13 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.arrays import Array
-from rig.decimation import REACH, SAMPLES_A_PERIOD, keeps_white
-from rig.recording.long.blocks import BLOCK
+from rig.decimation import REACH, SAMPLES_A_PERIOD, SPAN_STARTS, keeps_white
+from rig.recording.long.blocks import BLOCK_ROWS
 from rig.recording.long.laying import Decimating, Laying, Uneven
 from rig.recording.long.scan import Scan, scan
 from rig.recording.run import Excerpt
 
-PLACES = 12  # where a span may begin
 HELD = np.array([-1.0, 13.0, 13.0, -1.0]) / 24.0  # of the values held from two steps before to one after an instant
 Rows = Callable[[int, int], Mapping[str, Array]]
 
@@ -44,7 +43,9 @@ def take(rows: Rows, first: int, last: int, most: int, *, held: bool) -> Taken:
     seen = scan(_blocks(rows, first, last), channel)
     factor = _factor(seen, last - first, most)
     count = min(last - first, (most + 2 * REACH) * factor if factor > 1 else most)
-    places = np.unique(np.linspace(first, last - count, PLACES if count < last - first else 1).astype(int)).tolist()
+    places = np.unique(
+        np.linspace(first, last - count, SPAN_STARTS if count < last - first else 1).astype(int)
+    ).tolist()
     best: dict[str, Array] = {}
     most_told, scale = -np.inf, None
     for at in places:
@@ -62,8 +63,8 @@ def take(rows: Rows, first: int, last: int, most: int, *, held: bool) -> Taken:
 
 
 def _blocks(rows: Rows, first: int, last: int) -> Iterator[Mapping[str, Array]]:
-    for at in range(first, last, BLOCK):
-        block = rows(at, min(at + BLOCK, last))
+    for at in range(first, last, BLOCK_ROWS):
+        block = rows(at, min(at + BLOCK_ROWS, last))
         there = np.isfinite(block["time"])  # a lost sample may have lost its time too
         if there.any():
             yield block if there.all() else {name: values[there] for name, values in block.items()}

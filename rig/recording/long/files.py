@@ -14,7 +14,7 @@ import numpy as np
 from rig.arrays import Array
 from rig.errors import RecordingError
 from rig.recording.checks import check_run
-from rig.recording.long.blocks import BLOCK, BlockTable, block_table
+from rig.recording.long.blocks import BLOCK_ROWS, BlockTable, block_table
 from rig.recording.long.excerpt import Taken, take
 from rig.recording.run import Missing, Run
 from rig.recording.stated_units import with_factors_in_place
@@ -62,7 +62,7 @@ class LongFile:
 
         turns: Turns | None = None
         if section.axis == "rotary" and "angle" in factors:
-            turns = turns_along(rows, self.first, self.last, BLOCK)
+            turns = turns_along(rows, self.first, self.last, BLOCK_ROWS)
         taken = take(rows, self.first, self.last, self.most, held=held)
         named = Run(
             name=path.name,
@@ -74,8 +74,8 @@ class LongFile:
             added_inertia_kg_m2=entry.added_inertia_kg_m2,
             causes={name: config.channel(name) for name, config in section.columns.channels.items()},
         )
-        starts = range(self.first, self.last, BLOCK)  # as the scan of all rows takes them
-        blocks = [lost.get((at, min(at + BLOCK, self.last)), (0, [])) for at in starts]
+        starts = range(self.first, self.last, BLOCK_ROWS)  # as the scan of all rows takes them
+        blocks = [lost.get((at, min(at + BLOCK_ROWS, self.last)), (0, [])) for at in starts]
         quantities = dict.fromkeys(q for _, lacking in blocks for q in lacking)
         missing = Missing(within=sum(count for count, _ in blocks), quantities=tuple(quantities))
         run = dataclasses.replace(

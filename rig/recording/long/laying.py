@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.arrays import Array
 
-NEAR = 0.3  # of a period: stamps that lie farther from the beat belong to none
+MAX_OFF_BEAT_PERIODS = 0.3  # of a period: stamps that lie farther from the beat belong to none
 LONGEST_HOLE_S = 1.0  # a longer one ends a span
 
 
@@ -45,7 +45,7 @@ class Laying:
         spacing = np.diff(time, prepend=before) / self.step_s
         steps = np.rint(spacing)
         longest = max(2.0, LONGEST_HOLE_S / self.step_s)
-        if np.any(np.abs(spacing - steps) > NEAR) or np.any(steps < 1.0) or np.any(steps > longest):
+        if np.any(np.abs(spacing - steps) > MAX_OFF_BEAT_PERIODS) or np.any(steps < 1.0) or np.any(steps > longest):
             raise Uneven
         at = np.cumsum(steps).astype(np.int64)  # 1 is the instant after the last one laid
         n = int(at[-1])

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.arrays import Array
+from rig.decimation import NOISE_BAND
 from rig.recording.long.laying import Laying, Uneven
 
-SEGMENT = 8192  # samples of a periodogram
+PERIODOGRAM_SAMPLES = 8192  # samples of a periodogram
 FEWEST_SEGMENTS = 4
 ABOVE = 12.0  # times the floor from where on a frequency counts as motion, and
-MARGIN = 1.5  # times the highest of them is the bandwidth: as the search takes them from a whole run
-UPPER = (0.5, 0.98)  # of the Nyquist frequency: where the noise is read
+BANDWIDTH_RATIO = 1.5  # times the highest of them is the bandwidth: as the search takes them from a whole run
 
 
 @dataclass(frozen=True)
@@ -70,17 +70,19 @@ def scan(blocks: Iterable[Mapping[str, Array]], channel: str) -> Scan:
     if power is None or segments < FEWEST_SEGMENTS:
         return Scan(step_s, True, nyquist_hz, mean)
     of_nyquist = np.arange(len(power)) / (len(power) - 1)
-    floor = float(np.median(power[(of_nyquist > UPPER[0]) & (of_nyquist < UPPER[1])]))
+    floor = float(np.median(power[(of_nyquist > NOISE_BAND[0]) & (of_nyquist < NOISE_BAND[1])]))
     above = np.flatnonzero(power > ABOVE * floor)
     highest = of_nyquist[above[-1]] if len(above) else 0.05
-    return Scan(step_s, True, float(np.clip(MARGIN * highest, 2.0 / SEGMENT, 0.8)) * nyquist_hz, mean)
+    return Scan(
+        step_s, True, float(np.clip(BANDWIDTH_RATIO * highest, 2.0 / PERIODOGRAM_SAMPLES, 0.8)) * nyquist_hz, mean
+    )
 
 
 def _periodograms(values: Array) -> Array | None:
     """Of the whole segments in a block, shape (segments, frequencies)."""
-    rows = len(values) // SEGMENT
+    rows = len(values) // PERIODOGRAM_SAMPLES
     if not rows:
         return None
-    parts = values[: rows * SEGMENT].reshape(rows, SEGMENT)
-    window = np.hanning(SEGMENT)
+    parts = values[: rows * PERIODOGRAM_SAMPLES].reshape(rows, PERIODOGRAM_SAMPLES)
+    window = np.hanning(PERIODOGRAM_SAMPLES)
     return np.asarray(np.abs(np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * window, axis=1)) ** 2)

@@ -15,7 +15,7 @@ from rig.recording.readers.folder import is_ros_bag
 from rig.recording.run import Run
 from rig.recording.table import Table
 
-MAX_FILE_BYTES = 2 * 1024**3
+MAX_RECORDING_BYTES = 2 * 1024**3
 
 # Longest first where one suffix ends another. The modules load when asked for: SciPy and HDF5 are slow to import.
 _BY_SUFFIX = {
@@ -109,9 +109,9 @@ def _check_is_file(path: Path) -> None:
         raise RecordingError(f"{path}: is not a regular file (a pipe or device): save the data to a file first")
     if status.st_size == 0:
         raise RecordingError(f"{path}: the file is empty: export the recording again")
-    if status.st_size > MAX_FILE_BYTES:
+    if status.st_size > MAX_RECORDING_BYTES:
         raise RecordingError(
-            f"{path}: {status.st_size / 1024**3:.1f} GiB, at most {MAX_FILE_BYTES / 1024**3:.0f} GiB are read: "
+            f"{path}: {status.st_size / 1024**3:.1f} GiB, at most {MAX_RECORDING_BYTES / 1024**3:.0f} GiB are read: "
             "cut it into runs or lower its sample rate"
         )
 

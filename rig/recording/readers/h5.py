@@ -124,7 +124,7 @@ def _array(path: Path, name: str, inner: str, most_bytes: int) -> Any:
             count = int(np.prod(dataset.shape or (0,), dtype=object))
             if count * max(1, dataset.dtype.itemsize) > most_bytes:
                 raise too_long(path, count)
-            with at_most(hdf5.MAX_BYTES):
+            with at_most(hdf5.MAX_READ_BYTES):
                 return dataset[()]
     except _DAMAGE as error:
         raise RecordingError(f"{path}: dataset {name!r} is damaged ({error}): export it again") from error

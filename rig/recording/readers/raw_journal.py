@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rig.errors import RecordingError
-from rig.recording.checks import MIN_SAMPLES
+from rig.recording.checks import MIN_VALID_SAMPLES
 from rig.recording.journal_reader import JournalRun, read_journal, run_from_journal
 from rig.recording.run import Run
 
@@ -34,4 +34,4 @@ def is_worth_reading(run: JournalRun) -> bool:
     samples = len(run.tables.get("samples", ()))
     if run.complete or run.ended:
         return samples > 0
-    return samples >= MIN_SAMPLES and len(run.tables.get("commands", ())) > 0
+    return samples >= MIN_VALID_SAMPLES and len(run.tables.get("commands", ())) > 0

@@ -10,7 +10,7 @@ from rig.recording.readers.text.words import NO_READING
 
 MOST_WORDS = 12  # different ones: more are a comment or a name
 USUAL = 0.5  # of the rows have the usual word
-LONGEST = 40  # characters of a word that is told
+MAX_WORD_CHARACTERS = 40  # characters of a word that is told
 
 
 @dataclass
@@ -35,10 +35,11 @@ class Status:
         is_bad = any(word.lower() in NO_READING for word, _ in others)
         if not usual or (count < USUAL * sum(self.counts.values()) and not is_bad):
             return ""
-        listed = ", ".join(f"{word[:LONGEST]!r} in {n} (first in {self.first[word]})" for word, n in others)
+        listed = ", ".join(f"{word[:MAX_WORD_CHARACTERS]!r} in {n} (first in {self.first[word]})" for word, n in others)
         return (
-            f"column {self.name!r} is {usual[:LONGEST]!r} in {count} rows and {listed}; they are read alike: if the "
-            "others are no readings, empty their numbers, or add a column valid that is 0 there"
+            f"column {self.name!r} is {usual[:MAX_WORD_CHARACTERS]!r} in {count} rows and {listed}; "
+            "they are read alike: if the others are no readings, empty their numbers, or add a column valid that "
+            "is 0 there"
         )
 
 

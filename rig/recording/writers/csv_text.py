@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.arrays import Array
 
-BLOCK = 10_000
+WRITTEN_ROWS = 10_000
 
 
 def write(path: Path, columns: Mapping[str, Array]) -> None:
@@ -18,6 +18,6 @@ def write(path: Path, columns: Mapping[str, Array]) -> None:
     table = np.column_stack(list(columns.values()))
     with path.open("x", encoding="ascii", newline="\n") as file:
         file.write(",".join(columns) + "\n")
-        for start in range(0, len(table), BLOCK):
-            rows = table[start : start + BLOCK].tolist()
+        for start in range(0, len(table), WRITTEN_ROWS):
+            rows = table[start : start + WRITTEN_ROWS].tolist()
             file.writelines(",".join("" if math.isnan(v) else repr(v) for v in row) + "\n" for row in rows)

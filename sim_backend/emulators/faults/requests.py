@@ -13,7 +13,7 @@ from rig.config.bench import InjectedFault
 from rig.errors import ConfigError
 
 EVERY_S = 0.01  # between two looks
-LONGEST_LINE = 65_536  # bytes of a request
+MAX_REQUEST_BYTES = 65_536  # bytes of a request
 
 
 class FaultRequests:
@@ -50,14 +50,14 @@ class FaultRequests:
         try:
             if not select.select([self._descriptor], [], [], 0)[0]:
                 return
-            data = os.read(self._descriptor, LONGEST_LINE)
+            data = os.read(self._descriptor, MAX_REQUEST_BYTES)
         except (OSError, ValueError):
             data = b""
         if not data:
             self._descriptor = None
             return
         *lines, self._rest = (self._rest + data).split(b"\n")
-        if len(self._rest) > LONGEST_LINE:
+        if len(self._rest) > MAX_REQUEST_BYTES:
             self._rest = b""
             self._refuse("a line without an end")
         for line in lines:

@@ -107,7 +107,7 @@ def test_one_that_no_worker_could_begin_is_failed_at_once_with_the_reason() -> N
 def test_where_there_is_no_worker_the_pool_is_asked_what_to_do(
     names: Sequence[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(dispatch, "LOOK_S", 0.01)
+    monkeypatch.setattr(dispatch, "WORKER_CHECK_S", 0.01)
     pool = ScriptedPool(0)
     with pytest.raises(RuntimeError, match="no outcome"):
         run(pool, "".join(names))

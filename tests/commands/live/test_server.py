@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from commands.live.server import HOST, LiveProcess, handler_of
-from commands.live.view import STOPPED, live_view
+from commands.live.view import STOP_REASON, live_view
 
 TOKEN = "a-token-for-the-test"
 Said = list[Mapping[str, Any]]
@@ -90,4 +90,4 @@ def test_the_process_of_the_page_passes_a_stop_on_and_shows_what_it_is_told() ->
         assert state["notes"] == ["looking at what is left"]
         asked(int(port), "POST", f"/{token}/stop", X_Token=token)
         assert stopped.wait(5.0)
-    assert reasons == [STOPPED]
+    assert reasons == [STOP_REASON]

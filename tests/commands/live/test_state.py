@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from commands.live.envelope import BIN_S, WINDOW_S, Envelope
+from commands.live.envelope import BIN_S, SHOWN_S, Envelope
 from commands.live.fit import fit_of
 from commands.live.state import LiveState, PlayedSet
 from rig.recording.journal import BLOCK, BLOCK_HEAD, RUN, RUN_END
@@ -84,7 +84,7 @@ def test_an_envelope_keeps_peaks_and_the_last_seconds_alone() -> None:
     values = np.where(np.isclose(time, 19.0), 7.0, np.sin(time))
     envelope.add(time, values)
     points = envelope.points()
-    assert points[0][0] > 20.0 - WINDOW_S - 2 * BIN_S
+    assert points[0][0] > 20.0 - SHOWN_S - 2 * BIN_S
     assert max(high for _, _, high in points) == 7.0
     envelope.add(np.array([21.0]), np.array([np.nan]))
     assert envelope.points() == points

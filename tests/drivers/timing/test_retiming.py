@@ -215,7 +215,7 @@ def test_a_few_points_a_second_are_kept_however_many_samples_come():
 
 
 def test_of_a_long_day_the_last_readings_stay_and_the_last_sets_are_refined(monkeypatch):
-    monkeypatch.setattr("drivers.timing.retiming.BLOCKS_KEPT", 60)
+    monkeypatch.setattr("drivers.timing.retiming.MAX_STORED_BLOCKS", 60)
     clock = SourceClock(5e-3)
     hindsight = ClockRetiming(clock)
     played = play_gyro(clock, hindsight, 20e-6, 2, rate_hz=200.0, played=phases(40))

@@ -239,7 +239,7 @@ def test_a_report_that_cannot_be_written_is_said(tmp_path: Path) -> None:
 def test_a_campaign_too_long_to_be_read_back_keeps_no_report_data(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(report_data, "MAX_VALUES", 1000)
+    monkeypatch.setattr(report_data, "MAX_REPORT_VALUES", 1000)
     written(tmp_path)
     assert not (tmp_path / "report_data.h5").exists()
     with pytest.raises(UsageError, match="more samples than are kept"):

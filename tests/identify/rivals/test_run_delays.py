@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from identify.estimate.final_fit import by_output_error
-from identify.estimate.own_delays import DELAY, beside_own_delay
+from identify.estimate.own_delays import DELAY_NAME, beside_own_delay
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
 from identify.rivals.run_delays import Aligned, aligned, told
@@ -28,7 +28,7 @@ FREQUENCIES_HZ = (3.0, 6.0, 9.0, 14.0)
 LATE_S = np.array([-4e-6, 1e-6, 5e-6, -2e-6])
 NONE_S = np.zeros(4)
 STRUCTURE = Structure(effects=("torque_delay",))
-START = {("inertia",): 0.02, ("damping",): 0.045, ("stiffness",): 680.0, DELAY: 1e-4}
+START = {("inertia",): 0.02, ("damping",): 0.045, ("stiffness",): 680.0, DELAY_NAME: 1e-4}
 
 
 def recorded(late_s: Array, other_clock: bool = True, changing_s: float = 0.0) -> list[Trace]:
@@ -102,7 +102,7 @@ def test_runs_that_agree_or_have_one_clock_are_not_moved(other_clock: bool) -> N
 
 def test_without_a_delay_in_the_model_nothing_is_moved() -> None:
     traces = recorded(LATE_S)
-    values = {n: v for n, v in START.items() if n != DELAY}
+    values = {n: v for n, v in START.items() if n != DELAY_NAME}
     best = PredictionError(traces).fit(Structure(), values)
     assert aligned(traces, [t.keep for t in traces], best) is None
     single = [replace(traces[0], number=0)]
@@ -112,7 +112,7 @@ def test_without_a_delay_in_the_model_nothing_is_moved() -> None:
 
 def test_what_a_run_tells_of_the_rest_is_what_its_own_delay_cannot_follow() -> None:
     columns = np.random.default_rng(0).standard_normal((50, 3))
-    names = (("inertia",), DELAY, ("damping",))
+    names = (("inertia",), DELAY_NAME, ("damping",))
     along = np.linspace(-1.0, 1.0, 50)
     left = beside_own_delay(columns, names, along)
     assert left[:, 1] == pytest.approx(columns[:, 1])

@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from identify.signals.filtered_noise import filtered_density
-from identify.signals.noise import UPPER
+from rig.decimation import NOISE_BAND
 
 STEP_S = 4e-3
 
@@ -21,7 +21,7 @@ def test_the_end_of_the_spectrum_of_filtered_noise_is_as_high_as_it_says(lag: tu
     noise = signal.lfilter(b, a, np.random.default_rng(1).standard_normal(60_000 * fine))
     samples = noise[1000 * fine :: fine] / np.std(noise)
     f, density = signal.welch(samples, fs=2.0, nperseg=256)  # of Nyquist, one-sided: of white noise its variance
-    inside = (f > UPPER[0]) & (f < UPPER[1])
+    inside = (f > NOISE_BAND[0]) & (f < NOISE_BAND[1])
     assert filtered_density(lag, STEP_S) == pytest.approx(np.mean(density[inside]), rel=0.04)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.dynamics import TorqueSignal
-from rig.dynamics.torque import KEPT
+from rig.dynamics.torque import MAX_READINGS_KEPT
 from rig.signals import TorqueHold
 
 TIME = np.arange(1001) * 1e-3
@@ -50,7 +50,7 @@ def test_a_torque_asked_for_again_is_the_same_and_of_many_askings_few_are_kept(h
     assert torque.on_half_steps(0.1, 1e-3, 500) is torque.on_half_steps(0.1, 1e-3, 500)
     for n in range(20):
         torque.on_half_steps(0.1, 1e-3, 400 + n)
-    assert len(torque._read) <= KEPT
+    assert len(torque._read) <= MAX_READINGS_KEPT
     assert np.array_equal(torque.on_half_steps(0.1, 1e-3, 500), first)
     with pytest.raises(ValueError, match="read-only"):
         torque.on_half_steps(0.1, 1e-3, 500)[0] = 1.0

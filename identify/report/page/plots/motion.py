@@ -25,7 +25,7 @@ from identify.results import Identification, RunTraces
 from rig.recording.run import Array
 
 DRAWN_POINTS = 3000  # of one line
-RUNS = 12  # drawn at most; result.json and recording.h5 have all
+MAX_RUNS_DRAWN = 12  # drawn at most; result.json and recording.h5 have all
 
 
 def motion_error(trace: RunTraces, simulated: Array) -> Array:
@@ -46,7 +46,7 @@ def _rms(values: Array) -> float:
 
 def motion_figures(identification: Identification) -> list[Figure]:
     """One figure a run, in the order played; of very many runs those with the largest error."""
-    drawn = sorted(by_decreasing_error(identification.traces)[:RUNS])
+    drawn = sorted(by_decreasing_error(identification.traces)[:MAX_RUNS_DRAWN])
     return [run_figure(identification, identification.traces[i]) for i in drawn]
 
 

@@ -28,7 +28,7 @@ from identify.results import Identification, RunTraces
 from rig.platform import Platform
 from rig.recording.run import Array
 
-SEGMENT = 4096  # samples of one Welch segment at most
+MAX_WELCH_SAMPLES = 4096  # samples of one Welch segment at most
 INDEPENDENT_SEGMENT_SHARE = 0.5  # of the segments, which overlap by half
 CONFIDENCE = 0.95  # of the band of noise
 ODD, EVEN, FREE = SETS[7], SETS[1], SETS[6]
@@ -58,7 +58,9 @@ def spectrum(
         if len(left) < 16 or not known.any():
             continue
         rate = (len(left) - 1) / float(trace.time_s[-1] - trace.time_s[0])
-        hertz, density = signal.welch(np.where(known, left, 0.0), rate, nperseg=min(SEGMENT, len(left)), detrend=False)
+        hertz, density = signal.welch(
+            np.where(known, left, 0.0), rate, nperseg=min(MAX_WELCH_SAMPLES, len(left)), detrend=False
+        )
         found.append((hertz[1:], density[1:] / known.mean()))
         weights.append(float(known.sum()))
     if not found:
@@ -78,7 +80,7 @@ def noise_band(identification: Identification, hertz: Array) -> tuple[Array, Arr
     assert platform is not None
     white = identification.noise_floor.holdout_rate_rms * float(np.sqrt(2.0 * np.median(_steps_s(traces))))
     density = white * np.abs(torque_per_reading(platform, hertz, traces[0].channel))
-    segments = sum(max(1.0, 2.0 * len(t.time_s) / SEGMENT - 1.0) for t in traces)
+    segments = sum(max(1.0, 2.0 * len(t.time_s) / MAX_WELCH_SAMPLES - 1.0) for t in traces)
     freedom = 2.0 * max(1.0, INDEPENDENT_SEGMENT_SHARE * segments + 0.5)
     low, high = (float(np.sqrt(chi2.ppf(q, freedom) / freedom)) for q in (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2))
     return low * density, high * density

@@ -17,7 +17,7 @@ import numpy as np
 
 from rig.recording.readers.structures import Struct, Unknown
 
-MAX_DEPTH = 8  # structs and cells in each other
+MAX_STRUCT_DEPTH = 8  # structs and cells in each other
 MAX_MATRICES = 500_000  # of a file, those within others counted
 MAX_TEXT = 1 << 20  # characters
 
@@ -30,7 +30,7 @@ OBJECT = (
     "is an object of MATLAB (a table, timetable, timeseries or Dataset), which only MATLAB can open: save its columns "
     "as arrays, w = T.w, or w = ts.Data and t = ts.Time"
 )
-_TOO_DEEP = f"lies more than {MAX_DEPTH} structs deep: save it as an array"
+_TOO_DEEP = f"lies more than {MAX_STRUCT_DEPTH} structs deep: save it as an array"
 _NO_ARRAY = "is no array of numbers (sparse, or a function): save it as a full array"
 
 
@@ -119,7 +119,7 @@ class _Reader:
             return name, _text(parts, shape, self.order)
         if kind not in (_CELL, _STRUCT):
             return name, Unknown(_NO_ARRAY)
-        if depth >= MAX_DEPTH:
+        if depth >= MAX_STRUCT_DEPTH:
             return name, Unknown(_TOO_DEEP)
         count = int(np.prod(shape, dtype=object))
         return name, self._cell(parts, count, depth) if kind == _CELL else self._struct(parts, count, depth)

@@ -15,12 +15,12 @@ from rig.recording import hdf5
 from rig.recording.h5_heaps import check_heaps
 from rig.recording.memory import at_most
 from rig.recording.readers.h5 import text_of
-from rig.recording.readers.matlab.mat5 import MAX_DEPTH, OBJECT
+from rig.recording.readers.matlab.mat5 import MAX_STRUCT_DEPTH, OBJECT
 from rig.recording.readers.structures import Struct, Unknown
 from rig.recording.table import MAX_SAMPLES
 
 MAX_OBJECTS = 100_000  # of a file, those that are referred to twice counted twice
-MAX_BYTES = 64 * MAX_SAMPLES  # of one array
+MAX_ARRAY_BYTES = 64 * MAX_SAMPLES  # of one array
 CLASS, IS_OBJECT, IS_EMPTY = "MATLAB_class", "MATLAB_object_decode", "MATLAB_empty"
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, MemoryError)
 _ELSEWHERE = "keeps its values in another file: save it again with save(..., '-v7')"
@@ -30,7 +30,7 @@ def variables(path: Path) -> Mapping[str, Any]:
     """The variables, as ``structures.columns_of`` takes them. Raises RecordingError where the file is damaged."""
     try:
         check_heaps(path)
-        with h5py.File(path, "r") as file, at_most(hdf5.MAX_BYTES):
+        with h5py.File(path, "r") as file, at_most(hdf5.MAX_READ_BYTES):
             return _Reader(file).fields(file, 0)
     except _DAMAGE as error:
         raise RecordingError(
@@ -55,8 +55,8 @@ class _Reader:
         self.count += 1
         if self.count > MAX_OBJECTS:
             raise ValueError(f"more than {MAX_OBJECTS} arrays in it")
-        if depth > MAX_DEPTH:
-            return Unknown(f"lies more than {MAX_DEPTH} structs deep: save it as an array")
+        if depth > MAX_STRUCT_DEPTH:
+            return Unknown(f"lies more than {MAX_STRUCT_DEPTH} structs deep: save it as an array")
         if IS_OBJECT in item.attrs:
             return Unknown(OBJECT)
         return self._struct(item, depth) if isinstance(item, h5py.Group) else self._dataset(item, depth)
@@ -69,7 +69,7 @@ class _Reader:
             return Unknown(_ELSEWHERE)
         if h5py.check_ref_dtype(item.dtype) is not None:
             return [self.value(self.file[ref], depth + 1) for ref in self._references(item)]
-        if item.dtype.kind not in "fiubc" or item.size * item.dtype.itemsize > MAX_BYTES:
+        if item.dtype.kind not in "fiubc" or item.size * item.dtype.itemsize > MAX_ARRAY_BYTES:
             return Unknown("holds no numbers, or too many: save it as arrays of at most 10 000 000 numbers")
         values = np.asarray(item[()]).T  # HDF5 has MATLAB's dimensions the other way round
         return _text(values) if kind == "char" else values

@@ -23,12 +23,12 @@ from rig.recording.table import MAX_SAMPLES
 from rig.units import bare, unit_of
 
 MAX_LINE_CHARACTERS = 65_536
-MAX_LINES = MAX_SAMPLES + 1_000_000
-MAX_CHARACTERS = 2 * 1024**3  # a packed file of a few megabytes may unpack to terabytes
-LOOKED_AT = 400  # lines, comments and empty ones not counted, in which the data have to begin
+MAX_TEXT_LINES = MAX_SAMPLES + 1_000_000
+MAX_UNPACKED_CHARACTERS = 2 * 1024**3  # a packed file of a few megabytes may unpack to terabytes
+MAX_LINES_BEFORE_DATA = 400  # lines, comments and empty ones not counted, in which the data have to begin
 COMMENT = ("#", "%", "//")
 DATA_LINES = 50  # of which the decimal sign is read
-SURE = 3  # lines in a row that look like data before a preamble is believed
+MIN_DATA_LINES = 3  # lines in a row that look like data before a preamble is believed
 _TYPE = re.compile(r"[fiu][1248]$|(l?real|double|float|single|u?s?d?l?int)\d*$", re.IGNORECASE)  # of a column's numbers
 _SEPARATOR_LINE = re.compile(r'^"?sep=.?"?$', re.IGNORECASE)  # as spreadsheets write it
 
@@ -113,14 +113,16 @@ def all_lines(path: Path, encoding: str) -> Iterator[tuple[int, str]]:
         number = characters = 0
         while line := text_file.readline(MAX_LINE_CHARACTERS):
             number += 1
-            if number > MAX_LINES:
+            if number > MAX_TEXT_LINES:
                 raise RecordingError(
-                    f"{path}: more than {MAX_LINES} lines (empty ones included), the most that is read: "
+                    f"{path}: more than {MAX_TEXT_LINES} lines (empty ones included), the most that is read: "
                     "split it into runs"
                 )
             characters += len(line)
-            if characters > MAX_CHARACTERS:
-                raise RecordingError(f"{path}: unpacks to more than {MAX_CHARACTERS >> 30} GiB: cut it into runs")
+            if characters > MAX_UNPACKED_CHARACTERS:
+                raise RecordingError(
+                    f"{path}: unpacks to more than {MAX_UNPACKED_CHARACTERS >> 30} GiB: cut it into runs"
+                )
             if len(line) == MAX_LINE_CHARACTERS:
                 raise RecordingError(
                     f"{path}: line {number} is longer than {MAX_LINE_CHARACTERS} characters: one sample a line"
@@ -158,7 +160,7 @@ def _first_lines(path: Path, encoding: str) -> tuple[list[str], list[tuple[int, 
             comments += [] if lines else [text.lstrip().lstrip("#%/").strip()]
             continue
         lines.append((number, text))
-        if len(lines) == LOOKED_AT:
+        if len(lines) == MAX_LINES_BEFORE_DATA:
             break
     return comments, lines
 
@@ -178,7 +180,7 @@ def _first_data(lines: Sequence[tuple[int, str]]) -> tuple[int, str | None]:
     stated = stated_separator(lines)
     for at in range(1, len(lines)):
         delimiter = stated or _delimiter(lines[at][1])
-        following = [text for _, text in lines[at : at + SURE]]
+        following = [text for _, text in lines[at : at + MIN_DATA_LINES]]
         widths = {len(_trimmed(_split(text, delimiter))) for text in following}
         if all(_is_data(text, delimiter) for text in following) and len(widths) == 1 and max(widths) > 1:
             break

@@ -26,7 +26,7 @@ from rig.recording.readers.text.words import NO_READING, is_number
 from rig.recording.readers.unreadable import unreadable
 from rig.recording.table import MAX_SAMPLES, Table, too_long
 
-LOOKED_AT = 50  # rows in which a column of words shows
+ROWS_SEARCHED_FOR_WORDS = 50  # rows in which a column of words shows
 _WORD = re.compile(r"[^\W\d_]")  # begins with a letter
 _DAMAGE = (OSError, EOFError, zlib.error, UnicodeError)
 
@@ -83,7 +83,7 @@ def _told(text: _Text) -> list[str]:
     """What columns of words say of the rows."""
     layout = text.layout
     words: set[int] = set()
-    for _, line in islice(_data_lines(text), LOOKED_AT):
+    for _, line in islice(_data_lines(text), ROWS_SEARCHED_FOR_WORDS):
         fields = layout.fields(line)[: len(layout.names)]
         words |= {i for i, f in enumerate(fields) if _is_word(f)}
     if not words:

@@ -17,7 +17,7 @@ from identify.report.page.document import embedded
 from identify.report.page.markup import Markup, element, table, words
 from identify.report.page.plots.convergence import convergence_figure
 from identify.report.page.plots.estimates import estimates_figure
-from identify.report.page.plots.motion import RUNS, motion_figures, stretches
+from identify.report.page.plots.motion import MAX_RUNS_DRAWN, motion_figures, stretches
 from identify.report.page.plots.residual import residual_figures
 from identify.report.page.plots.spectrum import spectrum, spectrum_figures
 from identify.report.page.tables import candidate_table, parameter_table
@@ -114,7 +114,7 @@ def test_of_very_many_runs_the_worst_are_drawn_in_the_order_they_were_played(fou
     good = found.traces[0]
     bad = replace(good, name="bad", simulated_after=good.simulated_after + 1.0)
     figures = motion_figures(replace(found, traces=(*[good] * 20, bad, *[good] * 5)))
-    assert len(figures) == RUNS
+    assert len(figures) == MAX_RUNS_DRAWN
     assert "bad" in [figure.heading for figure in figures]
 
 
