@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
 
 from identify.model.parameters import Name
 from identify.signals.trace import Trace, loads_differ
 from rig import effects
 from rig.effects.base import Place
+
+HEARD = 0.1  # of the amplitude in the loudest run: a run with less does not have what repeats in time
+MAX_STRENGTH_SCATTER = 0.3  # of its mean amplitude, from run to run: more than any pump or fan changes by
 
 
 def why_unseen(name: str, traces: Sequence[Trace]) -> str:
@@ -33,6 +38,28 @@ def shows_a_period(name: str, values: Mapping[Name, float], traces: Sequence[Tra
         return True
     longest_s = max(len(t.measured) * t.step_s for t in traces)
     return values.get((name, repeats), 0.0) * longest_s >= 1.0
+
+
+def is_as_strong_in_all(name: str, values: Mapping[Name, float], std_error: Callable[[Name], float]) -> bool:
+    """Whether what repeats in time is as strong in every run that has it, but for its errors.
+
+    A source in the surroundings does not know what is played. A drive that loses its gain while it warms up leaves a
+    part of the excitation, in every run another one.
+    """
+    gains = {p.name for p in effects.get(name).parameters if p.linear and p.per_run}
+    if not effects.get(name).repeats or not gains:
+        return True
+    of_run: dict[str, list[Name]] = {}
+    for key in values:
+        if key[0] == name and len(key) == 3 and key[1] in gains:
+            of_run.setdefault(key[2], []).append(key)
+    size = np.array([math.hypot(*(values[k] for k in keys)) for keys in of_run.values()])
+    error = np.array([math.hypot(*(std_error(k) for k in keys)) for keys in of_run.values()])
+    heard = size > HEARD * np.max(size, initial=0.0)
+    if np.count_nonzero(heard) < 2:
+        return True
+    excess = np.var(size[heard], ddof=1) - np.mean(error[heard] ** 2)
+    return bool(excess <= (MAX_STRENGTH_SCATTER * np.mean(size[heard])) ** 2)
 
 
 def one_more(have: Sequence[str], values: Mapping[Name, float], traces: Sequence[Trace]) -> list[str]:

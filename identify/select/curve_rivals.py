@@ -15,10 +15,11 @@ import numpy as np
 
 from identify.bounds.separation import support_difference
 from identify.likelihood.fit import Fit
+from identify.model.parameter_fit import ParameterFit
 from identify.propose.free_forms import fitted, ranges
 from identify.propose.innovation_score import InnovationScores
-from identify.runs.observability import is_seen_to_repeat
-from identify.select.evidence import STRONG_SUPPORT
+from identify.runs.observability import is_as_strong_in_all, is_seen_to_repeat
+from identify.select.evidence import PREDICTS_TO_NOISE, STRONG_SUPPORT
 from identify.select.free_form_residual import CURVE_STEPS, ON
 from identify.select.trial_fits import COMPARABLE, TRIAL_ITERATIONS
 from identify.wording import joined, plain
@@ -65,6 +66,24 @@ def _seen_to_repeat(name: str, now: Fit, search: Stepwise) -> bool:
     return bool(effect.repeats_over_angle) and is_seen_to_repeat(
         effects.first_of(name), have, now.values, search.problem.traces
     )
+
+
+def not_as_strong(fit: ParameterFit, names: Sequence[str]) -> dict[str, str]:
+    """Effects that repeat in time and that the runs do not have alike, and why that refutes them."""
+    why = "a disturbance from outside is as strong in every run that has it, and this one is not"
+    return {n: why for n in names if not is_as_strong_in_all(n, fit.values, fit.std_error)}
+
+
+def seen_too_little(search: Stepwise, now: Fit) -> dict[str, str]:
+    """Waves over the angle of which the travel does not show two periods, where a disturbance limits the recording.
+
+    Any curve over the angle looks like part of a wave. Down to the sensor's noise its exact shape tells the two apart.
+    """
+    if now.reduced_chi_square < PREDICTS_TO_NOISE:
+        return {}
+    waves = [n for n in search.trials.added(now) if effects.get(effects.first_of(n)).repeats_over_angle]
+    why = "the travel does not show two of its periods, and other effects explain as much"
+    return {n: why for n in waves if not _seen_to_repeat(n, now, search)}
 
 
 def still_offered(search: Stepwise, names: Sequence[str]) -> list[str]:

@@ -22,6 +22,7 @@ from identify.model.structure import Structure
 from identify.results import Dependence, Disturbance
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
+from identify.select.curve_rivals import not_as_strong
 from identify.select.evidence import MAX_TRUSTED_INFLATION, STRONG_SUPPORT, in_band, inflation, torque_fit_of
 from identify.select.likelihood_search import MAX_CUTOFF_SHARE
 from identify.select.preference import follows_nothing_freely, is_more_flexible, leaves_less
@@ -111,7 +112,8 @@ def search_in_torque(
         search.run()
 
         def is_better(proposed: TorqueFit) -> bool:
-            if not leaves_less(search, proposed, trial, depends):
+            added = [e for e in proposed.structure.effects if e not in structure.effects]
+            if not leaves_less(search, proposed, trial, depends) or not_as_strong(proposed, added):
                 return False
             if trial.held_nm > A_MULTIPLE * proposed.held_nm and follows_nothing_freely(proposed, trial):
                 return True

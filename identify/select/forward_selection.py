@@ -77,6 +77,33 @@ def add_effects(search: Stepwise) -> None:
         search.best = _without_trial(search, *trial)
 
 
+def begin_again_without(search: Stepwise, why: Mapping[str, str]) -> None:
+    """Take effects back for a reason each, offer none of their kinds any more, and look for others."""
+    kinds = {effects.first_of(n) for n in why}
+    for name, reason in why.items():
+        search.dropped.append((name, reason))
+        search.say(f"took {plain(name)} back: {reason}")
+        search.best = search.without(search.best, name, FULL_ITERATIONS)
+    search.stood_for_curves |= set(why)
+    search.allowed = search.trials.allowed = [n for n in search.allowed if effects.first_of(n) not in kinds]
+    add_effects(search)
+
+
+def gone_on_without(search: Stepwise, why: Mapping[str, str]) -> Stepwise | None:
+    """A search of its own gone on without some effects; None where these explain clearly more than what it finds."""
+    other = search.apart()
+    other.best, other.trials.known = search.best, search.trials.known
+    begin_again_without(other, why)
+    other.concluded()
+    more = search.weigher.evidence(next(iter(why)), other.best, search.best)
+    if more.support > ADDED_SUPPORT and more.weight > WEIGHT:
+        search.say(
+            f"kept {joined([plain(n) for n in why])}: explains {100.0 * more.weight:.0f} % of what the others leave"
+        )
+        return None
+    return other
+
+
 def _share_of_disturbance(new: Evidence, beside_others: bool) -> str:
     """How much of the disturbance an effect takes, of all of it or of what the effects before it have left."""
     return f"explains {100.0 * new.weight:.0f} % of the torque that was {'still ' if beside_others else ''}unexplained"

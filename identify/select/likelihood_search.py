@@ -146,11 +146,9 @@ class LikelihoodSearch:
             return None
         less.say(f"searching on with {best.count} samples: they show an effect that the first {less.best.count} do not")
         base = problem.fit(less.base.structure, less.base.values, problem.noise_of(less.base))
-        out = replace(  # with lists of its own: what it takes back is not taken from the part's model
-            less, problem=problem, base=base, weigher=_weigher(problem, traces, parts, self.start, base), whole=None,
+        out = less.apart(
+            problem=problem, base=base, weigher=_weigher(problem, traces, parts, self.start, base), whole=None,
             rounds=[], settled=frozenset(less.trials.added(best)), left=None, in_place=None, doubtful=[], _on_all={},
-            rivals=dict(less.rivals), between_rivals=dict(less.between_rivals), dropped=list(less.dropped),
-            stood_for_curves=set(less.stood_for_curves), inflation=dict(less.inflation), needed=dict(less.needed),
         )  # fmt: skip
         out.best = best
         return out

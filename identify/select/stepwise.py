@@ -9,8 +9,10 @@ last. What it says is scaled by how far it can be believed, and a name takes wei
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +22,9 @@ from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
 from identify.propose.innovation_score import Score
-from identify.select.curve_rivals import against_curves
+from identify.select.curve_rivals import against_curves, not_as_strong, seen_too_little
 from identify.select.evidence import ADDED_SUPPORT, STRONG_SUPPORT, WEIGHT, Evidence, EvidenceModel, is_trusted
-from identify.select.forward_selection import Round, add_effects
+from identify.select.forward_selection import Round, add_effects, begin_again_without, gone_on_without
 from identify.select.free_form_residual import FreeFormFit, fit_free_forms, redundant_given
 from identify.select.needed_terms import is_in_doubt, is_light, replace_linear_terms, without_absorbing_stiffness
 from identify.select.preference import explains_most, no_possible_gain, prefers_special_case, simplest
@@ -92,9 +94,20 @@ class Stepwise:
             before, self.best = self.best.structure, other(self.best)
             if self.best.structure.parts != before.parts:  # beside what was replaced, others may have shown nothing
                 add_effects(self)
+        if why := not_as_strong(self.best, self.trials.added(self.best)):
+            begin_again_without(self, why)
+            return self.concluded()
+        if (why := seen_too_little(self, self.best)) and (instead := gone_on_without(self, why)):
+            vars(self).update(vars(instead))
+            return self.best
         self.best = self.backward_elimination(self.best, [*self.best.structure.terms, *self.trials.added(self.best)])
         self.best = self.compare_with_free_form(against_curves(self, self.best))
         return self.best
+
+    def apart(self, **changes: Any) -> Stepwise:
+        """The same with other settings and with lists of its own: what one takes back is not taken from the other."""
+        have = {f.name: getattr(self, f.name) for f in fields(self)}
+        return replace(self, **{**{k: copy(v) for k, v in have.items() if isinstance(v, list | dict | set)}, **changes})
 
     def known(self, structure: Structure) -> Fit | None:
         """A structure as the search has fitted it, on the way or to ask what is needed; None where it has not."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from identify.model.parameters import Name
 from identify.pipeline import identify
-from identify.runs.observability import shows_a_period, why_unseen
+from identify.runs.observability import is_as_strong_in_all, shows_a_period, why_unseen
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
 from rig.recording.run import Recording
@@ -51,3 +53,28 @@ def test_what_repeats_needs_a_run_as_long_as_its_period(hertz: float, shown: boo
     values = {("periodic_disturbance", "frequency"): hertz}
     assert shows_a_period("periodic_disturbance", values, traces) is shown
     assert shows_a_period("coulomb_friction", {("coulomb_friction", "level"): 1.0}, traces)
+
+
+def tone(*amplitudes: float) -> dict[Name, float]:
+    values: dict[Name, float] = {("inertia",): 0.02, ("periodic_disturbance", "frequency"): 9.0}
+    for run, size in enumerate(amplitudes):
+        values["periodic_disturbance", "sine", str(run)] = 0.6 * size
+        values["periodic_disturbance", "cosine", str(run)] = -0.8 * size
+    return values
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "error", "alike"),
+    [
+        ((32.2, 32.0, 32.0, 31.9), 0.2, True),
+        ((1.48, 2.7, 0.2, 0.05, 0.4, 0.04), 0.1, False),  # what a drive that warms up leaves of the excitation
+        ((1.0, 0.02, 1.1, 0.0), 0.01, True),  # a pump that was on in two of four runs
+        ((1.0, 2.2, 0.5), 0.8, True),  # as far as the errors tell
+        ((1.0,), 0.01, True),
+    ],
+)
+def test_a_source_in_the_surroundings_is_as_strong_in_every_run_that_has_it(
+    amplitudes: tuple[float, ...], error: float, alike: bool
+) -> None:
+    assert is_as_strong_in_all("periodic_disturbance", tone(*amplitudes), lambda name: error / np.sqrt(2.0)) is alike
+    assert is_as_strong_in_all("coulomb_friction", tone(*amplitudes), lambda name: 0.0)
