@@ -104,7 +104,8 @@ def _yokogawa(rows: _Rows) -> Heading | None:
         return None
     begin = _float(next(iter(rows.of("hoffset")), ""))
     rate_hz = _float(next(iter(rates), ""))
-    at = next((i for i in range(last + 1, len(rows.rows)) if any(_is_float(f) for f in rows.rows[i])), None)
+    behind = range(last + 1, len(rows.rows))  # more lines with a word, Date and Time among them, before the rows
+    at = next((i for i in behind if not rows.rows[i][0] and any(_is_float(f) for f in rows.rows[i])), None)
     if at is None or not rate_hz or len({*map(_float, rates)} - {None}) > 1:
         return None
     return Heading(rows.delimiter, ("", *names), _stated(names, rows.of("vunit")), at, (begin or 0.0, 1.0 / rate_hz))
