@@ -59,6 +59,13 @@ WRITTEN = {
     "decimal commas": "time_s;torque_nm;rate_rad_s\n" + comma(rows(T, TORQUE, RATE, delimiter=";")),
     "decimal commas after whole numbers": "time_s;torque_nm;rate_rad_s\n0;0;2\n"
     + comma(rows(T[1:], TORQUE[1:], RATE[1:], delimiter=";")),
+    "decimal commas beside a date with points": "Datum;time_s;torque_nm;rate_rad_s\n"
+    + "".join(f"06.05.2024;{line}\n" for line in comma(rows(T, TORQUE, RATE, delimiter=";")).splitlines()),
+    "decimal commas beside words with points": "time_s;torque_nm;rate_rad_s;state;rig\n"
+    + "".join(f"{line};i.O.;Nr. 4\n" for line in comma(rows(T, TORQUE, RATE, delimiter=";")).splitlines()),
+    "exponents of Fortran": "time_s,torque_nm,rate_rad_s\n"
+    + "".join(f"{t:.16E},{m:.16E},{w:.16e}\n" for t, m, w in zip(T, TORQUE, RATE, strict=True))
+    .replace("E", "D").replace("e", "d"),
     "decimal commas in quotes": "time_s,torque_nm,rate_rad_s\n" + quoted(comma(rows(T, TORQUE, RATE, delimiter=";"))),
     "decimal commas and tabs": "time_s\ttorque_nm\trate_rad_s\n" + comma(rows(T, TORQUE, RATE, delimiter="\t")),
     "bars": "time_s|torque_nm|rate_rad_s\n" + rows(T, TORQUE, RATE, delimiter="|"),

@@ -13,7 +13,7 @@ TAIL_BYTES = 1 << 16  # of the end that are looked at
 MIN_LINES = 3  # before the last one, or nothing can be said of it
 COMPARED = 200  # lines before the last one
 FEW = 0.1  # of their last numbers have as few decimals
-_NUMBER = re.compile(r"[-+]?\d*(?:[.,](\d*))?(?:[eE][-+]?(\d+))?$")
+_NUMBER = re.compile(r"[-+]?\d*(?:[.,](\d*))?(?:[eEdD][-+]?(\d+))?$")
 
 
 def cut_end(path: Path, encoding: str, fields: Callable[[str], list[str]], width: int) -> str:

@@ -77,6 +77,9 @@ def can_name(fields: Sequence[str]) -> bool:
 
 
 def decimal_comma(data: Sequence[str], delimiter: str | None) -> bool:
-    """Whether numbers have a decimal comma: some fields hold one (in quotes, between commas), none a decimal point."""
-    fields = [f for line in data for f in split(line, delimiter) if not is_stamp(f)]
-    return any("," in f for f in fields) and not any("." in f and not has_points_between(f) for f in fields)
+    """Whether numbers have a decimal comma: some hold one (in quotes, between commas), none a decimal point.
+
+    The points of a date, a name or a word say nothing of the numbers.
+    """
+    numbers = [f for line in data for f in split(line, delimiter) if not is_stamp(f) and is_number(f)]
+    return any("," in f for f in numbers) and not any("." in f and not has_points_between(f) for f in numbers)

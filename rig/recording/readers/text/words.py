@@ -21,6 +21,7 @@ _POINTS = re.compile(r"[-+]?\d{1,3}(\.\d{3})+,\d*$")
 _BETWEEN = re.compile(
     "(?<=\\d)[\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{THIN SPACE}'\N{RIGHT SINGLE QUOTATION MARK}](?=\\d{3})"
 )
+_FORTRAN = re.compile(r"([-+]?(?:\d+[.,]?\d*|[.,]\d+))[dD]([-+]\d+)$")  # 1.5D+01: Fortran's double precision
 TRUTH = {"true": 1.0, "false": 0.0}
 
 
@@ -35,6 +36,8 @@ def number(text: str, decimal_comma: bool) -> float:
         raise ValueError(text)
     if text.lower() in TRUTH:
         return TRUTH[text.lower()]
+    if "D" in text or "d" in text:
+        text = _FORTRAN.sub(r"\1e\2", text)
     if decimal_comma:
         text = text.replace(".", "") if _POINTS.match(text) else text
         if "." in text:
