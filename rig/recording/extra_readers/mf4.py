@@ -11,6 +11,7 @@ import numpy as np
 from rig.errors import RecordingError
 from rig.recording.extra_readers.packages import require
 from rig.recording.rasters import Group, one_table
+from rig.recording.readers.can_log import undecoded
 from rig.recording.table import Table
 
 RAW_CAN = ("CAN_DataFrame", "CAN_RemoteFrame", "CAN_ErrorFrame")
@@ -28,10 +29,7 @@ def read(path: Path) -> Sequence[Table]:
     except Exception as error:
         raise RecordingError(f"{path}: is not a valid MDF file ({error}): export the recording again") from error
     if raw and not groups:
-        raise RecordingError(
-            f"{path}: holds raw CAN frames and no signals: decode it with the DBC file first (asammdf: "
-            "MDF.extract_bus_logging, or in its window Bus logging), then read the decoded file"
-        )
+        raise undecoded(path, "asammdf: MDF.extract_bus_logging, or in its window Bus logging")
     return [one_table(path, groups)]
 
 

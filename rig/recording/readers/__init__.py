@@ -11,6 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 from rig.errors import RecordingError
+from rig.recording.readers import can_log
 from rig.recording.readers.folder import is_ros_bag
 from rig.recording.run import Run
 from rig.recording.table import Table
@@ -64,6 +65,8 @@ def read_file(path: Path) -> Sequence[Table | Run]:
         return _read_with("extra_readers.rosbag" if is_ros_bag(path) else "readers.folder", path)
     _check_is_file(path)
     suffix = next((s for s in _BY_SUFFIX if path.name.lower().endswith(s)), None)
+    if path.name.lower().endswith(can_log.SUFFIXES):
+        raise can_log.undecoded(path)
     if suffix is None:
         raise RecordingError(
             f"{path}: the suffix {path.suffix!r} is not a known format: export it as one of {', '.join(suffixes())}"

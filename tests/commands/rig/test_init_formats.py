@@ -67,6 +67,24 @@ def test_a_log_of_raw_can_frames_is_refused_with_what_decodes_it(tmp_path: Path)
     assert "raw CAN frames" in done.stderr and "extract_bus_logging" in done.stderr
 
 
+FRAMES = {
+    "vector.asc": "date Mon May 6 02:03:07.000 pm 2024\nbase hex  timestamps absolute\ninternal events logged\n"
+    "// version 9.0.0\n   0.000000 Start of measurement\n"
+    + "".join(f"   0.{i:03}000 1  201             Rx   d 8 01 02 03 04 05 06 07 08\n" for i in range(60)),
+    "candump.log": "".join(f"(22446.62{i}534) can0 601#4000100000000000\n" for i in range(10)),
+    "vector.blf": "LOGG",
+}
+
+
+@pytest.mark.parametrize("file", FRAMES)
+def test_a_log_of_frames_of_another_kind_is_told_once(file: str, tmp_path: Path) -> None:
+    (tmp_path / file).write_text(FRAMES[file])
+    done = command(app, "init", tmp_path / file, "--out", tmp_path / "rig.yaml")
+    assert done.exit_code == 2
+    assert "holds raw CAN frames and no signals: decode it with the DBC file first (CANalyzer" in done.stderr
+    assert done.stderr.count(file) == 1
+
+
 @pytest.mark.parametrize("file", ["x.parquet", "x.mf4", "x.tdms", "x.bag", "x.xlsx", "x.ods"])
 def test_a_damaged_file_is_refused_without_a_traceback(file: str, tmp_path: Path) -> None:
     (tmp_path / file).write_bytes(b"\x00not what it says" * 40)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import IO, cast
 
 from rig.errors import RecordingError
+from rig.recording.readers.can_log import is_can_log, undecoded
 from rig.recording.readers.text.first_data import first_data, header_above
 from rig.recording.readers.text.headings import known_heading
 from rig.recording.readers.text.line_fields import decimal_comma, delimiter_of, is_units, split, trimmed
@@ -78,6 +79,8 @@ def layout_of(path: Path) -> Layout:
     comments, lines = _first_lines(path, encoding)
     if not lines:
         raise RecordingError(f"{path}: holds no data: a header line and one line a sample are needed")
+    if is_can_log([text for _, text in lines]):
+        raise undecoded(path)
     if (known := known_heading(lines, split)) is not None:
         comma = decimal_comma([text for _, text in lines[known.at : known.at + DATA_LINES]], known.delimiter)
         header = lines[known.at - 1][0]
