@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,10 @@ from rig.recording.table import SingleNumberError, Table
 from rig.units import Unit, name_and_unit, unit_of
 
 MIN_NUMBERS = 10  # numbers that make a column
+MAX_CAUSES = 4  # different ones why columns cannot be used
+MAX_COLUMNS_IN_REASON = 6  # columns of one reason
 LONGEST_SUFFIX = 3  # words of a name that may be its unit: "torque_n_m", "rate_rad_s"
+_QUOTED = re.compile(r"'[^']*'")  # what stands in a field
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[^\W\dA-Za-z_]+", re.UNICODE)
 
 
@@ -77,12 +81,31 @@ def columns_of(table: Table) -> tuple[Column, ...]:
     length = usual[0][0] if usual else 0
     found = tuple(_column(table, name, whole.get(name, _unread(name)), length) for name in dict.fromkeys(table.names))
     if sum(c.values is not None for c in found) < 2:
-        reasons = "; ".join(f"{c.name!r} {c.why_not}" for c in found[:4] if c.why_not)
+        reasons = "; ".join(_reasons(found))
         raise RecordingError(
-            f"{table.path}: fewer than two columns of numbers, but a time and a measured channel are needed"
-            f"{f' ({reasons})' if reasons else ''}: export them as columns"
+            f"{table.path}: fewer than two columns of numbers, but a time and a measured channel are needed: "
+            f"{reasons or 'export them as columns'}"
         )
     return found
+
+
+def _reasons(columns: Sequence[Column]) -> list[str]:
+    """Why columns cannot be used, what is the same of several but for their names and numbers once, with their names.
+
+    The last of many reasons are left out.
+    """
+    alike: dict[str, tuple[str, list[str]]] = {}
+    for column in columns:
+        if not column.why_not:
+            continue
+        reason = column.why_not.replace(f", column {column.name!r}", "").removeprefix(f"column {column.name!r} ")
+        alike.setdefault(_QUOTED.sub("", reason), (reason, []))[1].append(repr(column.name))
+    said = []
+    for reason, names in list(alike.values())[:MAX_CAUSES]:
+        more = [f"{len(names) - MAX_COLUMNS_IN_REASON} more"] if len(names) > MAX_COLUMNS_IN_REASON else []
+        by = ":" if len(names) > 1 or reason.startswith("line ") else ""  # 'T' is an object of MATLAB
+        said.append(f"{', '.join([*names[:MAX_COLUMNS_IN_REASON], *more])}{by} {reason}")
+    return said
 
 
 def _unread(name: str) -> str:

@@ -27,6 +27,7 @@ from rig.recording.readers.unreadable import unreadable
 from rig.recording.table import MAX_SAMPLES, Table, too_long
 
 ROWS_SEARCHED_FOR_WORDS = 50  # rows in which a column of words shows
+ROWS_COMPARED = 1000  # rows of which it is told whether all differ from the header
 _WORD = re.compile(r"[^\W\d_]")  # begins with a letter
 _DAMAGE = (OSError, EOFError, zlib.error, UnicodeError)
 
@@ -201,11 +202,9 @@ def _careful(text: _Text, positions: Sequence[int]) -> Array:
     count = 0
     stamps: dict[int, Stamps] = {}
     for number, line in _data_lines(text):
-        fields = layout.fields(line)
-        while len(fields) > width and not fields[-1]:
-            fields.pop()
+        fields = _row(layout, line)
         if len(fields) != width:
-            raise RecordingError(_ragged(layout, number, len(fields)))
+            raise RecordingError(_ragged(text, number, len(fields), first=count == 0))
         for i in positions:
             try:
                 values.append(_value(layout, fields[i], i, stamps, first=count == 0))
@@ -215,6 +214,14 @@ def _careful(text: _Text, positions: Sequence[int]) -> Array:
                 raise RecordingError(f"{where}: {fields[i][:40]!r} {cure}") from None
         count += 1
     return np.array(values, dtype=np.float64).reshape(count, len(positions))
+
+
+def _row(layout: Layout, line: str) -> list[str]:
+    """The fields of a row, without empty ones beyond the header's."""
+    fields = layout.fields(line)
+    while len(fields) > len(layout.names) and not fields[-1]:
+        fields.pop()
+    return fields
 
 
 def _value(layout: Layout, text: str, position: int, stamps: dict[int, Stamps], first: bool) -> float:
@@ -232,11 +239,17 @@ def _value(layout: Layout, text: str, position: int, stamps: dict[int, Stamps], 
         return seconds
 
 
-def _ragged(layout: Layout, number: int, count: int) -> str:
-    text = f"{layout.path}: line {number} has {count} fields where the header names {len(layout.names)}: "
+def _ragged(text: _Text, number: int, count: int, *, first: bool) -> str:
+    """What is said of a row with another number of fields; ``first``: of the data."""
+    layout = text.layout
+    said = f"{layout.path}: line {number} has {count} fields where the header names {len(layout.names)}"
     if layout.delimiter == "," and count >= 2 * len(layout.names) - 1:
-        return text + "with decimal commas, separate the columns by semicolons"
-    return text + "complete or delete the line (the last one may be cut)"
+        return f"{said}: with decimal commas, separate the columns by semicolons"
+    widths = {len(_row(layout, line)) for _, line in islice(_data_lines(text), ROWS_COMPARED)} if first else set()
+    if widths != {count}:
+        return f"{said}: complete or delete the line (the last one may be cut)"
+    comma = ", or, if a comma stands within a number or a time, separate the columns by semicolons"
+    return f"{said}, and so have the others: name every column in the header{comma if layout.delimiter == ',' else ''}"
 
 
 def _line_of(text: _Text, index: int) -> int:

@@ -155,5 +155,5 @@ def test_a_linear_axis_is_known_by_its_units() -> None:
 
 
 def test_without_two_columns_of_numbers_the_file_is_refused_with_the_reasons() -> None:
-    with pytest.raises(RecordingError, match=r"fewer than two columns of numbers.*'b' has 3 numbers"):
-        columns_of(table(a=T, b=np.where(np.arange(500) < 3, T, np.nan)))
+    with pytest.raises(RecordingError, match=r"fewer than two columns of numbers.*'b', 'c': has 3 numbers$"):
+        columns_of(table(a=T, b=np.where(np.arange(500) < 3, T, np.nan), c=np.where(np.arange(500) < 3, T, np.nan)))
