@@ -27,8 +27,8 @@ _FACTORS: Mapping[str, Mapping[str, float]] = {
     "rate": {
         "rad/s": 1.0, "mrad/s": 1e-3, "urad/s": 1e-6, "deg/s": DEG, "dps": DEG, "mdeg/s": 1e-3 * DEG,
         "mdps": 1e-3 * DEG, "deg/h": DEG / 3600, "deg/min": DEG / 60, "rpm": TURN / 60, "rev/min": TURN / 60,
-        "r/min": TURN / 60, "1/min": TURN / 60, "u/min": TURN / 60, "rev/s": TURN, "rps": TURN,
-        "krpm": 1e3 * TURN / 60,
+        "r/min": TURN / 60, "1/min": TURN / 60, "/min": TURN / 60, "u/min": TURN / 60, "tr/min": TURN / 60,
+        "rev/s": TURN, "rps": TURN, "tr/s": TURN, "krpm": 1e3 * TURN / 60,
     },
     "speed": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "um/s": 1e-6, "in/s": INCH, "km/h": 1 / 3.6},
     "angle": {
@@ -59,7 +59,9 @@ DIMENSIONS: Mapping[str, Mapping[str, str]] = {
 SI: Mapping[str, str] = {
     "time": "s", "torque": "N m", "force": "N", "rate": "rad/s", "speed": "m/s", "angle": "rad", "length": "m"
 }  # fmt: skip
+_GERMAN_DEGREE = re.compile(r"\bGrad\b")  # with a capital, as nouns have it there; an English grad is a gon
 _BRACKETS = re.compile(r"^(?P<name>.*\S)\s*(?:\((?P<round>[^()]*)\)|\[(?P<square>[^][]*)\])\s*$")
+_IN = re.compile(r"^(?:(?P<name>.*\S)\s+)?in\s+(?P<unit>\S.*)$")  # "C1 in V": of Rohde & Schwarz
 _SLASH = re.compile(r"^(?P<name>[^/]*[^/\s])\s*/\s*(?P<unit>\S.*)$")
 
 
@@ -77,7 +79,7 @@ class Unit:
 
 def unit_of(text: str) -> Unit | None:
     """The unit that a text names ("N m", "deg/s", "[ms]", "°"), None where it is not known."""
-    words = bare(text)
+    words = _GERMAN_DEGREE.sub("deg", bare(text))
     if words.startswith("M") and not words.isupper():
         return None  # "MN m" is no millinewton metre
     plain = re.sub(r"[^\W\d_]+", lambda m: _WORDS.get(m[0], m[0]), words.translate(_SIGNS).lower())
@@ -95,10 +97,10 @@ def bare(text: str) -> str:
 
 
 def name_and_unit(header: str) -> tuple[str, str]:
-    """ "rate (deg/s)", "torque [N m]" and "t/s" as name and unit; the unit is "" where the header names none.
+    """ "rate (deg/s)", "torque [N m]", "t/s" and "rate in deg/s" as name and unit, "" where the header names none.
 
     Whatever stands in brackets at the end and has a letter counts as a unit (the 0 of rate[0] is an index); behind a
-    slash only what is known as one.
+    slash and behind "in" only what is known as one.
     """
     found = _BRACKETS.match(header)
     if found:
@@ -106,6 +108,9 @@ def name_and_unit(header: str) -> tuple[str, str]:
         if any(c.isalpha() or c in "°%" for c in inside):
             return found["name"].rstrip(" /"), inside
         return header, ""
+    found = _IN.match(header)
+    if found and unit_of(found["unit"]) is not None and unit_of(f"in {found['unit']}") is None:  # "in lbf" is a torque
+        return found["name"] or "", found["unit"].strip()
     found = _SLASH.match(header)
     if found and unit_of(found["unit"]) is not None and unit_of(header) is None:
         name, _, last = found["name"].rpartition(" ")

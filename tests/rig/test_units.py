@@ -20,7 +20,9 @@ KNOWN = {
     "rad/s": ("rate", 1.0), "rad s^-1": ("rate", 1.0), "rad·s⁻¹": ("rate", 1.0), "deg/s": ("rate", DEG),
     "°/s": ("rate", DEG), "deg/sec": ("rate", DEG), "dps": ("rate", DEG), "degrees per second": ("rate", DEG),
     "rpm": ("rate", math.pi / 30), "1/min": ("rate", math.pi / 30), "rev/s": ("rate", 2 * math.pi),
-    "mrad/s": ("rate", 1e-3),
+    "mrad/s": ("rate", 1e-3), "min-1": ("rate", math.pi / 30), "min⁻¹": ("rate", math.pi / 30),
+    "min^-1": ("rate", math.pi / 30), "U/min": ("rate", math.pi / 30),
+    "tr/min": ("rate", math.pi / 30), "tr/s": ("rate", 2 * math.pi), "Grad/s": ("rate", DEG), "[Grad]": ("angle", DEG),
     "m/s": ("speed", 1.0), "mm/s": ("speed", 1e-3), "rad": ("angle", 1.0), "deg": ("angle", DEG), "°": ("angle", DEG),
     "[Degrees]": ("angle", DEG), "turns": ("angle", 2 * math.pi), "mm": ("length", 1e-3), "A": ("current", 1.0),
     "Volt": ("voltage", 1.0),
@@ -34,7 +36,9 @@ def test_a_unit_is_known_however_it_is_written(text: str) -> None:
     assert (unit.dimension, pytest.approx(unit.factor, rel=1e-12)) == KNOWN[text]
 
 
-@pytest.mark.parametrize("text", ["", "filtered", "MN m", "Mrad", "furlong", "deg/fortnight", "1", "?", "s/", "raw"])
+@pytest.mark.parametrize(
+    "text", ["", "filtered", "MN m", "Mrad", "furlong", "grad", "grade", "deg/fortnight", "1", "?", "s/", "raw"]
+)
 def test_what_is_no_unit_is_none(text: str) -> None:
     assert unit_of(text) is None
 
@@ -46,7 +50,8 @@ def test_what_is_no_unit_is_none(text: str) -> None:
         ("ω / (rad/s)", ("ω", "rad/s")), ("Time (s)", ("Time", "s")), ("rate(filtered)", ("rate", "filtered")),
         ("M/Nm", ("M", "Nm")), ("rate_rad_s", ("rate_rad_s", "")), ("rad/s", ("rad/s", "")), ("in/out", ("in/out", "")),
         ("rate[0]", ("rate[0]", "")),
-        ("CH(1)", ("CH(1)", "")),
+        ("CH(1)", ("CH(1)", "")), ("C1 in V", ("C1", "V")), ("in s", ("", "s")), ("rate in deg/s", ("rate", "deg/s")),
+        ("torque in lbf", ("torque in lbf", "")), ("stuck in gear", ("stuck in gear", "")), ("in", ("in", "")),
         ("(s)", ("(s)", "")), ("", ("", "")),
     ],
 )  # fmt: skip

@@ -148,6 +148,12 @@ def test_a_unit_of_something_else_and_a_name_of_something_else_are_not_sure() ->
     assert all(factor.sure for factor in factors.values())
 
 
+def test_volts_behind_in_are_no_torque_and_no_rate() -> None:
+    roles, factors = guessed(**{"in__s": T, "C1__in__V": TORQUE, "C2__in__V": RATE})
+    assert names_of(roles) == {"time": "in s", "torque": None, "rate": None, "angle": None}
+    assert not roles["torque"].sure and factors["time"].sure
+
+
 def test_a_linear_axis_is_known_by_its_units() -> None:
     roles, factors = guessed(t_s=T, force_N=TORQUE, position_mm=1e3 * ANGLE)
     assert axis_of(roles) == "linear"
