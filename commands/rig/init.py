@@ -154,6 +154,7 @@ def _bench(options: InitOptions) -> int:
 def _of_table(table: Table, files: Sequence[str], options: InitOptions, ask: Ask | None) -> str:
     from rig.recording.guessing.columns import columns_of
     from rig.recording.guessing.factor import Factor
+    from rig.recording.guessing.roles import unused_rate
     from rig.recording.guessing.sampling import stated_rate
     from rig.recording.guessing.scales import axis_of, guess_factors
     from rig.recording.tables import DEFAULT_NAMES
@@ -177,6 +178,7 @@ def _of_table(table: Table, files: Sequence[str], options: InitOptions, ask: Ask
     written = {*options.scales, *(q for q, factor in factors.items() if not factor.sure)}
     factors = {q: questions.factor(q, factors[q], column, axis) for q, column in found}
     questions.finish()
+    show(unused_rate(columns, roles))
     entries = [
         Entry(q, text_value(c.name), f"{roles[q].why}; {factors[q].why}", questions.is_guess(q, "column"))
         for q, c in found

@@ -119,6 +119,21 @@ def unread(columns: Sequence[Column], quantity: Quantity) -> Column | None:
     return max(lost, key=lambda one: one[0])[1] if lost else None
 
 
+def unused_rate(columns: Sequence[Column], roles: dict[Quantity, Choice]) -> list[str]:
+    """What may be the rate and is not read, as an angle is enough: a line of words, or none.
+
+    Neither name nor unit of it says what it is.
+    """
+    angle, rate = roles["angle"].column, roles["rate"]
+    if angle is None or rate.column is not None or rate.said:
+        return []
+    taken = [c for one in roles.values() if (c := one.column) is not None]
+    moving = [c for c in columns if c.values is not None and all(c is not one for one in taken) and _may_be_any(c)]
+    moving = [c for c in moving if all(_score(c, quantity) <= 0.0 for quantity in QUANTITIES)]
+    said = f"no rate is read beside the angle {angle.name!r} ({_unused(moving)}): if one of these is the rate, name it"
+    return [said] if moving else []
+
+
 def _has_word(column: Column, words: frozenset[str]) -> bool:
     return any(w in words or any(len(k) >= MIN_LETTERS_INSIDE_WORD and k in w for k in words) for w in column.words)
 
