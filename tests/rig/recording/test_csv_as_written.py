@@ -86,7 +86,7 @@ def test_it_is_read_in_si_units(case: str, tmp_path: Path) -> None:
     agrees(as_read(tmp_path, WRITTEN[case]))
 
 
-@pytest.mark.parametrize("encoding", ["cp1252", "utf-8", "utf-16"])
+@pytest.mark.parametrize("encoding", ["cp1252", "utf-8", "utf-16", "utf-16-le", "utf-16-be"])
 def test_a_degree_sign_is_one_in_every_encoding(encoding: str, tmp_path: Path) -> None:
     agrees(as_read(tmp_path, "time (ms),torque (mN·m),rate (°/s)\n" + DEGREES, encoding=encoding))
 
@@ -200,6 +200,21 @@ def test_a_date_that_may_be_two_is_refused_with_the_cure(tmp_path: Path) -> None
     assert "write the date as 2024-12-31 or 31.12.2024" in refusal(tmp_path, "r.csv")
     with pytest.raises(ValueError, match="yesterday"):
         Stamps().seconds("yesterday")
+
+
+@pytest.mark.parametrize(
+    ("days", "form"),
+    [(("05/06/2024", "05/07/2024"), "%I:%M:%S.%f %p"), (("05/06/2024", "06/06/2024"), "%H:%M:%S.%f")],
+)
+def test_a_clock_that_goes_on_over_midnight_says_what_is_the_day(
+    days: tuple[str, str], form: str, tmp_path: Path
+) -> None:
+    start = datetime(2024, 1, 1, 23, 59, 59, 950_000)
+    times = [start + timedelta(seconds=float(t)) for t in T]
+    lines = [f"{days[time.day - 1]} {time.strftime(form)}" for time in times]
+    body = "".join(f"{s},{line}\n" for s, line in zip(lines, rows(TORQUE, RATE).splitlines(), strict=True))
+    run = as_read(tmp_path, "time_s,torque_nm,rate_rad_s\n" + body)
+    np.testing.assert_allclose(run.time_s - run.time_s[0], T, atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,13 @@ def test_a_last_line_that_is_cut_is_left_out_and_told(case: str, tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("file", "encoding", "by"), [("run.csv", "utf-16", "\t"), ("run.csv.gz", "utf-8", ";"), ("run.csv", "cp1252", ";")]
+    ("file", "encoding", "by"),
+    [
+        ("run.csv", "utf-16", "\t"),
+        ("run.csv", "utf-16-be", "\t"),
+        ("run.csv.gz", "utf-8", ";"),
+        ("run.csv", "cp1252", ";"),
+    ],
 )
 def test_it_is_seen_in_every_encoding(file: str, encoding: str, by: str, tmp_path: Path) -> None:
     run, said = run_of(tmp_path, "\n".join(lines("{:.9f}", by))[:-4], by, file, encoding)

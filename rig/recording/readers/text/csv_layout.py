@@ -29,6 +29,7 @@ MAX_TEXT_LINES = MAX_SAMPLES + 1_000_000
 MAX_UNPACKED_CHARACTERS = 2 * 1024**3  # a packed file of a few megabytes may unpack to terabytes
 MAX_LINES_BEFORE_DATA = 400  # lines, comments and empty ones not counted, in which the data have to begin
 COMMENT = ("#", "%", "//")
+MIN_ASCII = 0.9  # of the characters of a text whose encoding nothing says
 DATA_LINES = 50  # of which the decimal sign is read
 _SEPARATOR_LINE = re.compile(r'^"?sep=.?"?$', re.IGNORECASE)  # as spreadsheets write it
 
@@ -144,6 +145,9 @@ def _encoding(path: Path) -> str:
         head = file.read(4096)
     if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16"
+    for encoding in ("utf-16-le", "utf-16-be") if b"\0" in head else ():
+        if _is_text(head, encoding):
+            return encoding  # without the mark at the beginning that says so
     if b"\0" in head:
         raise RecordingError(f"{path}: is not a text file, despite its suffix: export the recording as CSV")
     try:
@@ -151,6 +155,16 @@ def _encoding(path: Path) -> str:
     except UnicodeDecodeError:
         return "cp1252"  # a degree sign as Windows programs write it
     return "utf-8-sig"
+
+
+def _is_text(head: bytes, encoding: str) -> bool:
+    """Whether bytes with zeros among them are text in an encoding: nearly all of it ASCII, and nothing that steers."""
+    try:
+        text = codecs.getincrementaldecoder(encoding)().decode(head)
+    except UnicodeDecodeError:
+        return False
+    is_plain = all(c.isprintable() or c in "\t\r\n" for c in text)
+    return is_plain and sum(c.isascii() for c in text) >= MIN_ASCII * len(text)
 
 
 def _first_lines(path: Path, encoding: str) -> tuple[list[str], list[tuple[int, str]]]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import re
 from datetime import date
 
+MIN_STEPS_BEFORE = 3  # steps from stamp to stamp before one can say what is the day
+LONGEST_EVEN_STEP = 2.0  # times the longest step before, which a clock that goes on may need
 _DAY_S = 86_400.0
 _HOUR_S = 3_600.0
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
@@ -38,7 +41,8 @@ class Stamps:
 
     Since midnight and not since 1970: a float has 4e-12 s of room left there. A clock without a date that falls by
     more than half of its round (a day; an hour where it shows minutes) has gone round. Between 05/06/2024 and
-    06/06/2024 it matters what is the day: the one of the two that is above twelve says it for the whole column.
+    06/06/2024 it matters what is the day: the one of the two that is above twelve says it for the whole column, or
+    the steps before, where the clock goes on in such a step only if one of the two is the day.
     """
 
     def __init__(self) -> None:
@@ -47,6 +51,10 @@ class Stamps:
         self._zone_s: float | None = None
         self._before = 0.0
         self._rounds_s = 0.0
+        self._order = ""  # of day and month, once it is known
+        self._last_s = math.nan  # the stamp before, with its date
+        self._longest_s = 0.0  # of the steps before
+        self._steps = 0
 
     def seconds(self, text: str) -> float:
         """Seconds of one stamp. Raises ValueError where the text is none, AmbiguousDateError for such a date."""
@@ -68,12 +76,32 @@ class Stamps:
         if self._first_day is None:
             self._first_day, self._zone_s = day, zone_s
             _check_day(day)
-        if day != self._day[0]:
-            self._day = (day, _DAY_S * _days_between(self._first_day, day))
         now, round_s = _of_clock(clock)
         if round_s != _DAY_S or now >= _DAY_S or (zone_s is None) != (self._zone_s is None):
             raise ValueError(text)
-        return now + self._day[1] - ((zone_s or 0.0) - (self._zone_s or 0.0))
+        now -= (zone_s or 0.0) - (self._zone_s or 0.0)
+        if day != self._day[0]:
+            self._day = (day, self._of_day(day, now))
+        now += self._day[1]
+        if not math.isnan(self._last_s):
+            self._longest_s, self._steps = max(self._longest_s, now - self._last_s), self._steps + 1
+        self._last_s = now
+        return now
+
+    def _of_day(self, day: str, now: float) -> float:
+        """Seconds between the first day and another one. Raises ValueError, AmbiguousDateError where both could be."""
+        assert self._first_day is not None
+        days = _days_between(self._first_day, day)
+        if self._order in days:
+            days = {self._order: days[self._order]}
+        elif len(days) > 1 and self._steps >= MIN_STEPS_BEFORE:
+            most = LONGEST_EVEN_STEP * self._longest_s
+            goes_on = {o: n for o, n in days.items() if 0.0 < now + _DAY_S * n - self._last_s <= most}
+            days = goes_on if len(goes_on) == 1 else days
+        if len(days) != 1:
+            raise AmbiguousDateError(day)
+        self._order, count = next(iter(days.items()))
+        return _DAY_S * count
 
 
 def _parted(text: str) -> tuple[str, str]:
@@ -153,17 +181,17 @@ def _orders(text: str) -> dict[str, date]:
     return out
 
 
-def _days_between(first: str, later: str) -> int:
-    """Whole days. Raises ValueError, AmbiguousDateError where both orders of day and month could be meant."""
+def _days_between(first: str, later: str) -> dict[str, int]:
+    """Whole days by the order of day and month, two where both could be meant. Raises ValueError for no day."""
     if first == later:
-        return 0
+        return {"": 0}
     if not _SLASHES.match(first):
-        return (_date(later) - _date(first)).days
+        return {"": (_date(later) - _date(first)).days}
     begun, now = _orders(first), _orders(later)
-    both = [(now[order] - begun[order]).days for order in begun if order in now]
-    if len(both) != 1:
-        raise AmbiguousDateError(later) if both else ValueError(later)
-    return both[0]
+    both = {order: (now[order] - begun[order]).days for order in begun if order in now}
+    if not both:
+        raise ValueError(later)
+    return both
 
 
 def is_stamp(text: str) -> bool:
