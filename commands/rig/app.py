@@ -12,7 +12,7 @@ from commands.campaign.context import CommandContext, Options, run_command
 from commands.terminal.exit_codes import run_to_exit_code
 from commands.terminal.options import (
     AngleColumn,
-    ColumnScale,
+    AngleScale,
     ConfigFile,
     DryRun,
     Emulate,
@@ -20,10 +20,13 @@ from commands.terminal.options import (
     Overrides,
     Quiet,
     RateColumn,
+    RateScale,
     Resume,
     Seed,
     TimeColumn,
+    TimeScale,
     TorqueColumn,
+    TorqueScale,
     Version,
     Yes,
     new_app,
@@ -224,10 +227,10 @@ def init(
     torque: TorqueColumn = None,
     rate: RateColumn = None,
     angle: AngleColumn = None,
-    time_scale: ColumnScale = None,
-    torque_scale: ColumnScale = None,
-    rate_scale: ColumnScale = None,
-    angle_scale: ColumnScale = None,
+    time_scale: TimeScale = None,
+    torque_scale: TorqueScale = None,
+    rate_scale: RateScale = None,
+    angle_scale: AngleScale = None,
     sample_rate: Annotated[
         str | None, typer.Option(metavar="HZ", help="Rows a second of a file without a time.", show_default=False)
     ] = None,

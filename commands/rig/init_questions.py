@@ -165,7 +165,8 @@ class Questions:
             return found
         guess = "" if found.value is None else number_value(found.value)
         if self._ask is not None:
-            question = f"Unit of {plain(column.name)!r}, or factor to SI units? (guess: {plain(found.why)}) [{guess}] "
+            said = f"(guess: {plain(found.why)}) [{guess}]" if guess else f"({plain(found.why)})"
+            question = f"Unit of {plain(column.name)!r}, or factor to SI units? {said} "
             return self._answer(question, guess, lambda text: factor_from(quantity, text, axis))
         option = f"--{quantity}-scale FACTOR (or a unit)"
         option += f", or {SAMPLE_RATE} HZ" if quantity == "time" and found.value is None else ""

@@ -39,8 +39,12 @@ TimeColumn = Annotated[str | None, typer.Option(metavar="COL", help="Column of t
 TorqueColumn = Annotated[str | None, typer.Option(metavar="COL", help="Column of the torque; none: a free decay.")]
 RateColumn = Annotated[str | None, typer.Option(metavar="COL", help="Column of the rate; none: not measured.")]
 AngleColumn = Annotated[str | None, typer.Option(metavar="COL", help="Column of the angle; none: not measured.")]
-_SCALE = "Its unit (mN m, deg/s), or the factor to SI units."
-ColumnScale = Annotated[str | None, typer.Option(metavar="FACTOR", help=_SCALE)]
+
+_SCALE = "Its unit ({}), or the factor to SI units."
+TimeScale = Annotated[str | None, typer.Option(metavar="FACTOR", help=_SCALE.format("ms, us"))]
+TorqueScale = Annotated[str | None, typer.Option(metavar="FACTOR", help=_SCALE.format("mN m, lbf ft"))]
+RateScale = Annotated[str | None, typer.Option(metavar="FACTOR", help=_SCALE.format("deg/s, rpm"))]
+AngleScale = Annotated[str | None, typer.Option(metavar="FACTOR", help=_SCALE.format("deg, rev"))]
 
 
 def new_app(help_text: str) -> typer.Typer:

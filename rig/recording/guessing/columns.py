@@ -131,8 +131,9 @@ def _read(table: Table, names: tuple[str, ...]) -> dict[str, Array | str]:
 
 def _column(table: Table, name: str, values: Array | str, length: int) -> Column:
     text = stated_unit(table, name)
-    words = tuple(w.lower() for w in _WORD.findall(name_and_unit(name)[0]))
-    suffix, count = (None, 0) if text else _suffix(words)
+    plain = name_and_unit(name)[0]
+    words = tuple(w.lower() for w in _WORD.findall(plain))
+    suffix, count = (None, 0) if text else _suffix(words, plain)
     why_not = values if isinstance(values, str) else _unusable(values, length)
     kept, instead = (None, "") if why_not or isinstance(values, str) else _readings(values)
     single = float(values[0]) if not isinstance(values, str) and len(values) == 1 else None
@@ -158,12 +159,13 @@ def _unusable(values: Array, length: int) -> str:
     return ""
 
 
-def _suffix(words: tuple[str, ...]) -> tuple[Unit | None, int]:
-    """The unit at the end of a name that has other words before it, and how many words it is."""
+def _suffix(words: tuple[str, ...], name: str) -> tuple[Unit | None, int]:
+    """The unit at the end of a name that has other words before it, as it is written, and how many words it is."""
     for count in range(min(LONGEST_SUFFIX, len(words) - 1), 0, -1):
         tail = words[-count:]
         for text in (" ".join(tail), "/".join(tail), f"{' '.join(tail[:-1])}/{tail[-1]}"):
             unit = unit_of(text)
             if unit is not None and (count > 1 or len(tail[0]) > 1 or unit.dimension == "time"):
-                return unit, count
+                written = unit_of(name[list(_WORD.finditer(name))[-count].start() :])
+                return (unit if written is None or written.factor != unit.factor else written), count
     return None, 0

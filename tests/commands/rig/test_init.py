@@ -267,18 +267,6 @@ def test_on_a_terminal_a_torque_that_was_not_recognised_is_asked_without_a_guess
     agrees(read_recording(load_config(tmp_path / "rig.yaml")).runs[0])
 
 
-def test_a_column_that_moves_beside_an_angle_and_may_be_the_rate_is_told(tmp_path: Path) -> None:
-    header = "time_s,torque_nm,angle_rad,vitesse [xy],torque_cmd,on,temperature [degC]\n"
-    columns = [TIME, TORQUE, ANGLE, RATE, TORQUE, TIME > 0.3, 20 + TIME]
-    (tmp_path / "r.csv").write_text(header + rows(*columns), encoding="utf-8")
-    done = command(app, "init", tmp_path / "r.csv", "--out", tmp_path / "rig.yaml")
-    assert done.exit_code == 0, done.stderr
-    said = "no rate is read beside the angle 'angle_rad' (not used, but they move: 'vitesse [xy]'): if one of these is"
-    assert said in done.stdout
-    done = command(app, "init", tmp_path / "r.csv", "--out", tmp_path / "two.yaml", "--rate", "none")
-    assert done.exit_code == 0 and "no rate is read" not in done.stdout
-
-
 def test_the_time_cannot_be_none(tmp_path: Path) -> None:
     (tmp_path / "r.csv").write_text(GOOD, encoding="utf-8")
     done = command(app, "init", tmp_path / "r.csv", "--out", tmp_path / "rig.yaml", "--time", "none")

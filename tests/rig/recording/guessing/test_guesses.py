@@ -102,6 +102,22 @@ def test_a_unit_in_the_name_is_taken_and_one_that_is_not_stated_is_asked() -> No
     assert factors["rate"].value == pytest.approx(DEG) and not factors["rate"].sure
 
 
+@pytest.mark.parametrize(
+    ("name", "shown", "factor"),
+    [
+        ("torque_mNm", "mNm", 1e-3),
+        ("Torque_Nm", "Nm", 1.0),
+        ("torque_n_m", "n m", 1.0),
+        ("rate_rad_s", "rad/s", 1.0),
+        ("timeMs", "ms", 1e-3),
+    ],
+)
+def test_a_unit_in_a_name_is_shown_as_it_is_written(name: str, shown: str, factor: float) -> None:
+    column = next(c for c in columns_of(table(**{name: T, "b": T})) if c.name == name)
+    assert column.suffix is not None
+    assert (column.suffix.text, column.suffix.factor) == (shown, factor)
+
+
 def test_what_nobody_can_guess_has_no_guess() -> None:
     _, factors = guessed(sample=np.arange(500.0), current=TORQUE, rate_rad_s=RATE)
     assert factors["time"].value is None and not factors["time"].sure
