@@ -1,4 +1,4 @@
-"""How a CSV file is written: encoding, preamble, delimiter, decimal sign, header, row of units, first data line."""
+"""How a CSV file is written: encoding, delimiter, decimal sign, names and units of its columns, first data line."""
 
 from __future__ import annotations
 
