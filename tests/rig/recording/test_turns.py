@@ -44,7 +44,7 @@ def test_a_wrapped_angle_in_degrees_beside_a_rate_agrees_with_it(tmp_path: Path)
     assert run.angle_rad is not None and run.wraps > 0
     assert np.max(np.abs(run.angle_rad - TRUE + np.radians(3.0))) < 1e-3
     (said,) = describe_turns([run], lambda _: None)
-    assert "begins anew" in said and f"run.csv ({run.wraps} times)" in said
+    assert "starts again at zero" in said and f"run.csv ({run.wraps} times)" in said
 
 
 def test_runs_of_one_sensor_count_from_the_same_zero(tmp_path: Path) -> None:
