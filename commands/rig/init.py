@@ -20,6 +20,7 @@ from commands.rig.init_questions import (
     rate_from,
     show,
 )
+from commands.rig.init_target import exists_already
 from commands.rig.init_yaml import Entry, number_value, recorded_yaml, text_value
 from commands.terminal.exit_codes import OK
 from rig.errors import RecordingError, UsageError
@@ -88,7 +89,7 @@ def init(sources: Sequence[Path], options: InitOptions, ask: Ask | None) -> int:
     if options.axis not in (None, "rotary", "linear"):
         raise UsageError(f"--axis {options.axis!r:.40} is not allowed: give rotary or linear")
     if out.exists() or out.is_symlink():
-        raise UsageError(f"{out} exists and is never overwritten: give another name with --out")
+        raise exists_already(out, sources)
     if not sources:
         return _bench(options)
     from rig.recording.readers import read_file
@@ -108,8 +109,8 @@ def init(sources: Sequence[Path], options: InitOptions, ask: Ask | None) -> int:
     else:
         table = next(content for content in contents if not isinstance(content, Run))
         text = _of_table(table, files, options, ask)
-    _write(out, text, checked=True)
-    show(["", f"{out}: written. Next: rig check {out}"])
+    _write(out, text, sources)
+    show(["", f"{out}: written. Next: rig check {out}, then identify-run {out}"])
     return OK
 
 
@@ -146,7 +147,7 @@ def _bench(options: InitOptions) -> int:
         raise UsageError(f"{options.first()} was given without a recording: name the file, `rig init FILE`")
     text, seen = bench_text(options.out.name)
     show(seen)
-    _write(options.out, text, checked=False)
+    _write(options.out, text, ())
     show(["", f"{options.out}: written. Fill in what it marks, then: identify-run {options.out} --emulate"])
     return OK
 
@@ -260,18 +261,18 @@ def _relative(source: Path, out: Path) -> str:
         return source.resolve().as_posix()
 
 
-def _write(out: Path, text: str, checked: bool) -> None:
-    """Write the file, once it has proved to be one that reads the recording."""
+def _write(out: Path, text: str, sources: Sequence[Path]) -> None:
+    """Write the file, once it has proved to be one that reads its recordings; a bench has none."""
     partial = out.with_name(f"{out.name}.part")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         partial.write_text(text, encoding="utf-8", newline="\n")
-        if checked:
+        if sources:
             show(_read_with(partial))
         with out.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
     except FileExistsError:
-        raise UsageError(f"{out} exists and is never overwritten: give another name with --out") from None
+        raise exists_already(out, sources) from None
     except OSError as error:
         raise UsageError(f"{out} cannot be written ({error.strerror}): give another place with --out") from None
     finally:

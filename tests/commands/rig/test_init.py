@@ -14,6 +14,7 @@ from scipy.io import savemat
 from commands.identify_run.app import app as identify_run
 from commands.rig.app import app
 from commands.rig.init import InitOptions, init
+from commands.rig.init_target import free_name
 from rig.config.load import load_config
 from rig.errors import UsageError
 from rig.recording.hdf5 import write_recording_h5
@@ -158,7 +159,34 @@ def test_what_is_written_passes_the_check_and_nothing_is_written_over(
     assert checked.exit_code == 0 and "400 samples of rate and angle" in checked.stdout
     again = command(app, "init", "data/run 1.csv")
     assert again.exit_code == 2
-    assert "rig.yaml exists and is never overwritten: give another name with --out" in again.stderr
+    assert "rig.yaml exists and is never overwritten: repeat the command with --out run_1.yaml, then" in again.stderr
+
+
+def test_where_the_file_exists_a_free_name_and_what_follows_are_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("rig.yaml", "my_recording.yaml"):
+        (tmp_path / name).write_text("kept", encoding="utf-8")
+    (tmp_path / "my_recording.csv").write_text(GOOD, encoding="utf-8")
+    refused = command(app, "init", "my_recording.csv")
+    assert refused.exit_code == 2
+    free = "my_recording_2.yaml"
+    assert f"repeat the command with --out {free}, then identify-run {free}" in refused.stderr
+    done = command(app, "init", "my_recording.csv", "--out", free)
+    assert done.exit_code == 0 and f"{free}: written. Next: rig check {free}, then identify-run {free}" in done.stdout
+    assert (tmp_path / "rig.yaml").read_text(encoding="utf-8") == "kept"
+
+
+@pytest.mark.parametrize(
+    ("source", "free"),
+    [
+        ("data/run 1;x.csv", "run_1_x"), ("run.csv.gz", "run"), ("bag", "bag"), ("--out.csv", "out"), ("*.csv", "recording")
+    ],
+)  # fmt: skip
+def test_the_name_proposed_needs_no_quotes(source: str, free: str, tmp_path: Path) -> None:
+    assert free_name(tmp_path / "rig.yaml", [Path(source)]) == tmp_path / f"{free}.yaml"
+    assert free_name(tmp_path / "rig.yaml", []) == tmp_path / "bench.yaml"
 
 
 @pytest.mark.slow
