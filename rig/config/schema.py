@@ -13,6 +13,7 @@ from rig.config.excitation import MAX_SETS
 from rig.config.json_schema import DRAFT, Json, model_schema
 from rig.config.recorded import MAX_RUNS
 from rig.config.root import BACKENDS, Config
+from rig.config.simulated import NEVER_NEGATIVE
 
 _IN_A_NAME = r'[^\x00-\x1f\x7f/\\<>:"|?*]'
 _AT_ITS_ENDS = r'[^\x00-\x1f\x7f/\\<>:"|?* .]'
@@ -43,7 +44,7 @@ def config_schema() -> Json:
         "title": "rig.yaml",
         **schema,
         "required": ["backend"],
-        "allOf": [*(_needs_its_section(backend) for backend in BACKENDS), known_effects_only()],
+        "allOf": [*(_needs_its_section(backend) for backend in BACKENDS), known_effects_only(), _truth_is_stable()],
     }
 
 
@@ -69,6 +70,12 @@ def _without_null(found: Json) -> Json:
 def _needs_its_section(backend: str) -> Json:
     asked = {"properties": {"backend": {"const": backend}}, "required": ["backend"]}
     return {"if": asked, "then": {"required": [backend]}}
+
+
+def _truth_is_stable() -> Json:
+    """A declared model may push away from rest, the simulated platform, which is played, may not."""
+    platform = {"properties": {key: {"minimum": 0} for key in NEVER_NEGATIVE}}
+    return {"properties": {"simulated": {"properties": {"platform": platform}}}}
 
 
 def _narrow(definitions: Json) -> None:

@@ -11,6 +11,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from rig.config.base import NonNegative, Positive, Section
 from rig.config.model import ModelConfig
 
+NEVER_NEGATIVE = ("damping_nm_s_rad", "stiffness_nm_rad")  # of a simulated platform, which would be unstable
 FASTEST_HZ = 5000.0  # of a simulated platform: each turn of it takes some two hundred fine steps
 
 
@@ -115,7 +116,7 @@ class SimulatedConfig(Section):
 
     @model_validator(mode="after")
     def _is_stable(self) -> Self:
-        for key in ("damping_nm_s_rad", "stiffness_nm_rad"):
+        for key in NEVER_NEGATIVE:
             if getattr(self.platform, key) < 0:
                 raise ValueError(f"platform.{key} is negative: such a platform is unstable; give 0 or more")
         inertia = self.platform.inertia_kg_m2

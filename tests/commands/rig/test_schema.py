@@ -57,6 +57,10 @@ TAKEN = {
     "sections that are empty": f"{SIMULATED}model:\nlimits:\nexcitation:\nidentify:\n",
     "a backend's section that is empty": "backend: bench\nbench:\n",
     "a model from a file": f"{SIMULATED}model: model.yaml\nidentify: {{candidates: [of_that_file]}}\n",
+    "a declared model that pushes away from rest": (
+        f"{SIMULATED}model: {{damping_nm_s_rad: -0.1, stiffness_nm_rad: -1}}\n"
+    ),
+    "a truth without damping": "backend: simulated\nsimulated: {platform: {damping_nm_s_rad: 0}}\n",
     "an excitation from a file": f"{SIMULATED}excitation: follow_up.yaml\n",
     "a twin": "backend: simulated\nsimulated: {platform: model.yaml}\n",
     "parameters with and without their unit": (
@@ -104,6 +108,8 @@ def test_what_the_loader_takes_is_taken(tmp_path: Path, case: str) -> None:
 REFUSED = {
     "an effect that is misspelt": f"{SIMULATED}model: {{effects: {{coulomb_frictoin: {{level_nm: 1}}}}}}",
     "the same in the truth": "backend: simulated\nsimulated: {platform: {effects: {backlsh: {half_gap_rad: 1}}}}",
+    "a truth with a negative damping": "backend: simulated\nsimulated: {platform: {damping_nm_s_rad: -0.1}}",
+    "a truth with a negative stiffness": "backend: simulated\nsimulated: {platform: {stiffness_nm_rad: -1}}",
     "a candidate that is misspelt": f"{SIMULATED}identify: {{candidates: [backlsh]}}",
     "a parameter twice": f"{SIMULATED}model: {{effects: {{torque_delay: {{delay_s: 0, delay_ms: 1}}}}}}",
     "a section that is null inside another": "backend: simulated\nsimulated: {gyro: null}",
