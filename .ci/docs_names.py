@@ -10,3 +10,8 @@ SEARCH = '<div class="md-search" data-md-component="search" role="dialog"'
 def on_post_page(output: str, **_: Any) -> str:
     """The page with the names."""
     return output.replace(SEARCH, f'{SEARCH} aria-label="Search"')
+
+
+def on_post_template(output_content: str, **_: Any) -> str:
+    """The same for pages that are made of no text, as 404.html."""
+    return on_post_page(output_content)

@@ -76,6 +76,13 @@ class Browser:
         while not self.of_kind("Page.loadEventFired"):
             self.events.append(self._next())
 
+    def leave(self) -> None:
+        """Close the page and forget what it reported, for another to be opened."""
+        if self._session:
+            self.call("Page.close")
+        self._session = ""
+        self.events.clear()
+
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
         """One command and its answer; events that come in between are kept."""
         self._number += 1
