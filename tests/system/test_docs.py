@@ -251,6 +251,6 @@ def test_all_programs_and_the_benchmarks_are_documented_and_benchmarks_as_module
 def test_every_public_name_is_explained_in_the_docs_and_where_it_is_defined(package: str) -> None:
     table = text_of(ROOT / "docs" / "from-python.md").partition("## All public names")[2]
     module = importlib.import_module(package)
-    listed = set(re.findall(r"`(?:identify|rig)\.(\w+)", table))
+    listed = set(re.findall(rf"`{package}\.(\w+)", table))
     assert set(module.__all__) <= listed
     assert [name for name in module.__all__ if not (getattr(module, name).__doc__ or "").strip()] == []
