@@ -181,7 +181,8 @@ def test_where_the_file_exists_a_free_name_and_what_follows_are_given(
 @pytest.mark.parametrize(
     ("source", "free"),
     [
-        ("data/run 1;x.csv", "run_1_x"), ("run.csv.gz", "run"), ("bag", "bag"), ("--out.csv", "out"), ("*.csv", "recording")
+        ("data/run 1;x.csv", "run_1_x"), ("run.csv.gz", "run"), ("bag", "bag"), ("--out.csv", "out"),
+        ("*.csv", "recording"),
     ],
 )  # fmt: skip
 def test_the_name_proposed_needs_no_quotes(source: str, free: str, tmp_path: Path) -> None:

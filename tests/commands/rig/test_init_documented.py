@@ -25,7 +25,10 @@ def documented() -> list[tuple[str, str, str]]:
     found = []
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
-        lines = [*re.findall(r"^(.*\brig init .*)\n(.*)", text, re.M), *((m, "") for m in re.findall(r"`([^`\n]+)`", text))]
+        lines = [
+            *re.findall(r"^(.*\brig init .*)\n(.*)", text, re.M),
+            *((m, "") for m in re.findall(r"`([^`\n]+)`", text)),
+        ]
         for line, following in lines:
             if match := re.fullmatch(r"(?:\S*/)?(rig init \S+[.]\w.*)", line.strip()):
                 found.append((page.name, match[1], "" if following.startswith("```") else following))
