@@ -36,6 +36,11 @@ def unit(text: str) -> str:
     return text.replace("*", "·").replace("^2", "²").replace("^3", "³")
 
 
+def on_axis(text: str, axis: str) -> str:
+    """The unit of a rotary axis as it is on ``axis``: ``N*m/rad`` as N/m on a linear one."""
+    return text.replace("kg*m^2", "kg").replace("N*m", "N").replace("rad", "m") if axis == "linear" else text
+
+
 def unbroken(text: str) -> str:
     """With its numbers and their units on one line: no line ends between them."""
     return _BEFORE_UNIT.sub("\u00a0", text)

@@ -156,8 +156,8 @@ def export(
         str,
         typer.Option(
             metavar="FORMAT",
-            help="csv, mat or npz: the runs; blf, asc or mf4: the CAN log; compensation (or C, python, table): "
-            "the compensating torque as C, Python and a table.",
+            help="csv, mat or npz: the runs; blf, asc or mf4: the CAN log; model-json, model-mat or modelica: the "
+            "identified model; compensation (or C, python, table): the compensating torque as C, Python and a table.",
         ),
     ],
     out: Annotated[
@@ -165,7 +165,10 @@ def export(
     ] = None,
     effects: EffectFiles = None,
 ) -> None:
-    """Write a recording for other programs at full precision, with a rig.yaml that reads it back."""
+    """Write a recording (with a rig.yaml that reads it back), the identified model or a compensation.
+
+    All numbers are at full precision.
+    """
 
     def command() -> int:
         from commands.rig.export import export_recording

@@ -1,24 +1,29 @@
-"""`rig export`: a recording for other programs with a rig.yaml that reads it; the CAN log; the compensation as code."""
+"""`rig export` for other programs: a recording with a rig.yaml that reads it, the CAN log, a model, a compensation."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from commands.rig.recover import CAPTURE_FILE
 from commands.terminal.display import plain
 from commands.terminal.exit_codes import OK, say
+from identify.report import model_formats
 from rig.errors import RecordingError, UsageError
 from rig.recording import writers
 from rig.recording.run import Run
 
+if TYPE_CHECKING:
+    from identify.results import Identification
+    from rig.recording.run import Recording
+
 CAN_FORMATS = ("blf", "asc", "mf4")
 COMPENSATION = "compensation"
-FORMATS = (*writers.names(), *CAN_FORMATS, COMPENSATION)
+FORMATS = (*writers.names(), *CAN_FORMATS, *model_formats.names(), COMPENSATION)
 IN_ITS_LANGUAGE = ("c", "python", "table")  # what people type for it: all of its files are written
 CONFIG_FILE = "rig.yaml"
 
@@ -26,7 +31,8 @@ CONFIG_FILE = "rig.yaml"
 def export_recording(source: Path, wanted: str, out: Path | None, effect_files: Sequence[Path] = ()) -> int:
     """Write ``source`` (a results folder, a recording.h5, a journal) as ``wanted``; returns the exit code.
 
-    ``effect_files`` are those of effects of your own: run for a compensation, copied beside a rig.yaml that names them.
+    ``effect_files`` are those of effects of your own: run for a model or a compensation, copied beside a rig.yaml that
+    names them.
 
     Raises UsageError where it cannot be done; nothing is overwritten.
     """
@@ -41,6 +47,8 @@ def export_recording(source: Path, wanted: str, out: Path | None, effect_files: 
         raise UsageError(f"{folder} exists and is never overwritten: choose another --out")
     if wanted == COMPENSATION:
         lines = list(_compensation(home, folder, effect_files))
+    elif wanted in model_formats.names():
+        lines = list(_model(home, wanted, folder, effect_files))
     elif wanted in CAN_FORMATS:
         lines = list(_can_logs(home, wanted, folder))
     else:
@@ -82,6 +90,45 @@ def _compensation(home: Path, folder: Path, effect_files: Sequence[Path]) -> Ite
     """The torque that cancels the effects of the final model, as a function of angle, rate and torque."""
     from identify.proof.controller import controller_of
     from identify.proof.controller_code import files
+
+    found, recording = _identified(home, effect_files)
+    model = found.final.platform
+    if model is None or found.torque_free:
+        raise UsageError(f"{home}: its identification gave no model from which a torque can be computed")
+    most_nm = _most_torque_nm(recording.info)
+    made = files(controller_of(model, recording, most_nm))
+    _made(folder)
+    for name, text in made.items():
+        (folder / name).write_text(text, encoding="ascii")
+        yield f"{folder / name}: written"
+
+
+def _model(home: Path, wanted: str, folder: Path, effect_files: Sequence[Path]) -> Iterator[str]:
+    """The final model, every effect with its equation."""
+    from identify.report.model_formats.description import described
+
+    found, recording = _identified(home, effect_files)
+    model = described(found, recording, _inertia_of(home) if found.torque_free else None)
+    content = model_formats.content_of(wanted, model)
+    _made(folder)
+    target = folder / model_formats.file_of(wanted)
+    target.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
+    yield f"{target}: written"
+    if not model.accepted:
+        yield f"NOT ACCEPTED: read {home / 'report.html'} before you use this model"
+
+
+def _inertia_of(home: Path) -> float | None:
+    """The inertia that set the scale of a recording without torque; None where model.yaml says that none did."""
+    try:
+        model = yaml.safe_load((home / "model.yaml").read_text(encoding="utf-8"))
+        return None if model.get("inertia_unknown") else float(model["inertia_kg_m2"])
+    except (OSError, yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError):
+        return None  # ratios to the inertia are right in any case
+
+
+def _identified(home: Path, effect_files: Sequence[Path]) -> tuple[Identification, Recording]:
+    """What was identified in a results folder, all of its effects known, and from what."""
     from identify.report.own_effects import make_effects_known
     from identify.report.report_data import FILE, read_report_data
     from rig.recording.hdf5 import read_recording_h5
@@ -91,20 +138,10 @@ def _compensation(home: Path, folder: Path, effect_files: Sequence[Path]) -> Ite
         if not (home / name).is_file():
             raise RecordingError(f"{home}: has no {name}: give the results folder of an identify-run")
     data = read_report_data(home / FILE)
-    found = data.identification
-    model = found.final.platform
-    if model is None or found.torque_free:
-        raise UsageError(f"{home}: its identification gave no model from which a torque can be computed")
     for file in effect_files:
         say(f"runs code: {file.resolve()} (named by --effects)")
     make_effects_known(data, effect_files)
-    recording = read_recording_h5(home / RECORDING_FILE)
-    most_nm = _most_torque_nm(recording.info)
-    made = files(controller_of(model, recording, most_nm))
-    _made(folder)
-    for name, text in made.items():
-        (folder / name).write_text(text, encoding="ascii")
-        yield f"{folder / name}: written"
+    return data.identification, read_recording_h5(home / RECORDING_FILE)
 
 
 def _most_torque_nm(info: Mapping[str, Any]) -> float:

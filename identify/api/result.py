@@ -12,8 +12,11 @@ import numpy as np
 from identify.api import figures
 from identify.api.columns import column, finite, increasing, same_length
 from identify.api.notebook import notebook_html
-from identify.api.state_space import state_space_of
+from identify.api.state_space import state_space_of, transfer_function_of
 from identify.report.files import final_platform, model_text, result_json, write_results
+from identify.report.model_formats import content_of, name_for
+from identify.report.model_formats.description import described
+from identify.report.replaced_file import replace_file
 from identify.report.summary import summary
 from identify.residual import Disturbance
 from identify.results import Identification, ParameterEstimate
@@ -221,6 +224,28 @@ class Result:
             Where no model with a positive inertia came out.
         """
         return state_space_of(self.platform, self._inertia_unknown)
+
+    def transfer_function(self) -> Any:
+        """The same as a ``control.TransferFunction``. Raises MissingPackage and InputError alike."""
+        return transfer_function_of(self.platform, self._inertia_unknown)
+
+    def save_model(self, path: str | Path) -> Path:
+        """Write the final model for another program: ``.json``, ``.mat`` or ``.mo`` (Modelica), by the suffix.
+
+        Raises
+        ------
+        InputError
+            Where the file exists or cannot be written, the suffix is another one, or no model came out.
+        """
+        file = Path(path)
+        inertia = None if self._inertia_unknown else self.platform.inertia_kg_m2
+        content = content_of(name_for(file.suffix), described(self.identification, self.recording, inertia))
+        if file.exists():
+            raise InputError(f"{file} exists and is never overwritten: choose another name")
+        try:
+            return replace_file(file, content)
+        except OSError as error:
+            raise InputError(f"{file} cannot be written ({error.strerror}): choose another place") from None
 
     def plot_motion(self, run: int | str = 0) -> Figure:
         """One run, by its number or name: motion measured and simulated, and the error before and after.

@@ -15,6 +15,7 @@ from identify.conclude.error_figures import Measured
 from identify.estimate.final_fit import FinalFit
 from identify.model.parameters import Name, platform_of
 from identify.results import UNITS, ModelResult, NotReported, ParameterEstimate
+from identify.wording import on_axis
 from rig import effects
 from rig.platform import Platform
 
@@ -69,9 +70,7 @@ def _unit(case: Case, name: Name) -> str:
     effect = effects.get(name[0])
     parameter = next(p for p in effect.parameters if p.name == name[1])
     unit = parameter.unit + ("/(kg*m^2)" if case.torque_free and effect.per_inertia(parameter) else "")
-    if case.recording.axis == "linear":
-        unit = unit.replace("kg*m^2", "kg").replace("N*m", "N").replace("rad", "m")
-    return unit
+    return on_axis(unit, case.recording.axis)
 
 
 def to_build_on(case: Case, fitted: FinalFit, model: ModelResult) -> ModelResult:

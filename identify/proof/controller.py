@@ -73,24 +73,38 @@ def controller_of(model: Platform, recording: Recording, most_torque_nm: float) 
     """
     terms, left_out = [], {}
     for name in model.effects:
-        effect = effects.get(name)
-        if effect.formula:
-            by_key = {
-                p.key: float(v) for p, v in zip(effect.parameters, effect.values(model.effects[name]), strict=True)
-            }
-            known = by_key | {"stiffness_nm_rad": float(model.stiffness_nm_rad)}
-            used = {k: v for k, v in known.items() if re.search(rf"\b{k}\b", effect.formula)}
-            terms.append(Term(name, effect.formula, used, effect.place is Place.FRICTION))
+        if (term := term_of(model, name)) is not None:
+            terms.append(term)
         else:
             left_out[name] = _why_not(name)
     if not terms:
         reasons = "; ".join(f"{name}: {why}" for name, why in left_out.items()) or "it has none"
         raise UsageError(f"no effect of this model is a function of angle, rate and torque: {reasons}")
     angle, rate = _reach(recording.runs)
+    soft = soft_rate_of(recording)
+    return Controller(tuple(terms), left_out, angle, rate, most_torque_nm, soft, version_of(model))
+
+
+def term_of(model: Platform, name: str) -> Term | None:
+    """One effect of a model as an expression with its numbers; None where it is no function of angle and rate."""
+    effect = effects.get(name)
+    if not effect.formula:
+        return None
+    by_key = {p.key: float(v) for p, v in zip(effect.parameters, effect.values(model.effects[name]), strict=True)}
+    known = by_key | {"stiffness_nm_rad": float(model.stiffness_nm_rad)}
+    used = {k: v for k, v in known.items() if re.search(rf"\b{k}\b", effect.formula)}
+    return Term(name, effect.formula, used, effect.place is Place.FRICTION)
+
+
+def version_of(model: Platform) -> str:
+    """The first digits of the SHA-256 of a model's values as a model.yaml has them."""
+    return hashlib.sha256(model_yaml(model).encode()).hexdigest()[:VERSION_DIGITS]
+
+
+def soft_rate_of(recording: Recording) -> float:
+    """The rate in rad/s below which a recording does not tell the direction of the motion."""
     noise = min((_rate_noise(run) for run in recording.runs), default=0.0)
-    version = hashlib.sha256(model_yaml(model).encode()).hexdigest()[:VERSION_DIGITS]
-    soft = max(SOFT * rate, NOISES * noise)
-    return Controller(tuple(terms), left_out, angle, rate, most_torque_nm, soft, version)
+    return max(SOFT * _reach(recording.runs)[1], NOISES * noise)
 
 
 def _why_not(name: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -48,6 +49,53 @@ def test_a_compensation_with_an_effect_of_your_own_asks_for_its_file(own: Path) 
     done = command(app, "export", own, "--to", "compensation", "--effects", own.parent / "my_effect.py")
     assert done.exit_code == 0, done.output
     assert "runs code" in done.stderr and (own / "export_compensation" / "compensation.c").is_file()
+
+
+def test_a_model_with_an_effect_of_your_own_asks_for_its_file_and_has_its_equation(own: Path) -> None:
+    done = command(app, "export", own, "--to", "model-json")
+    assert done.exit_code == 2 and f"--effects {own.parent / 'my_effect.py'}" in done.stderr
+    assert not (own / "export_model-json").exists()
+    done = command(app, "export", own, "--to", "model-json", "--effects", own.parent / "my_effect.py")
+    assert done.exit_code == 0 and "runs code" in done.stderr, done.output
+    read = json.loads((own / "export_model-json" / "platform.json").read_text(encoding="utf-8"))
+    brake = next(one for one in read["effects"] if one["name"] == "eddy_brake")
+    assert brake["equation"] == effects.get("eddy_brake").equation
+
+
+@pytest.mark.parametrize(
+    ("word", "file"), [("model-json", "platform.json"), ("model-mat", "platform.mat"), ("modelica", "Platform.mo")]
+)
+def test_the_model_is_written_in_every_format_and_never_over_another(tmp_path: Path, word: str, file: str) -> None:
+    found, recording = sample(2.0)
+    (tmp_path / "run").mkdir()
+    found = replace(found, after=replace(found.final, platform=TRUTH), accepted=False, reasons=("too little moved",))
+    write_results(tmp_path / "run", found, recording, Platform(0.0185, 0.06, 650.0), "default")
+    done = command(app, "export", tmp_path / "run", "--to", word)
+    assert done.exit_code == 0, done.output
+    target = tmp_path / "run" / f"export_{word}" / file
+    assert f"{target}: written" in done.stdout and target.stat().st_size > 500
+    assert f"NOT ACCEPTED: read {tmp_path / 'run' / 'report.html'}" in done.stdout
+    again = command(app, "export", tmp_path / "run", "--to", word)
+    assert again.exit_code == 2 and "never overwritten" in again.stderr
+    absent = command(app, "export", tmp_path, "--to", word)
+    assert absent.exit_code == 2 and "give the results folder of an identify-run" in absent.stderr
+
+
+@pytest.mark.parametrize(("declared", "stiffness"), [(True, 660.0), (False, 33000.0)])
+def test_a_decay_is_exported_with_the_inertia_that_was_declared(
+    tmp_path: Path, declared: bool, stiffness: float
+) -> None:
+    found, recording = sample(2.0)
+    ratios = replace(found.final, platform=Platform(1.0, 2.2, 33000.0))
+    (tmp_path / "run").mkdir()
+    write_results(
+        tmp_path / "run", replace(found, after=ratios, torque_free=True), recording, Platform(0.02), "decay",
+        inertia_declared=declared,
+    )  # fmt: skip
+    assert command(app, "export", tmp_path / "run", "--to", "model-json", "--out", tmp_path / "out").exit_code == 0
+    read = json.loads((tmp_path / "out" / "platform.json").read_text(encoding="utf-8"))
+    assert read["per_inertia"] is not declared
+    assert read["parameters"]["stiffness"]["value"] == pytest.approx(stiffness)
 
 
 def test_an_exported_configuration_names_the_file_of_an_effect_of_your_own(own: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -117,7 +118,33 @@ def test_the_state_space_has_the_poles_of_the_final_platform() -> None:
     np.testing.assert_allclose(system.dcgain().ravel(), [1.0 / TRUTH.stiffness_nm_rad, 0.0], atol=1e-12)
 
 
-@pytest.mark.parametrize(("package", "call"), [("control", "state_space"), ("matplotlib", "plot_motion")])
+def test_the_transfer_function_is_the_state_space() -> None:
+    one = result()
+    found, expected = one.transfer_function(), one.state_space()
+    at = [0.0, 3j, 180j, 1000j]
+    np.testing.assert_allclose([found(s) for s in at], [expected(s) for s in at], rtol=1e-9, atol=1e-15)
+    assert (found.input_labels, found.output_labels) == (["torque_nm"], ["angle_rad", "rate_rad_s"])
+    gain = 1.0 / TRUTH.inertia_kg_m2
+    assert [list(row[0]) for row in found.num] == [[gain], [gain, 0.0]]
+
+
+def test_the_model_is_written_for_other_programs_by_the_suffix(tmp_path: Path) -> None:
+    one = result()
+    for name in ("model.json", "model.mat", "Platform.mo"):
+        assert one.save_model(tmp_path / name).stat().st_size > 500
+    assert json.loads((tmp_path / "model.json").read_text(encoding="utf-8"))["parameters"]["inertia"]["value"] == 0.0203
+    with pytest.raises(InputError, match="exists and is never overwritten"):
+        one.save_model(tmp_path / "model.json")
+    with pytest.raises(InputError, match="cannot be written"):
+        one.save_model(tmp_path / "absent" / "model.json")
+    with pytest.raises(InputError, match=r"ends in \.json, \.mat, \.mo, not in '\.fmu'"):
+        one.save_model(tmp_path / "model.fmu")
+
+
+@pytest.mark.parametrize(
+    ("package", "call"),
+    [("control", "state_space"), ("control", "transfer_function"), ("matplotlib", "plot_motion")],
+)
 def test_a_package_that_is_absent_is_said_with_the_line_that_installs_it(
     package: str, call: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
