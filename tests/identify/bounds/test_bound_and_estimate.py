@@ -16,7 +16,7 @@ from rig.recording.run import Recording
 from tests.identify.sample import SIGMA, TRUTH, estimate, sample
 from tests.identify.simulated import campaign, white
 
-FOUND, RECORDING = sample(4.0)
+FOUND, RECORDING = sample(2.0)
 
 
 def reached(found: Identification, relative: float) -> Identification:

@@ -8,7 +8,7 @@ from identify.conclude.headline import accepted_or_not, headline
 from identify.residual import Dependence, Disturbance
 from tests.identify.sample import sample, unhappy
 
-FOUND, _ = sample(1.0)
+FOUND, _ = sample(2.0)
 
 
 def test_what_was_found_what_it_changes_and_why_it_is_accepted_are_three_sentences() -> None:

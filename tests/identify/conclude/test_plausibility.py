@@ -13,7 +13,7 @@ from identify.results import Identification
 from rig.config.model import ModelConfig
 from tests.identify.sample import REFERENCE, UNITS, estimate, sample
 
-GOOD = sample(1.0)[0]
+GOOD = sample(2.0)[0]
 DEGREES = 180.0 / np.pi
 
 

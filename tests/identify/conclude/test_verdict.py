@@ -13,7 +13,7 @@ from identify.residual import Dependence, Disturbance
 from identify.results import TAKEN_BACK, Candidate, NotReported
 from tests.identify.sample import estimate, sample
 
-FOUND, _ = sample(1.0)
+FOUND, _ = sample(2.0)
 
 
 def test_each_effect_is_named_with_its_numbers_and_units_in_the_order_of_finding() -> None:

@@ -64,6 +64,7 @@ def test_a_tenth_of_a_sample_does_not_move_the_damping() -> None:
     assert all(abs(off) < 3.0 for off in sigmas_off(found).values())
 
 
+@pytest.mark.slow
 def test_without_a_shift_the_numbers_stay_and_the_intervals_hold() -> None:
     assert all(abs(off) < 3.0 for off in sigmas_off(fitted(runs(0.0))).values())
     moved, spread = _beside_shift(
