@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from commands.terminal.display import plain
+from drivers import amplifiers, gyroscopes
 
 GUESS, FILL_IN = "GUESS: ", "FILL IN: "
 
@@ -130,11 +131,11 @@ def bench_yaml(gyro: str | None, can: Mapping[str, str] | None, seen: Sequence[s
             "",
             "bench:",
             "  gyroscope:",
-            "    device: stim300             # FILL IN: stim300 | vectornav | kvh1750 (docs/devices)",
+            f"    device: stim300             # FILL IN: {' | '.join(gyroscopes.DRIVERS)} (docs/devices)",
             _port("    port", gyro, "the gyroscope's serial port; null runs with --emulate only"),
             "    axis: z                     # FILL IN: the sensitive axis along the shaft",
             "  amplifier:",
-            "    device: cia402              # FILL IN: cia402 | odrive | moteus | vesc",
+            f"    device: cia402              # FILL IN: {' | '.join(amplifiers.DRIVERS)}",
             "    node: 1                     # FILL IN: the drive's address on the bus",
             "    gear_ratio: 1.0             # FILL IN: shaft torque over motor torque",
             "    can:",

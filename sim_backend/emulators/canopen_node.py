@@ -1,4 +1,4 @@
-"""The communication part of an emulated CANopen device (CiA 301): NMT, SDO, PDO, SYNC, heartbeat, EMCY."""
+"""The communication part of an emulated CANopen device (CiA 301): NMT, PDO, SYNC, heartbeat, EMCY; SDO passed on."""
 
 from __future__ import annotations
 
