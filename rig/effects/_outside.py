@@ -140,15 +140,23 @@ def _fault(effect: Any) -> str:
     searched = [p.name for p in effect.parameters if not p.linear and p.start is None]
     filters = effect.place in (Place.DRIVE, Place.SENSOR)
     wanted = FILTER_SIGNATURE if filters else KERNEL_SIGNATURE
-    if not _NAME.fullmatch(effect.name):
-        return "a name is lower-case letters, digits and _, as in my_effect"
-    if not given or len(set(given)) < len(given):
-        return "needs at least one parameter, and every parameter a name of its own"
-    if searched:
-        return f"parameter {searched[0]} is not linear, so the fit needs an initial value: give it `start=`"
-    if getattr(effect.kernel, "_sig", None) != wanted:
-        return f"its kernel has to be decorated with @{'filter_kernel' if filters else 'kernel'} of rig.effects"
-    return ""
+    faults = (
+        (not _NAME.fullmatch(effect.name), "a name is lower-case letters, digits and _, as in my_effect"),
+        (
+            not given or len(set(given)) < len(given),
+            "needs at least one parameter, and every parameter a name of its own",
+        ),
+        (
+            searched,
+            f"parameter {''.join(searched[:1])} is not linear, so the fit needs an initial value: give it `start=`",
+        ),
+        (
+            getattr(effect.kernel, "_sig", None) != wanted,
+            f"its kernel has to be decorated with @{'filter_kernel' if filters else 'kernel'} of rig.effects",
+        ),
+        ("**" in effect.formula, "its formula is written to C and Modelica, too, which have no **: write x * x"),
+    )
+    return next((said for is_wrong, said in faults if is_wrong), "")
 
 
 def _package(point: EntryPoint) -> str:

@@ -168,4 +168,6 @@ def _why_no_term(effect: Effect) -> str:
         return "it depends on a measured channel"
     if effect.states:
         return "it has memory: its torque depends on past motion"
+    if effects.file_of(effect.name) is not None:
+        return "its file gives no formula: Effect(formula=...), as docs/effects/your-own.md has it"
     return effect.stays or "it depends on the time"

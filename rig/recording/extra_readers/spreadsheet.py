@@ -19,7 +19,7 @@ from rig.units import bare, unit_of
 MOST_UNPACKED_BYTES = 1 << 30
 MIN_DATA_ROWS = 3  # rows in a row that look like data
 MAX_ROWS_BEFORE_DATA = 400  # rows in which the data have to begin
-_VALUES = (int, float, datetime, time, timedelta)
+_VALUES = (int, float, date, time, timedelta)  # a datetime is a date, too
 
 Row = Sequence[Any]
 
@@ -90,6 +90,8 @@ def _table(path: Path, sheet: str, rows: Sequence[Row], at: int) -> Table:
 
 def _numbers(path: Path, sheet: str, name: str, cells: Sequence[Any], first_row: int) -> Any:
     """The cells of a column as numbers, empty ones NaN, times as seconds since midnight of the first day."""
+    # A moment exactly at midnight comes as a date.
+    cells = [datetime.combine(c, time()) if isinstance(c, date) and not isinstance(c, datetime) else c for c in cells]
     day = next((cell for cell in cells if isinstance(cell, datetime)), None)
     midnight = None if day is None else datetime(day.year, day.month, day.day)
     out = np.empty(len(cells))

@@ -60,6 +60,11 @@ def test_a_model_with_an_effect_of_your_own_asks_for_its_file_and_has_its_equati
     read = json.loads((own / "export_model-json" / "platform.json").read_text(encoding="utf-8"))
     brake = next(one for one in read["effects"] if one["name"] == "eddy_brake")
     assert brake["equation"] == effects.get("eddy_brake").equation
+    assert brake["formula"] is None
+    done = command(app, "export", own, "--to", "modelica", "--effects", own.parent / "my_effect.py")
+    assert done.exit_code == 0, done.output
+    text = (own / "export_modelica" / "Platform.mo").read_text(encoding="utf-8")
+    assert "eddy brake, because its file gives no formula" in text
 
 
 @pytest.mark.parametrize(

@@ -109,6 +109,7 @@ def test_a_model_file_counts_its_effect_files_from_where_it_stands(tmp_path: Pat
         (("@kernel", "@(lambda f: f)"), "decorated with @kernel"),
         (("place=Place.LOAD", "place=Place.DRIVE"), "decorated with @filter_kernel"),
         (("start=speeds", "start=None"), "`start=`"),
+        (("place=Place.LOAD", "formula='rate_rad_s ** 2', place=Place.LOAD"), r"write x \* x"),
         (("family=", "family"), r"my_effect.py:\d+: SyntaxError"),
         (("from rig.effects import", "raise ValueError('no')  #"), "my_effect.py:1: ValueError: no"),
     ],

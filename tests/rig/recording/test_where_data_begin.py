@@ -38,6 +38,8 @@ READ = {
     "a header behind the sign of a comment": "#time_s,torque_nm,rate_rad_s,state\n" + lines(PLAIN + ",RUN"),
     "whole numbers below such a header": "# torque (N m),rate (rad/s),time (ms),state\n0,2,0,RUN\n"
     + lines("{1!r},{2!r},{3},RUN").partition("\n")[2],
+    "a comment with spaces before its units": "# time (s)   torque (N m)   rate (rad/s)\n"
+    + lines("{0!r}  {1!r}  {2!r}"),
     "times of the robots' bus": "%time (s),field.seq,field.frame_id,torque (N m),rate (rad/s)\n"
     + lines("{0!r},{3},base,{1!r},{2!r}"),
     "a preamble as wide as the data": "Data1\tStart\t5/6/2024 2:03:07.000 PM\nSample rate\t1000 Hz\nChannels\t2\n\n"
@@ -67,6 +69,17 @@ def test_the_header_is_found_and_no_sample_is_lost(case: str, tmp_path: Path) ->
 def test_data_with_words_and_without_a_header_are_refused_with_the_cure(tmp_path: Path) -> None:
     (tmp_path / "r.csv").write_text(lines(PLAIN + ",RUN"))
     assert "line 1 holds numbers where the header has to be: add a first line" in refusal(tmp_path, "r.csv")
+
+
+@pytest.mark.parametrize(
+    ("sign", "row"), [("\t", "{0!r}\t{1!r}\t{2!r}"), (" ", "{0!r} {1!r} {2!r}"), (";", "{0!r};{1!r};{2!r}")]
+)
+def test_the_cure_has_the_sign_that_the_numbers_have_between_them(sign: str, row: str, tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text(lines(row))
+    cure = sign.join(("time_s", "torque_nm", "rate_rad_s"))
+    assert refusal(tmp_path, "r.csv").endswith(f"e.g. {cure}")
+    (tmp_path / "r.csv").write_text(f"{cure}\n" + lines(row))
+    agrees(read(tmp_path, "r.csv").runs[0])
 
 
 @pytest.mark.parametrize(

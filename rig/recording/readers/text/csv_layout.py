@@ -187,15 +187,16 @@ def _without_header(
 ) -> Layout:
     """Data from the first line on: numpy.savetxt writes its header as a comment, some add one with the units."""
     line, first = lines[0]
-    rows = [split(comment, delimiter_of(comment)) for comment in comments[-2:]]
     width = len(split(first, delimiter))
+    rows = [_names(comment, delimiter_of(comment), width) for comment in comments[-2:]]
     has_units = len(rows) == 2 and is_units(rows[1]) and len(rows[0]) == len(rows[1]) == width
     names = rows[0] if has_units else rows[-1] if rows else []
     units = _units_of(names, rows[1]) if has_units else {}
     if len(names) != width:
         raise RecordingError(
             f"{path}: line {line} holds numbers where the header has to be: "
-            "add a first line that names the columns, e.g. time_s,torque_nm,rate_rad_s"
+            "add a first line that names the columns, with the sign between them that the numbers have, e.g. "
+            f"{(delimiter or ' ').join(('time_s', 'torque_nm', 'rate_rad_s'))}"
         )
     comma = decimal_comma([text for _, text in lines[:DATA_LINES]], delimiter)
     return Layout(path, encoding, tuple(names), delimiter, comma, line - 1, units)
