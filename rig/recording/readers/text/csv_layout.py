@@ -17,6 +17,7 @@ from rig.recording.readers.can_log import is_can_log, undecoded
 from rig.recording.readers.text.first_data import first_data, header_above
 from rig.recording.readers.text.headings import known_heading
 from rig.recording.readers.text.line_fields import decimal_comma, delimiter_of, is_units, split, trimmed
+from rig.recording.readers.text.not_a_table import SIDE_HEADER, beside_data, one_value_a_row
 from rig.recording.readers.text.preamble import stated_units
 from rig.recording.readers.text.timestamps import is_stamp
 from rig.recording.readers.text.words import EMPTY, is_number
@@ -84,11 +85,13 @@ def layout_of(path: Path) -> Layout:
         raise undecoded(path)
     if (known := known_heading(lines, split)) is not None:
         comma = decimal_comma([text for _, text in lines[known.at : known.at + DATA_LINES]], known.delimiter)
-        header = lines[known.at - 1][0]
+        header = lines[known.at - 1][0] if known.at else lines[0][0] - 1
         return Layout(
             path, encoding, known.names, known.delimiter, comma, header, known.units, known.counted, pairs=known.pairs
         )
     at, delimiter = first_data(lines, comments[-1] if comments else None)
+    if beside_data([split(text, delimiter) for _, text in lines]):
+        raise RecordingError(f"{path}: {SIDE_HEADER}")
     if at == 0:
         return _without_header(path, encoding, comments, lines, delimiter)
     names_at, units_at = header_above(lines, at, delimiter)
@@ -102,6 +105,10 @@ def layout_of(path: Path) -> Layout:
             "e.g. time (s),torque (N m),rate (deg/s) with the units that these numbers have, and delete what stands "
             "above it"
         )
+    if is_stamp(names[0]):
+        names[0] = "time_s"  # at which the names were sent
+    if why := one_value_a_row(names, [split(text, delimiter) for _, text in lines[at:]]):
+        raise RecordingError(f"{path}: {why}")
     above = stated_units([text for _, text in lines[:names_at]], names, lambda text: split(text, delimiter))
     below = {} if units_at is None else _units_of(names, _names(lines[units_at][1], delimiter, width))
     units = above | _without_stamps(below, names, split(lines[at][1], delimiter) if at < len(lines) else [])

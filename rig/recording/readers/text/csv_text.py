@@ -48,7 +48,8 @@ def read(path: Path) -> Sequence[Table]:
             said.append(f"the rows have no time: by the heading they begin at {begin_s:g} s and are {step_s:g} s apart")
         return said + _told(text)
 
-    if layout.pairs and (table := laid(path, layout.pairs, _columns(text, layout.names), layout.units)) is not None:
+    paired = [name for pair in layout.pairs for name in pair]
+    if paired and (table := laid(path, layout.pairs, _columns(text, paired), layout.units)) is not None:
         return [replace(table, notes=notes)]
     names = tuple(name for name in layout.names if name)
     if layout.counted is not None:

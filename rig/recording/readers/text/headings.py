@@ -1,4 +1,5 @@
-"""Headings that say by a word in each line what the line is: those of TwinCAT, ControlDesk, Yokogawa, Rigol, LabVIEW.
+"""Headings that say by a word in each line what the line is: those of TwinCAT, ControlDesk, Yokogawa, Rigol, LabVIEW,
+Tektronix.
 
 Nobody could find the names of the columns in them by their place above the data alone.
 """
@@ -9,6 +10,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from rig.recording.readers.text.not_a_table import beside_data
 from rig.recording.readers.text.words import EMPTY
 
 SEARCHED = 60  # lines in which a heading has to be known
@@ -62,7 +64,7 @@ def known_heading(lines: Lines, split: Callable[[str, str], list[str]]) -> Headi
     """The heading of a tool that is known; None for all other files. ``lines``: number and text, none empty."""
     for delimiter in ("\t", ";", ","):
         rows = _Rows(delimiter, [split(text, delimiter) or [""] for _, text in lines[:SEARCHED]])
-        for tool in (_twincat, _control_desk, _yokogawa, _rigol, _labview):
+        for tool in (_twincat, _control_desk, _yokogawa, _rigol, _labview, _tektronix):
             heading = tool(rows)
             if heading is not None:
                 return heading
@@ -146,6 +148,24 @@ def _labview(rows: _Rows) -> Heading | None:
     pairs = tuple((f"{name} time (s)", name) for name in names[1::2])
     columns = tuple(name for pair in pairs for name in pair)
     return Heading(rows.delimiter, columns, _stated(names[1::2], units), ends[1] + 2, pairs=pairs)
+
+
+def _tektronix(rows: _Rows) -> Heading | None:
+    """Tektronix' oscilloscopes: labels and their values beside the first rows, then a time and a channel; side by side
+    for more channels."""
+    blocks = beside_data(rows.rows)
+    names = [""] * len(rows.rows[0])
+    units, pairs = dict[str, str](), list[tuple[str, str]]()
+    for label, data in blocks:
+        said = {row[label].lower(): row[label + 1] for row in rows.rows}
+        channel = said.get("source", "")
+        if not channel or len(data) != 2 or channel in names:
+            return None
+        pair = (f"{channel} time", channel)
+        names[data[0]], names[data[1]] = pair
+        units |= _stated(pair, [said.get("horizontal units", ""), said.get("vertical units", "")])
+        pairs.append(pair)
+    return Heading(rows.delimiter, tuple(names), units, 0, pairs=tuple(pairs)) if blocks else None
 
 
 def _stated(names: Sequence[str], units: Sequence[str]) -> dict[str, str]:

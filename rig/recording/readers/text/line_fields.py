@@ -12,6 +12,7 @@ from rig.recording.readers.text.words import EMPTY, NO_READING, has_points_betwe
 from rig.units import unit_of
 
 _TYPE = re.compile(r"[fiu][1248]$|(l?real|double|float|single|u?s?d?l?int)\d*$", re.IGNORECASE)  # of a column's numbers
+_ARROW = re.compile(r"^(\s*[\d:.,]+) -> ")  # behind the time of day: of Arduino's serial monitor
 
 
 def delimiter_of(line: str) -> str | None:
@@ -20,7 +21,9 @@ def delimiter_of(line: str) -> str | None:
 
 
 def split(line: str, delimiter: str | None) -> list[str]:
-    """The fields of a line, without quotes and the spaces around them."""
+    """The fields of a line, without quotes and the spaces around them; an arrow behind a time of day parts two."""
+    if " -> " in line:
+        line = _ARROW.sub(rf"\1{delimiter or ' '}", line)
     if delimiter is None:
         return [part.strip().strip('"') for part in line.split()]
     if '"' not in line:
