@@ -64,8 +64,8 @@ def test_asked_for_without_a_terminal_it_is_written_and_not_played(tmp_path: Pat
     assert done.exit_code == 0, done.output
     assert len(identifier.given) == 1 and names(out) == ["5 Hz", "7 Hz"]
     follow_up = result(out)["follow_up"]
-    assert follow_up["played"] is False and "without a terminal" in follow_up["note"]
-    assert "without a terminal" in " ".join(done.stdout.split())
+    assert follow_up["played"] is False and "asked on a terminal only" in follow_up["note"]
+    assert "asked on a terminal only" in " ".join(done.stdout.split())
     assert (out / "follow_up.yaml").exists()
 
 
