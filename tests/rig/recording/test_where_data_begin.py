@@ -77,7 +77,8 @@ def test_data_with_words_and_without_a_header_are_refused_with_the_cure(tmp_path
 def test_the_cure_has_the_sign_that_the_numbers_have_between_them(sign: str, row: str, tmp_path: Path) -> None:
     (tmp_path / "r.csv").write_text(lines(row))
     cure = sign.join(("time_s", "torque_nm", "rate_rad_s"))
-    assert refusal(tmp_path, "r.csv").endswith(f"e.g. {cure}")
+    told = "time_s torque_nm rate_rad_s with a tab" if sign == "\t" else cure
+    assert refusal(tmp_path, "r.csv").endswith(f"e.g. {told}")
     (tmp_path / "r.csv").write_text(f"{cure}\n" + lines(row))
     agrees(read(tmp_path, "r.csv").runs[0])
 

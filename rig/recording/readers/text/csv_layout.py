@@ -25,6 +25,7 @@ from rig.recording.readers.text.words import number as number_of
 from rig.recording.table import MAX_SAMPLES
 from rig.units import bare, unit_of
 
+EXAMPLE_NAMES = ("time_s", "torque_nm", "rate_rad_s")
 MAX_LINE_CHARACTERS = 65_536
 MAX_TEXT_LINES = MAX_SAMPLES + 1_000_000
 MAX_UNPACKED_CHARACTERS = 2 * 1024**3  # a packed file of a few megabytes may unpack to terabytes
@@ -203,7 +204,11 @@ def _without_header(
         raise RecordingError(
             f"{path}: line {line} holds numbers where the header has to be: "
             "add a first line that names the columns, with the sign between them that the numbers have, e.g. "
-            f"{(delimiter or ' ').join(('time_s', 'torque_nm', 'rate_rad_s'))}"
+            + (
+                "time_s torque_nm rate_rad_s with a tab"
+                if delimiter == "\t"
+                else (delimiter or " ").join(EXAMPLE_NAMES)
+            )
         )
     comma = decimal_comma([text for _, text in lines[:DATA_LINES]], delimiter)
     return Layout(path, encoding, tuple(names), delimiter, comma, line - 1, units)
