@@ -26,6 +26,8 @@ from rig.dynamics.filters import through_filters
 from rig.dynamics.native import call, floats_at, integers_at, jit, offset, pointer
 
 EVENTS_PER_STEP = 12  # more reversals than this in one fine step is chatter: the plant is held stuck
+CUTS_PER_KINK = 2  # a cut lands beside its kink by the error of a cubic: it may take a second one
+AT_A_KINK = 1e-9  # fraction of a step
 MOST_RELAXED = 1.6  # time constants in a Runge-Kutta step after which least is left, 0.27; after 2.79 it runs away
 
 
@@ -207,7 +209,10 @@ def step(motion, n, z, work, saved, h, m0, m1, m2, jck, body):  # type: ignore[n
 
 @jit
 def _first_kink(th, w, end, w_end, h, kinks, count):  # type: ignore[no-untyped-def]
-    """Fraction of a step at which the angle first passes a kink of the torque; one where it passes none."""
+    """Fraction of a step at which the angle first passes a kink of the torque; one where it passes none.
+
+    A kink that the step begins at is behind it.
+    """
     first = 1.0
     for k in range(count):
         a, b = th - kinks[k], end - kinks[k]
@@ -221,7 +226,8 @@ def _first_kink(th, w, end, w_end, h, kinks, count):  # type: ignore[no-untyped-
             if slope == 0.0:
                 break
             x = min(max(x - f / slope, 0.0), 1.0)
-        first = min(first, x)
+        if x > AT_A_KINK:
+            first = min(first, x)
     return first
 
 
@@ -229,23 +235,28 @@ def _first_kink(th, w, end, w_end, h, kinks, count):  # type: ignore[no-untyped-
 def step_over_kinks(motion, n, z, work, saved, h, m0, m1, m2, jck, body, kinks, count, before):  # type: ignore[no-untyped-def]
     """``step``, cut where the angle passes a kink of the torque: a Runge-Kutta step must not span one.
 
-    ``before`` has room for the motion and z. Of several kinks in one step the first is where it is cut.
+    ``before`` has room for the motion and z. A platform that crosses a narrow gap in a step passes both its edges.
     """
-    if count == 0:
-        step(motion, n, z, work, saved, h, m0, m1, m2, jck, body)
-        return
     kept = offset(before, 4)
-    _copy(motion, before, 4)
-    _copy(z, kept, n)
-    step(motion, n, z, work, saved, h, m0, m1, m2, jck, body)
-    x = _first_kink(before[0], before[1], motion[0], motion[1], h, kinks, count)
-    if not 1e-9 < x < 1.0 - 1e-9:
-        return
-    _copy(before, motion, 4)
-    _copy(kept, z, n)
-    at = _quadratic(m0, m1, m2, x)
-    step(motion, n, z, work, saved, x * h, m0, _quadratic(m0, m1, m2, 0.5 * x), at, jck, body)
-    step(motion, n, z, work, saved, (1.0 - x) * h, at, _quadratic(m0, m1, m2, 0.5 + 0.5 * x), m2, jck, body)
+    done = 0.0
+    for _ in range(CUTS_PER_KINK * count):
+        left = 1.0 - done
+        begin = _quadratic(m0, m1, m2, done)
+        _copy(motion, before, 4)
+        _copy(z, kept, n)
+        step(motion, n, z, work, saved, left * h, begin, _quadratic(m0, m1, m2, done + 0.5 * left), m2, jck, body)
+        x = _first_kink(before[0], before[1], motion[0], motion[1], left * h, kinks, count)
+        if x >= 1.0 - AT_A_KINK:
+            return
+        _copy(before, motion, 4)
+        _copy(kept, z, n)
+        part = x * left
+        middle, end = _quadratic(m0, m1, m2, done + 0.5 * part), _quadratic(m0, m1, m2, done + part)
+        step(motion, n, z, work, saved, part * h, begin, middle, end, jck, body)
+        done += part
+    left = 1.0 - done
+    begin, middle = _quadratic(m0, m1, m2, done), _quadratic(m0, m1, m2, done + 0.5 * left)
+    step(motion, n, z, work, saved, left * h, begin, middle, m2, jck, body)
 
 
 @jit

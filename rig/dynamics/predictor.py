@@ -240,7 +240,7 @@ def predict_ahead(
     spans
         First and last sample of every stretch; each begins from its row of ``starts`` (angle, rate).
     measured, keep
-        The readings, (n, m), and which samples were measured, (n,). A gyro's reading stands before an encoder's.
+        The readings, (n, m), with a gyro's before an encoder's, and which samples were measured, (n,).
     reads
         How often in a fine step the sensor's filters are fed, where they are not all low-passes that are followed as
         such.
