@@ -9,7 +9,8 @@ import numpy as np
 
 from identify.estimate.final_fit import FinalFit, by_output_error, by_regression
 from identify.estimate.initial_guess import Start
-from identify.likelihood.by_prediction_error import by_prediction_error
+from identify.likelihood.by_prediction_error import by_prediction_error, disturbance_support
+from identify.likelihood.fit import Fit
 from identify.model.parameter_fit import ParameterFit
 from identify.model.structure import Structure
 from identify.results import ParameterEstimate
@@ -47,16 +48,19 @@ class FinalModels:
         """The declared model."""
         # A decay is judged by its free run, which the regression does not look at.
         if all(t.torque is None for t in self.traces) or search.reduced_chi_square(search.base) < RUNS_FREE:
-            return by_output_error(
+            fitted = by_output_error(
                 self.traces, self.structure, search.base.values, search.horizon,
                 self.split.final, self.split.everything,
             )  # fmt: skip
+            is_final = fitted.sensor_limited and search.best.structure == self.structure
+            return self._beside_disturbance(search.best, fitted) if is_final else fitted
         return self.regressed(search.base)
 
     def after(self, search: Search) -> FinalFit:
         """Output error where the model runs free at the sensor's noise; else prediction error with its disturbance.
 
-        A decay is told by how it swings on, whatever disturbs it.
+        A decay is told by how it swings on, whatever disturbs it. A disturbance that the free run does not show may
+        still move the parameters by many of the standard errors that they would have without.
         """
         structure = search.best.structure
         self.say(f"final fit with {joined([plain(name) for name in structure.effects]) or 'fewer terms'}")
@@ -65,10 +69,26 @@ class FinalModels:
             self.split.final, self.split.everything,
         )  # fmt: skip
         if fitted.sensor_limited:
-            return self._with_dropped_damping(search, self._without_unsupported(search, fitted))
+            fitted = self._with_dropped_damping(search, self._without_unsupported(search, fitted))
+            return self._beside_disturbance(search.best, fitted)
         if all(t.torque is None for t in self.traces):
             return fitted
         return self._predicted(search.best)
+
+    def _beside_disturbance(self, searched: ParameterFit, fitted: FinalFit) -> FinalFit:
+        """Values and errors of the likelihood that has a disturbance, where it tells one from none."""
+        if not isinstance(searched, Fit) or searched.structure != fitted.structure:
+            return fitted
+        if any(t.torque is None for t in self.traces):
+            return fitted
+        support = disturbance_support(self.traces, self.split.final, searched, fitted.values)
+        if not support > STRONG_SUPPORT:
+            return fitted
+        beside = by_prediction_error(
+            self.traces, searched.structure, searched.values, self.split.final, self.split.everything, searched,
+            coarse=False,
+        )  # fmt: skip
+        return replace(beside, fit=fitted.fit, sensor_limited=True)
 
     def _without_unsupported(self, search: Search, fitted: FinalFit) -> FinalFit:
         """The same without effects that whole runs do not support.

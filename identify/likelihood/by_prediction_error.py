@@ -28,13 +28,14 @@ from rig.arrays import Array
 
 MAX_FINAL_FIT_SAMPLES = 60_000  # of the final fit: longer recordings are filtered and decimated, all of them
 FINAL_FIT_ITERATIONS = 25  # steps of that fit
+NUMBERS_OF_A_DISTURBANCE = 4  # white density, variances of the rough and of the smooth torque, their time constant
 SHIFT_STEP = 0.01  # of a sample: for the slope over a shift of the torque
 UNIFORM_VARIANCE = 12.0  # one over the variance of what lies anywhere within a unit
 
 
 def by_prediction_error(
     traces: Sequence[Trace], structure: Structure, start: Mapping[Name, float], use: Sequence[Any],
-    everything: Sequence[Any], like: Fit | None = None,
+    everything: Sequence[Any], like: Fit | None = None, coarse: bool = True,
 ) -> FinalFit:  # fmt: skip
     """A model fitted with its disturbance, with the covariance that this likelihood gives.
 
@@ -44,18 +45,45 @@ def by_prediction_error(
         Samples that fit, and all that are looked at, one boolean array a run.
     like
         A fit to the same recording whose noise to begin from.
+    coarse
+        With the steps of a search: runs that run free at the sensor's noise are told to a millionth, which those miss.
     """
-    problem, fit = fitted_on_all(traces, structure, start, use, like)
+    problem, fit = fitted_on_all(traces, structure, start, use, like, coarse)
     return as_final(problem, fit, traces, everything)
+
+
+def disturbance_support(
+    traces: Sequence[Trace], use: Sequence[Any], searched: Fit, undisturbed: Mapping[Name, float]
+) -> float:  # fmt: skip
+    """By how much a torque disturbance is likelier than none, its numbers paid for (twice a log-likelihood).
+
+    A resonance rings with a torque far too small to be seen in the error of a free run, and that error is alike from
+    period to period: it takes far more samples to average out than white noise of its size does.
+
+    Parameters
+    ----------
+    searched
+        A model as the search has fitted it, with a disturbance.
+    undisturbed
+        Values of the same model fitted by its free run, without.
+    """
+    few, masks = thinned(traces, use, MAX_FINAL_FIT_SAMPLES)
+    problem = PredictionError(few, masks, coarse=False)
+    noise = problem.noise_of(searched)
+    none = replace(noise, white=0.0, slow=0.0, smooth=0.0)
+    without = problem.fit(searched.structure, undisturbed, none, 0, thorough=False)
+    beside = problem.fit(searched.structure, searched.values, noise, 0, thorough=False)
+    paid = NUMBERS_OF_A_DISTURBANCE * float(np.log(max(beside.count, 2)))
+    return without.cost - beside.cost - paid
 
 
 def fitted_on_all(
     traces: Sequence[Trace], structure: Structure, start: Mapping[Name, float], use: Sequence[Any],
-    like: Fit | None = None,
+    like: Fit | None = None, coarse: bool = True,
 ) -> tuple[PredictionError, Fit]:  # fmt: skip
     """The likelihood on all samples that fit, and the model fitted by it."""
     few, masks = thinned(traces, use, MAX_FINAL_FIT_SAMPLES)
-    problem = PredictionError(few, masks)
+    problem = PredictionError(few, masks, coarse)
     return problem, problem.fit(structure, start, problem.noise_of(like) if like else None, FINAL_FIT_ITERATIONS)
 
 

@@ -20,7 +20,8 @@ ORIGINS = ("derivation: ", "reference: ", "calibration run: ", "set by hand")
 # Judged by hand: these cost time, guard the arithmetic, or shape what is shown. None of them gives another name.
 DECIDE_NOTHING: Mapping[str, str] = {
     "bounds/separation.py": "ROUNDING",
-    "likelihood/by_prediction_error.py": "FINAL_FIT_ITERATIONS MAX_FINAL_FIT_SAMPLES SHIFT_STEP UNIFORM_VARIANCE",
+    "likelihood/by_prediction_error.py": "FINAL_FIT_ITERATIONS MAX_FINAL_FIT_SAMPLES NUMBERS_OF_A_DISTURBANCE "
+    "SHIFT_STEP UNIFORM_VARIANCE",
     "likelihood/derivatives.py": "GAIN_STEP MOTION_STEP NOISE_STEP RUNAWAY_SIGMAS",
     "likelihood/damped_step.py": "LEAST_DAMPING LEVENBERG_DAMPING MAX_STEP_TRIALS",
     "likelihood/descent.py": "COARSE_TOLERANCE DIFFERENCE_STEP EARLY_STEPS STALLED_STEPS",
