@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.signal.windows import hann
 from scipy.stats import norm
@@ -17,6 +18,7 @@ from scipy.stats import norm
 from identify.diagnose.disturbance import DEPENDENCE_SIGMAS, MIN_POWER_SHARE
 from identify.likelihood.fit import Fit
 from identify.results import Dependence
+from identify.signals.trace import UPSAMPLING
 from rig.arrays import Array
 
 FLOOR_BINS = 81  # of a spectrum, whose median is its level without lines
@@ -41,16 +43,18 @@ def lines_left(fit: Fit, torque_nm: float) -> Dependence | None:
         Root mean square of the torque, N m.
     """
     spectra = list(_spectra(fit))
-    count = sum(len(own) for own, _ in spectra)
+    count = sum(len(own) for own, _, _ in spectra)
     if not count:
         return None
     false_alarm = float(norm.sf(DEPENDENCE_SIGMAS))
     above = float(np.log(count / false_alarm))
     at_lines, together = np.zeros(2), np.zeros(2)
-    for own, disturbance in spectra:
-        level = median_filter(own, FLOOR_BINS, mode="reflect") / np.log(2.0)
+    for own, disturbance, let_through in spectra:
+        is_line = _stands_out(own, above)
+        if let_through is not None:
+            is_line &= ~_stands_out(let_through, above)
         both = np.stack([disturbance, own])
-        at_lines += np.sum(both[:, own > above * level], axis=1)
+        at_lines += np.sum(both[:, is_line], axis=1)
         together += np.sum(both, axis=1)
     share, of_readings = at_lines / np.maximum(together, 1e-300)
     if max(share, of_readings) < MIN_POWER_SHARE:
@@ -60,8 +64,17 @@ def lines_left(fit: Fit, torque_nm: float) -> Dependence | None:
     return Dependence("frequency", rms, rms / torque_nm, false_alarm)
 
 
-def _spectra(fit: Fit) -> Iterator[tuple[Array, Array]]:
-    """Power of the scaled innovations and of the disturbance in every bin of every stretch that counts."""
+def _stands_out(power: Array, above: float) -> NDArray[np.bool_]:
+    """Bins that are so many times what their neighbours have in the mean, as white noise would make these."""
+    return np.asarray(power > above * median_filter(power, FLOOR_BINS, mode="reflect") / np.log(2.0))
+
+
+def _spectra(fit: Fit) -> Iterator[tuple[Array, Array, Array | None]]:
+    """Power of innovations, of the disturbance and of a filtered torque in every bin of every stretch that counts.
+
+    The filter of a noisy torque lets that noise through around the frequencies of the torque itself: it is left as a
+    disturbance there, and no effect. Nothing stands for a torque that was not filtered.
+    """
     p = fit.prediction
     for innovations, variance, torque, shots in zip(
         p.innovations, p.variance, p.disturbance_nm, fit.shots, strict=True
@@ -69,7 +82,9 @@ def _spectra(fit: Fit) -> Iterator[tuple[Array, Array]]:
         scaled = innovations[:, 0] / np.sqrt(variance[:, 0])
         for first, last in _stretches(shots.weight):
             if last - first >= MIN_LINE_SAMPLES:
-                yield _power(scaled[first:last]), _power(torque[first:last])
+                trace, here = shots.trace, slice(first, last)
+                let_through = _power(trace.fine[3][::UPSAMPLING][here]) if trace.torque_is_filtered else None
+                yield _power(scaled[here]), _power(torque[here]), let_through
 
 
 def _power(values: Array) -> Array:

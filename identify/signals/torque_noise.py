@@ -50,7 +50,8 @@ def quieter(traces: Sequence[Trace]) -> tuple[list[Trace], float] | None:
     if not 0.0 < cutoff_hz < MAX_FLOOR_START_SHARE * nyquist:
         return None
     pairs = zip(traces, floors, strict=True)
-    return [replace(t, torque=_without_noise(t.torque, q), motion=None, _series={}) for t, q in pairs], cutoff_hz
+    quiet = ((t, _without_noise(t.torque, q)) for t, q in pairs)
+    return [replace(t, torque=q, torque_is_filtered=True, motion=None, _series={}) for t, q in quiet], cutoff_hz
 
 
 def _without_noise(torque: TorqueSignal | None, floor: float) -> TorqueSignal:

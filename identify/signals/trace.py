@@ -69,6 +69,7 @@ class Trace:
     beside: Array | None = None  # (n,): the other channel, where an encoder and a gyro read independently of each other
     beside_noise: float = 0.0
     drift_rad: Array | None = None  # (n,): of the integrated rate, where a spring tells it
+    torque_is_filtered: bool = False  # of its noise: what is left of that lies around the torque's own frequencies
     _series: dict[Any, Any] = field(default_factory=dict)
     _tables: dict[Channel, tuple[Array, float]] = field(default_factory=dict)  # shared by the pieces of a run
 
@@ -157,8 +158,7 @@ class Trace:
         """Angle, rate, time and torque, upsampled and smoothed, and the noise left in the rate."""
         if self.motion is not None:
             return self.motion
-        wn = 2.0 * self.cutoff_hz * self.step_s
-        y = self.measured
+        wn, y = 2.0 * self.cutoff_hz * self.step_s, self.measured
         if wn < 0.8:
             from scipy import signal  # noqa: PLC0415  slow to load: a forecast knows its motion
 
