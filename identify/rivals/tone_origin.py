@@ -17,6 +17,7 @@ import numpy as np
 from identify.estimate.evaluation import settled
 from identify.estimate.final_fit import FinalFit
 from identify.model.parameters import equations_of
+from identify.runs.observability import are_heard
 from identify.signals.trace import UPSAMPLING, Trace, loads_differ
 from identify.simulate.all_runs import shots_for
 from identify.simulate.shots import RUNAWAY, Shots, losses_of, predict
@@ -27,7 +28,7 @@ from rig.recording.run import Array
 TONE = "periodic_disturbance"
 DECISIVE = 25.0  # times the noise's variance by which one beginning has to fit better than the other
 AS_GOOD = 0.25  # of what the other beginning loses: losses that the platform's other effects may cost a steady one
-FAINT_LINE = 0.1  # of the amplitude in the loudest run: below, a run is not said to have the line
+MIN_EXCITED_AMPLITUDE = 0.1  # of a run's torque: from there it excites the platform at the line's frequency itself
 MOVED = 0.05  # relative: by which the mass has to change how far the line's torque moves the platform
 MAX_AMPLITUDE_SCATTER = 0.3  # of the scatter of the other: amplitudes that are the same in every run
 SOON_S = 0.1  # a run whose first sample that counts comes later does not show how it began
@@ -90,7 +91,7 @@ def standing_line(fitted: FinalFit, traces: Sequence[Trace]) -> SpectralLine | N
         return None
     fitted_in = [t for t in traces if (TONE, "sine", str(t.number)) in fitted.values]
     sizes = np.abs(np.array([_amplitudes(fitted, t) for t in fitted_in]).reshape(-1, 2))  # torque, rate
-    heard = sizes[:, 1] > FAINT_LINE * np.max(sizes[:, 1], initial=0.0)
+    heard = are_heard(sizes[:, 1])
     if not np.any(heard):
         return None
     torque_nm, rate_rad_s = (float(np.median(s)) for s in sizes[heard].T)
@@ -126,7 +127,7 @@ def _is_excited_at(trace: Trace, hertz: float) -> bool:
     torque = trace.fine[3][::UPSAMPLING]
     window = np.hanning(len(torque)) / np.sum(np.hanning(len(torque)))  # keeps a short run's neighbours out
     there = 2.0 * abs(np.sum(window * torque * np.exp(-2j * np.pi * hertz * trace.step_s * np.arange(len(torque)))))
-    return bool(there > FAINT_LINE * np.sqrt(2.0) * np.std(torque))
+    return bool(there > MIN_EXCITED_AMPLITUDE * np.sqrt(2.0) * np.std(torque))
 
 
 def describe(line: SpectralLine, axis: str, channel: str = "rate") -> tuple[str, str]:

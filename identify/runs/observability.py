@@ -6,13 +6,15 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identify.model.parameters import Name
 from identify.signals.trace import Trace, loads_differ
 from rig import effects
+from rig.arrays import Array
 from rig.effects.base import Place
 
-HEARD = 0.1  # of the amplitude in the loudest run: a run with less does not have what repeats in time
+FAINT_LINE = 0.1  # of the amplitude in the loudest run: a run with less does not have what repeats in time
 MAX_STRENGTH_SCATTER = 0.3  # of its mean amplitude, from run to run: more than any pump or fan changes by
 
 
@@ -55,11 +57,16 @@ def is_as_strong_in_all(name: str, values: Mapping[Name, float], std_error: Call
             of_run.setdefault(key[2], []).append(key)
     size = np.array([math.hypot(*(values[k] for k in keys)) for keys in of_run.values()])
     error = np.array([math.hypot(*(std_error(k) for k in keys)) for keys in of_run.values()])
-    heard = size > HEARD * np.max(size, initial=0.0)
+    heard = are_heard(size)
     if np.count_nonzero(heard) < 2:
         return True
     excess = np.var(size[heard], ddof=1) - np.mean(error[heard] ** 2)
     return bool(excess <= (MAX_STRENGTH_SCATTER * np.mean(size[heard])) ** 2)
+
+
+def are_heard(amplitudes: Array) -> NDArray[np.bool_]:
+    """Which runs have what repeats in time, by its amplitude in each of them, (n,)."""
+    return np.asarray(amplitudes > FAINT_LINE * np.max(amplitudes, initial=0.0))
 
 
 def one_more(have: Sequence[str], values: Mapping[Name, float], traces: Sequence[Trace]) -> list[str]:
