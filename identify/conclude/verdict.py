@@ -173,13 +173,13 @@ def _exchangeable(found: Identification) -> list[str]:
         return []
     if inertia is None or damping is None or min(inertia.value, damping.value) <= 0.0:
         return []
-    late_s = found.final.effect_parameters[lags[0]]["time"].value
-    if late_s < inertia.value / damping.value:
+    late = found.final.effect_parameters[lags[0]].get("time")  # none where the runs do not determine it
+    if late is None or late.value < inertia.value / damping.value:
         return []
     return [
         f"Without a spring, inertia over damping and the time of {plain(lags[0])} may be exchanged: "
         f"{title('inertia', found.axis)} of "
-        f"{number(damping.value * late_s, 3)} {unit(inertia.unit)} beside a lag of "
+        f"{number(damping.value * late.value, 3)} {unit(inertia.unit)} beside a lag of "
         f"{number(1e3 * inertia.value / damping.value, 3)} ms fits as well. Check the declared inertia: nothing "
         "else tells which."
     ]
