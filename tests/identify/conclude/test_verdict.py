@@ -9,8 +9,10 @@ import pytest
 from identify.conclude.conclusion import inseparable
 from identify.conclude.verdict import sentences_of
 from identify.model.structure import Structure
+from identify.report.summary import summary
 from identify.residual import Dependence, Disturbance
 from identify.results import TAKEN_BACK, Candidate, NotReported
+from rig import effects
 from tests.identify.sample import estimate, sample
 
 FOUND, _ = sample(2.0)
@@ -142,3 +144,16 @@ def test_a_parameter_that_is_known_badly_is_said_with_what_would_tell_it() -> No
     said = [s for s in sentences_of(replace(FOUND, after=wide)) if "Poorly determined" in s]
     assert said[0].startswith("Poorly determined: rotary inertia J ± 20 %. To determine inertia: add a set at another")
     assert not any("Poorly determined" in s for s in sentences_of(replace(FOUND, after=wide, accepted=False)))
+
+
+@pytest.mark.parametrize("missing", [(), ("inertia",), ("damping",), ("stiffness",), ("damping", "stiffness")])
+def test_whatever_the_runs_leave_open_has_its_sentences(missing: tuple[str, ...]) -> None:
+    """What is not determined is left out of the tables, and nothing may look it up there."""
+    assert FOUND.after is not None
+    terms = {k: v for k, v in FOUND.after.parameters.items() if k not in missing}
+    for name in effects.names():
+        after = replace(FOUND.after, parameters=terms, effect_parameters={name: {}}, platform=None)
+        verdict = replace(FOUND.verdict, effects=(name,), confusable_with={name: ()}, contribution={}, rival_models={})
+        said = sentences_of(found := replace(FOUND, after=after, verdict=verdict))
+        assert said and all(said)
+        assert summary(found)
