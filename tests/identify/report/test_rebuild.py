@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -69,19 +70,24 @@ def linear(recording: Recording) -> Recording:
     return replace(recording, axis="linear", noise=1e-3, info=info)
 
 
-@pytest.mark.parametrize(
-    ("found", "recording"),
-    [
-        (sample(2.0)[0], sample(2.0)[1]),
-        (unhappy(), linear(sample(2.0)[1])),
-        (replace(sample(2.0)[0], after=None, residual_after=None, aborted=True, accepted=False), sample(2.0)[1]),
-        (with_everything(), sample(2.0)[1]),
-        (replace(sample(2.0)[0], joint=None, per_set=()), replace(sample(2.0)[1], info={"backend": "<b>"})),
-    ],
-    ids=["accepted", "linear and unhappy", "aborted", "with everything", "without sets"],
-)  # fmt: skip
-def test_the_report_is_the_same_to_the_byte(tmp_path: Path, found: Identification, recording: Recording) -> None:
-    original = written(tmp_path, found, recording)
+def aborted(found: Identification) -> Identification:
+    return replace(found, after=None, residual_after=None, aborted=True, accepted=False)
+
+
+KINDS: dict[str, Callable[[Identification, Recording], tuple[Identification, Recording]]] = {
+    "accepted": lambda found, recording: (found, recording),
+    "linear and unhappy": lambda _, recording: (unhappy(), linear(recording)),
+    "aborted": lambda found, recording: (aborted(found), recording),
+    "with everything": lambda _, recording: (with_everything(), recording),
+    "without sets": lambda found, recording: (
+        replace(found, joint=None, per_set=()), replace(recording, info={"backend": "<b>"})
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_report_is_the_same_to_the_byte(tmp_path: Path, kind: str) -> None:
+    original = written(tmp_path, *KINDS[kind](*sample(2.0)))
     (tmp_path / "report.html").unlink()
     assert rebuild_report(tmp_path) == tmp_path / "report.html"
     assert (tmp_path / "report.html").read_bytes() == original
@@ -214,10 +220,19 @@ def void(_: object) -> None:
     """Of a change whose answer nobody needs."""
 
 
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A results folder, to be copied."""
+    folder = tmp_path_factory.mktemp("results")
+    written(folder)
+    return folder
+
+
 @pytest.mark.parametrize("case", FAULTS)
-def test_what_is_missing_or_damaged_is_said_and_the_old_report_stays(tmp_path: Path, case: str) -> None:
+def test_what_is_missing_or_damaged_is_said_and_the_old_report_stays(tmp_path: Path, results: Path, case: str) -> None:
     file, change, message = FAULTS[case]
-    original = written(tmp_path)
+    shutil.copytree(results, tmp_path, dirs_exist_ok=True)
+    original = (tmp_path / "report.html").read_bytes()
     change(tmp_path / file)
     with pytest.raises(UsageError) as refused:
         rebuild_report(tmp_path)
@@ -227,8 +242,8 @@ def test_what_is_missing_or_damaged_is_said_and_the_old_report_stays(tmp_path: P
     assert (tmp_path / "report.html").read_bytes() == original
 
 
-def test_a_report_that_cannot_be_written_is_said(tmp_path: Path) -> None:
-    written(tmp_path)
+def test_a_report_that_cannot_be_written_is_said(tmp_path: Path, results: Path) -> None:
+    shutil.copytree(results, tmp_path, dirs_exist_ok=True)
     (tmp_path / "report.html").unlink()
     (tmp_path / "report.html").mkdir()
     with pytest.raises(UsageError, match=r"cannot write .*report\.html"):
@@ -246,10 +261,9 @@ def test_a_campaign_too_long_to_be_read_back_keeps_no_report_data(
         rebuild_report(tmp_path)
 
 
-def test_the_traces_are_kept_thinned_nowhere(tmp_path: Path) -> None:
+def test_the_traces_are_kept_thinned_nowhere(results: Path) -> None:
     found = sample(2.0)[0]
-    written(tmp_path, found)
-    kept = read_report_data(tmp_path / "report_data.h5").identification
+    kept = read_report_data(results / "report_data.h5").identification
     for before, after in zip(found.traces, kept.traces, strict=True):
         assert np.array_equal(before.simulated_after, after.simulated_after)
         assert before.torque_residual_after is not None and after.torque_residual_after is not None

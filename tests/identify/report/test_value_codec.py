@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -76,8 +76,9 @@ def test_numbers_of_numpy_come_back_as_plain_ones() -> None:
     assert same(back, replace(WHOLE, is_good=True))
 
 
-@pytest.mark.parametrize("found", [sample(2.0)[0], unhappy()], ids=["accepted", "unhappy"])
-def test_a_whole_identification_comes_back_with_every_bit(found: Identification) -> None:
+@pytest.mark.parametrize("made", [lambda: sample(2.0)[0], unhappy], ids=["accepted", "unhappy"])
+def test_a_whole_identification_comes_back_with_every_bit(made: Callable[[], Identification]) -> None:
+    found = made()
     assert same(found, there_and_back(found))
 
 
