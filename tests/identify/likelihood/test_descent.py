@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from identify.likelihood.descent import Descent
+from identify.likelihood.fit import Fit
 from identify.likelihood.normal_equations import changed
 from identify.likelihood.other_noise import noise_alone
 from identify.likelihood.prediction_error import PredictionError
@@ -24,9 +26,12 @@ UNBALANCE = {"sine": -3.6, "cosine": 23.2}
 SETS = ((150.0, 1.0), (130.0, 5.0), (60.0, 15.0))
 
 
-def traces(effects: Effects | None = None, jck: tuple[float, float, float] = TRUTH) -> list[Trace]:
+def traces(
+    effects: Effects | None = None, jck: tuple[float, float, float] = TRUTH, lasts_s: float = 1.5
+) -> list[Trace]:
     runs = [
-        sine_run(m, f, seed=i, effects=effects, jck=jck, noise=1.7e-4, duration_s=3.0) for i, (m, f) in enumerate(SETS)
+        sine_run(m, f, seed=i, effects=effects, jck=jck, noise=1.7e-4, duration_s=lasts_s)
+        for i, (m, f) in enumerate(SETS)
     ]
     return one_noise([prepare(run, i) for i, run in enumerate(runs)], False)
 
@@ -65,11 +70,17 @@ def test_the_noise_ahead_of_a_gyros_low_pass_is_paid_for() -> None:
     assert numbers == pytest.approx([3.0, 5.0])
 
 
+@cache
+def beside_friction() -> tuple[PredictionError, Fit]:
+    """The model without the friction, whose noise is to be found."""
+    problem = PredictionError(traces({"coulomb_friction": {"level": 1.2}}, lasts_s=3.0))
+    platform: dict[Name, float] = {(k,): v for k, v in zip(TERMS, TRUTH, strict=True)}
+    return problem, problem.fit(Structure(), platform)
+
+
 @pytest.mark.parametrize("white, smooth, time", [(1e-4, 1e3, 1.0), (1e3, 1e-4, 10.0), (1e-3, 1e-3, 0.03)])
 def test_the_likeliest_noise_is_found_from_decades_off(white: float, smooth: float, time: float) -> None:
-    problem = PredictionError(traces({"coulomb_friction": {"level": 1.2}}))
-    platform: dict[Name, float] = {(k,): v for k, v in zip(TERMS, TRUTH, strict=True)}
-    known = problem.fit(Structure(), platform)
+    problem, known = beside_friction()
 
     def descent(noise: Noise) -> Descent:
         return Descent(problem, Structure(), known.values, problem.bounds.within(noise), known.shots, ())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 
 from identify.estimate.final_fit import by_output_error
 from identify.estimate.own_delays import DELAY_NAME, beside_own_delay
+from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
 from identify.rivals.run_delays import Aligned, aligned, told
@@ -25,14 +27,15 @@ from rig.recording.run import Run
 PLATFORM = Platform(0.02, 0.045, 680.0)
 STEP_S, COUNT, SIGMA = 1e-3, 4000, 9e-4
 FREQUENCIES_HZ = (3.0, 6.0, 9.0, 14.0)
-LATE_S = np.array([-4e-6, 1e-6, 5e-6, -2e-6])
-NONE_S = np.zeros(4)
+LATE_S = (-4e-6, 1e-6, 5e-6, -2e-6)
+NONE_S = (0.0, 0.0, 0.0, 0.0)
 STRUCTURE = Structure(effects=("torque_delay",))
 START = {("inertia",): 0.02, ("damping",): 0.045, ("stiffness",): 680.0, DELAY_NAME: 1e-4}
 
 
-def recorded(late_s: Array, other_clock: bool = True, changing_s: float = 0.0) -> list[Trace]:
-    """Runs whose torque acts so much later than it was stamped, each shaken at one frequency.
+@cache
+def recorded(late_s: tuple[float, ...], other_clock: bool = True, changing_s: float = 0.0) -> tuple[list[Trace], Fit]:
+    """Runs whose torque acts so much later than it was stamped, each shaken at one frequency; one delay fitted to all.
 
     ``changing_s``: by how much later yet at the end of every run than in its middle, and earlier where it begins.
     """
@@ -40,7 +43,7 @@ def recorded(late_s: Array, other_clock: bool = True, changing_s: float = 0.0) -
     time = STEP_S * np.arange(COUNT)
     stamps = time - 0.4 * STEP_S if other_clock else time
     out = []
-    for i, (hz, late) in enumerate(zip(FREQUENCIES_HZ, late_s.tolist(), strict=True)):
+    for i, (hz, late) in enumerate(zip(FREQUENCIES_HZ, late_s, strict=True)):
         torque = 60.0 * np.sin(2.0 * np.pi * hz * stamps)
         drifting_s = changing_s * np.linspace(-1.0, 1.0, COUNT)
         acting = TorqueSignal(stamps + 1e-4 + late + drifting_s, torque, "zero_order")
@@ -50,7 +53,16 @@ def recorded(late_s: Array, other_clock: bool = True, changing_s: float = 0.0) -
             torque_hold="zero_order", frequency_hz=hz,
         )  # fmt: skip
         out.append(prepare(run, i, SIGMA))
-    return out
+    return out, PredictionError(out).fit(STRUCTURE, START)
+
+
+@cache
+def moved() -> tuple[list[Trace], list[Trace]]:
+    """The runs that are late, as they were recorded and as they were moved."""
+    traces, best = recorded(LATE_S)
+    found = aligned(traces, [t.keep for t in traces], best)
+    assert found is not None
+    return traces, found.traces
 
 
 def offsets_of(traces: list[Trace]) -> Array:
@@ -60,30 +72,25 @@ def offsets_of(traces: list[Trace]) -> Array:
 
 
 def test_every_run_is_moved_to_the_delay_that_it_shows() -> None:
-    traces = recorded(LATE_S)
-    best = PredictionError(traces).fit(STRUCTURE, START)
-    moved = aligned(traces, [t.keep for t in traces], best)
-    assert moved is not None
-    assert re.search(r"by up to [67](\.\d)? us", told(traces, moved.traces))
-    found = offsets_of(moved.traces)
-    assert found - found[-1] == pytest.approx(LATE_S - LATE_S[-1], abs=1e-6)
+    traces, found = moved()
+    assert re.search(r"by up to [67](\.\d)? us", told(traces, found))
+    offsets = offsets_of(found)
+    assert offsets - offsets[-1] == pytest.approx(np.array(LATE_S) - LATE_S[-1], abs=1e-6)
 
 
 def test_runs_that_were_moved_tell_far_more_and_nothing_false() -> None:
-    traces = recorded(LATE_S)
+    traces, found = moved()
     use = [t.keep for t in traces]
-    found = aligned(traces, use, PredictionError(traces).fit(STRUCTURE, START))
-    assert found is not None
-    after, before = (by_output_error(ts, STRUCTURE, START, 1.0, use, use) for ts in (found.traces, traces))
+    after, before = (by_output_error(ts, STRUCTURE, START, 1.0, use, use) for ts in (found, traces))
     for name, truth in ((("inertia",), 0.02), (("damping",), 0.045), (("stiffness",), 680.0)):
         assert abs(after.values[name] - truth) < 3.0 * after.std_error(name)
     assert after.std_error(("inertia",)) < 0.3 * before.std_error(("inertia",))
 
 
 def test_a_clock_that_runs_a_little_faster_is_followed_along_the_run() -> None:
-    traces = recorded(NONE_S, changing_s=4e-6)
+    traces, best = recorded(NONE_S, changing_s=4e-6)
     use = [t.keep for t in traces]
-    found = aligned(traces, use, PredictionError(traces).fit(STRUCTURE, START))
+    found = aligned(traces, use, best)
     assert found is not None
     for trace in found.traces[1:]:  # the first tells its delay to several us only
         assert trace.torque is not None and trace.run.torque_time_s is not None
@@ -96,17 +103,17 @@ def test_a_clock_that_runs_a_little_faster_is_followed_along_the_run() -> None:
 
 @pytest.mark.parametrize("other_clock", [True, False])
 def test_runs_that_agree_or_have_one_clock_are_not_moved(other_clock: bool) -> None:
-    traces = recorded(LATE_S if not other_clock else 0.0 * LATE_S, other_clock)
-    assert aligned(traces, [t.keep for t in traces], PredictionError(traces).fit(STRUCTURE, START)) is None
+    traces, best = recorded(NONE_S if other_clock else LATE_S, other_clock)
+    assert aligned(traces, [t.keep for t in traces], best) is None
 
 
 def test_without_a_delay_in_the_model_nothing_is_moved() -> None:
-    traces = recorded(LATE_S)
+    traces, _ = recorded(LATE_S)
     values = {n: v for n, v in START.items() if n != DELAY_NAME}
-    best = PredictionError(traces).fit(Structure(), values)
+    best = PredictionError(traces).fit(Structure(), values, iterations=0, thorough=False)
     assert aligned(traces, [t.keep for t in traces], best) is None
     single = [replace(traces[0], number=0)]
-    alone = PredictionError(single).fit(STRUCTURE, START)
+    alone = PredictionError(single).fit(STRUCTURE, START, iterations=0, thorough=False)
     assert aligned(single, [single[0].keep], alone) is None
 
 

@@ -43,8 +43,11 @@ def test_a_lag_of_the_drive_is_not_taken_for_one_of_the_gyro_because_of_the_filt
 
 def test_of_many_runs_the_one_that_reaches_farthest_is_looked_at() -> None:
     """What limits the drive shows in no other: with only evenly spread runs the search could not see it."""
+    weak, strong = (
+        [sine_run(torque_nm, 1.0, jck=SOFT, seed=i, duration_s=3.0) for i in range(12)] for torque_nm in (5.0, 9.0)
+    )
     for strongest in range(12):
-        runs = [sine_run(9.0 if i == strongest else 5.0, 1.0, jck=SOFT, seed=i, duration_s=3.0) for i in range(12)]
+        runs = [strong[i] if i == strongest else run for i, run in enumerate(weak)]
         traces = one_noise([prepare(run, i) for i, run in enumerate(runs)], False)
         few, _ = reduced(traces, split(traces), enough=6000)
         assert len(few) < 12
