@@ -20,7 +20,7 @@ from benchmarks.blind.score import score
 
 JCK = (0.02, 0.045, 677.3)
 SETS = (sine(111.0, 1.0, 2.0), sine(42.0, 9.0, 2.0), multisine(60.0, (2.0, 7.0, 13.0, 19.0), 2.0, 0.5, 4))
-ORDER_OF_ONE = cases.Order("single", ("backlash",), 0.01, 1, "five_sines")
+ORDER_OF_ONE = cases.Order("single", ("backlash",), 0.01, 1, "short")
 
 
 @pytest.fixture(scope="module")

@@ -162,7 +162,7 @@ def test_a_free_decay_gives_ratios_with_their_units() -> None:
 def test_a_torque_of_zeros_is_a_free_decay_too() -> None:
     run = decay_run(Platform(0.5, 0.1, 20.0))
     still = replace(run, torque_time_s=run.time_s, torque_nm=np.zeros(len(run.time_s)))
-    assert "stiffness_over_inertia" in identify(Recording((still,)), Platform(), SETTINGS).final.parameters
+    assert "stiffness_over_inertia" in identify(Recording((still,)), Platform(), FRICTION).final.parameters
 
 
 def test_with_a_reference_the_largest_error_of_equation_fifteen_stands_with_every_set() -> None:
@@ -174,7 +174,7 @@ def test_with_a_reference_the_largest_error_of_equation_fifteen_stands_with_ever
 
 
 def test_a_result_can_be_written_and_a_second_run_repeats_it() -> None:
-    rubbing = campaign({"coulomb_friction": {"level": 1.0}}, sets=SETS[3:4], duration_s=2.0)
+    rubbing = campaign({"coulomb_friction": {"level": 1.0}}, sets=SETS[3:4], duration_s=1.0)
     first, again = (result_json(identify(rubbing, LOW, FRICTION)) for _ in range(2))
     assert first["after"]["effect_parameters"]["coulomb_friction"]
     assert first["after"] == again["after"]
@@ -217,7 +217,7 @@ def test_who_stops_the_search_gets_what_there_is_and_is_told_so(stop: BaseExcept
         if text.startswith("added"):
             raise stop
 
-    rubbing = campaign({"coulomb_friction": {"level": 1.0}}, sets=SETS[2:4], duration_s=2.0)
+    rubbing = campaign({"coulomb_friction": {"level": 1.0}}, sets=SETS[3:4], duration_s=1.0)
     found = identify(rubbing, LOW, FRICTION, interrupt)
     assert found.aborted
     assert not found.accepted

@@ -80,7 +80,7 @@ LIGHT = Platform(0.0057, 0.001, 0.24, effects={"coulomb_friction": {"level": 3e-
 
 @cache
 def a_decay() -> Identification:
-    return identify(Recording((decay_run(LIGHT, 0.5, 30.0),)), Platform(0.0057, 0.002, 0.3), FEW)
+    return identify(Recording((decay_run(LIGHT, 0.5, 15.0),)), Platform(0.0057, 0.002, 0.3), FEW)
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -22,23 +23,27 @@ from tests.identify.simulated import DECLARED, NOISE_RAD_S, TRUTH, traces_of
 
 PULSE_HZ = 3.7
 TONES_HZ = (0.6, 1.7, 4.3, 7.9)
-FINE = 2  # steps a sample
 
 
-def run_with(depth: dict[str, float], number: int, duration_s: float = 8.0) -> Run:
+def run_with(depth: dict[str, float], number: int) -> Run:
+    return _run_with(*next(iter(depth.items()), ("", 0.0)), number)
+
+
+@cache
+def _run_with(on: str, depth: float, number: int, duration_s: float = 8.0) -> Run:
     """A multisine at 1 kHz on a platform of which a share of something pulsates, at another phase in every run."""
     j, c, k = TRUTH
-    steps = round(duration_s * 1000) * FINE
-    t = np.arange(2 * steps + 1) * 0.5e-3 / FINE
+    steps = round(duration_s * 1000)
+    t = np.arange(2 * steps + 1) * 0.5e-3
     swell = np.minimum(t / 0.5, 1.0)
     moment = 30.0 * swell * sum(np.sin(2 * np.pi * f * t + 1.3 * i + number) for i, f in enumerate(TONES_HZ))
     wave = np.sin(2 * np.pi * PULSE_HZ * t + 2.0 * number)
     spring, drag, gain = (
-        of * (1.0 + depth.get(on, 0.0) * wave) for on, of in (("angle", k), ("rate", c), ("torque", 1.0))
+        of * (1.0 + (depth if on == each else 0.0) * wave) for each, of in (("angle", k), ("rate", c), ("torque", 1.0))
     )
     angle = rate = 0.0
     rates = np.zeros(steps + 1)
-    h = 1e-3 / FINE
+    h = 1e-3
 
     def slope(i: int, th: float, w: float) -> tuple[float, float]:
         return w, (gain[i] * moment[i] - drag[i] * w - spring[i] * th) / j
@@ -52,10 +57,10 @@ def run_with(depth: dict[str, float], number: int, duration_s: float = 8.0) -> R
         rate += h * (b1 + 2 * b2 + 2 * b3 + b4) / 6
         rates[n + 1] = rate
     time = np.arange(round(duration_s * 1000) + 1) * 1e-3
-    read = rates[::FINE] + NOISE_RAD_S * np.random.default_rng(number).standard_normal(len(time))
+    read = rates + NOISE_RAD_S * np.random.default_rng(number).standard_normal(len(time))
     return Run(
         f"run {number}", time, np.ones(len(time), bool), rate_rad_s=read, torque_time_s=time,
-        torque_nm=moment[:: 2 * FINE],
+        torque_nm=moment[::2],
     )  # fmt: skip
 
 

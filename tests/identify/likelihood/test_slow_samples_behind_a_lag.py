@@ -26,7 +26,7 @@ SETS = ((1.0, 1.5), (3.0, 5.0))  # Hz, N m
 def slow_run(hertz: float, torque_nm: float, seed: int, lag: str) -> Run:
     """A set read at 125 Hz, its torque known at 1 kHz."""
     effects = {lag: {"time": LAG_S}}
-    run = sine_run(torque_nm, hertz, seed=seed, duration_s=40.0, effects=effects, jck=SOFT, noise=0.1 * NOISE_RAD_S)
+    run = sine_run(torque_nm, hertz, seed=seed, duration_s=20.0, effects=effects, jck=SOFT, noise=0.1 * NOISE_RAD_S)
     assert run.rate_rad_s is not None
     return replace(run, time_s=run.time_s[::EVERY], valid=run.valid[::EVERY], rate_rad_s=run.rate_rad_s[::EVERY])
 

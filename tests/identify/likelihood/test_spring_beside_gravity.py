@@ -33,7 +33,7 @@ def test_gravity_that_nothing_stands_for_may_push_against_the_declared_stiffness
 
 def test_a_spring_that_softens_is_likelier_than_gravity_beside_a_spring() -> None:
     runs = [
-        sine_run(m, f, seed=i, effects={"cubic_stiffness": {"factor": SOFTER}}, duration_s=3.0)
+        sine_run(m, f, seed=i, effects={"cubic_stiffness": {"factor": SOFTER}}, duration_s=1.5)
         for i, (m, f) in enumerate(SETS)
     ]
     problem = PredictionError(one_noise([prepare(run, i) for i, run in enumerate(runs)], False))

@@ -21,7 +21,9 @@ def test_a_slow_gyro_promises_what_it_explains_though_the_disturbance_hides_it_a
     """A lag in the sensor changes how much the prediction errs, too: without that its score was zero."""
     runs = []
     for seed, (torque_nm, hertz) in enumerate(((104.0, 3.0), (67.0, 6.0))):
-        run = sine_run(torque_nm, hertz, seed=seed, noise=2e-3, effects={"sensor_lag": {"time": TIME_S}})
+        run = sine_run(
+            torque_nm, hertz, seed=seed, noise=2e-3, duration_s=2.0, effects={"sensor_lag": {"time": TIME_S}}
+        )
         assert run.torque_nm is not None
         runs.append(replace(run, torque_nm=run.torque_nm + white(len(run.torque_nm), 0.02 * torque_nm, 7 + seed)))
     problem = PredictionError(one_noise([prepare(r, i) for i, r in enumerate(runs)], False))

@@ -36,14 +36,16 @@ def test_where_no_torque_was_applied_no_drive_shows() -> None:
 def test_what_is_declared_and_unseen_is_set_aside_and_the_rest_identified(
     declared: dict[str, dict[str, float]],
 ) -> None:
-    found = identify(campaign(sets=TWO, duration_s=2.0), Platform(*TRUTH, declared), NONE)
+    found = identify(campaign(sets=TWO, duration_s=1.0), Platform(*TRUTH, declared), NONE)
     assert found.accepted
     assert [item.name for item in found.final.dropped] == list(declared)
     assert found.final.parameters["inertia"].value == pytest.approx(TRUTH[0], rel=1e-3)
 
 
 def test_no_candidates_means_none() -> None:
-    found = identify(campaign({"coulomb_friction": {"level": 1.0}}, sets=TWO, duration_s=1.0), Platform(*TRUTH), NONE)
+    found = identify(
+        campaign({"coulomb_friction": {"level": 1.0}}, sets=TWO[1:], duration_s=1.0), Platform(*TRUTH), NONE
+    )
     assert not found.verdict.candidates and found.verdict.unexplained
 
 

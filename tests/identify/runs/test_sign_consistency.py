@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from identify.pipeline import identify
 from identify.runs.sign_consistency import describe_reversed_runs, reversed_runs
 from rig.config.identify import IdentifyConfig
 from rig.recording.run import Recording, Run
-from tests.identify.simulated import DECLARED, TRUTH, campaign, sine_run, traces_of
+from tests.identify.simulated import DECLARED, SETS, TRUTH, campaign, sine_run, traces_of
 
 
 def turned(run: Run) -> Run:
@@ -19,8 +20,8 @@ def turned(run: Run) -> Run:
     return replace(run, torque_nm=-run.torque_nm)
 
 
-def with_turned(*numbers: int, duration_s: float = 4.0) -> Recording:
-    right = campaign(duration_s=duration_s)
+def with_turned(*numbers: int, sets: Sequence[tuple[float, float]] = SETS, duration_s: float = 4.0) -> Recording:
+    right = campaign(sets=sets, duration_s=duration_s)
     return replace(right, runs=tuple(turned(r) if i in numbers else r for i, r in enumerate(right.runs)))
 
 
@@ -62,7 +63,7 @@ def test_a_run_whose_torque_has_nothing_to_do_with_its_motion_is_not_called_turn
     "offered", [("coulomb_friction", "torque_delay"), pytest.param(None, marks=pytest.mark.slow)]
 )  # None: the library
 def test_the_rest_is_identified_without_it_and_the_result_says_so(offered: tuple[str, ...] | None) -> None:
-    recording = with_turned(1, duration_s=2.0)
+    recording = with_turned(1, sets=SETS[2:], duration_s=1.5)
     found = identify(recording, DECLARED, IdentifyConfig(candidates=offered))
     name = recording.runs[1].name
     assert found.verdict.effects == ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
@@ -23,23 +24,25 @@ from rig.recording.run import Recording
 from tests.identify.simulated import TRUTH, Effects, sine_run, traces_of, white
 
 SETS = ((67.0, 6.0), (111.0, 1.0), (104.0, 3.0))
-OFFERED = IdentifyConfig.model_validate({"candidates": ["torque_delay", "actuator_lag", "creep", "coulomb_friction"]})
+OFFERED = ("torque_delay", "actuator_lag", "creep", "coulomb_friction")
 CUBIC = {"cubic_stiffness": {"factor": 4000.0}}
 
 
-def found(hidden: Effects) -> Identification:
+def found(
+    hidden: Effects, sets: Sequence[tuple[float, float]] = SETS, lasts_s: float = 2.5, offered: Sequence[str] = OFFERED
+) -> Identification:
     """Sets with an effect and with a small torque that was not recorded."""
     runs = []
-    for seed, (torque_nm, hertz) in enumerate(SETS):
-        run = sine_run(torque_nm, hertz, seed=seed, effects=hidden, duration_s=2.5)
+    for seed, (torque_nm, hertz) in enumerate(sets):
+        run = sine_run(torque_nm, hertz, seed=seed, effects=hidden, duration_s=lasts_s)
         assert run.torque_nm is not None
         runs.append(replace(run, torque_nm=run.torque_nm + white(len(run.torque_nm), 0.003 * torque_nm, 50 + seed)))
-    return identify(Recording(tuple(runs)), Platform(*TRUTH), OFFERED)
+    return identify(Recording(tuple(runs)), Platform(*TRUTH), IdentifyConfig(candidates=tuple(offered)))
 
 
 @cache
 def found_beside_a_cube() -> Identification:
-    return found(CUBIC)
+    return found(CUBIC, SETS[::2], 1.5, OFFERED[:2])
 
 
 @pytest.mark.parametrize(

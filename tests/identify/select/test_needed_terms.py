@@ -21,7 +21,7 @@ WITHOUT_DAMPING = Structure(("inertia", "stiffness"), (CREEP, DELAY))
 
 def without_damping(hidden: dict[str, dict[str, float]]) -> tuple[Any, Any]:
     """A search over runs with something hidden, and its model with a creep and a delay in the place of the damping."""
-    runs = [sine_run(60.0, f, effects=hidden, jck=JCK, duration_s=3.0) for f in (2.0, 9.0, 25.0)]
+    runs = [sine_run(60.0, f, effects=hidden, jck=JCK, duration_s=1.5) for f in (2.0, 9.0, 25.0)]
     problem = PredictionError(one_noise([prepare(r, i) for i, r in enumerate(runs)], False))
     start: dict[Name, float] = {
         ("inertia",): 0.02, ("stiffness",): 677.3, (CREEP, "stiffness"): 60.0, (CREEP, "time"): 5e-3,
