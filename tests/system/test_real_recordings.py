@@ -20,7 +20,8 @@ from rig.recording.load import read_recording
 from rig.recording.run import Recording
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
-LORENZ_RUN = "{{file: {file}, use: {use}, min_rate_rad_s: 1.0}}"
+LORENZ_RUN = "{{file: {file}, use: {use}, min_rate_rad_s: 1.0, to_s: {to_s}}}"
+LORENZ_S = 11.0  # all of a run
 
 
 def needs(folder: str) -> pytest.MarkDecorator:
@@ -40,10 +41,12 @@ def identified(text: str) -> tuple[Recording, Identification]:
         return recording, identify(recording, loaded.config.model.platform(), loaded.config.identify)
 
 
-def lorenz(candidates: str = "", numbers: Sequence[int] = range(1, 6)) -> tuple[Recording, Identification]:
+def lorenz(
+    candidates: str = "", numbers: Sequence[int] = range(1, 6), to_s: float = LORENZ_S
+) -> tuple[Recording, Identification]:
     """Runs 1 to 3 to fit, 4 and 5 to judge; the declared model is a guess, stiffness included."""
     runs = [
-        LORENZ_RUN.format(file=DATA / "lorenz_servo" / f"run0{i}.npz", use="fit" if i < 4 else "holdout")
+        LORENZ_RUN.format(file=DATA / "lorenz_servo" / f"run0{i}.npz", use="fit" if i < 4 else "holdout", to_s=to_s)
         for i in numbers
     ]
     return identified(
@@ -77,7 +80,7 @@ def pendulum() -> tuple[Recording, Identification]:
 @needs("lorenz_servo")
 def test_among_a_few_candidates_the_servo_has_coulomb_friction_and_a_constant_torque() -> None:
     few = ", candidates: [coulomb_friction, torque_offset]"
-    _, found = lorenz(few, (1, 4))
+    _, found = lorenz(few, (1, 4), 6.0)
     assert found.verdict.effects[:2] == ("coulomb_friction", "torque_offset")
     assert found.final.error.holdout_torque_relative is not None
     assert found.final.error.holdout_torque_relative <= 0.065

@@ -19,7 +19,16 @@ excitation:
     - {torque_nm: 20, frequency_hz: 8, duration_s: 0.6}
 identify: {candidates: [coulomb_friction], genetic: {population: 20, generations: 20}}
 """
-RECORDED = "backend: recorded\nrecorded: {{runs: [{{file: {file}}}]}}\nidentify: {{candidates: []}}\n"
+FRICTION = "effects: {coulomb_friction: {level_nm: 0.4}}"
+
+
+def recorded(file: object, effects_from: str = "") -> str:
+    """A rig.yaml for one file of such a campaign; the friction is declared, so that nothing is left to look into."""
+    own = f"effects_from: {effects_from}, " if effects_from else ""
+    return (
+        f"backend: recorded\nrecorded: {{runs: [{{file: {file}}}]}}\nmodel: {{{own}{FRICTION}}}\n"
+        "identify: {candidates: [], genetic: {population: 20, generations: 20}}\n"
+    )
 
 
 def play(folder: Path, seed: int, text: str = PLAYED) -> Path:

@@ -15,7 +15,7 @@ from commands.identify_batch.campaigns import Job
 from commands.identify_batch.row import COLUMNS, FAILED, IDENTIFIED
 from commands.identify_run.app import app
 from rig.recording.hdf5 import read_recording_h5, write_recording_h5
-from tests.commands.identify_batch.campaigns import PLAYED, RECORDED, play
+from tests.commands.identify_batch.campaigns import PLAYED, play, recorded
 from tests.commands.support import command
 
 PAGE = Path(__file__).parents[3] / "docs" / "effects" / "your-own.md"
@@ -83,7 +83,9 @@ def test_settings_of_today_come_on_top_of_those_of_the_recording(played: Path) -
 
 def test_a_campaign_cut_short_is_identified_from_its_complete_sets_and_says_so(copy: Path) -> None:
     sets = [dict(one, complete=i == 0) for i, one in enumerate(read_recording_h5(copy).info["sets"])]
-    row = identified_here(job(with_info(copy, aborted="Stopped by Ctrl-C.", sets=sets), "identify.candidates=[]"))
+    cut_short = with_info(copy, aborted="Stopped by Ctrl-C.", sets=sets)
+    declared = "model.effects={coulomb_friction: {level_nm: 0.4}}"
+    row = identified_here(job(cut_short, "identify.candidates=[]", declared))
     assert (row["status"], row["aborted"]) == (IDENTIFIED, True)
     assert row["reason"].startswith("the campaign was cut short, this is from its complete sets: Stopped by Ctrl-C.")
 
@@ -123,11 +125,11 @@ def test_code_that_a_recording_names_is_not_run(copy: Path) -> None:
 def test_a_yaml_without_a_date_has_none_and_with_one_of_its_recordings_has_that(played: Path, tmp_path: Path) -> None:
     (tmp_path / "tuesday").mkdir()
     config = tmp_path / "tuesday" / "rig.yaml"
-    config.write_text(RECORDED.format(file=played), encoding="utf-8")
+    config.write_text(recorded(played), encoding="utf-8")
     row = identified_here(job(config))
     assert (row["status"], row["name"], row["rig"]) == (IDENTIFIED, "tuesday", "rig")
     assert row["recorded_utc"] == read_recording_h5(played).info["started_utc"]
-    config.write_text(RECORDED.format(file="gone.csv"), encoding="utf-8")
+    config.write_text(recorded("gone.csv"), encoding="utf-8")
     gone = identified_here(job(config))
     assert (gone["status"], gone["recorded_utc"]) == (FAILED, None)
     assert "gone.csv" in gone["reason"]
@@ -138,7 +140,7 @@ def test_effects_of_ones_own_stay_in_a_process_of_their_own(played: Path, tmp_pa
 
     (tmp_path / "own.py").write_text(OWN_EFFECT, encoding="utf-8")
     config = tmp_path / "rig.yaml"
-    config.write_text("model: {effects_from: own.py}\n" + RECORDED.format(file=played), encoding="utf-8")
+    config.write_text(recorded(played, "own.py"), encoding="utf-8")
     before = effects.known()
     row = identify_campaign(job(config))
     assert row["status"] == IDENTIFIED, row["reason"]
@@ -148,7 +150,7 @@ def test_effects_of_ones_own_stay_in_a_process_of_their_own(played: Path, tmp_pa
 def test_a_campaign_that_ends_its_process_is_not_taken_for_a_result(played: Path, tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text("import os\nos._exit(3)\n", encoding="utf-8")
     config = tmp_path / "rig.yaml"
-    config.write_text("model: {effects_from: own.py}\n" + RECORDED.format(file=played), encoding="utf-8")
+    config.write_text(recorded(played, "own.py"), encoding="utf-8")
     with pytest.raises(ProcessEnded, match="its process ended with 3"):
         identify_campaign(job(config))
 
