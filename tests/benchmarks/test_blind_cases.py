@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,13 @@ from benchmarks.blind.recordings import write_case
 from benchmarks.blind.score import score
 
 JCK = (0.02, 0.045, 677.3)
-SETS = (sine(111.0, 1.0, 2.0), sine(42.0, 9.0, 2.0), multisine(60.0, (2.0, 7.0, 13.0, 19.0), 2.0, 0.5, 4))
 ORDER_OF_ONE = cases.Order("single", ("backlash",), 0.01, 1, "short")
+
+
+@cache
+def sets() -> tuple[Excitation, ...]:
+    """Made when they are asked for: what draws them is compiled."""
+    return sine(111.0, 1.0, 2.0), sine(42.0, 9.0, 2.0), multisine(60.0, (2.0, 7.0, 13.0, 19.0), 2.0, 0.5, 4)
 
 
 @pytest.fixture(scope="module")
@@ -104,10 +110,10 @@ def test_a_pair_that_physics_cannot_part_counts_where_both_are_named() -> None:
 @pytest.mark.slow
 def test_a_rival_that_passes_for_the_truth_in_this_record_has_to_be_declared() -> None:
     late = Hidden(*JCK, {"torque_delay": {"delay": 5e-5}}, noise=math.radians(0.2))
-    (energy,) = imitation.confusable(late, SETS, "torque_delay").values()
+    (energy,) = imitation.confusable(late, sets(), "torque_delay").values()
     assert energy < DETECTABLE, "a lag that short is a delay"
     gap = Hidden(*JCK, {"backlash": {"half_gap": 0.003}})
-    assert imitation.imitation(gap, SETS, "backlash", "cubic_stiffness") > DETECTABLE
+    assert imitation.imitation(gap, sets(), "backlash", "cubic_stiffness") > DETECTABLE
     case = cases.make(11, 6, cases.Order("single", ("torque_delay",), 0.003, 2, "five_sines"))
     truth = {k: dict(v) for k, v in case.hidden.effects.items()}
     alike = {"torque_delay": ["actuator_lag"]}
@@ -160,8 +166,7 @@ def test_an_effect_outside_the_library_has_to_stay_unexplained() -> None:
 
 def test_an_effect_far_below_the_noise_counts_as_undetectable() -> None:
     hidden = Hidden(*JCK, {"cubic_stiffness": {"factor": 1e-3}})
-    sets: tuple[Excitation, ...] = SETS
-    assert not cases.energies(hidden, sets, hidden.play(sets))["cubic_stiffness"].detectable
+    assert not cases.energies(hidden, sets(), hidden.play(sets()))["cubic_stiffness"].detectable
 
 
 def test_a_mass_off_the_axis_counts_by_what_no_other_stiffness_imitates() -> None:

@@ -37,7 +37,7 @@ AUTO = ("--set", "identify.prove=auto")
 
 def named(effects: Mapping[str, Mapping[str, float]], rivals: Mapping[str, Platform] | None = None) -> Identification:
     """Accepted, with these effects beside the true J, C and K; ``rivals`` of the first."""
-    found = sample(2.0)[0]
+    found = sample(1.0)[0]
     assert found.after is not None
     model = replace(TRUE, effects=effects)
     models = {next(iter(effects), ""): dict(rivals)} if rivals else {}

@@ -20,7 +20,7 @@ def stubbed(monkeypatch: pytest.MonkeyPatch) -> Callable[[Identification | BaseE
 
 @pytest.fixture
 def accepted(stubbed: Callable[[Identification], Identifier]) -> Identifier:
-    return stubbed(sample(2.0)[0])
+    return stubbed(sample(1.0)[0])
 
 
 @pytest.fixture

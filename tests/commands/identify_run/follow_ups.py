@@ -29,13 +29,13 @@ def plan_of(number: int = 1, separation: float = 900.0, torque_nm: float = 5.0) 
 
 def doubtful() -> Identification:
     """Accepted, but one name has a rival."""
-    found = sample(2.0)[0]
+    found = sample(1.0)[0]
     confusable = {"coulomb_friction": ("stribeck_friction",), "torque_delay": ()}
     return replace(found, verdict=replace(found.verdict, confusable_with=confusable))
 
 
 def sure() -> Identification:
-    found = sample(2.0)[0]
+    found = sample(1.0)[0]
     confusable: dict[str, tuple[str, ...]] = {"coulomb_friction": (), "torque_delay": ()}
     return replace(found, verdict=replace(found.verdict, confusable_with=confusable))
 

@@ -68,7 +68,7 @@ def test_one_that_is_not_accepted_ends_in_1_with_all_results_and_the_reason(
     tmp_path: Path, stubbed: Callable[[Identification], Identifier]
 ) -> None:
     reason = "the residual stays unexplained: play a multisine"
-    stubbed(dataclasses.replace(sample(2.0)[0], accepted=False, reasons=(reason,)))
+    stubbed(dataclasses.replace(sample(1.0)[0], accepted=False, reasons=(reason,)))
     out = tmp_path / "out"
     done = command(app, write_config(tmp_path), "--quiet", "--out", out)
     assert done.exit_code == 1

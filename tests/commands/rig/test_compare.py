@@ -15,7 +15,7 @@ from tests.identify.sample import sample
 
 @pytest.fixture
 def folders(tmp_path: Path) -> tuple[Path, Path]:
-    content = result_json(sample(2.0)[0])
+    content = result_json(sample(1.0)[0])
     for name in ("before", "later"):
         (tmp_path / name).mkdir()
         content["after"]["parameters"]["damping"]["ci95"] = [0.1, 0.2] if name == "later" else [0.04, 0.05]

@@ -28,7 +28,7 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     file = tmp_path / "my_effect.py"
     file.write_text(EXAMPLE, encoding="utf-8")
     effects.read_file(file)
-    found, recording = sample(2.0)
+    found, recording = sample(1.0)
     model = replace(TRUTH, effects={"coulomb_friction": {"level": 1.2}, "eddy_brake": {"level": 1.0, "speed": 1.0}})
     found = replace(
         found, after=replace(found.final, platform=model), verdict=replace(found.verdict, effects=("eddy_brake",))
@@ -71,7 +71,7 @@ def test_a_model_with_an_effect_of_your_own_asks_for_its_file_and_has_its_equati
     ("word", "file"), [("model-json", "platform.json"), ("model-mat", "platform.mat"), ("modelica", "Platform.mo")]
 )
 def test_the_model_is_written_in_every_format_and_never_over_another(tmp_path: Path, word: str, file: str) -> None:
-    found, recording = sample(2.0)
+    found, recording = sample(1.0)
     (tmp_path / "run").mkdir()
     found = replace(found, after=replace(found.final, platform=TRUTH), accepted=False, reasons=("too little moved",))
     write_results(tmp_path / "run", found, recording, Platform(0.0185, 0.06, 650.0), "default")
@@ -90,7 +90,7 @@ def test_the_model_is_written_in_every_format_and_never_over_another(tmp_path: P
 def test_a_decay_is_exported_with_the_inertia_that_was_declared(
     tmp_path: Path, declared: bool, stiffness: float
 ) -> None:
-    found, recording = sample(2.0)
+    found, recording = sample(1.0)
     ratios = replace(found.final, platform=Platform(1.0, 2.2, 33000.0))
     (tmp_path / "run").mkdir()
     write_results(
@@ -125,7 +125,7 @@ def test_a_file_of_effects_that_cannot_be_taken_along_is_said(own: Path, tmp_pat
 
 @pytest.mark.parametrize("word", ["C", "python", "Table"])
 def test_the_words_of_the_help_write_the_compensation(tmp_path: Path, word: str) -> None:
-    found, recording = sample(2.0)
+    found, recording = sample(1.0)
     (tmp_path / "run").mkdir()
     write_results(tmp_path / "run", found, recording, Platform(0.0185, 0.06, 650.0), "default")
     done = command(app, "export", tmp_path / "run", "--to", word)
