@@ -18,12 +18,17 @@ from benchmarks.long_recording import blocks
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("name", ["genetic", "estimation", "growth", "compare"])
-def test_every_command_says_what_it_does(name: str) -> None:
+def test_every_command_says_what_it_does() -> None:
+    """All in one process, which imports what they share once."""
+    names = ("genetic", "estimation", "growth", "compare")
+    lines = [["python", "-m", f"benchmarks.{name}", "--help"] for name in names]
     done = subprocess.run(
-        [sys.executable, "-m", f"benchmarks.{name}", "--help"], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    assert f"python -m benchmarks.{name}" in done.stdout
+        [sys.executable, "-m", "tests.system.helps"], input=json.dumps(lines), cwd=ROOT, capture_output=True, text=True,
+        check=True,
+    )  # fmt: skip
+    for name, (code, said, _) in zip(names, json.loads(done.stdout), strict=True):
+        assert code == 0
+        assert f"python -m benchmarks.{name}" in said
 
 
 def test_a_ratio_a_fifth_smaller_is_worse_and_a_missing_one_too() -> None:

@@ -16,7 +16,9 @@ import psutil
 import pyarrow.parquet as pq
 import pytest
 
+from commands.identify_batch.app import app
 from tests.commands.identify_batch.campaigns import play
+from tests.commands.support import command
 
 COMMAND = str(Path(sys.executable).parent / "identify-batch")
 COUNT = 4
@@ -269,10 +271,13 @@ def test_wrong_usage_ends_with_2_and_writes_nothing(tmp_path: Path) -> None:
         ("*.h5", "t.parquet", ("--workers", "2", "--scheduler", "tcp://127.0.0.1:1"), "exclude each other"),
         ("*.h5", "t.parquet", ("--workers", "0"), "--workers"),
     ):
-        done = batch(f"{tmp_path}/{pattern}", tmp_path / table, *options)
-        assert done.returncode == 2, done.stderr
+        done = command(app, f"{tmp_path}/{pattern}", "--out", tmp_path / table, *options)
+        assert done.exit_code == 2, done.output
         assert words in done.stderr
         assert "Traceback" not in done.stderr
+    ended = batch(f"{tmp_path}/*.h5", tmp_path / "other.parquet")  # the program itself, once
+    assert ended.returncode == 2 and "exists without its journal" in ended.stderr
+    assert "Traceback" not in ended.stderr
     assert sorted(p.name for p in tmp_path.iterdir()) == ["other.parquet", "recording.h5"]
 
 
