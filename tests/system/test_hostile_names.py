@@ -14,8 +14,11 @@ import pytest
 from commands.identify_run.app import app as identify_run
 from commands.rig.app import app
 from rig.config.load import load_config
+from rig.dynamics import TorqueSignal, simulate
 from rig.errors import ConfigError
+from rig.platform import Platform
 from rig.recording.journal import Journal
+from rig.signals import TorqueHold
 from tests.commands.support import command
 
 SCRIPT = "<script>alert(1)</script>"
@@ -76,14 +79,16 @@ def assert_calm(text: str) -> None:
     assert all(c.isprintable() or c in "\n\r" for c in text), repr(text)
 
 
-def motion() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def motion(hold: TorqueHold) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of the declared platform, so that nothing is left to look into."""
     time_s = np.arange(1200) * 1e-3
-    rate = np.cos(30 * time_s) + 1e-3 * np.random.default_rng(1).standard_normal(1200)
-    return time_s, 3 * np.sin(30 * time_s + 1.0), rate
+    torque = TorqueSignal(time_s, 20 * np.sin(30 * time_s), hold)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(1200)
+    return time_s, torque.torque_nm, simulate(Platform(), time_s, torque).rate_rad_s + noise
 
 
 def write_journal(path: Path, names: tuple[str, ...]) -> None:
-    time_s, torque, rate = motion()
+    time_s, torque, rate = motion("zero_order")
     with Journal.create(path, {"noise": 0.001, "config_text": SCRIPT, IMAGE: BREAKOUT}) as journal:
         for name in names:
             journal.begin_run(name, {"torque_hold": "zero_order"}, {"ticks": ("time_s", "late_s", name, IMAGE)})
@@ -110,7 +115,7 @@ def test_a_journal_full_of_markup_gives_a_clean_report(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="such names cannot be given to files there")
 def test_files_and_columns_with_markup_in_their_names_give_a_clean_report(tmp_path: Path) -> None:
-    time_s, torque, rate = motion()
+    time_s, torque, rate = motion("band_limited")
     names = [f"{name.replace('/', '_')}.csv" for name in (SCRIPT + TURNED, IMAGE + STEERING)]
     for name in names:
         rows = "".join(
