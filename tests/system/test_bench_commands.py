@@ -109,7 +109,10 @@ def test_ctrl_c_while_it_identifies_keeps_the_record_and_says_so(tmp_path: Path)
     assert recording.info["emulated_drive"][-1]["torque_nm"][1] == 0.0
 
 
+@pytest.mark.slow
 def test_a_second_ctrl_c_leaves_no_torque_either(tmp_path: Path) -> None:
+    """In one process, on a stage: test_play.py and test_stop_requests.py. One Ctrl-C on the bench: test_commands.py."""
+
     def stop_twice(process: subprocess.Popen[bytes], log: Path) -> int:
         journal = log.with_name(f"live{log.stem}") / "recording.journal"
         while process.poll() is None and not (journal.exists() and journal.stat().st_size > 20_000):

@@ -20,6 +20,7 @@ CHROMIUM = find_chromium()
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed: apt-get install chromium")
 
 PHONE_PX = 390
+SHOWN_S = 4.0  # of every run: longer ones only take longer to be drawn
 # Pairs of texts of one plot that lie over each other, each as its words.
 OVERLAPS = """[...document.querySelectorAll('.plot')].flatMap(plot => {
     const texts = [...plot.querySelectorAll('.annotation-text, .xtitle, .ytitle, .legendtext')]
@@ -56,7 +57,7 @@ def opened(folder: Path, page: str) -> Browser:
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     """The report of an accepted campaign."""
-    browser = opened(tmp_path_factory.mktemp("report"), report_html(*sample(), "default"))
+    browser = opened(tmp_path_factory.mktemp("report"), report_html(*sample(SHOWN_S), "default"))
     yield browser
     browser.close()
 
@@ -129,21 +130,27 @@ def test_nothing_is_wider_than_the_window(page: Browser) -> None:
     assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
 
 
-@pytest.fixture(scope="module", params=["light", "dark"])
-def phone(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """The report in a window of 390 px, all folds open."""
+@pytest.fixture(scope="module")
+def phones(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Browser, str]]:
+    """A browser for one page after the other, and where the report is."""
     folder = tmp_path_factory.mktemp("phone")
-    (folder / "report.html").write_text(report_html(*sample(), "default"), encoding="utf-8")
+    (folder / "report.html").write_text(report_html(*sample(SHOWN_S), "default"), encoding="utf-8")
     assert CHROMIUM
     browser = Browser(CHROMIUM, folder / "profile")
+    yield browser, (folder / "report.html").as_uri()
+    browser.close()
+
+
+@pytest.fixture(scope="module", params=["light", "dark"])
+def phone(request: pytest.FixtureRequest, phones: tuple[Browser, str]) -> Iterator[Browser]:
+    """The report in a window of 390 px, all folds open."""
+    browser, page = phones
     scheme = [{"name": "prefers-color-scheme", "value": request.param}]
-    try:
-        browser.open((folder / "report.html").as_uri(), width_px=PHONE_PX, features=scheme)
-        browser.wait_for("document.documentElement.dataset.drawn")
-        browser.evaluate("document.querySelectorAll('details').forEach(fold => { fold.open = true })")
-        yield browser
-    finally:
-        browser.close()
+    browser.open(page, width_px=PHONE_PX, features=scheme)
+    browser.wait_for("document.documentElement.dataset.drawn")
+    browser.evaluate("document.querySelectorAll('details').forEach(fold => { fold.open = true })")
+    yield browser
+    browser.leave()
 
 
 def test_on_a_phone_nothing_is_wider_and_tables_scroll_in_their_own_place(phone: Browser) -> None:
