@@ -35,7 +35,7 @@ def test_the_closed_form_of_the_benchmarks_is_the_motion_that_the_project_simula
         assert simulated == pytest.approx(campaigns.sine_rate(t, 111.0, 3.0, delay), abs=0.01 * campaigns.SIGMA_RAD_S)
 
 
-@pytest.mark.parametrize("delay", [False, True])
+@pytest.mark.parametrize("delay", [pytest.param(False, marks=pytest.mark.slow), True])  # the model with more in it
 def test_one_campaign_lands_within_a_few_bounds_of_the_truth(load: Any, delay: bool) -> None:
     efficiency: ModuleType = load("efficiency")
     off = np.abs(efficiency.errors(delay, 1, seed=3)[0])

@@ -41,7 +41,7 @@ SHORT = "[{torque_nm: 300, frequency_hz: 1, duration_s: 2}, {torque_nm: 200, fre
 @pytest.mark.parametrize(
     ("offered", "more"),
     [
-        ("[coulomb_friction, torque_delay]", ("--set", f"excitation.sets={SHORT}")),
+        ("[coulomb_friction, torque_delay]", ("--set", f"excitation.sets={SHORT}", "--set", "excitation.rest_s=6")),
         pytest.param("[coulomb_friction, torque_delay]", (), marks=pytest.mark.slow),
         pytest.param(
             "[coulomb_friction, torque_delay, presliding_friction, sensor_lag, unbalance]", (), marks=pytest.mark.slow

@@ -127,7 +127,7 @@ def test_a_result_repeats_itself_and_another_seed_gives_another_population() -> 
     assert runs[0].parameters != runs[2].parameters
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.slow) for k in (2, 3))])  # one noise of many
 def test_a_set_that_hardly_tells_its_numbers_apart_says_so_in_their_errors(seed: int) -> None:
     truth = (0.02, 0.1, 20.0)
     time = np.arange(4001) * 5e-3

@@ -107,7 +107,8 @@ def hidden_platform(rng: np.random.Generator) -> dict[str, object]:
     }
 
 
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(k, marks=pytest.mark.slow) for k in range(2, 40))])
+# One draw of many: the others are slow.
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 40))])
 def test_no_platform_within_a_factor_of_two_trips_whatever_it_hides(seed: int) -> None:
     truth = hidden_platform(np.random.default_rng([402, seed]))
     assert played(campaign(truth)) is None, truth
