@@ -17,6 +17,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from identify.model.effect_torque import feeds_on_torque, torque_along
 from identify.proof.drive import PARTS, Drive
+from identify.proof.rounding import feedback, rounded
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics import Equations, Motion, TorqueSignal, simulate
@@ -74,31 +75,9 @@ def compensated(
     if drive.hold == "zero_order" and drive.resolution_nm is not None:
         ticks_s = drive.tick_s * np.arange(round((planned.duration_s + lead_s) / drive.tick_s))
         exact = np.asarray(planned.torque(ticks_s - lead_s), dtype=float) + table.at(ticks_s)
-        natural_rad_s = math.sqrt(max(platform.stiffness_nm_rad, 0.0) / platform.inertia_kg_m2)
-        commands = HeldCommands(drive.tick_s, rounded(exact, drive.resolution_nm, natural_rad_s * drive.tick_s))
+        made_good = feedback(platform, drive.tick_s, planned.duration_s)
+        commands = HeldCommands(drive.tick_s, rounded(exact, drive.resolution_nm, made_good))
     return CompensatedSet.of(planned, name, lead_s, table, _early_s(platform, active), drive.latency_s, commands)
-
-
-def rounded(torque_nm: Array, resolution_nm: float, natural_rad: float) -> Array:
-    """Commands in steps of a drive whose rounding does not excite the platform, (n,).
-
-    Each command makes good for the rounding of the two before it, so that none of it is left at the natural frequency
-    and little below it (error feedback with its zero there; Schreier, Temes, Understanding Delta-Sigma Converters).
-
-    Parameters
-    ----------
-    torque_nm
-        Shape (n,): what is wanted at each tick.
-    natural_rad
-        By how much the platform's own oscillation turns in a tick.
-    """
-    gain = 2.0 * math.cos(min(natural_rad, math.pi))
-    out, last, before = np.empty(len(torque_nm)), 0.0, 0.0
-    for i, wanted in enumerate(torque_nm.tolist()):
-        asked = wanted - gain * last + before
-        out[i] = resolution_nm * round(asked / resolution_nm)
-        last, before = out[i] - asked, last
-    return out
 
 
 def _set_torque(planned: PlannedSet, lead_s: float, drive: Drive) -> TorqueSignal:

@@ -108,12 +108,17 @@ def deviation(run: Run, planned: PlannedSet, platform: Platform, noise: float | 
     return Deviation(time_s, np.asarray(error), keep, trace.noise)
 
 
-def simulated_run(planned: PlannedSet, platform: Platform, drive: Drive, angle: bool) -> Run:
-    """What a platform would show of a planned set without noise, its torque as late and held as the drive's."""
+def simulated_run(
+    planned: PlannedSet, platform: Platform, drive: Drive, angle: bool, aside_rad: float = 0.0
+) -> Run:  # fmt: skip
+    """What a platform would show of a planned set without noise, its torque as late and held as the drive's.
+
+    It begins at rest, so far beside where the spring holds it.
+    """
     time_s = drive.tick_s * np.arange(round(planned.duration_s / drive.tick_s) + 1)
     late_s = time_s + drive.latency_s
     torque_nm = np.asarray(planned.torque(time_s), dtype=float)
-    start = (Equations(platform).rest_angle_rad(), 0.0)
+    start = (Equations(platform).rest_angle_rad() + aside_rad, 0.0)
     with np.errstate(all="ignore"):
         motion = simulate(platform, time_s, TorqueSignal(late_s, torque_nm, drive.hold), start)
     return Run(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -202,10 +203,32 @@ def _allowed_share(planned: PlannedSet, variant: str, models: Models, allowed: P
 
 
 def announced(model: Platform, plain: PlannedSet, better: PlannedSet, drive: Drive, angle: bool) -> Announced:
-    """What stays of the error against the linear model by the model's own account; nothing where there was none."""
-    several = [deviation(simulated_run(s, model, drive, angle), s, model, NEGLIGIBLE_NOISE) for s in (plain, better)]
-    share = share_left([(several[0], several[1], plain.duration_s)])
-    return Announced(share.left if share is not None else 0.0, several[0].rms)
+    """What stays of the error against the linear model by the model's own account; nothing where there was none.
+
+    Where an effect leaves open at which angle the platform rests, the mean square over all angles that it allows.
+    """
+    pairs = []
+    for aside_rad in _rest_angles(model):
+        one, other = (
+            deviation(simulated_run(s, model, drive, angle, aside_rad), s, model, NEGLIGIBLE_NOISE)
+            for s in (plain, better)
+        )
+        pairs.append((one, other, plain.duration_s))
+    share = share_left(pairs)
+    error = math.sqrt(sum(one.rms**2 for one, _, _ in pairs) / len(pairs))
+    return Announced(share.left if share is not None else 0.0, error)
+
+
+def _rest_angles(model: Platform) -> tuple[float, ...]:
+    """Beside where the spring holds a platform: two with the mean square of all at which its effects let it rest.
+
+    A platform that swings out stops anywhere in the band of a dry friction or a gap: on an even distribution, what
+    grows with the square of the angle has its mean at band / sqrt(3) (Gauss-Legendre of two points).
+    """
+    jck = (model.inertia_kg_m2, model.damping_nm_s_rad, model.stiffness_nm_rad)
+    known = [(effects.get(name), given) for name, given in model.effects.items()]
+    band = sum(e.rests_within_rad((*jck, *e.values(given))) for e, given in known if e.rests_within_rad is not None)
+    return (-band / math.sqrt(3.0), band / math.sqrt(3.0)) if band > 0.0 else (0.0,)
 
 
 NEGLIGIBLE_NOISE = 1e-9  # noise of a simulated sensor in the unit of its channel: far below what any effect does

@@ -27,6 +27,7 @@ EFFECT = Effect(
     formula="-stiffness_nm_rad * fmin(fmax(angle_rad, -half_gap_rad), half_gap_rad)",
     kinks=lambda values: (-values[0], values[0]),
     leans_on=("stiffness",),
+    rests_within_rad=lambda values: values[3],
     stays="the rest angle within the gap is not known before the run",
     separated_by="from cubic stiffness and cogging: excite at a small and at a large amplitude",
 )

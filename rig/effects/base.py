@@ -177,6 +177,8 @@ class Effect:
     # stiffness_nm_rad and its own parameters by their key; empty where it has memory.
     formula: str = ""
     foreseen: bool = True  # False: nobody knows before a run what it will do in it (its phase, say)
+    # Of (J, C, K, *values): the platform may rest this far to either side of where its spring would hold it.
+    rests_within_rad: Callable[[tuple[float, ...]], float] | None = None
     stays: str = ""  # what of it no torque that is computed before a run takes away, and why: one clause
 
     @property

@@ -30,6 +30,7 @@ EFFECT = Effect(
     kernel=_level,
     formula="level_nm",
     other_minima=_others,
+    rests_within_rad=lambda values: values[3] / values[2] if values[2] > 0.0 else 0.0,
     stays="friction holds the platform anywhere within a band, so its rest angle is not known before the run",
     separated_by="from Stribeck and presliding friction: ramp slowly, hold and release; excite at several amplitudes",
 )

@@ -34,6 +34,7 @@ EFFECT = Effect(
     ordered=(("coulomb", "static"),),
     nests=("coulomb_friction",),
     from_special={"coulomb_friction": lambda v: {"coulomb": v[0], "static": v[0]}},
+    rests_within_rad=lambda values: values[3] / values[2] if values[2] > 0.0 else 0.0,
     stays="friction holds the platform anywhere within a band, so its rest angle is not known before the run",
     separated_by="from Coulomb friction: spend more time at low speed; ramp slowly, hold and release",
 )

@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.proof.compensation import cancelled, compensated, linear_part, rounded
+from identify.proof.compensation import cancelled, compensated, linear_part
+from identify.proof.deviation import deviation, simulated_run
 from identify.proof.drive import Drive, latency_of
 from identify.proof.plan import ALL, PLAIN, announced, not_cancelled, plan_proof
+from identify.proof.rounding import feedback, rounded
 from rig import effects
 from rig.errors import PreflightRefusal
 from rig.excitation import CompensatedSet, PlannedSet, Sine
@@ -21,6 +23,7 @@ from rig.signals import TorqueHold
 
 LINEAR = Platform(0.0203, 0.0447, 681.2)
 SET = PlannedSet("3 Hz", Sine(torque_nm=60.0, frequency_hz=3.0, duration_s=3.0))
+DRIVE = Drive(1e-3, "zero_order")
 HOLDS: tuple[TorqueHold, ...] = ("zero_order", "band_limited")
 SMOOTH = {
     "quadratic_damping": {"factor": 0.01},
@@ -92,7 +95,7 @@ def test_effects_of_one_platform_are_cancelled_together() -> None:
     both = with_effects(
         coulomb_friction={"level": 1.0}, cubic_stiffness={"factor": 1000.0}, torque_delay={"delay": 1e-3}
     )
-    assert left_of(both, "zero_order") < 0.05
+    assert left_of(both, "zero_order") < 0.07  # of which 0.05 by where in the band of the friction it rests
 
 
 def test_an_effect_that_is_left_out_stays_as_it_was() -> None:
@@ -116,7 +119,7 @@ def test_commands_of_a_drive_that_rounds_are_its_steps_and_do_not_excite_the_pla
     time_s = np.arange(10_000) * 1e-3
     wanted, step_nm = 5.0 * np.sin(2.0 * math.pi * 3.0 * time_s), 0.12
     natural = math.sqrt(LINEAR.stiffness_nm_rad / LINEAR.inertia_kg_m2)
-    shaped = rounded(wanted, step_nm, natural * 1e-3)
+    shaped = rounded(wanted, step_nm, feedback(LINEAR, 1e-3, 10.0))
     np.testing.assert_allclose(shaped / step_nm, np.rint(shaped / step_nm), atol=1e-9)
     turn = np.exp(-1j * natural * time_s)
     plain_rounding = step_nm * np.rint(wanted / step_nm) - wanted
@@ -125,6 +128,23 @@ def test_commands_of_a_drive_that_rounds_are_its_steps_and_do_not_excite_the_pla
 
 def test_a_drive_that_rounds_leaves_no_more_of_a_smooth_effect() -> None:
     assert left_of(with_effects(cubic_stiffness={"factor": 1000.0}), "zero_order", 0.12) < 0.02
+
+
+def test_rounding_does_not_excite_the_resonances_that_an_effect_makes() -> None:
+    heavy = with_effects(flexible_mode={"inertia": 0.02, "frequency": 60.0, "ratio": 0.02})  # as heavy as the platform
+    assert left_of(heavy, "zero_order", 0.12) < 1.5 * left_of(heavy, "zero_order")
+
+
+def test_where_a_gap_lets_the_platform_rest_is_in_what_is_announced() -> None:
+    gap = with_effects(backlash={"half_gap": 1e-3})
+    wanted = compensated(gap, SET, "c", DRIVE)
+    seen = []
+    for aside_rad in (-0.8e-3, -0.4e-3, 0.0, 0.4e-3, 0.8e-3):  # middles of five equal parts of the gap
+        one, other = (deviation(simulated_run(s, gap, DRIVE, False, aside_rad), s, gap, 1e-9) for s in (SET, wanted))
+        seen.append((one.rms**2, other.rms**2))
+    before, after = np.mean(seen, axis=0)
+    left = announced(gap, SET, wanted, DRIVE, angle=False).left
+    assert left > 0.02 and left == pytest.approx(math.sqrt(after / before), rel=0.25)
 
 
 @pytest.mark.parametrize("name", ["coulomb_friction", "cubic_stiffness", "torque_delay"])
