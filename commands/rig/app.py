@@ -120,8 +120,8 @@ def prove(
 
     Refuted effects are excluded and the search is repeated.
 
-    Exit codes: 0 all names confirmed, 1 not all, 2 wrong usage or forecast, 3 device fault, 4 safety trip, 70 internal
-    error, 130 Ctrl-C.
+    Exit codes: 0 all names confirmed (but those too small to be seen), 1 not all, 2 wrong usage or forecast, 3 device
+    fault, 4 safety trip, 70 internal error, 130 Ctrl-C.
     """
 
     def command(context: CommandContext) -> int:

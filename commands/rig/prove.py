@@ -58,9 +58,11 @@ def prove_folder(context: CommandContext, folder: Path, rival: str | None) -> in
 
 
 def _code(proof: Proof | None) -> int:
-    if proof is None or not proof.effects:
+    """0 where all names are confirmed but those that are too small to be seen, for which no run was played."""
+    if proof is None:
         return NOT_ACCEPTED
-    return OK if all(one.status == "confirmed" for one in proof.effects.values()) else NOT_ACCEPTED
+    judged = [one for one in proof.effects.values() if one.sets]
+    return OK if judged and all(one.status == "confirmed" for one in judged) else NOT_ACCEPTED
 
 
 class ExistingFolder(ResultsFolder):

@@ -25,6 +25,8 @@ PLANNING_ATTEMPTS = 12  # torques of one set that are tried, each smaller than t
 # rings on from wherever friction or a gap held it when the set began: with 1 N m on 681 N m/rad that took 0.25 deg of a
 # travel of 10 deg (`rig prove` on the default campaign), and the guard adds what the gyro may have drifted.
 RESERVE = 0.92
+# Share left, beyond the one announced, from which a name explains less than half of the error's power.
+REFUTED = 0.7
 BACK_OFF = 0.98  # below what the pre-flight allows, for a compensation that does not shrink in proportion
 
 
@@ -62,12 +64,16 @@ class ProofPlan:
         Variant -> set -> what its model says of it (see ``pair_of``).
     torque_scale
         Set -> the factor on its torque, where it had to be reduced.
+    too_small
+        Effect -> the share that the model announces to stay of what comes back without it alone: more than would refute
+        it in every set, so that playing that tells nothing, and it is not played.
     """
 
     runs: tuple[PlannedRun, ...]
     models: Mapping[str, Platform]
     announced: Mapping[str, Mapping[str, Announced]]
     torque_scale: Mapping[str, float] = field(default_factory=dict)
+    too_small: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def sets(self) -> tuple[PlannedSet, ...]:
@@ -142,7 +148,15 @@ def plan_proof(
         for variant, (of, _) in models.items():
             without, better = pair_of(variant)
             announcements[variant][asked.name] = announced(of, made[without], made[better], drive, angle)
-    return ProofPlan(tuple(runs), {v: of for v, (of, _) in models.items()}, announcements, scales)
+    small = {
+        variant: min(one.left for one in announcements[variant].values())
+        for variant, (_, left_out) in models.items()
+        if left_out and sets and all(one.left > REFUTED for one in announcements[variant].values())
+    }
+    return ProofPlan(
+        tuple(run for run in runs if run.variant not in small),
+        {v: of for v, (of, _) in models.items() if v not in small}, announcements, scales, small,
+    )  # fmt: skip
 
 
 def pair_of(variant: str) -> tuple[str, str]:

@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from identify.proof.deviation import Deviation, deviation, explained_left, share_left
-from identify.proof.plan import ALL, PLAIN, ProofPlan, not_cancelled, pair_of
+from identify.proof.plan import ALL, PLAIN, REFUTED, ProofPlan, not_cancelled, pair_of
 from identify.proven import EffectProof, Proof, ProofLines, ProofSet, ProofStatus, Share
 from identify.results import NORMAL_95
 from identify.wording import plain as plain_words
@@ -24,8 +24,6 @@ CONFIRMED = 0.10
 AS_ANNOUNCED = 1.5
 # Reduced chi-square at which what is left is noise.
 AT_NOISE = 1.2**2
-# Share left, beyond the one announced, from which a name explains less than half of the error's power.
-REFUTED = 0.7
 # Times the error of another name by which it is no better and no worse: less than the models' own numbers move it.
 MIN_ERROR_RATIO = 1.1
 # Error without compensation over the announced one: from here on the name explains less than a quarter of its power.
@@ -52,14 +50,23 @@ def judge(plan: ProofPlan, recording: Recording, model: Platform) -> Proof:
     total = proofs.pop(ALL)
     rivals = {name: one for name, one in proofs.items() if " / " in name}
     single = {name: one for name, one in proofs.items() if name not in rivals}
-    if not single:
+    if not single and not plan.too_small:
         single = {name: total for name in model.effects if effects.get(name).cancelled_by_torque}
+    single |= {name: _too_small(left) for name, left in plan.too_small.items()}
     total, single = _numbers_or_name(plan, recording, total, single)
     total, single, rivals = _compared(plan, sets, found, total, single, rivals)
     return Proof(
         total, {name: _told_beforehand(name, one) for name, one in single.items()}, rivals, not_cancelled(model),
         plan.torque_scale, tuple(_lines(name, plan, found) for name in sets),
     )  # fmt: skip
+
+
+def _too_small(left: float) -> EffectProof:
+    """Of a name without which alone nothing was played."""
+    why = (
+        f"{_percent(left)} or more of its part would remain beside what stays of the others, so it was not tried alone"
+    )
+    return EffectProof("cannot be told", why, None, left, ())
 
 
 Found = Mapping[tuple[str, str], Deviation]
@@ -144,6 +151,8 @@ def status_of(
     if share is None:
         return "cannot be told", "without compensation, the error does not exceed the sensor's noise"
     went = f"{_percent(share.gone)} of the error was cancelled ({_interval(share)})"
+    if share.gone < 0.0:
+        went = f"the error grew to {share.left:.3g} times what it was"
     sentence = f"{went}; {_percent(1.0 - announced)} was predicted"
     near = max(CONFIRMED, AS_ANNOUNCED * announced)
     if announced > REFUTED:

@@ -25,6 +25,10 @@ def plan_lines(plan: ProofPlan, model: Platform) -> list[str]:
         for name, (left, _) in plan.announced[variant].items():
             if left > NOTABLE:
                 lines.append(f"  {name}: about {percent(left)} of the error {_of(variant)} will remain")
+    lines += [
+        f"  {capital(plain(name))}: too small to be seen beside what stays of the others, so no set leaves out it alone"
+        for name in plan.too_small
+    ]
     for name in model.effects:
         effect = effects.get(name)
         if effect.cancelled_by_torque and effect.stays:

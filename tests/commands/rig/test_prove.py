@@ -119,6 +119,16 @@ def test_a_rival_is_played_too_and_the_worse_one_refuted(tmp_path: Path, monkeyp
     assert "proof: 5 Hz, quadratic_damping compensated" in names(folder)
 
 
+def test_a_name_too_small_to_be_seen_does_not_take_the_zero_from_the_exit_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = campaign(tmp_path, monkeypatch, named({**TRUE.effects, "torque_delay": {"delay": 1e-8}}))
+    done = command(app, "prove", folder)
+    assert done.exit_code == 0, done.output
+    assert result(folder)["proof"]["effects"]["torque_delay"]["status"] == "cannot be told"
+    assert "too small to be seen" in done.stderr and not any("torque_delay" in name for name in names(folder))
+
+
 def test_an_unknown_rival_is_said_and_nothing_moves(folder: Path) -> None:
     before = contents(folder)
     done = command(app, "prove", folder, "--rival", "backlash")

@@ -90,6 +90,27 @@ def test_of_several_each_is_judged_by_what_comes_back_without_it() -> None:
     assert proof.effects["cubic_stiffness"].sets[0].without == "proof: 1 Hz, all but cubic_stiffness"
 
 
+def test_a_name_too_small_to_be_seen_is_not_played_without_and_takes_nothing_from_the_others() -> None:
+    late = with_effects(coulomb_friction={"level": 1.0}, torque_delay={"delay": 2e-6})
+    plan = plan_proof(late, SETS, ALLOWED, DRIVE)
+    assert {run.variant for run in plan.runs} == {PLAIN, ALL, "coulomb_friction"}
+    assert list(plan.too_small) == ["torque_delay"]
+    assert any("Torque delay: too small to be seen" in line for line in plan_lines(plan, late))
+    proof = judge(plan, recorded(late, plan), late)
+    assert {name: one.status for name, one in proof.effects.items()} == {
+        "coulomb_friction": "confirmed", "torque_delay": "cannot be told"
+    }  # fmt: skip
+    assert (
+        "was not tried alone" in " ".join(lines(proof)) and proof_json(proof)["effects"]["torque_delay"]["gone"] is None
+    )
+
+
+def test_an_error_that_grew_is_said_so() -> None:
+    assert status_of(Share(3.5, (3.0, 4.0)), 0.05, 50.0**2)[1].startswith(
+        "the error grew to 3.5 times what it was; 95 %"
+    )
+
+
 def test_a_name_that_leaves_another_effect_is_not_all_of_it() -> None:
     total = proof_of(with_effects(coulomb_friction={"level": 0.03}, **CUBIC.effects), CUBIC).total
     assert total.status == "partly" and "The rest has another cause" in total.why
