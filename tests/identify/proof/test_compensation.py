@@ -126,6 +126,15 @@ def test_commands_of_a_drive_that_rounds_are_its_steps_and_do_not_excite_the_pla
     assert abs(np.sum((shaped - wanted) * turn)) < 0.1 * abs(np.sum(plain_rounding * turn))
 
 
+@pytest.mark.parametrize(
+    ("hold", "resolution_nm"), [("zero_order", None), ("zero_order", 0.12), ("band_limited", None)]
+)
+def test_the_torque_of_one_tick_is_that_of_many(hold: TorqueHold, resolution_nm: float | None) -> None:
+    made = compensated(with_effects(cogging=SMOOTH["cogging"]), SET, "c", Drive(1e-3, hold, resolution_nm))
+    time_s = np.concatenate([1e-3 * np.arange(-3, 3010), np.linspace(-0.01, made.duration_s + 0.01, 777)])
+    np.testing.assert_array_equal([made.torque(one) for one in time_s.tolist()], made.torque(time_s))
+
+
 def test_a_drive_that_rounds_leaves_no_more_of_a_smooth_effect() -> None:
     assert left_of(with_effects(cubic_stiffness={"factor": 1000.0}), "zero_order", 0.12) < 0.02
 
