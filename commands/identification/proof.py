@@ -37,8 +37,10 @@ def why_no_proof(found: Identification) -> str:
     from identify.proof.compensation import cancelled
 
     model = found.final.platform
-    if found.aborted or model is None:
+    if model is None:
         return "the identification gave no model"
+    if found.aborted:
+        return "the identification was stopped before its end: identify again from the recording first"
     if found.torque_free:
         return (
             "no torque was recorded, so only ratios to the inertia are known and no compensating torque can be computed"

@@ -15,6 +15,7 @@ from commands.identification.proof import ProofPart, prove, why_no_proof
 from commands.identification.results import conclude
 from commands.terminal.exit_codes import NOT_ACCEPTED, OK, exit_code_of
 from rig.errors import RecordingError, UsageError
+from rig.recording.results import journals_of
 
 if TYPE_CHECKING:
     from identify.proven import Proof
@@ -23,9 +24,14 @@ if TYPE_CHECKING:
     from rig.recording.run import Recording
 
 
+PROOF_FILES = "proof"  # what the names of its journals begin with
+
+
 def prove_folder(context: CommandContext, folder: Path, rival: str | None) -> int:
     """Play the proof of what a results folder found; returns the exit code. Raises UsageError."""
     found, recording, identified_runs = _read(folder)
+    if found.aborted and _has_proof(folder):  # a proof was cut short: of a search that was, none is played
+        found = dataclasses.replace(found, aborted=False)
     why = why_no_proof(found)
     if why:
         raise UsageError(f"{folder}: nothing to prove: {why}. Nothing was moved.")
@@ -34,8 +40,6 @@ def prove_folder(context: CommandContext, folder: Path, rival: str | None) -> in
     before = recording.info.get("played_on")
     if backend != before:
         return _rehearsed(context, folder, loaded, found, recording, rival, f"{before or 'recorded'} backend")
-    from rig.recording.results import journals_of
-
     journals = tuple(path.name for path in journals_of(folder))
     if not journals:
         raise RecordingError(
@@ -44,7 +48,7 @@ def prove_folder(context: CommandContext, folder: Path, rival: str | None) -> in
     names = frozenset(run.name for run in recording.runs)
     existing = ExistingFolder(folder)
     context.folder = existing
-    first = 1 + sum(name.startswith("proof") for name in journals)
+    first = 1 + sum(name.startswith(PROOF_FILES) for name in journals)
     earlier = PlayedCampaign(recording, names, None, journals)
     proved = prove(context, loaded, existing, earlier, found, rival, first=first)
     runs = proved.recording.runs
@@ -55,6 +59,10 @@ def prove_folder(context: CommandContext, folder: Path, rival: str | None) -> in
     if proved.played.cause is not None:
         return exit_code_of(proved.played.cause)
     return _code(proved.found.proof)
+
+
+def _has_proof(folder: Path) -> bool:
+    return any(path.name.startswith(PROOF_FILES) for path in journals_of(folder))
 
 
 def _code(proof: Proof | None) -> int:

@@ -14,6 +14,7 @@ import yaml
 
 from commands.identify_run.app import app as identify_run
 from commands.rig.app import app
+from identify.report.report_data import FILE, image_of, read_report_data
 from rig.config.load import check_config
 from rig.errors import DeviceFault
 from rig.interface import Exchange, GyroSample, Statement, Torque
@@ -229,6 +230,28 @@ def test_what_cuts_a_proof_short_keeps_every_sample_and_the_results(
     assert len(read_recording_h5(folder / "recording.h5").runs[-1].time_s) > 100
     new = result(folder)
     assert new["aborted"] is True and new["after"] == old["after"] and new["verdict"] == old["verdict"]
+
+
+def test_after_a_proof_that_was_cut_short_another_can_be_played(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as failing:
+        put_on_stage(failing, FailingRig(0.9, trips=True))
+        assert command(app, "prove", folder).exit_code == 4
+    first = (folder / "proof.journal").read_bytes()
+    done = command(app, "prove", folder)
+    assert done.exit_code == 0, done.output
+    assert result(folder)["aborted"] is False and result(folder)["proof"]["status"] == "confirmed"
+    assert (folder / "proof.journal").read_bytes() == first and (folder / "proof_2.journal").exists()
+    assert names(folder) == [*SETS, PROOF[0], *(name.replace("proof", "proof 2", 1) for name in PROOF)]
+
+
+def test_an_identification_that_was_stopped_is_not_proved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = campaign(tmp_path, monkeypatch)
+    stored = read_report_data(folder / FILE)
+    image = image_of(replace(stored, identification=replace(stored.identification, aborted=True)))
+    assert image is not None
+    (folder / FILE).write_bytes(image)
+    done = command(app, "prove", folder)
+    assert done.exit_code == 2 and "was stopped before its end: identify again" in done.stderr
 
 
 def test_ctrl_c_while_the_search_runs_again_leaves_the_proof(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -78,6 +78,7 @@ def test_every_effect_without_memory_on_the_shaft_has_a_formula() -> None:
         effect = effects.get(name)
         memoryless = effect.place in (Place.LOAD, Place.FRICTION) and not effect.states and effect.foreseen
         assert bool(effect.formula) == memoryless, name
+    assert set(GIVEN) == {name for name in effects.names() if effects.get(name).formula}  # what is compiled below
 
 
 def test_c_compiles_without_a_warning_and_agrees_with_python(tmp_path: Path) -> None:
