@@ -154,7 +154,7 @@ def status_of(
     if share.gone < 0.0:
         went = f"the error grew to {share.left:.3g} times what it was"
     sentence = f"{went}; {_percent(1.0 - announced)} was predicted"
-    near = max(CONFIRMED, AS_ANNOUNCED * announced)
+    near = max(CONFIRMED, min(AS_ANNOUNCED * announced, 0.5 * (1.0 + announced)))  # half of what was to go, at least
     if announced > REFUTED:
         return _of_little(announced, over_announced, sentence)
     if share.left <= near or chi_square <= AT_NOISE:

@@ -191,7 +191,8 @@ def test_the_share_takes_the_noise_off_and_its_interval_holds_the_truth() -> Non
     ("left", "low", "announced", "status"),
     [
         (0.05, 0.04, 0.01, "confirmed"), (0.25, 0.2, 0.2, "confirmed"), (0.25, 0.2, 0.05, "partly"),
-        (0.9, 0.65, 0.05, "partly"), (0.9, 0.8, 0.05, "refuted"), (1.0, 0.99, 0.95, "cannot be told"),
+        (0.9, 0.65, 0.05, "partly"), (0.99, 0.5, 0.68, "partly"), (0.83, 0.5, 0.68, "confirmed"),
+        (0.9, 0.8, 0.05, "refuted"), (1.0, 0.99, 0.95, "cannot be told"),
     ],
 )  # fmt: skip
 def test_the_limits_of_the_verdict(left: float, low: float, announced: float, status: str) -> None:
