@@ -109,6 +109,11 @@ class Devices:
         self._folder.cleanup()
 
 
+def ports_of(devices: Devices) -> tuple[str, str]:
+    """The settings by which a host finds emulated devices."""
+    return f"bench.gyroscope.port={devices.ports['gyro']}", f"bench.amplifier.can.channel={devices.ports['can']}"
+
+
 @dataclass
 class Host:
     """A process that plays on emulated devices, by `rig play` unless told otherwise."""
@@ -119,17 +124,21 @@ class Host:
     command: str = "play"
     terminal: str | None = None  # a terminal of its own, that it loses when the other end is closed
     log: Path | None = None  # where it says what it says; beside the folder unless told otherwise
+    results: Path | None = None  # where its results go, which would be written over what it says
     process: Started = field(init=False)
 
     def __post_init__(self) -> None:
-        ports = self.devices.ports
-        line = [self.command, CONFIG, "--yes", "--out", str(self.folder)]
-        taken = (f"bench.gyroscope.port={ports['gyro']}", f"bench.amplifier.can.channel={ports['can']}")
-        for override in (*taken, *self.overrides):
-            line += ["--set", override]
         self.log = self.log or self.folder.with_suffix(".log")
         said = self.terminal or str(self.log)
-        self.process = parent().start("host", line, self.terminal or os.devnull, said, said)
+        results = self.terminal or str(self.results or self.log)
+        self.process = parent().start("host", self.line(), self.terminal or os.devnull, results, said)
+
+    def line(self) -> list[str]:
+        """What follows `rig`."""
+        line = [self.command, CONFIG, "--yes", "--out", str(self.folder)]
+        for override in (*ports_of(self.devices), *self.overrides):
+            line += ["--set", override]
+        return line
 
     def send(self, *signals: int) -> float:
         """Signals, one after the other; the moment of the first."""
@@ -184,20 +193,21 @@ class Recovered:
     in_set: bool = False
 
 
-def recovered(folder: Path) -> Recovered:
-    """Read the journal and the raw capture of a folder as `rig recover` does."""
+def recovered(folder: Path, part: str = "") -> Recovered:
+    """Read the journal and the raw capture of a folder as `rig recover` does, or those of a further part of it."""
+    raw, journal_file = folder / "raw" / part, folder / f"{part or 'recording'}.journal"
     starts: list[float] = []
     in_set = False
     last_tick: float | None = None
     try:
-        for entry in read_capture(folder / "raw" / FILE_NAME):
+        for entry in read_capture(raw / FILE_NAME):
             if entry.kind == MARK:
                 mark = json.loads(entry.payload)
                 in_set = mark["mark"] == "begin_set"
                 starts += [float(mark["start_s"])] if in_set else []
             elif entry.kind == TICK:
                 last_tick = entry.time_s
-        journal = read_journal(folder / "recording.journal")
+        journal = read_journal(journal_file)
     except RigError as problem:
         return Recovered(None, last_tick, None, str(problem))
     verdicts = [event.values["verdict_s"] for event in journal.events if event.values.get("verdict_s") is not None]

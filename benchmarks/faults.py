@@ -65,19 +65,19 @@ def one_try(case: Case, after_s: float, folder: Path) -> Outcome:
             host = Host(devices, folder, (*SHORT, *case.overrides), terminal=case.terminal())
             if devices.wait_for(("enabled",), 30.0) is None:
                 host.ended(1.0)
-                return _nothing(f"the drive was never enabled: {host.said}")
+                return never_on(f"the drive was never enabled: {host.said}")
             devices.wait_for(("nothing",), TO_THE_SET_S + after_s)
             fault_s = case.strike(devices, host)
         code = host.ended(HANGS_S)
         devices.wait_for(("nothing",), 0.4)  # until the drive's own watchdog has had its time
-        return _judged(case, devices, host, code, fault_s, recovered(folder))
+        return judged(case, devices, host, code, fault_s, recovered(folder))
 
 
-def _nothing(why: str) -> Outcome:
+def never_on(why: str) -> Outcome:
     return Outcome(None, math.nan, math.nan, math.nan, math.nan, why, (why,), disturbed=True)
 
 
-def _judged(case: Case, devices: Devices, host: Host, code: int | None, fault_s: float, found: Recovered) -> Outcome:
+def judged(case: Case, devices: Devices, host: Host, code: int | None, fault_s: float, found: Recovered) -> Outcome:
     zero = devices.first(OFF, fault_s)
     zero_s = float(zero["time_s"]) - fault_s if zero is not None else math.nan
     verdict_s = found.verdict_s - case.ahead_s - fault_s if found.verdict_s is not None else math.nan
@@ -177,7 +177,7 @@ def main(given: Sequence[str] | None = None) -> int:
         concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool,
     ):
         waiting = {
-            pool.submit(undisturbed, case, _moment_s(arguments.seed, case.name, k), Path(scratch) / f"{n}"): case
+            pool.submit(undisturbed, case, moment_s(arguments.seed, case.name, k), Path(scratch) / f"{n}"): case
             for n, (case, k) in enumerate(todo)
         }
         for future in concurrent.futures.as_completed(waiting):
@@ -196,7 +196,7 @@ def main(given: Sequence[str] | None = None) -> int:
     return failed
 
 
-def _moment_s(seed: int, name: str, k: int) -> float:
+def moment_s(seed: int, name: str, k: int) -> float:
     """When in the set: random, and the same whenever the benchmark is run with this seed."""
     return random.Random(f"{seed} {name} {k}").uniform(0.1, 0.6 * SET_S)
 

@@ -99,6 +99,8 @@ def sized(name: str, share: float, rng: np.random.Generator) -> dict[str, float]
     torque = SETS[1][0] * np.sin(2.0 * math.pi * SETS[1][1] * time_s)
     motion = simulate(TRUE, time_s, TorqueSignal(time_s, torque))
     acts = along(replace(TRUE, effects={name: given}), name, time_s, motion, torque)
+    if not np.any(acts):  # a constant torque shifts the rest angle and moves nothing
+        return given
     factor = share * float(np.sqrt(np.mean(torque**2)) / np.sqrt(np.mean(acts**2)))
     return given | {p.name: factor * given[p.name] for p in effect.parameters if p.linear}
 
@@ -150,6 +152,18 @@ def fitted(recording: Recording, name: str, start: Mapping[str, float]) -> Ident
     """The model with one effect of that name, its numbers fitted from ``start``; nothing else is searched for."""
     settings = config_of({}, 1).identify.model_copy(update={"candidates": ()})
     return identify(replace(recording, info={}), replace(TRUE, effects={name: dict(start)}), settings)
+
+
+def with_known_scale(model: Platform, scale: float) -> Platform:
+    """The same model with a known scale of the torque, of which torque and rate tell only its ratios to J, C and K."""
+    own = model.effects.get("torque_scale")
+    if own is None:
+        return model
+    times = scale / own["scale"]
+    return replace(
+        model, inertia_kg_m2=times * model.inertia_kg_m2, damping_nm_s_rad=times * model.damping_nm_s_rad,
+        stiffness_nm_rad=times * model.stiffness_nm_rad, effects={**model.effects, "torque_scale": {"scale": scale}},
+    )  # fmt: skip
 
 
 def proved(

@@ -13,7 +13,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from benchmarks.proof.rigs import SHAPES, SMOOTH, Outcome, campaign, config_of, fitted, proved, sized
+from benchmarks.proof.rigs import (
+    SHAPES, SMOOTH, Outcome, campaign, config_of, fitted, proved, sized, with_known_scale,
+)  # fmt: skip
 from identify.proven import EffectProof, ProofSet
 from rig import effects
 from rig.errors import RigError
@@ -75,16 +77,13 @@ def one_proof(hidden: str, declared: str, seed: int) -> Outcome:
     model = fitted(recording, declared, start).final.platform
     if model is None or declared not in model.effects:
         return Outcome(model, None, "dropped by the identification")
-    return proved(config, recording, model, seed)
+    return proved(config, recording, with_known_scale(model, values.get("scale", 1.0)), seed)
 
 
 def _start(hidden: str, declared: str, values: Mapping[str, float], rng: np.random.Generator) -> dict[str, float]:
     """Where the fit begins: a fifth off the truth, or the usual size of a wrong effect."""
     begin = values if hidden == declared else SHAPES[declared]
-    start = {k: float(v) * float(rng.uniform(0.8, 1.2)) for k, v in begin.items()}
-    if "scale" in begin:  # of which no torque is the value 1; torque and rate alone do not tell it, so it stays
-        start["scale"] = 1.0 + (float(begin["scale"]) - 1.0) * start["scale"] / float(begin["scale"])
-    return start
+    return {k: float(v) * float(rng.uniform(0.8, 1.2)) for k, v in begin.items()}
 
 
 def effects_table(names: list[str], seeds: int) -> None:
