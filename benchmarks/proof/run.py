@@ -13,9 +13,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from benchmarks.proof.rigs import (
-    SHAPES, SMOOTH, Outcome, campaign, config_of, fitted, proved, sized, with_known_scale,
-)  # fmt: skip
+from benchmarks.proof import rigs
+from benchmarks.proof.rigs import SHAPES, SMOOTH, Outcome, campaign, config_of, fitted, proved, sized
 from identify.proven import EffectProof, ProofSet
 from rig import effects
 from rig.errors import RigError
@@ -77,7 +76,7 @@ def one_proof(hidden: str, declared: str, seed: int) -> Outcome:
     model = fitted(recording, declared, start).final.platform
     if model is None or declared not in model.effects:
         return Outcome(model, None, "dropped by the identification")
-    return proved(config, recording, with_known_scale(model, values.get("scale", 1.0)), seed)
+    return proved(config, recording, rigs.with_known_scale(model, values.get("scale", 1.0)), seed)
 
 
 def _start(hidden: str, declared: str, values: Mapping[str, float], rng: np.random.Generator) -> dict[str, float]:

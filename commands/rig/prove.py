@@ -66,10 +66,13 @@ def _has_proof(folder: Path) -> bool:
 
 
 def _code(proof: Proof | None) -> int:
-    """0 where all names are confirmed but those that are too small to be seen, for which no run was played."""
+    """0 where all names are confirmed but those that by the model are too small to be seen beside the others."""
+    from identify.proof.plan import REFUTED
+
     if proof is None:
         return NOT_ACCEPTED
-    judged = [one for one in proof.effects.values() if one.sets]
+    several = proof.effects.values()
+    judged = [one for one in several if not (one.status == "cannot be told" and one.announced_left > REFUTED)]
     return OK if judged and all(one.status == "confirmed" for one in judged) else NOT_ACCEPTED
 
 
