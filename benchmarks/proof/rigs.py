@@ -62,7 +62,6 @@ SHAPES: Mapping[str, Mapping[str, float]] = {
     "actuator_lag": {"time": 0.0012},
     "torque_deadzone": {"width": 1.2},
     "torque_scale": {"scale": 1.03},
-    "torque_offset": {"level": 1.0},
     "torque_saturation": {"limit": 52.0},
     "periodic_disturbance": {"sine": 0.2, "cosine": 0.1, "frequency": 11.3},
     "sensor_lag": {"time": 0.001},
@@ -99,8 +98,6 @@ def sized(name: str, share: float, rng: np.random.Generator) -> dict[str, float]
     torque = SETS[1][0] * np.sin(2.0 * math.pi * SETS[1][1] * time_s)
     motion = simulate(TRUE, time_s, TorqueSignal(time_s, torque))
     acts = along(replace(TRUE, effects={name: given}), name, time_s, motion, torque)
-    if not np.any(acts):  # a constant torque shifts the rest angle and moves nothing
-        return given
     factor = share * float(np.sqrt(np.mean(torque**2)) / np.sqrt(np.mean(acts**2)))
     return given | {p.name: factor * given[p.name] for p in effect.parameters if p.linear}
 
