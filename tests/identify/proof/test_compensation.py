@@ -135,6 +135,10 @@ def test_the_torque_of_one_tick_is_that_of_many(hold: TorqueHold, resolution_nm:
     np.testing.assert_array_equal([made.torque(one) for one in time_s.tolist()], made.torque(time_s))
 
 
+def test_the_steps_of_a_set_are_no_error_of_a_drive_that_lags() -> None:
+    assert left_of(with_effects(actuator_lag={"time": 0.001}), "zero_order") < 0.01
+
+
 def test_a_drive_that_rounds_leaves_no_more_of_a_smooth_effect() -> None:
     assert left_of(with_effects(cubic_stiffness={"factor": 1000.0}), "zero_order", 0.12) < 0.02
 
