@@ -29,12 +29,18 @@ def identification() -> None:
 
 
 def plants() -> None:
-    """Import every effect, play the simulated rig with its motor, and make the torque of a blind case."""
+    """Make gains, import every effect, play the simulated rig with its motor, and make the torque of a blind case."""
+    import numpy as np  # noqa: PLC0415
+
     from benchmarks.blind import excitations as blind  # noqa: PLC0415
     from rig import effects  # noqa: PLC0415
+    from rig.dynamics.gains import Noise, Sensing, gains_of  # noqa: PLC0415
+    from rig.dynamics.linear_part import LinearPart  # noqa: PLC0415
     from rig.excitation import Sine  # noqa: PLC0415
     from tests.sim_backend.test_simulated import DRIVES, config, played  # noqa: PLC0415
 
+    # First, while the other process compiles the simulation: it needs these next.
+    gains_of(LinearPart(0.02, 0.05, 700.0), Noise(1e-3, 0.1), 1e-3, Sensing(True), np.ones(9, bool), [(0, 8)])
     for name in effects.names():
         effects.get(name)
     effects.free_forms()

@@ -24,13 +24,12 @@ def serial_ports() -> list[Any]:
 
 def can_adapters() -> list[Any]:
     """The CAN adapters that python-can finds: interface, channel, and more."""
-    import can
-    from can.interfaces import BACKENDS
+    from drivers import can
 
     earlier = logging.root.manager.disable
     logging.disable(logging.CRITICAL)  # python-can reports every interface whose library is not installed
     try:
-        return list(can.detect_available_configs([name for name in BACKENDS if name not in NO_ADAPTERS]))
+        return list(can.detect_available_configs([name for name in can.interfaces.BACKENDS if name not in NO_ADAPTERS]))
     finally:
         logging.disable(earlier)
 

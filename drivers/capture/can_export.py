@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,8 +13,14 @@ import can
 from drivers.capture.wire_capture import CAN_READ, CAN_SENT, read_capture, unpack_frame
 from rig.errors import RecordingError, UsageError
 
+
+def _mf4_writer(path: str) -> Any:
+    """Of python-can, which was imported as if asammdf were not there (see ``drivers``)."""
+    return importlib.reload(importlib.import_module("can.io.mf4")).MF4Writer(path)
+
+
 # Times in these formats begin at the first frame; the host's clock counts from when the machine was switched on.
-WRITERS: Mapping[str, Callable[..., Any]] = {"blf": can.BLFWriter, "asc": can.ASCWriter, "mf4": can.MF4Writer}
+WRITERS: Mapping[str, Callable[..., Any]] = {"blf": can.BLFWriter, "asc": can.ASCWriter, "mf4": _mf4_writer}
 
 
 def check_installed(name: str) -> None:

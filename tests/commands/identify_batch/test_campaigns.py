@@ -9,7 +9,7 @@ import pytest
 
 from commands.identify_batch.campaigns import campaigns_of, content_of, inputs_of, keeps_apart
 from rig.errors import UsageError
-from tests.commands.identify_batch.campaigns import RECORDED
+from tests.commands.identify_batch.campaigns import recorded as recorded_from
 
 
 def write(path: Path, text: str = "x") -> Path:
@@ -27,7 +27,7 @@ def test_a_folder_stands_for_the_recording_in_it_and_each_campaign_comes_once(tm
 
 
 def test_a_yaml_counts_if_it_is_recorded_or_cannot_be_read(tmp_path: Path) -> None:
-    recorded = write(tmp_path / "recorded.yaml", RECORDED.format(file="run.csv"))
+    recorded = write(tmp_path / "recorded.yaml", recorded_from("run.csv"))
     damaged = write(tmp_path / "damaged.yaml", "backend: [")
     write(tmp_path / "model.yaml", "inertia_kg_m2: 0.02\n")
     write(tmp_path / "played.yaml", "backend: simulated\nsimulated: {}\n")
@@ -44,20 +44,20 @@ def test_a_pattern_without_a_match_is_refused_with_what_to_give(tmp_path: Path) 
 
 def test_all_files_that_a_yaml_names_belong_to_it(tmp_path: Path) -> None:
     model = write(tmp_path / "models" / "model.yaml", "model: {effects_from: own.py}\n")
-    config = write(tmp_path / "rig.yaml", "model: models/model.yaml\n" + RECORDED.format(file="data/run.csv"))
+    config = write(tmp_path / "rig.yaml", "model: models/model.yaml\n" + recorded_from("data/run.csv"))
     expected = {config, model, tmp_path / "models" / "own.py", tmp_path / "data" / "run.csv"}
     assert set(inputs_of(config, ())) == expected
 
 
 def test_any_change_of_what_decides_a_row_shows_in_its_content(tmp_path: Path) -> None:
     data = write(tmp_path / "run.csv", "1,2\n")
-    config = write(tmp_path / "rig.yaml", RECORDED.format(file="run.csv"))
+    config = write(tmp_path / "rig.yaml", recorded_from("run.csv"))
     contents = [content_of(config, (), "1"), content_of(config, (), "2"), content_of(config, ("identify.seed=2",), "1")]
     data.write_text("1,3\n", encoding="utf-8")
     contents.append(content_of(config, (), "1"))
     data.unlink()
     contents.append(content_of(config, (), "1"))
-    config.write_text(RECORDED.format(file="run.csv") + "\n", encoding="utf-8")
+    config.write_text(recorded_from("run.csv") + "\n", encoding="utf-8")
     contents.append(content_of(config, (), "1"))
     assert len(set(contents)) == 6
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -82,3 +84,9 @@ def test_what_a_kill_left_unexported_is_exported_once(tmp_path: Path) -> None:
     (path.with_name("gyro.bin")).write_bytes(b"cut")
     assert [file.name for file in export_if_missing(path, account)] == ["recovered_gyro.bin", "recovered_can.log"]
     assert (path.with_name("gyro.bin")).read_bytes() == b"cut"
+
+
+def test_no_command_waits_for_the_package_of_mf4_logs() -> None:
+    program = "import drivers.transport.can_link, sys; print([m for m in ('asammdf', 'pandas') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
