@@ -132,7 +132,11 @@ def search_in_torque(
     regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
     final = by_likelihood.fit.structure if by_likelihood else best.structure
     say(f"final fit with {joined([plain(e) for e in final.effects]) or 'fewer terms'}")
-    before = _final(regression, base, fitted_on_all(traces, structure, base.values, split.final), traces, split)
+    # In torque the shapes of declared effects stay as they are declared: the likelihood has fitted them.
+    shaped = by_likelihood is not None and known.fit.structure == structure and any(shapes.values())
+    begun, like = (known.fit.values, known.fit) if shaped else (base.values, None)
+    likely = fitted_on_all(traces, structure, begun, split.final, like)
+    before = _final(regression, base, likely, traces, split, trusted=shaped)
 
     def fitted(final: Structure) -> FinalFit:
         if final == structure:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from functools import cache
 
+import numpy as np
 import pytest
 
+from benchmarks.proof.rigs import campaign, config_of, fitted, sized
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.initial_guess import scale_of
 from identify.likelihood.by_prediction_error import fitted_on_all
@@ -98,3 +100,15 @@ def test_where_the_likelihood_leaves_a_multiple_the_numbers_of_least_squares_are
         final = _final(regression, least, (problem, fit), traces, parts, trusted=True)
         assert final.method == by
         assert final.values[level] == pytest.approx(0.02, rel=0.05)
+
+
+@pytest.mark.slow
+def test_shapes_of_a_declared_effect_are_those_of_the_likelihood_also_where_torque_cannot_follow_it() -> None:
+    """A hysteresis cannot be followed along the measured motion; in torque its shapes had stayed as declared."""
+    rng = np.random.default_rng([3, *b"hysteresis"])
+    true = sized("hysteresis", float(rng.uniform(0.02, 0.05)), rng)
+    recording = campaign(config_of({"hysteresis": true}, 3), 3)
+    found = fitted(recording, "hysteresis", {k: float(v * rng.uniform(0.8, 1.2)) for k, v in true.items()})
+    assert found.final.platform is not None
+    assert found.final.platform.effects["hysteresis"] == pytest.approx(true, rel=0.01)
+    assert found.final.platform.inertia_kg_m2 == pytest.approx(0.0203, rel=1e-3)
