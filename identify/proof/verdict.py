@@ -243,9 +243,15 @@ def _compared(
 
 
 def _material(ratio: float, rival: EffectProof, name: EffectProof) -> bool:
-    """Whether what the two leave differs by more than a tenth, and the worse of them leaves more than noise."""
+    """Whether what the two leave differs by more than a tenth, and speaks against the worse of them.
+
+    It does not where that leaves no more than noise, or than it announced: what no torque takes away (friction and gaps
+    hold the platform anywhere in a band before the run) is as large as chance has it, for either.
+    """
     worse = rival if ratio > 1.0 else name
-    return abs(np.log(ratio)) > np.log(MIN_ERROR_RATIO) and _reduced_chi_square(worse.sets) > AT_NOISE
+    expected = worse.share is not None and worse.share.left <= AS_ANNOUNCED * worse.announced_left
+    differs = abs(np.log(ratio)) > np.log(MIN_ERROR_RATIO)
+    return differs and not expected and _reduced_chi_square(worse.sets) > AT_NOISE
 
 
 def _ratio(plan: ProofPlan, pair: str, sets: list[str], found: Found) -> tuple[float, float, float]:

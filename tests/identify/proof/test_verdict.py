@@ -14,9 +14,9 @@ from identify.proof.deviation import Deviation, share_left
 from identify.proof.drive import Drive
 from identify.proof.plan import ALL, PLAIN, RESERVE, ProofPlan, plan_proof
 from identify.proof.seen import expected_peaks
-from identify.proof.verdict import judge, status_of
+from identify.proof.verdict import _material, judge, status_of
 from identify.proof.wording import lines, plan_lines
-from identify.proven import Proof, Share
+from identify.proven import EffectProof, Proof, ProofSet, Share
 from identify.report.proof import proof_json
 from rig.dynamics import Equations, TorqueSignal, simulate
 from rig.excitation import PlannedSet, Sine
@@ -152,6 +152,17 @@ def test_a_name_that_leaves_more_than_its_rival_is_refuted() -> None:
     proof = proof_of(COULOMB, wrong, {"quadratic_damping / coulomb_friction": COULOMB})
     assert proof.effects["quadratic_damping"].status == "refuted"
     assert proof.rivals["quadratic_damping / coulomb_friction"].status == "confirmed"
+
+
+@pytest.mark.parametrize(("announced", "speaks"), [(0.02, True), (0.15, False)])
+def test_what_a_name_said_would_stay_does_not_speak_against_it(announced: float, speaks: bool) -> None:
+    """Stribeck friction announced 15 to 24 % for where it may rest; Coulomb friction in its place had left less."""
+    row = ProofSet("1 Hz", "plain", "better", 1.0, 0.08, 0.001, Share(0.08, (0.07, 0.09)), announced, 1.0)
+    name = EffectProof("confirmed", "", Share(0.08, (0.07, 0.09)), announced, (row,))
+    rival = replace(name, share=Share(0.06, (0.05, 0.07)), announced_left=0.01)
+    assert _material(0.75, rival, name) == speaks
+    assert not _material(0.95, rival, name)
+    assert _material(1.3, replace(rival, share=Share(0.1, (0.09, 0.11))), name)
 
 
 def test_a_rival_that_is_the_same_along_the_motion_cannot_be_told() -> None:
