@@ -64,7 +64,8 @@ def judge(plan: ProofPlan, recording: Recording, model: Platform) -> Proof:
 def _too_small(left: float) -> EffectProof:
     """Of a name without which alone nothing was played."""
     why = (
-        f"{_percent(left)} or more of its part would remain beside what stays of the others, so it was not tried alone"
+        f"at least {_percent(left)} of its error would remain beside what remains of the others, so no set was played "
+        "to test it alone"
     )
     return EffectProof("cannot be told", why, None, left, ())
 
@@ -229,7 +230,7 @@ def _compared(
             f"the error left by compensating {plain_words(name)} is {ratio:.2g} times that of {plain_words(effect)}"
         )
         if low <= 1.0 <= high or not _material(ratio, rival, total):
-            why = f"{reason}, a difference within chance and noise"
+            why = f"{reason}: within chance, noise and what was announced to remain"
             out[pair] = replace(rival, status="cannot be told", why=why)
             if effect in single and single[effect].status == "confirmed":
                 single[effect] = replace(single[effect], status="cannot be told", why=f"confirmed, but {why}")

@@ -26,7 +26,7 @@ def plan_lines(plan: ProofPlan, model: Platform) -> list[str]:
             if left > NOTABLE:
                 lines.append(f"  {name}: about {percent(left)} of the error {_of(variant)} will remain")
     lines += [
-        f"  {capital(plain(name))}: too small to be seen beside what stays of the others, so no set leaves out it alone"
+        f"  {capital(plain(name))}: too small to be seen beside what remains of the others, so no set tests it alone"
         for name in plan.too_small
     ]
     for name in model.effects:
