@@ -229,7 +229,8 @@ def _compared(
         reason = (
             f"the error left by compensating {plain_words(name)} is {ratio:.2g} times that of {plain_words(effect)}"
         )
-        if low <= 1.0 <= high or not _material(ratio, rival, total):
+        worse, model = (rival, plan.models[pair]) if ratio > 1.0 else (total, plan.models[ALL])
+        if low <= 1.0 <= high or not _material(ratio, worse, model):
             why = f"{reason}: within chance, noise and what was announced to remain"
             out[pair] = replace(rival, status="cannot be told", why=why)
             if effect in single and single[effect].status == "confirmed":
@@ -243,16 +244,16 @@ def _compared(
     return total, single, out
 
 
-def _material(ratio: float, rival: EffectProof, name: EffectProof) -> bool:
-    """Whether what the two leave differs by more than a tenth, and speaks against the worse of them.
+def _material(ratio: float, worse: EffectProof, model: Platform) -> bool:
+    """Whether what two models leave differs by more than a tenth, and speaks against the worse of them.
 
-    It does not where that leaves no more than noise, or than it announced: what no torque takes away (friction and gaps
-    hold the platform anywhere in a band before the run) is as large as chance has it, for either.
+    It does not where that leaves no more than noise. Nor where its effects hold the platform anywhere in a band before
+    a run (friction, a gap) and it leaves no more than it announced: that is as large as chance has it.
     """
-    worse = rival if ratio > 1.0 else name
-    expected = worse.share is not None and worse.share.left <= AS_ANNOUNCED * worse.announced_left
+    by_chance = any(effects.get(name).rests_within_rad is not None for name in model.effects)
+    expected = by_chance and worse.share is not None and worse.share.left <= AS_ANNOUNCED * worse.announced_left
     differs = abs(np.log(ratio)) > np.log(MIN_ERROR_RATIO)
-    return differs and not expected and _reduced_chi_square(worse.sets) > AT_NOISE
+    return bool(differs and not expected and _reduced_chi_square(worse.sets) > AT_NOISE)
 
 
 def _ratio(plan: ProofPlan, pair: str, sets: list[str], found: Found) -> tuple[float, float, float]:

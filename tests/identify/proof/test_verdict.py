@@ -152,15 +152,19 @@ def test_a_name_that_leaves_more_than_its_rival_is_refuted() -> None:
     assert proof.rivals["quadratic_damping / coulomb_friction"].status == "confirmed"
 
 
-@pytest.mark.parametrize(("announced", "speaks"), [(0.02, True), (0.15, False)])
-def test_what_a_name_said_would_stay_does_not_speak_against_it(announced: float, speaks: bool) -> None:
+@pytest.mark.parametrize(
+    ("model", "announced", "speaks"), [(COULOMB, 0.02, True), (COULOMB, 0.15, False), (CUBIC, 0.15, True)]
+)
+def test_what_a_name_said_chance_may_leave_does_not_speak_against_it(
+    model: Platform, announced: float, speaks: bool
+) -> None:
     """Stribeck friction announced 15 to 24 % for where it may rest; Coulomb friction in its place had left less."""
-    row = ProofSet("1 Hz", "plain", "better", 1.0, 0.08, 0.001, Share(0.08, (0.07, 0.09)), announced, 1.0)
-    name = EffectProof("confirmed", "", Share(0.08, (0.07, 0.09)), announced, (row,))
-    rival = replace(name, share=Share(0.06, (0.05, 0.07)), announced_left=0.01)
-    assert _material(0.75, rival, name) == speaks
-    assert not _material(0.95, rival, name)
-    assert _material(1.3, replace(rival, share=Share(0.1, (0.09, 0.11))), name)
+    share = Share(0.08, (0.07, 0.09))
+    row = ProofSet("1 Hz", "plain", "better", 1.0, 0.08, 0.001, share, announced, 1.0)
+    worse = EffectProof("confirmed", "", share, announced, (row,))
+    assert _material(0.75, worse, model) == speaks
+    assert not _material(0.95, worse, model)
+    assert not _material(1.3, replace(worse, sets=(replace(row, noise=0.08),)), model)
 
 
 def test_a_rival_that_is_the_same_along_the_motion_cannot_be_told() -> None:
