@@ -248,10 +248,10 @@ def _material(ratio: float, worse: EffectProof, model: Platform) -> bool:
     """Whether what two models leave differs by more than a tenth, and speaks against the worse of them.
 
     It does not where that leaves no more than noise. Nor where its effects hold the platform anywhere in a band before
-    a run (friction, a gap) and it leaves no more than it announced: that is as large as chance has it.
+    a run (friction, a gap) and it is confirmed by itself: what stays of it then is as large as chance has it.
     """
     by_chance = any(effects.get(name).rests_within_rad is not None for name in model.effects)
-    expected = by_chance and worse.share is not None and worse.share.left <= AS_ANNOUNCED * worse.announced_left
+    expected = by_chance and worse.status == "confirmed"
     differs = abs(np.log(ratio)) > np.log(MIN_ERROR_RATIO)
     return bool(differs and not expected and _reduced_chi_square(worse.sets) > AT_NOISE)
 

@@ -16,7 +16,7 @@ from identify.proof.plan import ALL, PLAIN, RESERVE, ProofPlan, plan_proof
 from identify.proof.seen import expected_peaks
 from identify.proof.verdict import _material, judge, status_of
 from identify.proof.wording import lines, plan_lines
-from identify.proven import EffectProof, Proof, ProofSet, Share
+from identify.proven import EffectProof, Proof, ProofSet, ProofStatus, Share
 from identify.report.proof import proof_json
 from rig.dynamics import Equations, TorqueSignal, simulate
 from rig.excitation import PlannedSet, Sine
@@ -153,15 +153,15 @@ def test_a_name_that_leaves_more_than_its_rival_is_refuted() -> None:
 
 
 @pytest.mark.parametrize(
-    ("model", "announced", "speaks"), [(COULOMB, 0.02, True), (COULOMB, 0.15, False), (CUBIC, 0.15, True)]
+    ("model", "alone", "speaks"), [(COULOMB, "partly", True), (COULOMB, "confirmed", False), (CUBIC, "confirmed", True)]
 )
 def test_what_a_name_said_chance_may_leave_does_not_speak_against_it(
-    model: Platform, announced: float, speaks: bool
+    model: Platform, alone: ProofStatus, speaks: bool
 ) -> None:
     """Stribeck friction announced 15 to 24 % for where it may rest; Coulomb friction in its place had left less."""
     share = Share(0.08, (0.07, 0.09))
-    row = ProofSet("1 Hz", "plain", "better", 1.0, 0.08, 0.001, share, announced, 1.0)
-    worse = EffectProof("confirmed", "", share, announced, (row,))
+    row = ProofSet("1 Hz", "plain", "better", 1.0, 0.08, 0.001, share, 0.15, 1.0)
+    worse = EffectProof(alone, "", share, 0.15, (row,))
     assert _material(0.75, worse, model) == speaks
     assert not _material(0.95, worse, model)
     assert not _material(1.3, replace(worse, sets=(replace(row, noise=0.08),)), model)
