@@ -91,7 +91,7 @@ def test_runs_that_begin_in_motion_tell_as_little_and_say_so() -> None:
     ("seed", "begun"),
     [
         pytest.param(0, 1e-4, marks=pytest.mark.slow),
-        (2, 1e-4),
+        pytest.param(2, 1e-4, marks=pytest.mark.slow),
         pytest.param(4, 8.714331e-5, marks=pytest.mark.slow),
         pytest.param(5, 1.293086e-04, marks=pytest.mark.slow),
         pytest.param(7, 6.847339e-5, marks=pytest.mark.slow),

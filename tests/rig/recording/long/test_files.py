@@ -70,6 +70,7 @@ def test_csv_and_parquet_give_what_hdf5_gives(tmp_path: Path) -> None:
         np.testing.assert_allclose(other.torque_nm, runs[0].torque_nm, rtol=1e-9)
 
 
+@pytest.mark.slow  # benchmarks.growth asks it of whole identifications
 def test_memory_does_not_grow_with_the_recording(tmp_path: Path) -> None:
     peaks = []
     for count in (600_000, 2_400_000):
