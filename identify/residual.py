@@ -59,6 +59,7 @@ class ResidualDiagnosis:
     moments: tuple[Moment, ...] = ()  # that hold most of it, the loudest first; empty where it is spread
 
 
+GAIN = "gain of the drive"  # what a drive changes as it runs
 FROM_RUN_TO_RUN = "from run to run"
 
 
@@ -84,7 +85,7 @@ class Dependence:
     wave_on, wave_hz
         Of what is "angle", "rate" or "torque" times a wave over the time: which, and the wave's frequency.
     changes
-        "inertia", "stiffness", "damping", "friction" or "torque of the drive" where one of these, changing with what
+        "inertia", "stiffness", "damping", "friction" or "gain of the drive" where one of these, changing with what
         it depends on, gives this torque; "from run to run" where J, C and K fitted to every run by itself give it.
     """
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from identify.residual import FROM_RUN_TO_RUN, Dependence
+from identify.residual import FROM_RUN_TO_RUN, GAIN, Dependence
 from identify.results import NORMAL_95, Errors, Identification, NotReported, ParameterEstimate
 
 SYMBOLS = {
@@ -236,7 +236,7 @@ def not_reported(several: Sequence[NotReported]) -> list[str]:
     return [capital(f"{plain(item.name.replace('.', ', '))}: {item.reason}") for item in several]
 
 
-PULSATING = {"angle": "stiffness", "rate": "damping", "torque": "torque of the drive"}
+PULSATING = {"angle": "stiffness", "rate": "damping", "torque": GAIN}
 
 
 def depends_on(quantity: str, axis: str) -> str:
@@ -247,7 +247,12 @@ def depends_on(quantity: str, axis: str) -> str:
 
 
 def quantity_of(part: Dependence, axis: str) -> str:
-    """The same of a part of the residual; what changes from run to run depends on the run."""
+    """The same of a part of the residual; what changes from run to run depends on the run.
+
+    What a drive passes on depends on its load before, which is no history of the motion.
+    """
+    if part.changes == GAIN and part.on == "history":
+        return "past force" if axis == "linear" else "past torque"
     return "run" if part.changes == FROM_RUN_TO_RUN else depends_on(part.on, axis)
 
 

@@ -193,6 +193,7 @@ INSEPARABLE: Mapping[str, frozenset[str]] = {
 PART_OF: Mapping[str, frozenset[str]] = {
     "friction_by_angle": frozenset({"coulomb_friction"}),
     "warming_friction": frozenset({"coulomb_friction"}),
+    "two_relaxations": frozenset({"creep"}),  # its first relaxation is the library's
 }
 # Names that are true of a gyro behind a slow low-pass, where nothing was hidden.
 LATE = frozenset({"sensor_lag", "actuator_lag", "torque_delay"})

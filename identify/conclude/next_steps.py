@@ -12,7 +12,7 @@ from identify.diagnose import torque_sensor_noise
 from identify.diagnose.torque_residual import dependence
 from identify.diagnose.wording import is_significant
 from identify.model.parameter_fit import reduced_chi_square
-from identify.residual import FROM_RUN_TO_RUN
+from identify.residual import FROM_RUN_TO_RUN, GAIN
 from identify.results import GeneticRun, Identification, ResidualDiagnosis, RunTraces, follow_up_file_name
 from identify.runs.sign_convention import SENTENCE
 from identify.wording import PULSATING, capital, joined, number, plain
@@ -50,6 +50,10 @@ BETWEEN_RUNS = (
     "J, C and K of the runs differ, and no effect here explains why: play the same frequency at half and at twice the "
     "torque, and then once more as before. If the numbers follow the travel, the platform or a sensor is nonlinear "
     "(compare a sensor's scale at small and large rates); if they do not return, the rig changed between the runs."
+)
+DRIVE_CHANGES = (
+    "The drive passes on another share of the torque as it runs: look for a motor that warms up, a current limit by "
+    "temperature or a supply that sags. Record the motor's current and take the torque from that."
 )
 CHANGING = {
     "inertia": "a crank, a linkage, a load that shifts or a second axis that stands elsewhere",
@@ -230,6 +234,8 @@ def _changing(found: Identification) -> str:
     most = max(parts, key=lambda d: d.relative, default=None)
     if most is not None and most.changes == FROM_RUN_TO_RUN:
         return BETWEEN_RUNS
+    if most is not None and most.changes == GAIN:
+        return DRIVE_CHANGES
     if most is None or most.changes not in CHANGING or most.on == "time":
         return ""
     position = "position" if found.axis == "linear" else "angle"

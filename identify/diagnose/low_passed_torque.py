@@ -234,6 +234,14 @@ class LowPassedTorque:
         out = [np.stack([self._passed(i, c) for c in of(x).T], axis=1) for i, x in enumerate(series)]
         return np.concatenate(out)
 
+    def with_wave(self, quantity: str, frequency_hz: float) -> Array:
+        """A quantity times cosine and sine of a wave over each run's time, behind the low-pass, (n, 2)."""
+        out = []
+        for i, (x, t) in enumerate(zip(self.ahead(quantity), self.traces, strict=True)):
+            phase = 2.0 * np.pi * frequency_hz * t.step_s * np.arange(len(x))
+            out.append(np.stack([self._passed(i, x * f(phase)) for f in (np.cos, np.sin)], axis=1))
+        return np.concatenate(out)
+
     def series(self) -> tuple[Array, Array, Array, Array, Array, Array]:
         """Angle, rate, acceleration, torque, time and number of the run at every sample behind the low-pass."""
         motions = [np.concatenate([m[k] for m in self._motion]) for k in range(3)]

@@ -65,9 +65,14 @@ class FreeFormFit:
         return self.evidence.effect
 
     @property
+    def is_there(self) -> bool:
+        """Whether it is believed, however little it takes."""
+        return self.evidence.support > STRONG_SUPPORT
+
+    @property
     def is_significant(self) -> bool:
         """Whether it is believed, and takes enough."""
-        return self.evidence.support > STRONG_SUPPORT and self.share > WEIGHT
+        return self.is_there and self.share > WEIGHT
 
     @property
     def chance_level(self) -> float:
@@ -79,8 +84,8 @@ class FreeFormFit:
 def fit_free_forms(search: Stepwise, now: Fit) -> tuple[FreeFormFit | None, list[FreeFormFit]]:
     """The curve that explains most of what a model leaves, None where none explains enough to be believed.
 
-    Besides, the other curves that take a little and are hardly chance: too little for a belief, but J may be another
-    beside them.
+    Besides, the other curves that are there or hardly chance: they take too little to speak against a name, but J may
+    be another beside them.
     """
     problem = search.problem
     best: FreeFormFit | None = None
@@ -96,11 +101,12 @@ def fit_free_forms(search: Stepwise, now: Fit) -> tuple[FreeFormFit | None, list
         if not np.isfinite(fit.cost):
             continue
         beside = _beside(search, now, fit, name)
-        if beside.is_significant:
+        if beside.is_there:
             beside = _beside(search, _from_there(search, now, fit), fit, name)
         if beside.is_significant and (best is None or fit.penalised < best.evidence.fit.penalised):
             best = beside
-        elif beside.share > 0.0 and beside.chance_level < CURVE_BY_CHANCE:  # beside some, more is left than without
+        # Beside a curve the disturbance may come out larger than without, where it is taken for another colour.
+        elif beside.is_there or (beside.share > 0.0 and beside.chance_level < CURVE_BY_CHANCE):
             others.append(beside)
     return best, others
 
@@ -227,9 +233,12 @@ def _shape(form: str, fit: Fit) -> tuple[list[float], list[float]]:
 def curves_left(
     search: Stepwise, most_percent: Mapping[str, float]
 ) -> list[tuple[Dependence, dict[str, float]]]:  # fmt: skip
-    """What curves over the torque that is left show; of those hardly believed, the one J, C or K hang on."""
-    moving = most_moving(search, search.doubtful, most_percent)
-    believed = [] if search.left is None else [dependence_on(search, search.left)]
+    """What curves over the torque that is left show: the likeliest that is believed, and the one J, C or K hang on."""
+    there = search.left or min(
+        (c for c in search.doubtful if c.is_there), key=lambda c: c.evidence.fit.penalised, default=None
+    )
+    moving = most_moving(search, [c for c in search.doubtful if c is not there], most_percent)
+    believed = [] if there is None else [dependence_on(search, there)]
     return believed if moving is None else [*believed, moving]
 
 

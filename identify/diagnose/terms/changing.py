@@ -3,23 +3,49 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.signal import lfilter
 
 from identify.diagnose.terms.free_form import FreeForm, free_splines
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
+from identify.residual import GAIN
 from rig.arrays import Array
 
+WARMING_RUN_SHARES = (0.02, 0.1, 0.5)  # of the longest run: time constants with which a drive warms up
 MIN_PERIODS = 3.0  # in the longest run, of what changes as a wave: a slower change is one over the time itself
 
 
 def with_time(regression: TorqueRegression) -> list[FreeForm]:
     """What angle, rate and torque pass on, changing with time: a spring that sets, grease or a drive that warms up."""
     angle, rate, _, torque, time, _ = regression.series()
-    series = {"stiffness": angle, "damping": rate} | ({} if regression.torque_free else {"torque of the drive": torque})
+    series = {"stiffness": angle, "damping": rate} | ({} if regression.torque_free else {GAIN: torque})
     along = (time - np.mean(time)) / max(float(np.ptp(time)), 1e-300)
     shape = np.stack([along, along**2 - np.mean(along**2)], axis=1)
     none = np.zeros((0, 2))
     return [FreeForm("time", shape * x[:, None], np.zeros(0), none, changes=what) for what, x in series.items()]
+
+
+def with_load(regression: TorqueRegression) -> list[FreeForm]:
+    """The drive's torque, changing with the load before: a motor warms up with the square of its torque, and cools.
+
+    Every run begins cold, and the gain changes about what it is on average, which is the number that the model has.
+    """
+    torques = regression.ahead("torque")
+    mean_square = sum(float(x @ x) for x in torques) / max(sum(map(len, torques)), 1)
+    if not mean_square > 0.0:
+        return []
+    longest = max(map(len, torques))
+
+    def warmed(torque: Array) -> Array:
+        heat = []
+        for share in WARMING_RUN_SHARES:
+            kept = float(np.exp(-1.0 / max(share * longest, 1.0)))
+            heat.append(lfilter([1.0 - kept], [1.0, -kept], torque**2 / mean_square))
+        return np.stack(heat, axis=1) * torque[:, None]
+
+    passed, torque = regression.along(torques, warmed), regression.at_rows(torques)
+    columns = passed - torque[:, None] * (torque @ passed / max(float(torque @ torque), 1e-300))
+    return [FreeForm("history", columns, np.zeros(0), np.zeros((0, columns.shape[1])), changes=GAIN)]
 
 
 def along_angle(regression: TorqueRegression) -> list[FreeForm]:
@@ -64,11 +90,13 @@ def pulsating(regression: TorqueRegression, fit: TorqueFit) -> list[FreeForm]:
     out = []
     driven = [] if regression.torque_free else [("torque", torque)]
     for on, series in (("angle", angle), ("rate", rate), *driven):
-        frequency_hz = _strongest_line_hz(residual * series, time, run, regression.cutoff_hz)
+        # A wave times a motion swings with the sum and the difference of their frequencies: one of these may lie in the
+        # band where the wave itself does not.
+        frequency_hz = _strongest_line_hz(residual * series, time, run, 2.0 * regression.cutoff_hz)
         if frequency_hz is None:
             continue
-        wave = np.exp(2j * np.pi * frequency_hz * time) * series
-        columns = [part * (run == k) for k in np.unique(run) for part in (wave.real, wave.imag)]
+        wave = regression.with_wave(on, frequency_hz)
+        columns = [part * (run == k) for k in np.unique(run) for part in wave.T]
         none = np.zeros((0, len(columns)))
         out.append(FreeForm("time", np.stack(columns, axis=1), np.zeros(0), none, True, on, frequency_hz))
     return out

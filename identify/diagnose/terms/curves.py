@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.diagnose.terms.changing import with_time
+from identify.diagnose.terms.changing import with_load, with_time
 from identify.diagnose.terms.free_form import SHAPE_POINTS, FreeForm, free_splines, smooth_splines
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
@@ -37,7 +37,7 @@ def curves(regression: TorqueRegression, fit: TorqueFit) -> list[FreeForm]:
     ]  # fmt: skip
     if float(np.max(time)) > 0.0:
         out += [_over_time(time), *with_time(regression)]
-    out.append(_history(rate, run, regression))
+    out += [_history(rate, run, regression), *([] if regression.torque_free else with_load(regression))]
     return [f for f in out if f.columns.shape[1] > 0 and np.all(np.isfinite(f.columns))]
 
 

@@ -25,19 +25,19 @@ PULSE_HZ = 3.7
 TONES_HZ = (0.6, 1.7, 4.3, 7.9)
 
 
-def run_with(depth: dict[str, float], number: int) -> Run:
-    return _run_with(*next(iter(depth.items()), ("", 0.0)), number)
+def run_with(depth: dict[str, float], number: int, pulse_hz: float = PULSE_HZ) -> Run:
+    return _run_with(*next(iter(depth.items()), ("", 0.0)), number, pulse_hz=pulse_hz)
 
 
 @cache
-def _run_with(on: str, depth: float, number: int, duration_s: float = 8.0) -> Run:
+def _run_with(on: str, depth: float, number: int, duration_s: float = 8.0, pulse_hz: float = PULSE_HZ) -> Run:
     """A multisine at 1 kHz on a platform of which a share of something pulsates, at another phase in every run."""
     j, c, k = TRUTH
     steps = round(duration_s * 1000)
     t = np.arange(2 * steps + 1) * 0.5e-3
     swell = np.minimum(t / 0.5, 1.0)
     moment = 30.0 * swell * sum(np.sin(2 * np.pi * f * t + 1.3 * i + number) for i, f in enumerate(TONES_HZ))
-    wave = np.sin(2 * np.pi * PULSE_HZ * t + 2.0 * number)
+    wave = np.sin(2 * np.pi * pulse_hz * t + 2.0 * number)
     spring, drag, gain = (
         of * (1.0 + (depth if on == each else 0.0) * wave) for each, of in (("angle", k), ("rate", c), ("torque", 1.0))
     )
@@ -65,7 +65,7 @@ def _run_with(on: str, depth: float, number: int, duration_s: float = 8.0) -> Ru
 
 
 # Of several runs the stiffness is told apart least easily: the others are slow there.
-EACH = (("angle", 0.06, "stiffness"), ("rate", 0.9, "damping"), ("torque", 0.05, "torque of the drive"))
+EACH = (("angle", 0.06, "stiffness"), ("rate", 0.9, "damping"), ("torque", 0.05, "gain of the drive"))
 
 
 @pytest.mark.parametrize(
@@ -87,6 +87,16 @@ def test_what_pulsates_is_told_with_its_frequency(on: str, depth: float, what: s
     assert part.false_alarm < 1e-4
     said = residual_torque_sentence(left, "rotary")
     assert f"depends on the time, as if something changed the {what} at 3.7" in said
+
+
+def test_what_pulsates_faster_than_the_band_is_told_by_what_it_makes_of_the_motion() -> None:
+    cutoff_hz, pulse_hz = 10.0, 13.1
+    traces = traces_of(Recording((run_with({"angle": 0.06}, 0, pulse_hz),)))
+    regression = TorqueRegression(traces, split(traces, "auto"), cutoff_hz, scale_of(traces, TRUTH, ()))
+    fit = regression.solve(Structure(), {})
+    (part,) = disturbance_of(regression, fit, regression.noise_floor_nm(fit.values), "N*m").depends_on
+    assert (part.on, part.wave_on) == ("time", "angle")
+    assert part.wave_hz == pytest.approx(pulse_hz, abs=0.07)
 
 
 def test_a_curve_over_the_angle_that_takes_a_quarter_of_it_does_not_hide_it() -> None:
