@@ -14,7 +14,7 @@ import signal
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any, TypeVar
@@ -52,34 +52,29 @@ class Workers:
 
     def each(self, work: Callable[[_In], _Out], items: Sequence[_In]) -> list[_Out]:
         """Work on many items that have nothing to do with each other, in their order."""
-
-        def some(of: Sequence[_In]) -> list[_Out]:
-            return [work(x) for x in of]
-
-        shares = self.side_by_side([partial(some, items[k :: self.AT_ONCE]) for k in range(self.AT_ONCE)])
-        out: list[Any] = [None] * len(items)
-        for k, share in enumerate(shares):
-            out[k :: self.AT_ONCE] = share
-        return out
+        return self.side_by_side([partial(work, x) for x in items])
 
     def side_by_side(self, tasks: Sequence[Callable[[], _Done]]) -> list[_Done]:
-        """Several tasks that have nothing to do with each other, in their order."""
+        """Several tasks that have nothing to do with each other, in their order.
+
+        Whichever process is free takes the next: one task may take ten times as long as another.
+        """
         if len(tasks) < self.AT_ONCE or self._busy or not FORKS or len(os.sched_getaffinity(0)) < self.AT_ONCE:
             return [task() for task in tasks]
-        out: list[Any] = [None] * len(tasks)
         begun = time.monotonic()
         self._busy = True
-        child = _Child(self, tasks[1 :: self.AT_ONCE])
+        queue = _Queue(len(tasks))
+        child = _Child(self, tasks, queue)
         try:
-            out[:: self.AT_ONCE] = [task() for task in tasks[:: self.AT_ONCE]]
+            out = {k: tasks[k]() for k in queue}
             own_s = time.monotonic() - begun
-            found = child.results(max(SHORTEST_WAIT_S, PATIENCE * own_s))
             # A child that failed has left its tasks undone: what stopped it is said here, where somebody hears it.
-            out[1 :: self.AT_ONCE] = [task() for task in tasks[1 :: self.AT_ONCE]] if found is None else found
+            out |= child.results(max(SHORTEST_WAIT_S, PATIENCE * own_s)) or {}
+            return [out[k] if k in out else task() for k, task in enumerate(tasks)]
         finally:  # on Ctrl-C, too: what nobody waits for would go on
             child.end()
+            queue.close()
             self._busy = False
-        return out
 
     def packed(self, results: object) -> bytes:
         """Results as bytes, shared objects by what they are called here."""
@@ -96,10 +91,29 @@ class Workers:
         return unpickler.load()
 
 
-class _Child:
-    """A forked process that works on some tasks and sends what it found."""
+class _Queue:
+    """Numbers from zero, each handed out once, to whichever of several processes asks for it."""
 
-    def __init__(self, workers: Workers, tasks: Sequence[Callable[[], object]]) -> None:
+    NUMBER_BYTES = 2  # a pipe hands out as many at once
+
+    def __init__(self, count: int) -> None:
+        self._next, writes = os.pipe()
+        with os.fdopen(writes, "wb") as pipe:
+            pipe.write(b"".join(k.to_bytes(self.NUMBER_BYTES, "little") for k in range(count)))
+
+    def __iter__(self) -> Iterator[int]:
+        while number := os.read(self._next, self.NUMBER_BYTES):
+            yield int.from_bytes(number, "little")
+
+    def close(self) -> None:
+        """Hand out no more."""
+        os.close(self._next)
+
+
+class _Child:
+    """A forked process that works on the tasks that it takes from a queue, and sends what it found."""
+
+    def __init__(self, workers: Workers, tasks: Sequence[Callable[[], object]], queue: _Queue) -> None:
         self.workers = workers
         self.reads, writes = os.pipe()
         with warnings.catch_warnings():
@@ -115,11 +129,11 @@ class _Child:
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
             os.close(self.reads)
             with os.fdopen(writes, "wb") as pipe:
-                pipe.write(workers.packed([task() for task in tasks]))
+                pipe.write(workers.packed({k: tasks[k]() for k in queue}))
         finally:
             os._exit(0)
 
-    def results(self, patience_s: float) -> list[Any] | None:
+    def results(self, patience_s: float) -> dict[int, Any] | None:
         """What the child found; None where it failed, or has not come to an end for so long."""
         parts, until = [], time.monotonic() + patience_s
         while select.select([self.reads], [], [], max(0.0, until - time.monotonic()))[0]:
@@ -128,7 +142,7 @@ class _Child:
                 break
             parts.append(part)
         try:
-            found: list[Any] = self.workers.unpacked(b"".join(parts))
+            found: dict[int, Any] = self.workers.unpacked(b"".join(parts))
         except (EOFError, pickle.UnpicklingError):  # nothing came, or half of it
             return None
         return found

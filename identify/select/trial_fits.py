@@ -132,14 +132,15 @@ class TrialFits:
     def each_fitted(
         self, now: Fit, starts: Mapping[str, Sequence[Mapping[Name, float] | CandidateTorque]], least: float = np.inf
     ) -> dict[str, Fit]:
-        """Candidates fitted, two at a time; one that begins far behind the best so far is not followed."""
+        """Candidates fitted, the first two and then the others; one that begins far behind the best is not followed."""
         fits: dict[str, Fit] = {}
         workers = self.problem.workers
         tasks = list(starts.items())
-        for k in range(0, len(tasks), workers.AT_ONCE):
-            two = tasks[k : k + workers.AT_ONCE]
-            found = workers.side_by_side([partial(self.fitted, now, name, begin, least) for name, begin in two])
-            for (name, _), fit in zip(two, found, strict=True):
+        # What has a motion of its own may have to be followed in short steps, and takes longest: it begins first.
+        others = sorted(tasks[workers.AT_ONCE :], key=lambda task: effects.get(task[0]).fastest_rad_s is None)
+        for some in (tasks[: workers.AT_ONCE], others):
+            found = workers.side_by_side([partial(self.fitted, now, name, begin, least) for name, begin in some])
+            for (name, _), fit in zip(some, found, strict=True):
                 if fit is not None:
                     fits[name] = self.known.best(fit)
                     least = min(least, now.cost - BEHIND * (now.cost - fits[name].cost))

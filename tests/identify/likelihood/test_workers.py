@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import time
 from collections.abc import Callable
@@ -15,6 +16,16 @@ from identify.likelihood.workers import FORKS, Workers
 forked = pytest.mark.skipif(
     not FORKS or len(os.sched_getaffinity(0)) < Workers.AT_ONCE, reason="needs a system that forks, and two cores"
 )
+
+
+def met() -> Callable[[], None]:
+    """What a task of either process calls to wait for one of the other."""
+    barrier = multiprocessing.get_context("fork").Barrier(2)
+
+    def wait() -> None:
+        barrier.wait(timeout=30.0)
+
+    return wait
 
 
 @dataclass(frozen=True)
@@ -36,27 +47,50 @@ def test_tasks_come_back_in_their_order_with_parts_of_their_own() -> None:
 
 @forked
 def test_tasks_run_in_two_processes_and_shared_objects_come_back_as_the_same() -> None:
-    recording, other = object(), [1.0]
+    recording, other, meet = object(), [1.0], met()
     workers = Workers([recording])
 
     def fit(number: int) -> tuple[int, Found, list[float]]:
+        meet()
         return os.getpid(), Found(recording, number), other
 
-    (here, first, mine), (there, second, theirs) = workers.each(fit, (1, 2))
+    found = workers.each(fit, (1, 2))
 
-    assert here == os.getpid() != there
-    assert first.recording is second.recording is recording
-    assert (first.number, second.number) == (1, 2)
+    assert [f.number for _, f, _ in found] == [1, 2]
+    assert all(f.recording is recording for _, f, _ in found)
+    (mine,) = (own for pid, _, own in found if pid == os.getpid())
+    (theirs,) = (own for pid, _, own in found if pid != os.getpid())
     assert mine is other
     assert theirs == other and theirs is not other
 
 
 @forked
+def test_beside_a_task_that_takes_long_the_other_process_does_all_others() -> None:
+    meet = met()
+
+    def task(k: int) -> int:
+        if k in (0, 5):  # the first goes on until the last has begun
+            meet()
+        return os.getpid()
+
+    found = Workers().each(task, range(6))
+    assert len(set(found[1:])) == 1
+    assert found[0] != found[1]
+
+
+@forked
 def test_what_fails_in_the_other_process_is_raised_in_this_one() -> None:
+    meet, here = met(), os.getpid()
+
+    waited: list[int] = []
+
     def unreadable(k: int) -> int:
-        if k == 1:
-            raise OSError("cannot be read")
-        return k
+        if not waited:
+            waited.append(k)
+            meet()
+            if os.getpid() == here:
+                return k
+        raise OSError("cannot be read")
 
     with pytest.raises(OSError, match="cannot be read"):
         Workers().each(unreadable, (0, 1))
@@ -64,11 +98,16 @@ def test_what_fails_in_the_other_process_is_raised_in_this_one() -> None:
 
 @forked
 def test_tasks_of_a_process_that_is_killed_are_done_in_this_one() -> None:
-    here = os.getpid()
+    meet, here = met(), os.getpid()
+    waited: list[int] = []
 
     def killed(k: int) -> tuple[int, int]:
         if os.getpid() != here:
+            meet()
             os.kill(os.getpid(), 9)
+        if not waited:
+            waited.append(k)
+            meet()
         return k, os.getpid()
 
     assert Workers().each(killed, (0, 1, 2)) == [(0, here), (1, here), (2, here)]
@@ -94,8 +133,9 @@ def test_an_interruption_ends_the_other_process_and_leaves_the_workers_usable(tm
             time.sleep(0.001)
         raise KeyboardInterrupt
 
+    here = os.getpid()
     with pytest.raises(KeyboardInterrupt):
-        workers.side_by_side([interrupted, endless])
+        workers.side_by_side([lambda: interrupted() if os.getpid() == here else endless()] * 2)
     with pytest.raises(ProcessLookupError):
         os.kill(int(started.read_text()), 0)
     assert workers.side_by_side([lambda: 1, lambda: 2]) == [1, 2]
