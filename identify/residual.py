@@ -87,6 +87,8 @@ class Dependence:
     changes
         "inertia", "stiffness", "damping", "friction" or "gain of the drive" where one of these, changing with what
         it depends on, gives this torque; "from run to run" where J, C and K fitted to every run by itself give it.
+    step_nm
+        Of a torque that acts in steps: how far these are apart.
     """
 
     on: str
@@ -98,6 +100,7 @@ class Dependence:
     wave_on: str = ""
     wave_hz: float | None = None
     changes: str = ""
+    step_nm: float | None = None
 
 
 @dataclass(frozen=True)

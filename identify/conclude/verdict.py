@@ -205,16 +205,17 @@ def residual_torque_sentence(left: Disturbance, axis: str) -> str:
             f"The final model leaves a residual {torque} of {size}. It depends on no quantity that was tested, so it "
             "counts as noise and is included in the intervals."
         )
-    each = joined(
-        [f"{number(100.0 * d.relative, 2)} % depends on the {quantity_of(d, axis)}{_how(d)}" for d in left.depends_on]
-    )
+    parts = [(d.relative, quantity_of(d, axis), _how(d, left.unit)) for d in left.depends_on]
+    each = joined([f"{number(100.0 * part, 2)} % depends on the {quantity}{how}" for part, quantity, how in parts])
     moved = joined([f"{SYMBOLS[k]} by {number(v, 2)} %" for k, v in left.moves_percent.items() if v > 0.0])
     change = f" Fitting this part too changes {moved}." if moved else ""
     return f"The final model leaves a residual {torque} of {size}. Of the {torque}, {each}.{change}"
 
 
-def _how(part: Dependence) -> str:
-    """Of what changes as a wave: what, and how fast; of what changes with a quantity: what."""
+def _how(part: Dependence, of_torque: str) -> str:
+    """Of what changes as a wave: what, and how fast; of what changes with a quantity: what; of steps: their size."""
+    if part.step_nm is not None:
+        return f", as if the drive gave it in steps of {number(part.step_nm, 3)} {unit(of_torque)}"
     if part.changes == FROM_RUN_TO_RUN:
         return " (J, C and K fitted to each run by itself differ)"
     if part.changes:

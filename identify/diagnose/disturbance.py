@@ -16,6 +16,7 @@ from identify.diagnose.terms.changing import along_angle, pulsating
 from identify.diagnose.terms.curves import curves
 from identify.diagnose.terms.free_form import FreeForm
 from identify.diagnose.terms.from_run_to_run import FROM_RUN_TO_RUN, between_runs, moved_on_average
+from identify.diagnose.terms.in_steps import in_steps
 from identify.diagnose.terms.repeating import repeating
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
@@ -55,6 +56,8 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
     follow = [*along_angle(regression), *between_runs(regression, fit)]
     found += [f for f in _depends(regression, fit, follow) if f[0].torque_rms > most]
     found += [f for f in _depends(regression, fit, repeating(regression)) if f[0].torque_rms > MOST_OF_IT * most]
+    most = max((f[0].torque_rms for f in found), default=0.0)
+    found += [f for f in _depends(regression, fit, in_steps(regression, fit)) if f[0].torque_rms > MOST_OF_IT * most]
     # What pulsates may follow, as a change over time, what an angle or a rate explains by itself, too.
     most = max((f[0].torque_rms for f in found), default=0.0)
     found += [f for f in _depends(regression, fit, pulsating(regression, fit)) if f[0].torque_rms > MOST_OF_IT * most]
@@ -71,9 +74,13 @@ def beside(regression: TorqueRegression, fit: TorqueFit, part: Dependence, other
     """
     every = (
         *curves(regression, fit), *along_angle(regression), *between_runs(regression, fit), *repeating(regression),
-        *pulsating(regression, fit),
+        *pulsating(regression, fit), *in_steps(regression, fit),
     )  # fmt: skip
-    same = [t for t in every if (t.on, t.changes, t.wave_on) == (part.on, part.changes, part.wave_on)]
+    same = [
+        t for t in every
+        if (t.on, t.changes, t.wave_on, t.step_nm is None)
+        == (part.on, part.changes, part.wave_on, part.step_nm is None)
+    ]  # fmt: skip
     if not same:
         return ()
     tried = [[regression.beside(f, t)[0] for t in same] for f in (fit, other)]
@@ -109,7 +116,7 @@ def _dependence(
     at, shape_nm = tuple(term.at.tolist()), tuple((term.shape @ gains).tolist())
     found = Dependence(
         term.on, size, size / regression.torque_nm, float(norm.sf(sure)), at, shape_nm, term.wave_on, term.wave_hz,
-        term.changes,
+        term.changes, term.step_nm,
     )  # fmt: skip
     return found, _moved(regression, fit, richer, term, gains)
 

@@ -40,6 +40,7 @@ class FreeForm:
     of_each_run: bool = False  # columns that belong to one run each
     wave_on: str = ""
     wave_hz: float | None = None
+    step_nm: float | None = None  # over which it repeats along the torque
     changes: str = ""
     noise_nm: Callable[[], float] | None = None  # what it makes of noise, where that is not its fit to noise alone
     over: Array | None = None
