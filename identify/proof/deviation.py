@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,13 +12,13 @@ from identify.estimate.output_error import refine
 from identify.follow_up.pairs import free_run
 from identify.proof.compensation import linear_part
 from identify.proof.drive import Drive
+from identify.proof.given import as_set
 from identify.proven import Share
 from identify.results import NORMAL_95
 from identify.signals.prepare import prepare
-from rig import effects
 from rig.arrays import Array, Mask
 from rig.dynamics import Equations, TorqueSignal, simulate
-from rig.excitation import CompensatedSet, PlannedSet
+from rig.excitation import PlannedSet
 from rig.platform import Platform
 from rig.recording.run import Run
 
@@ -77,46 +77,18 @@ def explained_left(
     return _root(squares[0] / squares[1]) if squares[1] > 0.0 and np.isfinite(squares[0]) else np.inf
 
 
-def _as_set(run: Run, planned: PlannedSet) -> tuple[Run, float]:
-    """A run with the set alone as its torque, and how long after the run the set begins. Raises ValueError."""
-    if run.torque_nm is None or run.torque_time_s is None:
-        raise ValueError(f"{run.name}: no torque was recorded")
-    made = planned.excitation
-    if not isinstance(made, CompensatedSet):
-        return run, 0.0
-    time_s, set_nm = made.set_torque(run.torque_time_s, run.torque_nm)
-    return replace(run, torque_time_s=time_s, torque_nm=set_nm), made.lead_s
-
-
-def _without_steps(run: Run) -> Run:
-    """With a held torque as a smooth curve of the same mean over every tick: a drive that lags passes no steps on.
-
-    Within a tick the steps move the rate by K tick^2 / (12 J) of itself, 0.3 % of a rate that is to be told to 0.1 %. A
-    mean over a tick takes 1/24 of the second difference away from a curve.
-    """
-    time_s, torque_nm = run.torque_time_s, run.torque_nm
-    if run.torque_hold != "zero_order" or time_s is None or torque_nm is None or len(time_s) < 3:
-        return run
-    bent = np.zeros(len(torque_nm))
-    bent[1:-1] = torque_nm[2:] - 2.0 * torque_nm[1:-1] + torque_nm[:-2]
-    middles_s = time_s + 0.5 * np.diff(time_s, append=2.0 * time_s[-1] - time_s[-2])
-    return replace(run, torque_time_s=middles_s, torque_nm=torque_nm + bent / 24.0, torque_hold="band_limited")
-
-
 def deviation(run: Run, planned: PlannedSet, platform: Platform, noise: float | None) -> Deviation:
     """How far a run strays from the linear part of a platform.
 
     The linear part is given the torque as it was recorded, less the compensation: rounding and late ticks of the drive
-    are in both and no error of the model.
+    are in both and no error of the model (``as_set``).
 
     Raises
     ------
     ValueError
         Where the run has no torque.
     """
-    run, lead_s = _as_set(run, planned)
-    if any(effects.get(name).spreads for name in platform.effects):
-        run = _without_steps(run)
+    run, lead_s = as_set(run, planned, platform)
     trace = prepare(run, 0, noise)
     linear = linear_part(platform)
     fitted = free_run(linear, [trace])
@@ -129,13 +101,13 @@ def deviation(run: Run, planned: PlannedSet, platform: Platform, noise: float | 
 def simulated_run(
     planned: PlannedSet, platform: Platform, drive: Drive, angle: bool, aside_rad: float = 0.0
 ) -> Run:  # fmt: skip
-    """What a platform would show of a planned set without noise, its torque as late and held as the drive's.
+    """What a platform would show of a planned set without noise, its torque as late, held and rounded as the drive's.
 
     It begins at rest, so far beside where the spring holds it.
     """
     time_s = drive.tick_s * np.arange(round(planned.duration_s / drive.tick_s) + 1)
     late_s = time_s + drive.latency_s
-    torque_nm = np.asarray(planned.torque(time_s), dtype=float)
+    torque_nm = drive.played(np.asarray(planned.torque(time_s), dtype=float))
     start = (Equations(platform).rest_angle_rad() + aside_rad, 0.0)
     with np.errstate(all="ignore"):
         motion = simulate(platform, time_s, TorqueSignal(late_s, torque_nm, drive.hold), start)

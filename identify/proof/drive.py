@@ -41,6 +41,12 @@ class Drive:
         """Of the table of a compensating torque."""
         return self.tick_s / PARTS
 
+    def played(self, torque_nm: Array) -> Array:
+        """Commands in its steps, shape as given; as they are where it does not round."""
+        if self.resolution_nm is None or self.hold != "zero_order":
+            return torque_nm
+        return np.asarray(self.resolution_nm * np.round(torque_nm / self.resolution_nm))
+
 
 def latency_of(recording: Recording, sets: Sequence[PlannedSet], tick_s: float) -> float:
     """By how much later than it was asked for the torque of recorded sets was there, in s; 0 where that does not show.

@@ -132,20 +132,27 @@ class CompensatedSet(ExcitationSet):
             return self.commands.at(time_s)
         return self.plain.torque(time_s - self.lead_s) + self.compensation.at(time_s)
 
-    def set_torque(self, time_s: Array, recorded_nm: Array) -> tuple[Array, Array]:
-        """What of a recorded torque is the set, as it reaches the shaft: instants in s since the start, and N m, (n,).
+    def asked(self, time_s: Array, recorded_nm: Array) -> tuple[Array, Array, Array]:
+        """What was asked for behind a recorded torque, (n,) each.
 
-        All by which the recorded torque differs from the planned one (rounding, late ticks) stays in it.
+        Returns
+        -------
+        at_shaft_s
+            When it reaches the shaft, since the start of the run.
+        set_nm
+            The set alone then.
+        exact_nm
+            The whole torque before the drive rounds it: what is recorded beyond it, rounding moved and late ticks
+            played otherwise.
         """
         asked_s = time_s - self.latency_s
+        at_shaft_s = time_s + self.early_s
         if self.commands is not None:
             asked_s = self.commands.asked_at(asked_s, recorded_nm)
-            wanted = self.plain.torque(asked_s + self.latency_s + self.early_s - self.lead_s)
-            exact = self.plain.torque(asked_s - self.lead_s) + self.compensation.at(asked_s)
-            return time_s + self.early_s, wanted + recorded_nm - exact
-        planned = self.plain.torque(asked_s - self.lead_s) + self.compensation.at(asked_s)
-        at_shaft_s = time_s + self.early_s
-        return at_shaft_s, self.plain.torque(at_shaft_s - self.lead_s) + recorded_nm - planned
+            set_nm = self.plain.torque(asked_s + self.latency_s + self.early_s - self.lead_s)
+        else:
+            set_nm = self.plain.torque(at_shaft_s - self.lead_s)
+        return at_shaft_s, set_nm, self.plain.torque(asked_s - self.lead_s) + self.compensation.at(asked_s)
 
     @classmethod
     def of(
