@@ -126,13 +126,14 @@ def config_of(hidden: Mapping[str, Mapping[str, float]], seed: int) -> Config:
     )  # fmt: skip
 
 
-def play(config: Config, sets: Sequence[PlannedSet], model: Platform, seed: int) -> tuple[Recording, RigError | None]:
+def play(
+    config: Config, sets: Sequence[PlannedSet], model: Platform, seed: int, rest_s: float | None = None
+) -> tuple[Recording, RigError | None]:  # fmt: skip
     """The recording of sets on the rig, and what cut it short."""
+    rest_s = config.excitation.rest_s if rest_s is None else rest_s
     rig = SimulatedRig(config.simulated, 1.0 / TICK_S, seed=seed)
     guard = Guard(config.limits, motion_checks(config.limits, model))
-    sequencer = Sequencer(
-        rig, VirtualClock(), guard, sample_rate_hz=1.0 / TICK_S, rest_s=config.excitation.rest_s, declared=model
-    )
+    sequencer = Sequencer(rig, VirtualClock(), guard, sample_rate_hz=1.0 / TICK_S, rest_s=rest_s, declared=model)
     campaign = sequencer.play(sets)
     return campaign.recording, campaign.cause
 
@@ -171,10 +172,13 @@ def proved(
     allowed = allowed_peaks(config.limits, config.excitation.margin)
     try:
         sets = plan(model, config.excitation, config.limits)
-        planned: ProofPlan = plan_proof(model, sets, allowed, drive, rivals=rivals, recorded=recording.runs)
+        planned: ProofPlan = plan_proof(
+            model, sets, allowed, drive,
+            rivals=rivals, recorded=recording.runs, rest_s=config.excitation.rest_s, noise=recording.noise,
+        )  # fmt: skip
     except RigError as error:
         return Outcome(model, None, f"refused: {str(error).splitlines()[0][:90]}")
-    played, cause = play(config, planned.sets, model, seed + 1000)
+    played, cause = play(config, planned.sets, model, seed + 1000, planned.rest_s)
     if cause is not None:
         return Outcome(model, None, f"stopped: {str(cause)[:90]}")
     return Outcome(model, judge(planned, played, model), most_travel=_travel(played) / config.limits.travel_deg)

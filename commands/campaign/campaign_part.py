@@ -58,7 +58,8 @@ class CampaignPart:
     ``earlier`` is what was played before: into the same folder, where its recording is kept and added to, or into
     the one that this part ``resumes``; then its journals are ``copied_journals``, each under its new name.
 
-    ``plan`` makes the sets to play, where they are not those of the configuration; it may refuse with UsageError.
+    ``plan`` makes the sets to play, where they are not those of the configuration; it may refuse with UsageError. After
+    it ``rest_s`` says how long the rests between them have to be, where not as in the configuration.
     ``listed`` is where in the information of a recording stands what is said of this part.
     """
 
@@ -69,6 +70,7 @@ class CampaignPart:
     copied_journals: tuple[tuple[Path, str], ...] = ()
     resumes: Path | None = None
     plan: Callable[[Rig, LoadedConfig], tuple[PlannedSet, ...]] | None = None
+    rest_s: Callable[[], float | None] = lambda: None
     listed: str = "follow_ups"
 
     @property

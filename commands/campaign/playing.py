@@ -74,9 +74,18 @@ def play(
         context.terminal.show("Starting the emulated devices ...")
     with BACKENDS[backend](loaded, folder.path / part.raw) as stage:
         every = (part.plan or planned_sets)(stage.rig, loaded)
+        loaded = _resting(loaded, part.rest_s())
         sets = tuple(planned for planned in every if planned.name not in part.done)
         _open(context, stage, loaded, sets, folder.path, part)
         return _record(context, stage, loaded, sets, folder, part, [planned.name for planned in every])
+
+
+def _resting(loaded: LoadedConfig, rest_s: float | None) -> LoadedConfig:
+    """The same with other rests between the sets, where they are given."""
+    if rest_s is None:
+        return loaded
+    excitation = loaded.config.excitation.model_copy(update={"rest_s": rest_s})
+    return replace(loaded, config=loaded.config.model_copy(update={"excitation": excitation}))
 
 
 def planned_sets(rig: Rig, loaded: LoadedConfig) -> tuple[PlannedSet, ...]:

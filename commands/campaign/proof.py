@@ -43,6 +43,8 @@ class ProofPart:
         Which proof of the campaign it is, from 1.
     recorded
         The runs of the campaign, which tell how the platform moves whatever the model says.
+    noise
+        Of the sensor, in which the ring of a run has to be lost before the next; None where it is not known.
     plan
         Made once the rig is there; None before.
     """
@@ -53,6 +55,7 @@ class ProofPart:
     resolution_nm: float | None = None
     number: int = 1
     recorded: Sequence[Run] = ()
+    noise: float | None = None
     plan: ProofPlan | None = None
 
     @property
@@ -90,13 +93,17 @@ def play_proof(
         part.plan = plan_proof(
             part.model, asked, allowed, drive,
             angle=part.angle, rivals=part.rivals, prefix=part.prefix, recorded=part.recorded,
+            rest_s=config.excitation.rest_s, noise=part.noise,
         )  # fmt: skip
-        for line in plan_lines(part.plan, part.model):
+        for line in plan_lines(part.plan, part.model, config.excitation.rest_s):
             context.terminal.show(line)
         return part.plan.sets
 
     name = part.prefix.replace(" ", "_")
     journal, raw = (f"{name}.journal", f"{RAW_FOLDER}/{name}") if earlier else (CampaignPart.journal, RAW_FOLDER)
     further = further_config(loaded, part.model, PARTS_BEFORE + part.number)
-    campaign_part = CampaignPart(journal, raw, earlier, consent, plan=sets, listed="proofs")
+    campaign_part = CampaignPart(
+        journal, raw, earlier, consent, plan=sets, rest_s=lambda: part.plan.rest_s if part.plan else None,
+        listed="proofs",
+    )  # fmt: skip
     return play(context, further, folder, campaign_part)

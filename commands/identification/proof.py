@@ -100,7 +100,9 @@ def _part(now: Proved, rival: str | None, number: int) -> ProofPart:
     traces = now.found.traces
     angle = bool(traces) and traces[0].channel == "angle"
     rivals = rival_models(now.found, rival) if rival is not None else {}
-    return ProofPart(model, rivals, angle, resolution_of(now.played.recording), number, now.played.recording.runs)
+    noise = now.found.noise_floor.holdout_rate_rms
+    recorded = now.played.recording
+    return ProofPart(model, rivals, angle, resolution_of(recorded), number, recorded.runs, noise)
 
 
 def _judged(now: Proved, more: PlayedCampaign, part: ProofPart) -> Proved:

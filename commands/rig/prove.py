@@ -144,7 +144,8 @@ def _rehearsed(
     model: Any = found.final.platform
     angle = bool(found.traces) and found.traces[0].channel == "angle"
     rivals = rival_models(found, rival) if rival is not None else {}
-    part = ProofPart(model, rivals, angle, resolution_of(recording), recorded=recording.runs)
+    noise = found.noise_floor.holdout_rate_rms
+    part = ProofPart(model, rivals, angle, resolution_of(recording), recorded=recording.runs, noise=noise)
     context.folder = ResultsFolder(free_name(folder, "rehearsal"), loaded.config.name, _now())
     context.terminal.show(
         f"A rehearsal: the recording is of the {was}, so nothing of {folder} is changed; the runs go to a folder of "

@@ -18,9 +18,10 @@ from scipy.ndimage import gaussian_filter1d
 from identify.model.effect_torque import feeds_on_torque, torque_along
 from identify.proof.drive import PARTS, Drive
 from identify.proof.rounding import feedback, rounded
+from identify.proof.standing import Standing
 from rig import effects
 from rig.arrays import Array
-from rig.dynamics import Equations, Motion, TorqueSignal, simulate
+from rig.dynamics import Motion, TorqueSignal, simulate
 from rig.dynamics.equations import STEP_PHASE_RAD
 from rig.effects.base import Effect, Place
 from rig.excitation import CompensatedSet, HeldCommands, PlannedSet, TorqueTable
@@ -44,9 +45,25 @@ def cancelled(platform: Platform) -> tuple[str, ...]:
     return tuple(n for n in platform.effects if effects.get(n).cancelled_by_torque)
 
 
+def not_cancelled(model: Platform) -> dict[str, str]:
+    """Effects of a model that a proof does not touch, and why."""
+    return {
+        name: effects.get(name).stays or _no_torque(name) for name in model.effects
+        if not effects.get(name).cancelled_by_torque
+    }  # fmt: skip
+
+
+def _no_torque(name: str) -> str:
+    read = effects.get(name).reads
+    return (
+        f"the readings of {read.name} are not known before the run" if read is not None else "no torque can cancel it"
+    )
+
+
 def compensated(
-    platform: Platform, planned: PlannedSet, name: str, drive: Drive, left_out: Collection[str] = ()
-) -> PlannedSet:
+    platform: Platform, planned: PlannedSet, name: str, drive: Drive, left_out: Collection[str] = (),
+    begin: Standing | None = None,
+) -> PlannedSet:  # fmt: skip
     """A set together with the torque that cancels the effects of a platform, as a set of that name.
 
     Parameters
@@ -57,14 +74,17 @@ def compensated(
         The set as it is played without compensation.
     left_out
         Effects of the model that are not compensated.
+    begin
+        How the run finds the platform; as if nothing had moved it where None.
     """
+    begin = begin or Standing.untouched(platform)
     active = [n for n in cancelled(platform) if n not in left_out]
     lead_s = _lead_s(platform, active, drive)
     count = round((planned.duration_s + lead_s) / drive.step_s)
     middles_s = drive.step_s * (np.arange(count) + 0.5)
     set_nm = _set_torque(planned, lead_s, drive)
     wanted = set_nm.at(middles_s)
-    resisting = _resistance(platform, active, middles_s, _motion(platform, set_nm, middles_s), wanted)
+    resisting = _resistance(platform, active, middles_s, _motion(platform, set_nm, middles_s, begin), wanted, begin)
     of_set = _through_drive(platform, active, wanted, drive.step_s)
     of_effects = _through_drive(platform, active, wanted + resisting, drive.step_s) - of_set
     apart = math.modf((drive.latency_s + _early_s(platform, active)) / drive.tick_s)[0]
@@ -101,15 +121,17 @@ def _lead_s(platform: Platform, active: list[str], drive: Drive) -> float:
     return math.ceil(early + slope + spread - 1e-9) * drive.tick_s
 
 
-def _motion(platform: Platform, set_nm: TorqueSignal, time_s: Array) -> Motion:
+def _motion(platform: Platform, set_nm: TorqueSignal, time_s: Array, begin: Standing) -> Motion:
     """Of the linear part under a set, from where the model rests without torque."""
     half = 0.5 * (time_s[1] - time_s[0])
     moved = simulate(replace(platform, effects={}), half * np.arange(2 * len(time_s) + 1), set_nm, substeps=2)
-    angle = moved.angle_rad + Equations(platform).rest_angle_rad()
+    angle = moved.angle_rad + begin.angle_rad
     return Motion(angle[1::2], moved.rate_rad_s[1::2], moved.sensed_rate_rad_s[1::2])
 
 
-def _resistance(platform: Platform, active: list[str], time_s: Array, motion: Motion, wanted_nm: Array) -> Array:
+def _resistance(
+    platform: Platform, active: list[str], time_s: Array, motion: Motion, wanted_nm: Array, begin: Standing
+) -> Array:  # fmt: skip
     """Torque of the effects on the shaft along a motion, less what the spring holds at rest, (n,)."""
     on_shaft = [n for n in active if effects.get(n).place in (Place.LOAD, Place.FRICTION)]
     total = np.zeros(len(time_s))
@@ -117,12 +139,15 @@ def _resistance(platform: Platform, active: list[str], time_s: Array, motion: Mo
         shaft = wanted_nm + total
         total = np.zeros(len(time_s))
         for name in on_shaft:
-            total += along(platform, name, time_s, motion, shaft)
+            total += along(platform, name, time_s, motion, shaft, begin)
     return total
 
 
-def along(platform: Platform, name: str, time_s: Array, motion: Motion, torque_nm: Array) -> Array:
-    """The resisting torque of one effect of a platform along a motion at even steps, zero at rest, (n,)."""
+def along(
+    platform: Platform, name: str, time_s: Array, motion: Motion, torque_nm: Array, begin: Standing | None = None
+) -> Array:  # fmt: skip
+    """The resisting torque of one effect of a platform along a motion at even steps, zero as it began, (n,)."""
+    begin = begin or Standing.untouched(platform)
     effect = effects.get(name)
     jck = (platform.inertia_kg_m2, platform.damping_nm_s_rad, platform.stiffness_nm_rad)
     p = np.array([*jck, *effect.values(platform.effects[name])], dtype=float)
@@ -130,15 +155,14 @@ def along(platform: Platform, name: str, time_s: Array, motion: Motion, torque_n
     friction = effect.place is Place.FRICTION
     rate = np.abs(motion.rate_rad_s) if friction else motion.rate_rad_s
     out = np.zeros(len(time_s))
-    rest = Equations(platform).rest_angle_rad()
-    z = np.array(effect.rest_state(rest, 0.0) if effect.rest_state else (0.0,) * effect.states, dtype=float)
+    z = begin.of(platform, name)
     torque_along(
         effect.kernel.address, motion.angle_rad, rate, time_s, torque_nm, step_s, z, _substeps(effect, p, step_s), p,
         False, 1.0, out,
     )  # fmt: skip
     if friction:
         return out * _direction(motion.rate_rad_s)
-    return out - _at_rest(effect, p, rest)
+    return out - _at_rest(effect, p, begin.angle_rad, z)
 
 
 def _substeps(effect: Effect, p: Array, step_s: float) -> int:
@@ -153,10 +177,9 @@ def _direction(rate_rad_s: Array) -> Array:
     return np.clip(rate_rad_s / np.maximum(across, soft), -1.0, 1.0)
 
 
-def _at_rest(effect: Effect, p: Array, angle_rad: float) -> float:
+def _at_rest(effect: Effect, p: Array, angle_rad: float, z: Array) -> float:
     """What an effect pulls at rest: the spring holds that, and it is no part of the motion."""
     out, at = np.zeros(1), np.array([angle_rad])
-    z = np.array(effect.rest_state(angle_rad, 0.0) if effect.rest_state else (0.0,) * effect.states, dtype=float)
     none = np.zeros(1)
     torque_along(effect.kernel.address, at, none, none, none, 1.0, z, 1, p, False, 1.0, out)
     return float(out[0])

@@ -13,11 +13,12 @@ from identify.follow_up.pairs import free_run
 from identify.proof.compensation import linear_part
 from identify.proof.drive import Drive
 from identify.proof.given import as_set
+from identify.proof.standing import Standing, remembers
 from identify.proven import Share
 from identify.results import NORMAL_95
 from identify.signals.prepare import prepare
 from rig.arrays import Array, Mask
-from rig.dynamics import Equations, TorqueSignal, simulate
+from rig.dynamics import TorqueSignal, simulate
 from rig.excitation import PlannedSet
 from rig.platform import Platform
 from rig.recording.run import Run
@@ -99,18 +100,21 @@ def deviation(run: Run, planned: PlannedSet, platform: Platform, noise: float | 
 
 
 def simulated_run(
-    planned: PlannedSet, platform: Platform, drive: Drive, angle: bool, aside_rad: float = 0.0
+    planned: PlannedSet, platform: Platform, drive: Drive, angle: bool, aside_rad: float = 0.0,
+    begin: Standing | None = None,
 ) -> Run:  # fmt: skip
     """What a platform would show of a planned set without noise, its torque as late, held and rounded as the drive's.
 
-    It begins at rest, so far beside where the spring holds it.
+    It begins at rest, so far beside where the spring holds it; as if nothing had moved it where ``begin`` is None.
     """
+    begin = begin or Standing.untouched(platform)
     time_s = drive.tick_s * np.arange(round(planned.duration_s / drive.tick_s) + 1)
     late_s = time_s + drive.latency_s
     torque_nm = drive.played(np.asarray(planned.torque(time_s), dtype=float))
-    start = (Equations(platform).rest_angle_rad() + aside_rad, 0.0)
+    start = (begin.angle_rad + aside_rad, 0.0)
+    states = begin.states.copy() if remembers(platform) else None
     with np.errstate(all="ignore"):
-        motion = simulate(platform, time_s, TorqueSignal(late_s, torque_nm, drive.hold), start)
+        motion = simulate(platform, time_s, TorqueSignal(late_s, torque_nm, drive.hold), start, states=states)
     return Run(
         planned.name, time_s, np.ones(len(time_s), dtype=bool),
         rate_rad_s=None if angle else motion.sensed_rate_rad_s, angle_rad=motion.angle_rad if angle else None,

@@ -11,6 +11,7 @@ from identify.proof.compensation import cancelled, compensated
 from identify.proof.deviation import deviation, share_left, simulated_run
 from identify.proof.drive import Drive
 from identify.proof.seen import expected_peaks
+from identify.proof.standing import Standing, Standings, rest_needed_s
 from rig import effects
 from rig.errors import PreflightRefusal
 from rig.excitation import PlannedSet
@@ -67,6 +68,8 @@ class ProofPlan:
     too_small
         Effect -> the share that the model announces to stay of what comes back without it alone: more than would refute
         it in every set, so that playing that tells nothing, and it is not played.
+    rest_s
+        How long the platform has to rest between two runs: what was asked for, or until its ring is lost in the noise.
     """
 
     runs: tuple[PlannedRun, ...]
@@ -74,6 +77,7 @@ class ProofPlan:
     announced: Mapping[str, Mapping[str, Announced]]
     torque_scale: Mapping[str, float] = field(default_factory=dict)
     too_small: Mapping[str, float] = field(default_factory=dict)
+    rest_s: float = 0.0
 
     @property
     def sets(self) -> tuple[PlannedSet, ...]:
@@ -108,12 +112,14 @@ Models = Mapping[str, tuple[Platform, tuple[str, ...]]]
 def plan_proof(
     model: Platform, sets: Sequence[PlannedSet], allowed: Peaks, drive: Drive, *, angle: bool = False,
     rivals: Mapping[str, Platform] | None = None, prefix: str = "proof", recorded: Sequence[Run] = (),
+    rest_s: float = 0.0, noise: float | None = None,
 ) -> ProofPlan:  # fmt: skip
     """Every set without and with compensation, and with each effect left out once where there are several.
 
-    The order turns round from set to set, so that what drifts falls on all variants. Every run is held against the
-    limits on its model, that of a rival on both, and by the recorded run of its set; where one breaks them the torque
-    of the whole set is reduced.
+    Each run is compensated from the state in which the one before it leaves the effects of its model. The order turns
+    round from set to set, so that what drifts falls on all variants. Every run is held against the limits on its model,
+    that of a rival on both, and by the recorded run of its set; where one breaks them the torque of the whole set is
+    reduced.
 
     Parameters
     ----------
@@ -127,6 +133,10 @@ def plan_proof(
         "effect / rival" -> the model with the rival in the place of the effect.
     recorded
         The campaign: a run of the name of a set tells how the platform moves in that set, whatever the model says.
+    rest_s
+        Between two runs, where the platform needs no longer one.
+    noise
+        Of the sensor, in which the ring of the run before has to be lost; where None it is left to ``rest_s``.
 
     Raises
     ------
@@ -138,16 +148,24 @@ def plan_proof(
     runs: list[PlannedRun] = []
     scales: dict[str, float] = {}
     announcements: dict[str, dict[str, Announced]] = {variant: {} for variant in models}
+    if noise is not None:
+        rest_s = rest_needed_s(sets, model, drive, angle, noise, rest_s)
+    apart = {variant: of for variant, (of, _) in models.items() if of is not model or variant == ALL}
+    stand = Standings.untouched(apart, drive, rest_s)
     for number, asked in enumerate(sets):
         run = next((r for r in recorded if r.name == asked.name), None)
-        made, factor = _within(asked, models, allowed, drive, prefix, run)
+        order = [PLAIN, *models] if number % 2 == 0 else [*reversed(models), PLAIN]
+        made, factor = _within(asked, models, allowed, order, stand, prefix, run)
         if factor < 1.0:
             scales[asked.name] = factor
-        order = list(made) if number % 2 == 0 else list(reversed(made))
-        runs += [PlannedRun(asked.name, variant, made[variant]) for variant in order]
+        runs += [PlannedRun(asked.name, variant, made[variant].planned) for variant in order]
         for variant, (of, _) in models.items():
-            without, better = pair_of(variant)
-            announcements[variant][asked.name] = announced(of, made[without], made[better], drive, angle)
+            pair, own = [made[one] for one in pair_of(variant)], variant if variant in apart else ALL
+            begins = [one.stand.found[own] for one in pair]
+            announcements[variant][asked.name] = announced(
+                of, pair[0].planned, pair[1].planned, drive, angle, (begins[0], begins[1])
+            )
+        stand = made[order[-1]].stand.after(made[order[-1]].planned)
     small = {
         variant: min(one.left for one in announcements[variant].values())
         for variant, (_, left_out) in models.items()
@@ -155,7 +173,7 @@ def plan_proof(
     }
     return ProofPlan(
         tuple(run for run in runs if run.variant not in small),
-        {v: of for v, (of, _) in models.items() if v not in small}, announcements, scales, small,
+        {v: of for v, (of, _) in models.items() if v not in small}, announcements, scales, small, rest_s,
     )  # fmt: skip
 
 
@@ -168,17 +186,19 @@ def _within(
     asked: PlannedSet,
     models: Mapping[str, tuple[Platform, tuple[str, ...]]],
     allowed: Peaks,
-    drive: Drive,
+    order: Sequence[str],
+    stand: Standings,
     prefix: str,
     run: Run | None,
-) -> tuple[dict[str, PlannedSet], float]:
+) -> tuple[dict[str, _Made], float]:
     """All variants of a set with the largest torque, of those tried, that passes on all; and the factor on it."""
     factor = 1.0
     for _ in range(PLANNING_ATTEMPTS):
-        made = _made(asked.scaled(factor), models, drive, prefix)
-        worst = min(_allowed_share(s, variant, models, allowed) for variant, s in made.items())
+        made = _made(asked.scaled(factor), models, order, stand, prefix)
+        worst = min(_allowed_share(one.planned, variant, models, allowed) for variant, one in made.items())
         if run is not None:
-            seen = [expected_peaks(run, asked.scaled(factor), s, models[ALL][0]) for s in made.values()]
+            plain = asked.scaled(factor)
+            seen = [expected_peaks(run, plain, one.planned, models[ALL][0]) for one in made.values()]
             worst = min(worst, *(_share_within(peaks, allowed) for peaks in seen if peaks is not None), 1.0)
         if worst >= 1.0:
             return made, factor
@@ -197,10 +217,26 @@ def _share_within(peaks: Peaks, allowed: Peaks) -> float:
     return min(limit / value for value, limit in zip(peaks, allowed, strict=True) if value > 0.0)
 
 
-def _made(plain: PlannedSet, models: Models, drive: Drive, prefix: str) -> dict[str, PlannedSet]:
-    made = {PLAIN: replace(plain, name=f"{prefix}: {plain.name}")}
-    for variant, (model, left_out) in models.items():
-        made[variant] = compensated(model, plain, f"{prefix}: {plain.name}, {_words(variant)}", drive, left_out)
+class _Made(NamedTuple):
+    """A run, and how it finds the models."""
+
+    planned: PlannedSet
+    stand: Standings
+
+
+def _made(
+    plain: PlannedSet, models: Models, order: Sequence[str], stand: Standings, prefix: str
+) -> dict[str, _Made]:  # fmt: skip
+    made: dict[str, _Made] = {}
+    for number, variant in enumerate(order):
+        if number:
+            stand = stand.after(made[order[number - 1]].planned)
+        if variant == PLAIN:
+            made[variant] = _Made(replace(plain, name=f"{prefix}: {plain.name}"), stand)
+            continue
+        (model, left_out), begin = models[variant], stand.found.get(variant, stand.found[ALL])
+        name = f"{prefix}: {plain.name}, {_words(variant)}"
+        made[variant] = _Made(compensated(model, plain, name, stand.drive, left_out, begin), stand)
     return made
 
 
@@ -216,7 +252,10 @@ def _allowed_share(planned: PlannedSet, variant: str, models: Models, allowed: P
     return min(predict(on, planned, allowed).scale for on in own.values())
 
 
-def announced(model: Platform, plain: PlannedSet, better: PlannedSet, drive: Drive, angle: bool) -> Announced:
+def announced(
+    model: Platform, plain: PlannedSet, better: PlannedSet, drive: Drive, angle: bool,
+    begins: tuple[Standing | None, Standing | None] = (None, None),
+) -> Announced:  # fmt: skip
     """What stays of the error against the linear model by the model's own account; nothing where there was none.
 
     Where an effect leaves open at which angle the platform rests, the mean square over all angles that it allows.
@@ -224,8 +263,8 @@ def announced(model: Platform, plain: PlannedSet, better: PlannedSet, drive: Dri
     pairs = []
     for aside_rad in _rest_angles(model):
         one, other = (
-            deviation(simulated_run(s, model, drive, angle, aside_rad), s, model, NEGLIGIBLE_NOISE)
-            for s in (plain, better)
+            deviation(simulated_run(s, model, drive, angle, aside_rad, begin), s, model, NEGLIGIBLE_NOISE)
+            for s, begin in zip((plain, better), begins, strict=True)
         )
         pairs.append((one, other, plain.duration_s))
     share = share_left(pairs)
@@ -246,18 +285,3 @@ def _rest_angles(model: Platform) -> tuple[float, ...]:
 
 
 NEGLIGIBLE_NOISE = 1e-9  # noise of a simulated sensor in the unit of its channel: far below what any effect does
-
-
-def not_cancelled(model: Platform) -> dict[str, str]:
-    """Effects of a model that a proof does not touch, and why."""
-    return {
-        name: effects.get(name).stays or _no_torque(name) for name in model.effects
-        if not effects.get(name).cancelled_by_torque
-    }  # fmt: skip
-
-
-def _no_torque(name: str) -> str:
-    read = effects.get(name).reads
-    return (
-        f"the readings of {read.name} are not known before the run" if read is not None else "no torque can cancel it"
-    )

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from identify.proof.compensation import not_cancelled
 from identify.proof.deviation import Deviation, deviation, explained_left, share_left
-from identify.proof.plan import ALL, PLAIN, REFUTED, ProofPlan, not_cancelled, pair_of
+from identify.proof.plan import ALL, PLAIN, REFUTED, ProofPlan, pair_of
 from identify.proven import EffectProof, Proof, ProofLines, ProofSet, ProofStatus, Share
 from identify.results import NORMAL_95
 from identify.wording import plain as plain_words

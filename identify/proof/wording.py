@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from identify.proof.plan import ALL, ProofPlan, not_cancelled, pair_of
+from identify.proof.compensation import not_cancelled
+from identify.proof.plan import ALL, ProofPlan, pair_of
 from identify.proven import EffectProof, Proof
 from identify.wording import capital, joined, plain
 from rig import effects
@@ -13,8 +14,8 @@ from rig.platform import Platform
 NOTABLE = 0.005  # share that is announced to stay, below which nothing is said
 
 
-def plan_lines(plan: ProofPlan, model: Platform) -> list[str]:
-    """What is going to be played and what will stay, before anything moves."""
+def plan_lines(plan: ProofPlan, model: Platform, rest_s: float = 0.0) -> list[str]:
+    """What is going to be played and what will stay, before anything moves; ``rest_s`` is the rest asked for."""
     kinds = 1 + len(plan.variants)
     names = joined([plain(n) for n in model.effects if effects.get(n).cancelled_by_torque]) or "nothing"
     lines = [
@@ -38,6 +39,11 @@ def plan_lines(plan: ProofPlan, model: Platform) -> list[str]:
         f"  {name}: reduced to {100 * scale:.1f} % to stay within the limits with compensation"
         for name, scale in plan.torque_scale.items()
     ]
+    if plan.rest_s > rest_s:
+        lines.append(
+            f"  The rests between the runs last {plan.rest_s:.1f} s in place of {rest_s:g} s: by the model the "
+            "platform rings that long"
+        )
     return lines
 
 

@@ -150,26 +150,27 @@ class Equations:
                 z[self.z_at[i] : self.z_at[i + 1]] = rest(angle_rad, rate_rad_s)
         return z
 
-    def rest_angle_rad(self) -> float:
+    def rest_angle_rad(self, states: Array | None = None) -> float:
         """Where the platform stands without torque, near zero: what its loads pull there, the spring holds.
 
-        Loads with a memory or a clock of their own are taken as they are at the start. Zero where no such place is
-        found within a turn.
+        Loads with a memory or a clock of their own are taken as they are at the start, or in these ``states``. Zero
+        where no such place is found within a turn.
         """
         if not self.loads or not self.jck[2] > 0.0:
             return 0.0
         at = 0.0
         for _ in range(_NEWTON):
-            here, beside = self.pull_nm(at), self.pull_nm(at + _BESIDE_RAD)
+            here, beside = self.pull_nm(at, states), self.pull_nm(at + _BESIDE_RAD, states)
             slope = (beside - here) / _BESIDE_RAD
             if not slope > 0.0 or not abs(at) < 2.0 * np.pi:
                 return 0.0
             at -= here / slope
-        return at if abs(self.pull_nm(at)) <= 1e-9 * self.jck[2] else 0.0
+        return at if abs(self.pull_nm(at, states)) <= 1e-9 * self.jck[2] else 0.0
 
-    def pull_nm(self, angle_rad: float) -> float:
+    def pull_nm(self, angle_rad: float, states: Array | None = None) -> float:
         """Torque by which spring and loads pull a platform back that stands still at an angle."""
-        return float(integrator.pull(angle_rad, self.rest_states(0.0, 0.0), self.jck, *self._loads_only()))
+        states = self.rest_states(0.0, 0.0) if states is None else states
+        return float(integrator.pull(angle_rad, states, self.jck, *self._loads_only()))
 
     def _loads_only(self) -> tuple[Any, int, Any, Array, Any]:
         return self.kernels, self.loads, self.z_at, self.p, self.p_at
@@ -212,15 +213,19 @@ class Equations:
         return p, kept
 
     def integrate(
-        self, torque: Array, step_s: float, start: tuple[float, float], readings: Readings | None = None
-    ) -> Array:
-        """Angle, rate and acceleration, shape (n + 1, 3), under a shaft torque of shape (n, 3)."""
+        self, torque: Array, step_s: float, start: tuple[float, float], readings: Readings | None = None,
+        states: Array | None = None,
+    ) -> Array:  # fmt: skip
+        """Angle, rate and acceleration, shape (n + 1, 3), under a shaft torque of shape (n, 3).
+
+        ``states`` are the internal states at the start, of a platform at rest where None; they are left as at the end.
+        """
         p, _kept = self.parameters_with(readings)
         state = np.array([start[0], start[1], np.sign(start[1]), 0.0])
         out = np.empty((len(torque) + 1, 3))
         integrator.run_steps(
             state,
-            self.rest_states(*start),
+            self.rest_states(*start) if states is None else states,
             step_s,
             torque,
             self.jck,

@@ -205,9 +205,12 @@ class Grid:
         t = self.step_s * np.arange(self.n + 1)
         return np.asarray(CubicHermiteSpline(t, fine, slope)(self.time_s - self.time_s[0]), dtype=float)
 
-    def simulate(self, equations: Equations, start: tuple[float, float]) -> Motion:
-        """Motion at the sample instants from ``start`` (angle_rad, rate_rad_s) at the first one."""
-        fine = equations.integrate(self.shaft_torque(equations), self.step_s, start)
+    def simulate(self, equations: Equations, start: tuple[float, float], states: Array | None = None) -> Motion:
+        """Motion at the sample instants from ``start`` (angle_rad, rate_rad_s) at the first one.
+
+        ``states`` as in ``Equations.integrate``.
+        """
+        fine = equations.integrate(self.shaft_torque(equations), self.step_s, start, states=states)
         angle, rate, acceleration = fine[:, 0], fine[:, 1], fine[:, 2]
         sampled = self.sample(rate, acceleration)
         sensed = sampled
@@ -223,6 +226,7 @@ def simulate(
     torque: TorqueSignal | None,
     start: tuple[float, float] = (0.0, 0.0),
     substeps: int | None = None,
+    states: Array | None = None,
 ) -> Motion:
     """Motion of a platform over a whole set.
 
@@ -236,6 +240,8 @@ def simulate(
         Angle in rad and rate in rad/s at ``time_s[0]``.
     substeps
         Fine steps a sample; chosen from the platform's fastest motion when left out.
+    states
+        Internal states at ``time_s[0]``, of a platform at rest where None; they are left as at the end.
 
     Raises
     ------
@@ -245,4 +251,4 @@ def simulate(
     equations = Equations(platform)
     if substeps is None:
         substeps = equations.substeps(float(np.median(np.diff(time_s))))
-    return Grid(time_s, torque, substeps).simulate(equations, start)
+    return Grid(time_s, torque, substeps).simulate(equations, start, states)

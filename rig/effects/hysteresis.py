@@ -55,6 +55,6 @@ EFFECT = Effect(
     from_special={"presliding_friction": lambda v: {"level": v[0], "yield_angle": v[1], "exponent": 1.0, "share": 1.0}},
     is_flexible=True,
     goes_with=("history", "direction"),
-    stays="the initial deflection of the contact is not known before the run",
+    stays="the deflection at which a run finds it is computed from the run before: a touch in between changes it",
     separated_by="from presliding friction: repeat at several amplitudes",
 )

@@ -47,6 +47,6 @@ EFFECT = Effect(
     fastest_rad_s=_fastest,
     follows_within_rad=lambda values: values[4],
     nests=("coulomb_friction",),
-    stays="the initial deflection of the contact is not known before the run",
+    stays="the deflection at which a run finds it is computed from the run before: a touch in between changes it",
     separated_by="from Coulomb friction and hysteresis: repeat at a small amplitude",
 )

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.proof.compensation import cancelled, compensated, linear_part
+from identify.proof.compensation import cancelled, compensated, linear_part, not_cancelled
 from identify.proof.deviation import deviation, simulated_run
 from identify.proof.drive import Drive, latency_of
-from identify.proof.plan import ALL, PLAIN, announced, not_cancelled, plan_proof
+from identify.proof.plan import ALL, PLAIN, announced, plan_proof
 from identify.proof.rounding import feedback, rounded
 from rig import effects
 from rig.errors import PreflightRefusal
