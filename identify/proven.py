@@ -82,6 +82,24 @@ class ProofLines:
 
 
 @dataclass(frozen=True)
+class LateTicks:
+    """Ticks of the compensated runs whose torque came late, and what they may have done.
+
+    Parameters
+    ----------
+    late, ticks
+        Deadlines at which the torque of an earlier tick still stood, by the recorded torque, of how many.
+    reproduced
+        The share of the error that remained which the identified model reproduces when it is given the torque as it was
+        played; None where no more than noise remained.
+    """
+
+    late: int
+    ticks: int
+    reproduced: float | None
+
+
+@dataclass(frozen=True)
 class Proof:
     """A proof that was played.
 
@@ -99,6 +117,8 @@ class Proof:
         By how much the sets were reduced so that they stay within the limits with compensation, by name of the set.
     excluded
         Names that were refuted and left out of the search that followed.
+    late
+        The late ticks of the compensated runs; None where there were none.
     """
 
     total: EffectProof
@@ -108,4 +128,5 @@ class Proof:
     torque_scale: Mapping[str, float] = field(default_factory=dict)
     lines: tuple[ProofLines, ...] = ()
     excluded: tuple[str, ...] = ()
+    late: LateTicks | None = None
     earlier: tuple[str, ...] = ()  # what earlier proofs of this campaign found, one sentence each

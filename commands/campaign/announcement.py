@@ -17,8 +17,10 @@ from rig.sequencer.probe import Probe
 SEPARATOR_LINE = "=" * 78
 
 
-def announcement(statement: Statement, config: Config, sets: Sequence[PlannedSet], folder: Path) -> str:
-    """The opening statement of a campaign that is played."""
+def announcement(
+    statement: Statement, config: Config, sets: Sequence[PlannedSet], folder: Path, then: str = "the identification"
+) -> str:
+    """The opening statement of a campaign that is played; ``then`` is what follows it."""
     limits = config.limits
     lines = [SEPARATOR_LINE, f"  {plain(str(statement))}", SEPARATOR_LINE]
     lines.append(
@@ -27,7 +29,7 @@ def announcement(statement: Statement, config: Config, sets: Sequence[PlannedSet
     lines += [f"{'sets' if i == 0 else '':10}{_line(s)}" for i, s in enumerate(sets)]
     if statement.torque is not Torque.SIMULATED and config.bench is not None:
         lines.append(f"probe     {_probe(config, sets)}")
-    lines += [f"time      {_time(statement, config, sets)}", f"results   {plain(str(folder))}"]
+    lines += [f"time      {_time(statement, config, sets)}; then {then}", f"results   {plain(str(folder))}"]
     return "\n".join(lines)
 
 
@@ -62,6 +64,6 @@ def _probe(config: Config, sets: Sequence[PlannedSet]) -> str:
 def _time(statement: Statement, config: Config, sets: Sequence[PlannedSet]) -> str:
     seconds = duration_s(config, sets)
     if statement.torque is Torque.SIMULATED:
-        return f"{seconds:.0f} s of simulated time, computed in a few seconds; then the identification"
+        return f"{seconds:.0f} s of simulated time, computed in a few seconds"
     settle_s = config.bench.settle_s if config.bench is not None else 0.0
-    return f"{seconds + settle_s:.0f} s on the bench; then the identification"
+    return f"{seconds + settle_s:.0f} s on the bench"

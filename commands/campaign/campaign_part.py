@@ -60,7 +60,7 @@ class CampaignPart:
 
     ``plan`` makes the sets to play, where they are not those of the configuration; it may refuse with UsageError. After
     it ``rest_s`` says how long the rests between them have to be, where not as in the configuration.
-    ``listed`` is where in the information of a recording stands what is said of this part.
+    ``listed`` is where in the information of a recording stands what is said of this part; ``then`` is what follows it.
     """
 
     journal: str = JOURNAL_FILE
@@ -72,6 +72,7 @@ class CampaignPart:
     plan: Callable[[Rig, LoadedConfig], tuple[PlannedSet, ...]] | None = None
     rest_s: Callable[[], float | None] = lambda: None
     listed: str = "follow_ups"
+    then: str = "the identification"
 
     @property
     def done(self) -> frozenset[str]:

@@ -108,7 +108,7 @@ def _open(
 ) -> None:
     statement = stage.rig.statement()
     loudly = context.terminal.show_always if statement.torque is Torque.REAL else context.terminal.show
-    loudly(announcement(statement, loaded.config, sets, path))
+    loudly(announcement(statement, loaded.config, sets, path, part.then))
     scarce = disk_space_warning(path, estimated_bytes(loaded.config, statement, sets, part))
     if scarce:
         context.terminal.show_always(scarce)

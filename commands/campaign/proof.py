@@ -104,6 +104,6 @@ def play_proof(
     further = further_config(loaded, part.model, PARTS_BEFORE + part.number)
     campaign_part = CampaignPart(
         journal, raw, earlier, consent, plan=sets, rest_s=lambda: part.plan.rest_s if part.plan else None,
-        listed="proofs",
+        listed="proofs", then="the verdict",
     )  # fmt: skip
     return play(context, further, folder, campaign_part)

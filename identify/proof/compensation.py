@@ -19,11 +19,13 @@ from identify.model.effect_torque import feeds_on_torque, torque_along
 from identify.proof.drive import PARTS, Drive
 from identify.proof.rounding import feedback, rounded
 from identify.proof.standing import Standing
+from identify.wording import joined, plain
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics import Motion, TorqueSignal, simulate
 from rig.dynamics.equations import STEP_PHASE_RAD
 from rig.effects.base import Effect, Place
+from rig.errors import PreflightRefusal
 from rig.excitation import CompensatedSet, HeldCommands, PlannedSet, TorqueTable
 from rig.platform import Platform
 
@@ -87,6 +89,8 @@ def compensated(
     resisting = _resistance(platform, active, middles_s, _motion(platform, set_nm, middles_s, begin), wanted, begin)
     of_set = _through_drive(platform, active, wanted, drive.step_s)
     of_effects = _through_drive(platform, active, wanted + resisting, drive.step_s) - of_set
+    if not np.all(np.isfinite(of_effects)):
+        raise _runs_away(platform, name)
     apart = math.modf((drive.latency_s + _early_s(platform, active)) / drive.tick_s)[0]
     table = TorqueTable(
         drive.step_s, _as_played(_sooner(of_set, drive), _sooner(of_effects, drive), wanted, drive, apart)
@@ -98,6 +102,15 @@ def compensated(
         made_good = feedback(platform, drive.tick_s, planned.duration_s)
         commands = HeldCommands(drive.tick_s, rounded(exact, drive.resolution_nm, made_good))
     return CompensatedSet.of(planned, name, lead_s, table, _early_s(platform, active), drive.latency_s, commands)
+
+
+def _runs_away(platform: Platform, name: str) -> PreflightRefusal:
+    c, k = platform.damping_nm_s_rad, platform.stiffness_nm_rad
+    names = joined([plain(n) for n in platform.effects])
+    return PreflightRefusal(
+        f"{name}: no compensating torque can be computed. By the model with {names} "
+        f"(C = {c:.3g} N m s/rad, K = {k:.3g} N m/rad) the motion grows without bound; nothing was moved."
+    )
 
 
 def _set_torque(planned: PlannedSet, lead_s: float, drive: Drive) -> TorqueSignal:

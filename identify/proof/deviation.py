@@ -90,9 +90,13 @@ def deviation(run: Run, planned: PlannedSet, platform: Platform, noise: float | 
         Where the run has no torque.
     """
     run, lead_s = as_set(run, planned, platform)
+    return beside(run, linear_part(platform), lead_s, noise)
+
+
+def beside(run: Run, platform: Platform, lead_s: float, noise: float | None) -> Deviation:
+    """Measured less a platform in free run under the torque of the run; its set begins ``lead_s`` after the run."""
     trace = prepare(run, 0, noise)
-    linear = linear_part(platform)
-    fitted = free_run(linear, [trace])
+    fitted = free_run(platform, [trace])
     (error,), (shots,) = fitted.residuals(), fitted.shots
     time_s = trace.start_s + trace.step_s * np.arange(len(error)) - lead_s
     keep = shots.weight & np.isfinite(error) & (time_s >= 0.0)

@@ -236,7 +236,12 @@ def _made(
             continue
         (model, left_out), begin = models[variant], stand.found.get(variant, stand.found[ALL])
         name = f"{prefix}: {plain.name}, {_words(variant)}"
-        made[variant] = _Made(compensated(model, plain, name, stand.drive, left_out, begin), stand)
+        try:
+            made[variant] = _Made(compensated(model, plain, name, stand.drive, left_out, begin), stand)
+        except PreflightRefusal as refused:
+            if " / " not in variant:
+                raise
+            raise PreflightRefusal(f"{refused} Leave out --rival to play the proof without this alternative.") from None
     return made
 
 

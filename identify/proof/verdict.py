@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from identify.proof.compensation import not_cancelled
 from identify.proof.deviation import Deviation, deviation, explained_left, share_left
+from identify.proof.late import late_of, with_late_ticks
 from identify.proof.plan import ALL, PLAIN, REFUTED, ProofPlan, pair_of
 from identify.proven import EffectProof, Proof, ProofLines, ProofSet, ProofStatus, Share
 from identify.results import NORMAL_95
@@ -56,9 +57,12 @@ def judge(plan: ProofPlan, recording: Recording, model: Platform) -> Proof:
     single |= {name: _too_small(left) for name, left in plan.too_small.items()}
     total, single = _numbers_or_name(plan, recording, total, single)
     total, single, rivals = _compared(plan, sets, found, total, single, rivals)
+    late = late_of(plan, recording, model, found)
+    single = {name: _told_beforehand(name, with_late_ticks(one, late)) for name, one in single.items()}
     return Proof(
-        total, {name: _told_beforehand(name, one) for name, one in single.items()}, rivals, not_cancelled(model),
+        with_late_ticks(total, late), single, rivals, not_cancelled(model),
         plan.torque_scale, tuple(_lines(name, plan, found) for name in sets),
+        late=late,
     )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from identify.proof.compensation import not_cancelled
 from identify.proof.plan import ALL, ProofPlan, pair_of
-from identify.proven import EffectProof, Proof
+from identify.proven import EffectProof, LateTicks, Proof
 from identify.wording import capital, joined, plain
 from rig import effects
 from rig.platform import Platform
@@ -74,10 +74,24 @@ def _found(proof: Proof) -> Iterator[str]:
     for pair, one in proof.rivals.items():
         effect, rival = pair.split(" / ")
         yield _sentence(f"{capital(plain(rival))} instead of {plain(effect)}", one)
+    if proof.late is not None:
+        yield _late(proof.late, proof.total.announced_left)
     for name, why in proof.not_cancelled.items():
         yield f"{capital(plain(name))} was not compensated: {why}."
     if proof.excluded:
         yield _left_out(proof)
+
+
+def _late(late: LateTicks, announced_left: float) -> str:
+    """How many ticks were late, and what of the rest that may explain."""
+    said = f"The torque was late in {late.late} of the {late.ticks} ticks of the compensated runs"
+    if late.reproduced is None:
+        return f"{said}; no more than the sensor's noise remained."
+    also = f", beside the {percent(announced_left)} that was predicted to remain" if announced_left > NOTABLE else ""
+    return (
+        f"{said}. Given the torque as it was played, the identified model reproduces {percent(late.reproduced)} of the "
+        f"error that remained: as much of it may be due to late ticks{also}."
+    )
 
 
 def _left_out(proof: Proof) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from identify.proof.wording import lines
@@ -18,6 +19,7 @@ def proof_json(proof: Proof) -> dict[str, Any]:
         "not_cancelled": dict(proof.not_cancelled),
         "torque_scale": dict(proof.torque_scale),
         "excluded": list(proof.excluded),
+        "late_ticks": None if proof.late is None else asdict(proof.late),
         "sentences": lines(proof),
     }
 

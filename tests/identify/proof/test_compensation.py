@@ -220,3 +220,14 @@ def test_a_set_without_compensation_is_foretold_in_the_steps_of_the_drive() -> N
     assert run.torque_nm is not None
     steps = run.torque_nm / 0.12
     np.testing.assert_allclose(steps, np.rint(steps), atol=1e-9)
+
+
+def test_a_rival_whose_model_runs_away_is_refused_in_words() -> None:
+    model = with_effects(cubic_stiffness={"factor": 1000.0})
+    cogging = {"cogging": {"sine": 4424.0, "cosine": 82.5, "order": 0.5}}
+    rival = Platform(1e-4, -0.14, 0.0, effects=cogging)
+    with pytest.raises(PreflightRefusal, match=r"with cogging .* grows without bound.*Leave out --rival"):
+        plan_proof(
+            model, [SET], Peaks(10.0, 400.0, 150.0), Drive(1e-3, "zero_order", 0.12),
+            rivals={"cubic_stiffness / cogging": rival},
+        )  # fmt: skip
