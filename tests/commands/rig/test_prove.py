@@ -134,6 +134,8 @@ def test_an_unknown_rival_is_said_and_nothing_moves(folder: Path) -> None:
     before = contents(folder)
     done = command(app, "prove", folder, "--rival", "backlash")
     assert done.exit_code == 2 and "--rival backlash: this result has no such alternative" in done.stderr
+    done = command(app, "prove", folder, "--rival", "unbalance")
+    assert done.exit_code == 2 and "no proof tells it from cubic stiffness: within 15 deg" in done.stderr
     assert contents(folder) == before
 
 
