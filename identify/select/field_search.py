@@ -141,9 +141,10 @@ def search_in_torque(
     def fitted(final: Structure) -> FinalFit:
         if final == structure:
             return before
-        known = by_likelihood.fit if by_likelihood else None
-        likely = fitted_on_all(traces, final, (known or best).values, split.final, known)
-        return _final(regression, best, likely, traces, split, trusted=bool(known))
+        found_by_it = by_likelihood is not None or final == known.fit.structure  # what torque had beside it was dropped
+        its = known.fit if found_by_it else None
+        likely = fitted_on_all(traces, final, (its or best).values, split.final, its)
+        return _final(regression, best, likely, traces, split, trusted=found_by_it)
 
     after, found_so_far = fitted(final), final
     while name := _unsupported(after, structure, bool(by_likelihood)):

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from functools import cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from benchmarks.proof.rigs import campaign, config_of, fitted, sized
 from identify.diagnose.torque_regression import TorqueRegression
-from identify.estimate.initial_guess import scale_of
+from identify.estimate.final_fit import FinalFit
+from identify.estimate.initial_guess import Start, scale_of
 from identify.likelihood.by_prediction_error import fitted_on_all
 from identify.model.structure import Structure
 from identify.pipeline import identify
 from identify.results import Dependence, Disturbance, Identification
 from identify.runs.holdout import split
-from identify.select.field_search import _final
+from identify.select import field_search
+from identify.select.field_search import Judged, _final, search_in_torque
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
 from tests.identify.servo import Servo
@@ -112,3 +116,35 @@ def test_shapes_of_a_declared_effect_are_those_of_the_likelihood_also_where_torq
     assert found.final.platform is not None
     assert found.final.platform.effects["hysteresis"] == pytest.approx(true, rel=0.01)
     assert found.final.platform.inertia_kg_m2 == pytest.approx(0.0203, rel=1e-3)
+
+
+def test_what_is_left_of_a_model_found_in_torque_is_the_likelihoods_where_that_has_found_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Dropped down to the likelihood's own model, it was least squares': a damping 12 % off where a limit bends it."""
+    traces = traces_of(TILTED.recording(2))
+    parts, declared = split(traces, "auto"), Structure(("inertia", "damping"))
+    own = declared.plus("coulomb_friction")
+    regression = TorqueRegression(traces, parts, 20.0, scale_of(traces, (TILTED.inertia, 1e-3, 0.0), ()))
+    _, fit = fitted_on_all(traces, own, regression.solve(own, {}).values, parts.final)
+    search: Any = SimpleNamespace()
+    trusted: list[tuple[tuple[str, ...], bool]] = []
+
+    def final(*args: Any, **options: Any) -> Any:
+        found = _final(*args, **options)
+        trusted.append((found.structure.effects, options["trusted"]))
+        return found
+
+    def unsupported(fit: FinalFit, *_: Any) -> str | None:
+        return "torque_offset" if "torque_offset" in fit.structure.effects else None
+
+    better = (("_final", final), ("_unsupported", unsupported), ("leaves_less", lambda *_: True))
+    for name, by in (*better, ("is_more_flexible", lambda *_: False)):
+        monkeypatch.setattr(field_search, name, by)
+    start = Start((TILTED.inertia, 1e-3, 0.0), 1.0, 20.0)
+    search_in_torque(
+        traces, parts, declared, {}, start, ("coulomb_friction", "torque_offset"),
+        "N*m", lambda _: None, Judged(fit, search), False, regression,
+        lambda proposed: "torque_offset" not in proposed.structure.effects,
+    )  # fmt: skip
+    assert trusted[-1] == (("coulomb_friction",), True)
