@@ -26,6 +26,7 @@ from identify.select.curve_rivals import against_curves, not_as_strong, seen_too
 from identify.select.evidence import ADDED_SUPPORT, STRONG_SUPPORT, WEIGHT, Evidence, EvidenceModel, is_trusted
 from identify.select.forward_selection import Round, add_effects, begin_again_without, gone_on_without
 from identify.select.free_form_residual import FreeFormFit, fit_free_forms, redundant_given
+from identify.select.lags import drives
 from identify.select.needed_terms import is_in_doubt, is_light, replace_linear_terms, without_absorbing_stiffness
 from identify.select.preference import explains_most, no_possible_gain, prefers_special_case, simplest
 from identify.select.trial_fits import FULL_ITERATIONS, TRIAL_ITERATIONS, TrialFits
@@ -145,6 +146,9 @@ class Stepwise:
         best = min(good.values(), key=lambda e: e.fit.penalised, default=None)
         if best is None:
             return None
+        if drives(best.fit):  # no platform feeds its motion: what does so is a delay or a lag that is missing
+            passive = {n: e for n, e in good.items() if not drives(e.fit) and e.support > best.support}
+            good, best = passive or good, min(passive.values(), key=lambda e: e.fit.penalised, default=best)
         special = [n for n in effects.get(best.effect).nests if n in good and prefers_special_case(good[n], best)]
         if special:
             best = max((good[n] for n in special), key=lambda e: e.support)

@@ -127,3 +127,25 @@ def test_a_simple_effect_goes_first_only_if_it_makes_most_of_the_fall(
         "cogging": tried("cogging", 1e3, 2),
     }
     assert found.best_candidate(both) == chosen
+
+
+@pytest.mark.parametrize(
+    ("inflation", "damping", "chosen"), [(12.0, -4.4, "sensor_lag"), (1.0, -4.4, "creep"), (12.0, 1.2, "creep")]
+)
+def test_a_model_that_feeds_the_motion_is_not_added_where_a_passive_one_is_believed_more(
+    inflation: float, damping: float, chosen: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Creep beside a damping below zero is late as a lag is; the hysteresis that was hidden was then not found."""
+    monkeypatch.setattr("identify.select.stepwise.support_difference", lambda one, other: abs(one.cost - other.cost))
+    found, _ = search({})
+
+    def tried(name: str, gain: float, damping: float, inflation: float) -> Evidence:
+        new: Any = SimpleNamespace(
+            penalised=-gain, cost=-gain, names=(("damping",),), values={("damping",): damping}, std_error=lambda n: 0.1
+        )
+        return Evidence(name, new, gain, inflation, 9.0, 0.96)
+
+    found.weigher.left = lambda there: 1.0  # type: ignore[method-assign]
+    found.weigher.in_torque = lambda there: there  # type: ignore[method-assign,assignment,return-value]
+    both = {"creep": tried("creep", 3052.0, damping, inflation), "sensor_lag": tried("sensor_lag", 2334.0, 1.2, 4.3)}
+    assert found.best_candidate(both) == chosen
