@@ -10,6 +10,7 @@ from identify.conclude.headline import error_before_and_after, headline
 from identify.report.page.document import Gallery
 from identify.report.page.markup import Markup, element, paragraph, section, words
 from identify.report.page.plots.figure import AFTER, BEFORE, FLOOR, MEASURED, Figure, Panel, grid, level, lines
+from identify.report.page.plots.residual import residual_of
 from identify.report.page.quantities import QUANTITIES, axis
 from identify.results import Identification, RunTraces
 from identify.wording import (
@@ -83,7 +84,8 @@ def convincing_figure(found: Identification) -> Figure | None:
     In torque where the torque decided: a free run accumulates every torque that nobody recorded.
     """
     by_torque = found.final.error.holdout_measure == "holdout_torque_relative"
-    several = [(t, shown) for t in found.traces if (shown := _channels(t, by_torque)) is not None]
+    lowpass_hz = found.final.error.lowpass_hz
+    several = [(t, shown) for t in found.traces if (shown := _channels(t, by_torque, lowpass_hz)) is not None]
     if not several:
         return None
     places = [(_strongest(t, *shown), i) for i, (t, shown) in enumerate(several)]
@@ -92,14 +94,18 @@ def convincing_figure(found: Identification) -> Figure | None:
     return _figure(found, trace, [c[start:end] for c in channels], (start, end), by_torque)
 
 
-def _channels(trace: RunTraces, by_torque: bool) -> tuple[Array, Array, Array] | None:
-    """Measured, by the declared and by the final model, each (n,): the motion, or the torque along the motion."""
+def _channels(trace: RunTraces, by_torque: bool, lowpass_hz: float | None) -> tuple[Array, Array, Array] | None:
+    """Measured, by the declared and by the final model, each (n,): the motion, or the torque along the motion.
+
+    NaN where the low-pass of the torque residual has not settled: the ends of a run are no error of a model.
+    """
     if not by_torque:
         return trace.measured, trace.simulated_before, trace.simulated_after
     if trace.torque_nm is None or trace.torque_residual_before is None or trace.torque_residual_after is None:
         return None
     torque = trace.torque_nm
-    return torque, torque - trace.torque_residual_before, torque - trace.torque_residual_after
+    before, after = (torque - residual_of(trace, which, True, lowpass_hz) for which in ("before", "after"))
+    return torque, before, after
 
 
 def _strongest(trace: RunTraces, measured: Array, before: Array, after: Array) -> tuple[float, int, int]:

@@ -64,3 +64,19 @@ def test_the_genetic_algorithm_and_the_bounds_are_folded_away() -> None:
 def test_without_runs_there_is_no_plot_and_the_page_is_made_all_the_same() -> None:
     assert convincing_figure(replace(unhappy(), traces=())) is None
     assert "What was found" in report_html(replace(unhappy(), traces=()), RECORDING, "x")
+
+
+def test_the_ends_of_a_run_where_the_low_pass_has_not_settled_are_no_error() -> None:
+    assert FOUND.after is not None
+    error = replace(
+        FOUND.after.error, holdout_measure="holdout_torque_relative", holdout_torque_relative=0.02, lowpass_hz=20.0
+    )
+    edge = []
+    for t in FOUND.traces:
+        assert t.torque_nm is not None and t.torque_residual_after is not None
+        late = np.where(t.time_s > t.time_s[-1] - 0.02, 0.9 * np.max(np.abs(t.torque_nm)), 0.0)
+        edge.append(replace(t, torque_residual_before=t.torque_residual_after + late))
+    figure = convincing_figure(replace(FOUND, after=replace(FOUND.after, error=error), traces=tuple(edge)))
+    assert figure is not None
+    shown = next(values(t, "y") for t in figure.traces if (t["name"], t["yaxis"]) == ("declared model", "y2"))
+    assert np.nanmax(np.abs(shown)) < 1.0  # N m
