@@ -43,7 +43,7 @@ def with_load(regression: TorqueRegression) -> list[FreeForm]:
             heat.append(lfilter([1.0 - kept], [1.0, -kept], torque**2 / mean_square))
         return np.stack(heat, axis=1) * torque[:, None]
 
-    passed, torque = regression.along(torques, warmed), regression.at_rows(torques)
+    passed, torque = regression.along(torques, warmed), regression.series()[3]
     columns = passed - torque[:, None] * (torque @ passed / max(float(torque @ torque), 1e-300))
     return [FreeForm("history", columns, np.zeros(0), np.zeros((0, columns.shape[1])), changes=GAIN)]
 

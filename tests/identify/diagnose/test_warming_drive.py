@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 from identify.conclude.next_steps import next_steps
 from identify.conclude.verdict import residual_torque_sentence
 from identify.diagnose.disturbance import disturbance_of
+from identify.diagnose.terms.changing import with_load
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.initial_guess import scale_of
 from identify.model.structure import Structure
@@ -18,7 +19,7 @@ from identify.residual import Disturbance
 from identify.runs.holdout import split
 from rig.arrays import Array
 from rig.config.identify import IdentifyConfig
-from rig.recording.run import Recording
+from rig.recording.run import Recording, Run
 from tests.identify.diagnose.driven import STEP_S, run_driven
 from tests.identify.simulated import DECLARED, TRUTH, traces_of
 
@@ -50,6 +51,22 @@ def test_the_gain_of_a_drive_that_warms_up_is_told_by_its_history() -> None:
     assert most.relative > 0.9 * left.relative
     said = residual_torque_sentence(left, "rotary")
     assert "depends on the past torque (as if the gain of the drive changed with it)" in said
+
+
+def test_noise_of_the_recorded_torque_is_no_gain_that_changes() -> None:
+    """The average gain was taken off along the torque ahead of the low-pass, with all of its noise."""
+    run, rng = run_driven(warms(0.1), 0), np.random.default_rng(2)
+    assert run.torque_nm is not None
+    read = Run(
+        run.name, run.time_s, run.valid, rate_rad_s=run.rate_rad_s, torque_time_s=run.torque_time_s,
+        torque_nm=run.torque_nm + rng.normal(0.0, 30.0, len(run.torque_nm)),
+    )  # fmt: skip
+    regression = TorqueRegression(
+        traces := traces_of(Recording((read,))), split(traces, "auto"), 30.0, scale_of(traces, TRUTH, ())
+    )
+    (term,) = with_load(regression)
+    torque = regression.series()[3]
+    assert np.max(np.abs(torque @ term.columns)) < 1e-9 * float(torque @ torque)
 
 
 def test_a_drive_that_stays_as_it_is_has_no_history() -> None:
