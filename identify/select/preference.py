@@ -79,7 +79,8 @@ def follows_nothing_freely(best: TorqueFit, trial: TorqueFit) -> bool:
     """Whether a model has nothing but stiff effects besides: none that fits almost anything, and no lag of the drive.
 
     What such a model leaves on held-out samples is no matter of how freely it follows: where another leaves a multiple,
-    that is no disturbance.
+    that is no disturbance. A further wave of a kind that the other has, too, follows no more freely than that.
     """
-    added = [effects.get(e) for e in best.structure.effects if e not in trial.structure.effects]
+    kinds = {effects.first_of(e) for e in trial.structure.effects}
+    added = [effects.get(e) for e in best.structure.effects if effects.first_of(e) not in kinds]
     return not any(e.place is Place.DRIVE or e.is_flexible for e in added)

@@ -22,6 +22,7 @@ def fit(*effects: str) -> TorqueFit:
     [
         (("coulomb_friction", "torque_offset"), ("coulomb_friction", "cogging"), True),
         (("coulomb_friction", "cogging"), ("cogging",), True),  # what both have follows for neither
+        (("coulomb_friction", "cogging", "cogging_2"), ("cogging", "hysteresis"), True),  # nor does one wave more
         (("coulomb_friction", "cogging"), (), False),
         (("coulomb_friction", "actuator_lag"), ("coulomb_friction",), False),
         (("torque_delay",), (), False),
