@@ -94,7 +94,7 @@ def gone_on_without(search: Stepwise, why: Mapping[str, str]) -> Stepwise | None
     other = search.apart()
     other.best, other.trials.known = search.best, search.trials.known
     begin_again_without(other, why)
-    other.concluded()
+    other = other.concluded()
     more = search.weigher.evidence(next(iter(why)), other.best, search.best)
     if more.support > ADDED_SUPPORT and more.weight > WEIGHT:
         search.say(

@@ -100,13 +100,13 @@ class LikelihoodSearch:
 
     def run(self) -> bool:
         """Search; whether the last model predicts down to the sensor's noise."""
-        less, best = self.stepwise, self.stepwise.run()
+        less = self.stepwise = self.stepwise.run()
         if self.more is not None and (beyond := self._beyond(*self.more)) is not None:
             add_effects(beyond)
-            if _shows_more(beyond.best, best) and _shows_more(there := beyond.concluded(), best):
+            if _shows_more(beyond.best, less.best) and _shows_more((there := beyond.concluded()).best, less.best):
                 release(less.problem.traces)
-                self.earlier, self.stepwise, best = tuple(less.rounds), beyond, there
-        return self._nearer(best).reduced_chi_square < PREDICTS_TO_NOISE
+                self.earlier, self.stepwise = tuple(less.rounds), there
+        return self._nearer(self.stepwise.best).reduced_chi_square < PREDICTS_TO_NOISE
 
     def _nearer(self, best: Fit) -> Fit:
         """The best model; with platform and lag exchanged where that is as likely and the declared inertia says so.

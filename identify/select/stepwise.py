@@ -84,13 +84,13 @@ class Stepwise:
         self.best = self.base
         self.trials = TrialFits(self.problem, self.base.structure, self.allowed, self.weigher)
 
-    def run(self) -> Fit:
+    def run(self) -> Stepwise:
         """Add effects as long as one is worth it; judge each again beside the others; drop what is needless."""
         add_effects(self)
         return self.concluded()
 
-    def concluded(self) -> Fit:
-        """The best model judged again and compared with curves."""
+    def concluded(self) -> Stepwise:
+        """The search to go on with, its best model judged again and compared with curves: this one or one without."""
         for other in (partial(replace_linear_terms, self), self.re_evaluate):
             before, self.best = self.best.structure, other(self.best)
             if self.best.structure.parts != before.parts:  # beside what was replaced, others may have shown nothing
@@ -99,11 +99,10 @@ class Stepwise:
             begin_again_without(self, why)
             return self.concluded()
         if (why := seen_too_little(self, self.best)) and (instead := gone_on_without(self, why)):
-            vars(self).update(vars(instead))
-            return self.best
+            return instead
         self.best = self.backward_elimination(self.best, [*self.best.structure.terms, *self.trials.added(self.best)])
         self.best = self.compare_with_free_form(against_curves(self, self.best))
-        return self.best
+        return self
 
     def apart(self, **changes: Any) -> Stepwise:
         """The same with other settings and with lists of its own: what one takes back is not taken from the other."""

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from identify.estimate.initial_guess import first_guess
-from identify.likelihood.fit import Fit
 from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.runs.holdout import Split, split
@@ -77,14 +76,15 @@ def test_where_it_ends_with_no_other_effect_the_part_keeps_its_model_and_all_tha
 ) -> None:
     concluded = Stepwise.concluded
 
-    def taking_all_back(search: Stepwise) -> Fit:
+    def taking_all_back(search: Stepwise) -> Stepwise:
         if not search.settled:
             return concluded(search)
         search.stood_for_curves.add("coulomb_friction")
         search.dropped.append(("coulomb_friction", "a curve"))
         search.inflation["coulomb_friction"] = np.inf
         search.rivals.clear()
-        return search.base
+        search.best = search.base
+        return search
 
     monkeypatch.setattr(Stepwise, "concluded", taking_all_back)
     search, said = searched({**FRICTION, **CLIPS}, monkeypatch)

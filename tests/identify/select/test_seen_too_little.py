@@ -10,9 +10,10 @@ import pytest
 
 from identify.likelihood.fit import Fit
 from identify.model.structure import Structure
-from identify.select import forward_selection
+from identify.select import forward_selection, stepwise
 from identify.select.curve_rivals import not_as_strong, seen_too_little
 from identify.select.forward_selection import gone_on_without
+from identify.select.likelihood_search import LikelihoodSearch
 from identify.select.stepwise import Stepwise
 
 TRAVEL_DEG = 9.0
@@ -51,7 +52,7 @@ def test_a_wave_that_is_not_seen_twice_stays_where_nothing_else_explains_as_much
 ) -> None:
     cubic = cast(Fit, SimpleNamespace(structure=Structure(effects=("cubic_stiffness",))))
     monkeypatch.setattr(Stepwise, "without", lambda search, now, name, steps: search.base)
-    monkeypatch.setattr(Stepwise, "concluded", lambda search: search.best)
+    monkeypatch.setattr(Stepwise, "concluded", lambda search: search)
     monkeypatch.setattr(forward_selection, "add_effects", lambda search: setattr(search, "best", cubic))
     search = searched(of_periods(0.7), weight)
     said: list[str] = []
@@ -64,6 +65,19 @@ def test_a_wave_that_is_not_seen_twice_stays_where_nothing_else_explains_as_much
         assert instead is not None and instead.best is cubic
         assert instead.dropped == [("cogging", "it is not seen twice")]
         assert list(instead.allowed) == ["cubic_stiffness"] and instead.stood_for_curves == {"cogging"}
+
+
+def test_the_search_without_it_is_the_one_to_go_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    search, instead = searched(of_periods(0.7)), searched(of_periods(2.1))
+    monkeypatch.setattr(stepwise, "replace_linear_terms", lambda search, now: now)
+    monkeypatch.setattr(Stepwise, "re_evaluate", lambda search, now: now)
+    monkeypatch.setattr(stepwise, "not_as_strong", lambda fit, names: {})
+    monkeypatch.setattr(stepwise, "gone_on_without", lambda search, why: instead)
+    assert search.concluded() is instead
+    monkeypatch.setattr(stepwise, "add_effects", lambda search: None)
+    whole = LikelihoodSearch(search, [], WAVE, cast(Any, None))
+    whole.run()
+    assert whole.stepwise is instead
 
 
 def test_a_tone_that_goes_with_what_is_played_is_refuted_and_one_from_outside_is_not() -> None:
