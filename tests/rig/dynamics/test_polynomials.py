@@ -16,6 +16,8 @@ def test_a_b_spline_is_read_as_scipy_reads_it(degree: int) -> None:
     spline = make_interp_spline(KNOTS, VALUES, k=degree)
     at = np.linspace(KNOTS[0], KNOTS[-1], 10_001)
     np.testing.assert_allclose(Polynomials(spline)(at), spline(at), rtol=0.0, atol=1e-11)
+    for other in (spline.derivative(), spline.antiderivative()):  # of the one, SciPy holds weights that are not used
+        np.testing.assert_allclose(Polynomials(other)(at[:-1]), other(at[:-1]), rtol=1e-11, atol=1e-11)
 
 
 def test_a_cubic_spline_and_its_integral_are_read_as_scipy_reads_them() -> None:
