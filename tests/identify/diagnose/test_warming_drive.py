@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
+import pytest
 from scipy.signal import lfilter
 
 from identify.conclude.next_steps import next_steps
@@ -21,6 +24,7 @@ from rig.arrays import Array
 from rig.config.identify import IdentifyConfig
 from rig.recording.run import Recording, Run
 from tests.identify.diagnose.driven import STEP_S, run_driven
+from tests.identify.sample import sample
 from tests.identify.simulated import DECLARED, TRUTH, traces_of
 
 WARMING_S = 0.9
@@ -37,6 +41,7 @@ def warms(loss: float) -> Callable[[Array], Array]:
     return drive
 
 
+@cache
 def left_of(loss: float) -> Disturbance:
     traces = traces_of(Recording(tuple(run_driven(warms(loss), i) for i in range(2))))
     regression = TorqueRegression(traces, split(traces, "auto"), 30.0, scale_of(traces, TRUTH, ()))
@@ -74,6 +79,15 @@ def test_a_drive_that_stays_as_it_is_has_no_history() -> None:
 
 
 def test_what_to_do_about_a_drive_that_warms_up_is_said() -> None:
+    found, _ = sample(1.0)
+    lost = replace(found, accepted=False, verdict=replace(found.verdict, unexplained=True))
+    for left, said in ((left_of(0.1), True), (left_of(0.0), False)):
+        steps = next_steps(replace(lost, disturbance=left))
+        assert any("motor that warms up" in step for step in steps) == said
+
+
+@pytest.mark.slow
+def test_an_identification_leaves_what_a_drive_that_warms_up_does_unexplained_and_says_what_to_do() -> None:
     found = identify(
         Recording(tuple(run_driven(warms(0.1), i) for i in range(2))), DECLARED, IdentifyConfig(candidates=())
     )
