@@ -11,9 +11,11 @@ from identify.likelihood.prediction_error import PredictionError
 from identify.model.structure import Structure
 from identify.signals.prepare import one_noise, prepare
 from identify.signals.trace import Trace
-from identify.simulate.all_runs import PARTS_OF_A_LAG, READ_BIAS, reads_a_sample
-from rig.platform import TERMS
-from rig.recording.run import Run
+from identify.simulate.all_runs import COARSEST, PARTS_OF_A_LAG, READ_BIAS, reads_a_sample, shots_for
+from identify.simulate.shots import predict
+from rig.dynamics import Equations
+from rig.platform import TERMS, Platform
+from rig.recording.run import Array, Run
 from tests.identify.simulated import NOISE_RAD_S, sine_run
 
 LAG_S = 1.2e-3
@@ -41,6 +43,24 @@ def test_a_lag_shorter_than_a_sample_moves_no_number(lag: str) -> None:
     fit = PredictionError(slow_traces(lag)).fit(Structure(effects=(lag,)), true)
     for name, value in true.items():
         assert abs(fit.values[name] - value) < 3.0 * fit.std_error(name), name
+
+
+@pytest.mark.parametrize("lag", LAGS)
+def test_what_a_simulation_feeds_a_lag_is_off_by_less_than_the_noise_of_a_mean(lag: str) -> None:
+    """Prediction follows the lag exactly; a simulation has to take finer steps for it than the platform asks for."""
+    trace = slow_traces(lag)[0]
+    trace = replace(trace, noise=NOISE_RAD_S)
+    values = {(k,): v for k, v in zip(TERMS, SOFT, strict=True)} | {(lag, "time"): LAG_S}
+    structure, names, x = Structure(effects=(lag,)), list(values), np.array(list(values.values()))
+    equations = Equations(Platform(*SOFT, {lag: {"time": LAG_S}}))
+    assert 1.0 < reads_a_sample(trace, LAG_S, len(trace.measured)) < COARSEST
+
+    def read(finer: int) -> Array:
+        (shots,) = shots_for([trace], structure, names, x, None, None, None, True, finer)
+        return predict(shots, equations, np.zeros((1, 2)), 0.0)
+
+    off = float(np.sqrt(np.mean((read(1) - read(16)) ** 2)))
+    assert off < trace.noise / np.sqrt(len(trace.measured))
 
 
 def test_the_rate_is_read_as_often_as_its_bend_and_the_lag_ask_for() -> None:
