@@ -23,7 +23,7 @@ simulated:
   amplifier: {{kind: hold, resolution_nm: 0.12}}
 limits: {{frozen_gyro_ms: null}}
 excitation:
-  rest_s: 6
+  rest_s: 4
   sets:
     - {{torque_nm: 40, frequency_hz: 5, duration_s: 0.8}}
     - {{torque_nm: 35, frequency_hz: 7, duration_s: 0.8}}

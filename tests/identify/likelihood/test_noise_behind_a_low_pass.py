@@ -22,7 +22,7 @@ from rig.recording.run import Run
 
 INERTIA, DAMPING = 0.05, 0.37
 LAG = ("sensor_lag_second_order", "time")
-STEP_S, FINE, SECONDS = 4e-3, 20, 60.0
+STEP_S, FINE, SECONDS = 4e-3, 20, 30.0
 CORNER_HZ = 65.0
 STRUCTURE = Structure(("inertia", "damping"), ("sensor_lag_second_order",))
 

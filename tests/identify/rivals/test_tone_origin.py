@@ -75,7 +75,7 @@ def test_beside_a_torque_disturbance_only_the_tone_is_taken_back() -> None:
 
 @pytest.mark.parametrize("made", [pytest.param(shaken, marks=pytest.mark.slow), heard])
 def test_a_line_that_stood_before_the_runs_began_may_be_torque_or_sensor_and_is_left_open(made) -> None:  # type: ignore[no-untyped-def]
-    found = found_in([made(*one, seed=k) for k, one in enumerate(SETS)])
+    found = found_in([made(*one, seed=k, lasts_s=1.2) for k, one in enumerate(SETS)])  # 16 periods of the line
     assert found.verdict.effects == ()
     assert found.verdict.unexplained
     assert not found.accepted
