@@ -72,6 +72,7 @@ class LowPassedTorque:
             self._by_block = [used & (blocks % FOLDS == k) for k in range(FOLDS)]
             several = len(traces) >= FOLDS
             self._by_run = [used & (runs % FOLDS == k) for k in range(FOLDS)] if several else self._by_block
+        self.judges_by_other_runs = declared or len(traces) >= FOLDS  # else by other parts of the same runs
         self._judged = np.any(self._by_block, axis=0)
         self._cache: dict[Any, Array] = {}
         self.torque_nm = float(np.sqrt(np.mean(np.concatenate([self._target(i, ()) for i in range(len(traces))]) ** 2)))

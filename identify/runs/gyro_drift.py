@@ -4,7 +4,8 @@ The angle is the integral of the rate, and the integral of the gyro's bias goes 
 over a minute is six degrees. What turned while readings were lost is missing besides. A linear model does not mind; a
 spring that stiffens is looked for at angles at which the platform never was. But the spring itself tells: what inertia,
 damping, friction and spring leave of the torque is the spring's pull over the drift, and that is slow. It is taken for
-a polynomial in time over every stretch, fitted together with them by least squares.
+a polynomial in time over every stretch, with a step where readings were lost, fitted together with them by least
+squares.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from identify.runs.reduced import thinned
-from identify.signals.low_pass import low_pass, settled
+from identify.signals.low_pass import GAP_PERIODS, low_pass, settled
 from identify.signals.trace import MOST_WALK, UPSAMPLING, Trace
 from rig.arrays import Array
 
@@ -29,6 +30,7 @@ SPRING_POWERS = 3  # of the angle, by which a spring is followed
 DRIFT_ROUNDS = (1, 1, *4 * (SPRING_POWERS,))  # the powers, of the angle that the round before has found
 KNOWN_SIGMAS = 10.0  # standard errors of the spring's stiffness: one that is known worse holds nothing
 DRIFT_BLOCKS = 20  # of each stretch; every other one is held out where degrees are compared
+SPANNED_RCOND = 1e-9  # of the largest singular value: what a polynomial and its steps span
 WORTH_IT = 0.9  # of the power on held-out samples, that a higher degree leaves at most: a slow torque is no drift
 ROWS_A_PERIOD = 4.0  # of the low-pass
 SLOW_SHARE = 0.02  # of the largest rate: below, static friction may hold the platform
@@ -69,10 +71,9 @@ def without_drift(traces: Sequence[Trace], cutoff_hz: float) -> list[Trace]:
 def _may_be_bias(run: _Run) -> bool:
     """Whether what bends a run's drift may be the walk of a gyro's bias; if not, it is a torque."""
     walks = 0.0
-    for (first, last), drift in zip(run.spans, run.drifts, strict=True):
-        bias = (
-            legendre.legval(np.linspace(-1.0, 1.0, DRIFT_BLOCKS)[1:-1], legendre.legder(drift)) * 2.0 / (last - first)
-        )
+    for (first, last), drift, gaps in zip(run.spans, run.drifts, run.gaps, strict=True):
+        bends = legendre.legder(drift[: len(drift) - len(gaps)])
+        bias = legendre.legval(np.linspace(-1.0, 1.0, DRIFT_BLOCKS)[1:-1], bends) * 2.0 / (last - first)
         walks = max(walks, float(np.ptp(bias)) / run.step_s)
     return walks <= MOST_WALK * float(np.sqrt(np.mean(run.rate**2)))
 
@@ -82,8 +83,10 @@ class _Run:
 
     Attributes
     ----------
+    gaps
+        Of every stretch: where readings were lost for long enough to miss a turn, in samples.
     drifts
-        Of every stretch: coefficients of its Legendre polynomials, in rad.
+        Of every stretch: coefficients of its Legendre polynomials, and of its steps at these gaps, in rad.
     """
 
     def __init__(self, trace: Trace, cutoff_hz: float) -> None:
@@ -94,13 +97,16 @@ class _Run:
         slow = SLOW_SHARE * float(np.max(np.abs(self.rate))) + 1e-300
         counts = settled(trace.keep, trace.step_s, cutoff_hz) & (np.abs(self.rate) > slow)
         every = max(1, int(1.0 / (ROWS_A_PERIOD * cutoff_hz * trace.step_s)))
-        self.stretches, self.spans, rows = [], [], []
+        lost = np.array([0.5 * (a + b) for a, b in _lost(trace, GAP_PERIODS / cutoff_hz)])
+        self.stretches, self.spans, self.gaps, rows = [], [], [], []
         for first, last in trace.stretches:
             here = np.arange(first, last + 1, every)
             here = here[counts[here]]
             if len(here) >= 4 * DRIFT_BLOCKS:
                 self.stretches.append((first, last))
                 self.spans.append((int(here[0]), int(here[-1])))
+                between = np.searchsorted(lost, here)  # one step where nothing counts between two gaps
+                self.gaps.append(lost[between[np.flatnonzero(np.diff(between))]])
                 rows.append(here)
         self.sizes = [len(r) for r in rows]
         self.rows = np.concatenate(rows) if rows else np.zeros(0, dtype=int)
@@ -111,10 +117,10 @@ class _Run:
 
     def begin(self, degrees: Sequence[int]) -> None:
         """Look for drifts of other degrees, from none at all."""
-        self.drifts = [np.zeros(d + 1) for d in degrees]
+        self.drifts = [np.zeros(d + 1 + len(gaps)) for d, gaps in zip(degrees, self.gaps, strict=True)]
         self.polynomials = [
-            legendre.legvander(through(span, rows), degree)
-            for span, rows, degree in zip(self.spans, self.by_stretch(self.rows), degrees, strict=True)
+            np.column_stack([legendre.legvander(through(span, rows), degree), steps_at(gaps, rows)])
+            for span, gaps, rows, degree in zip(self.spans, self.gaps, self.by_stretch(self.rows), degrees, strict=True)
         ]
 
     def by_stretch(self, values: Any) -> list[Any]:
@@ -124,9 +130,9 @@ class _Run:
     def columns(self, powers: int) -> tuple[Array, Array]:
         """Acceleration, rate, direction, and a spring's powers of the angle, (n, 3 + powers); and the angle, (n,)."""
         angle = self.angle.copy()
-        for (first, last), span, drift in zip(self.stretches, self.spans, self.drifts, strict=True):
+        for (first, last), span, gaps, drift in zip(self.stretches, self.spans, self.gaps, self.drifts, strict=True):
             at = np.arange(first, last + 1)
-            angle[at] -= drift_at(span, drift, at)
+            angle[at] -= drift_at(span, gaps, drift, at)
         passed = [self._passed(angle**k)[self.rows] for k in range(1, powers + 1)]
         return np.column_stack([self.of_motion, *passed]), angle[self.rows]
 
@@ -140,11 +146,25 @@ def through(span: tuple[int, int], at: Any) -> Array:
     return np.asarray(2.0 * (at - first) / (last - first) - 1.0)
 
 
-def drift_at(span: tuple[int, int], drift: Array, at: Any) -> Array:
+def steps_at(gaps: Array, at: Any) -> Array:
+    """Which samples lie behind each gap, (n, gaps)."""
+    return np.asarray(np.asarray(at)[:, None] > gaps, dtype=float)
+
+
+def drift_at(span: tuple[int, int], gaps: Array, drift: Array, at: Any) -> Array:
     """A stretch's drift; no polynomial is extrapolated: ahead of what counts and behind it goes on as on average."""
     x = through(span, at)
     inside = np.clip(x, -1.0, 1.0)
-    return np.asarray(legendre.legval(inside, drift) + (x - inside) * (drift[1] if len(drift) > 1 else 0.0))
+    bent, steps = np.split(drift, [len(drift) - len(gaps)])
+    slope = bent[1] if len(bent) > 1 else 0.0
+    return np.asarray(legendre.legval(inside, bent) + (x - inside) * slope + steps_at(gaps, at) @ steps)
+
+
+def _lost(trace: Trace, longest_s: float) -> list[tuple[int, int]]:
+    """First sample of every gap between readings that lasts longer, and the first one behind it."""
+    seen = np.flatnonzero(trace.keep)
+    ends = np.flatnonzero(np.diff(seen) * trace.step_s > longest_s)
+    return [(int(seen[k]), int(seen[k + 1])) for k in ends]
 
 
 def _over(trace: Trace, run: _Run) -> Array:
@@ -153,9 +173,9 @@ def _over(trace: Trace, run: _Run) -> Array:
     at = np.arange(len(trace.measured))
     known = np.zeros(len(at), dtype=bool)
     out = np.zeros(len(at))
-    for (first, last), span, drift in zip(run.stretches, run.spans, run.drifts, strict=True):
+    for (first, last), span, gaps, drift in zip(run.stretches, run.spans, run.gaps, run.drifts, strict=True):
         here = at[int(first * times) : min(int(last * times) + 1, len(at))]
-        out[here] = drift_at(span, drift, here / times)
+        out[here] = drift_at(span, gaps, drift, here / times)
         known[here] = True
     out = np.interp(at, at[known], out[known])
     return np.asarray(out - out[0])
@@ -202,9 +222,10 @@ def _held_out(runs: Sequence[_Run]) -> float:
         a, y = _projected(runs, columns, fold)
         x, _ = _least_squares(np.concatenate(a), np.concatenate(y))
         for r, own, folds in zip(runs, columns, fold, strict=True):
-            for p, e, f in zip(r.polynomials, r.by_stretch(r.torque - own @ x), folds, strict=True):
+            for p, e, f, gaps in zip(r.polynomials, r.by_stretch(r.torque - own @ x), folds, r.gaps, strict=True):
                 left = e - p @ np.linalg.lstsq(p[~f], e[~f], rcond=None)[0]
-                out += float(np.sum(left[f] ** 2))
+                piece = np.sum(p[:, p.shape[1] - len(gaps) :], axis=1)
+                out += float(np.sum(left[f & np.isin(piece, piece[~f])] ** 2))  # a step that nothing fits tells nothing
     return out
 
 
@@ -216,7 +237,8 @@ def _projected(
     for i, (r, own) in enumerate(zip(runs, columns, strict=True)):
         for k, p in enumerate(r.polynomials):
             use = np.ones(len(p), dtype=bool) if without is None else ~without[i][k]
-            q = np.linalg.qr(p[use])[0]
+            spanned, size, _ = np.linalg.svd(p[use], full_matrices=False)
+            q = spanned[:, size > SPANNED_RCOND * size[0]]  # between two gaps there may be nothing that counts
             mine, torque = r.by_stretch(own)[k][use], r.by_stretch(r.torque)[k][use]
             a.append(mine - q @ (q.T @ mine))
             y.append(torque - q @ (q.T @ torque))

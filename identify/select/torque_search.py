@@ -22,6 +22,7 @@ from rig import effects
 from rig.effects.base import Place
 
 FALL_SIGMAS = 4.0  # standard errors, over blocks of the held-out samples, by which the squared residual must fall: 3e-5
+SEARCHED_FALL_SIGMAS = 5.4  # the same by chance for the best of a thousand shapes
 RICHER = 0.6  # share of what its special case leaves that a richer effect has to take away to be named in its place
 EQUAL_WEIGHT_MARGIN = 0.05  # of what is left: candidates that differ by less carry the same torque
 RIVAL = 0.02  # of what is left: rivals carry as much as what was taken, to that
@@ -57,8 +58,11 @@ class TorqueCandidate:
     @property
     def is_significant(self) -> bool:
         """Whether it is proven and carries enough to be named."""
-        flexible = effects.get(self.effect).is_flexible  # its shape was looked for on the held-out samples, too
-        return self.weight >= WEIGHT and (self.absolute_fall_sigmas if flexible else self.fall_sigmas) >= FALL_SIGMAS
+        if self.weight < WEIGHT:
+            return False
+        # The shape of a flexible one was looked for on the held-out samples, too.
+        looked_for = effects.get(self.effect).is_flexible and self.absolute_fall_sigmas < FALL_SIGMAS
+        return self.fall_sigmas >= (SEARCHED_FALL_SIGMAS if looked_for else FALL_SIGMAS)
 
 
 @dataclass
@@ -87,27 +91,55 @@ class TorqueSearch:
     path: list[TorqueFit] = field(default_factory=list)  # models on the way, the last one the result
 
     def run(self, begin: TorqueFit | None = None) -> TorqueFit:
-        """Add effects as long as one carries weight, then drop what no longer does.
+        """Add effects as long as one carries weight, drop what no longer does, and judge again what was added early.
 
         What falls back to a model that was there before would go round for ever: it ends with that.
         ``begin`` is where to begin; at the declared model where None.
         """
         now = self.without_absorbing_stiffness(begin or self.base)
         before = {now.structure.parts}
-        while len(now.structure.effects) < MAX_EFFECTS + len(self.base.structure.effects):
-            looks = self.candidates(now)
-            self.rounds.append(tuple(looks))
-            chosen = self.best_candidate(looks)
+        while True:
+            chosen, there = self._next(now) or self._in_place(now) or (None, now)
             if chosen is None:
                 break
             share = f"{100.0 * chosen.weight:.0f} % of the residual torque on held-out data"
             self.say(f"added {plain(chosen.effect)}: explains {share}")
-            now = self.backward_elimination(self.without_absorbing_stiffness(chosen.fit))
+            now = self.backward_elimination(self.without_absorbing_stiffness(there))
             if now.structure.parts in before:
                 break
             before.add(now.structure.parts)
             self.path.append(now)
         return now
+
+    def _next(self, now: TorqueFit) -> tuple[TorqueCandidate, TorqueFit] | None:
+        """The effect to add, and the model with it."""
+        if len(now.structure.effects) >= MAX_EFFECTS + len(self.base.structure.effects):
+            return None
+        looks = self.candidates(now)
+        self.rounds.append(tuple(looks))
+        chosen = self.best_candidate(looks)
+        return None if chosen is None else (chosen, chosen.fit)
+
+    def _in_place(self, now: TorqueFit) -> tuple[TorqueCandidate, TorqueFit] | None:
+        """An effect that carries more in the place of one that follows almost anything, and the model with it.
+
+        What was added early was asked while the others were still missing, and may have followed part of theirs: in
+        steady turning a tone stands for a wave over the angle. One with more parameters follows more freely, as a tone
+        does, which has a phase in every run: that it carries more there is no wonder.
+        """
+        found = [e for e in now.structure.effects if e not in self.base.structure.effects]
+        for name in found[:-1]:
+            if not effects.get(name).is_flexible or any(name in effects.get(e).lower_order for e in found):
+                continue
+            without = self.without(now, name)
+            size = len(now.values)
+            looks = [w for w in self.candidates(without) if w.effect != name and len(w.fit.values) <= size]
+            chosen = self.best_candidate([self.candidate(name, without, now), *looks])
+            if chosen is not None and chosen.effect != name:
+                self.say(f"{plain(name)} is replaced: another effect carries its torque beside the others")
+                self.rounds.append(tuple(looks))
+                return chosen, chosen.fit
+        return None
 
     def left(self, fit: TorqueFit) -> float:
         """Held-out power of the residual above the sensor's."""
@@ -119,7 +151,9 @@ class TorqueSearch:
         worth = share > WORTH_EVIDENCE * WEIGHT
         evidence = self.regression.evidence(now, fit) if worth else 0.0
         by_size, by_ratio = self.regression.fall_in_sigmas(now, fit) if worth else (0.0, 0.0)
-        return TorqueCandidate(name, fit, share, evidence, max(by_size, by_ratio), by_size)
+        # A wave that fits one run all along need not come back in another: there the largest moments speak alone.
+        of_one_run = effects.get(name).is_flexible and not self.regression.judges_by_other_runs
+        return TorqueCandidate(name, fit, share, evidence, by_size if of_one_run else max(by_size, by_ratio), by_size)
 
     def _smaller_inertia(self, now: TorqueFit, fit: TorqueFit) -> float:
         """By how much more a smaller inertia makes of the same torque, in acceleration and squared.

@@ -25,6 +25,7 @@ JCK = (3.3e-4, 8.4e-4, 6.15)
 CUBIC = {"cubic_stiffness": {"factor": 30.0}}
 BIAS_RAD_S = 0.03
 LOST = ((3123, 3165), (6523, 6565), (8203, 8245))
+SHORT = ((3123, 3147), (6523, 6547), (6700, 6724), (8203, 8227))  # what is filled in: most of a swing of 22 Hz
 CUTOFF_HZ = 40.0
 
 
@@ -52,7 +53,7 @@ def trace_of(run: Run) -> Trace:
     return one_noise([prepare(run)], False)[0]
 
 
-@pytest.mark.parametrize(("lost", "walk"), [((), 0.0), ((), 3e-3), (LOST, 0.0), (LOST, 3e-3)])
+@pytest.mark.parametrize(("lost", "walk"), [((), 0.0), ((), 3e-3), (LOST, 0.0), (LOST, 3e-3), (SHORT, 0.0)])
 def test_the_angle_stays_with_the_platform(lost: tuple[tuple[int, int], ...], walk: float) -> None:
     run, true = stepped(lost, walk)
     trace = trace_of(run)
