@@ -172,11 +172,9 @@ class EmulatedBench:
 
     def run(self, stop: Callable[[], bool]) -> None:
         """Emulate until ``stop()``, asked at least every 2 ms."""
-        lag_s = self._gyro.latency_s + self._gyro.transmission_s
         self._now_s = self._clock()
         while not stop():
-            due_s = self._start_s + (self._samples + 1) * self._period_s + lag_s
-            wait_s = min(max(due_s - self._clock(), 0.0), LONGEST_SLEEP_S)
+            wait_s = min(max(self.next_sample_s() - self._clock(), 0.0), LONGEST_SLEEP_S)
             ports = [port for port in (self.can_port, self.gyro_port) if port.plugged_in]
             readable = select.select(ports, [], [], wait_s)[0]
             before_s, self._now_s = self._now_s, self._clock()
@@ -188,7 +186,12 @@ class EmulatedBench:
             self._serve_drive(b"")
             if self.gyro_port in readable and self.gyro_port.plugged_in:
                 self._gyro.command(self.gyro_port.read())
-            self._send_samples(lag_s)
+            self._send_samples()
+
+    def next_sample_s(self) -> float:
+        """When the last bit of the gyro's next datagram is out."""
+        lag_s = self._gyro.latency_s + self._gyro.transmission_s
+        return self._start_s + (self._samples + 1) * self._period_s + lag_s
 
     def _report_pause(self, paused_s: float) -> None:
         nm = self.drive.torque_nm
@@ -218,18 +221,21 @@ class EmulatedBench:
                 self._faults.enabled(event.time_s)
             self._on_event(event)
 
-    def _send_samples(self, lag_s: float) -> None:
-        while self._start_s + (self._samples + 1) * self._period_s + lag_s <= self._now_s:
-            for rate in self._world.advance(WORLD_STEPS_PER_SAMPLE):
-                self._remember(self._faults.rate(rate))
+    def _send_samples(self) -> None:
+        while self.next_sample_s() <= self._now_s:
+            self._remember([self._faults.rate(rate) for rate in self._world.advance(WORLD_STEPS_PER_SAMPLE)])
             self._samples += 1
             self.gyro_port.write(self._faults.gyro_bytes(self._gyro.sample(self._filtered())))
 
-    def _remember(self, rate_rad_s: float) -> None:
+    def _remember(self, rates_rad_s: list[float]) -> None:
         # Written twice, so that the last len(kernel) values always stand side by side.
         n = len(self._kernel)
-        self._window[self._slot] = self._window[self._slot + n] = rate_rad_s
-        self._slot = (self._slot + 1) % n
+        while rates_rad_s:
+            slot, part = self._slot, rates_rad_s[: n - self._slot]
+            end = slot + len(part)
+            self._window[slot:end] = self._window[slot + n : end + n] = part
+            self._slot = end % n
+            rates_rad_s = rates_rad_s[len(part) :]
 
     def _filtered(self) -> float:
         return float(self._kernel @ self._window[self._slot : self._slot + len(self._kernel)])

@@ -62,11 +62,15 @@ def flat_low_pass(group_delay_s: float, corner_hz: float, step_s: float) -> Arra
     return shape(0.5 * (narrow + wide))
 
 
+def _latency_us(number: int) -> int:
+    return 506 + number % 2
+
+
 class Stim300Emulator:
     """Sends what a STIM300 sends, start-up phase included, and answers its requests.
 
     ``sample(rate)`` returns the datagram for the instant just reached; it leaves the device
-    ``latency_s + transmission_s`` later.
+    ``latency_s + transmission_s`` later, as they are before the call.
     """
 
     def __init__(self, config: GyroSettings) -> None:
@@ -87,9 +91,13 @@ class Stim300Emulator:
         self.flags = 0
         self._waiting: list[bytes] = []
         length = self._layout.length + 2 * self._line_ending
-        self.latency_s = 506e-6
         self.transmission_s = length * BITS_PER_BYTE / config.baud
         self.group_delay_s = stim300.GROUP_DELAY_S[self.filter_hz]
+
+    @property
+    def latency_s(self) -> float:
+        """From the next sample to the first bit of its datagram, as that will say."""
+        return _latency_us(self._sent + 1) * 1e-6
 
     def sample(self, rate_rad_s: float) -> bytes:
         """The datagram of this sample, or a special one that was asked for and takes its place."""
@@ -111,7 +119,7 @@ class Stim300Emulator:
                 (gyro[0], gyro[1], gyro[2]),
                 status,
                 self._counter,
-                506 + self._sent % 2,
+                _latency_us(self._sent),
                 acceleration_status=status & 0xE0,
                 inclination_status=status & 0xE0,
             ),

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from collections import deque
 
 from rig.platform import Platform
 from sim_backend.plant import SENSED_COLUMN, Plant
+
+QUIET_MARGIN = 1e-6  # steps: a change within so much of a grid point is left to the single step before that
 
 
 class World:
@@ -41,11 +44,19 @@ class World:
 
     def advance(self, steps: int) -> list[float]:
         """Advance by so many grid steps; the rates behind the sensor effects at their ends, in rad/s."""
-        end_s = self._start_s + (self._at + steps) * self._step_s
-        quiet = not self._changes or self._changes[0][0] >= end_s
-        if quiet and not self._taken_over_nm:
-            return self._hold(self._torque_nm, steps)
-        return [rate for _ in range(steps) for rate in self._hold(self._mean_torque_nm(), 1)]
+        rates: list[float] = []
+        while len(rates) < steps:
+            quiet = min(self._quiet_steps(), steps - len(rates))
+            rates += self._hold(self._torque_nm, quiet) if quiet else self._hold(self._mean_torque_nm(), 1)
+        return rates
+
+    def _quiet_steps(self) -> int:
+        """Whole steps from here on in which the torque does not change."""
+        if self._taken_over_nm:
+            return 0
+        if not self._changes:
+            return sys.maxsize
+        return max(0, int((self._changes[0][0] - self._start_s) / self._step_s - QUIET_MARGIN) - self._at)
 
     def _mean_torque_nm(self) -> float:
         """Mean over the coming step, changes within it by their share; the torque at its end is kept."""

@@ -48,6 +48,16 @@ def test_gyro_overload_is_flagged_for_its_axis():
     assert stim300.axis_is_good(datagram.gyro_status, "x")
 
 
+def test_gyro_sends_each_datagram_as_late_as_it_says_in_it():
+    gyro = Stim300Emulator(settings())
+    sent_late_s, said_s = [], []
+    for _ in range(6):
+        sent_late_s.append(gyro.latency_s)
+        said_s.append(decoded(gyro.sample(0.0)).latency_us * 1e-6)
+    assert sent_late_s == said_s
+    assert len(set(said_s)) == 2, "it is not the same for all"
+
+
 @pytest.mark.parametrize("corner_hz", [16, 33, 66, 131, 262])
 def test_gyro_filter_has_the_delay_and_corner_of_the_data_sheet_and_a_flat_pass_band(corner_hz):
     step_s = 1e-4
@@ -73,6 +83,17 @@ def test_world_takes_a_torque_at_any_instant_with_its_exact_impulse():
     rates = world.advance(3) + world.advance(7)
     impulse = 4.0 * (0.00535 - 0.00025) - 1.0 * (0.010 - 0.00535)
     assert rates[-1] == pytest.approx(impulse / 0.5)
+
+
+def test_world_moves_alike_in_many_calls_and_in_one():
+    platform = Platform(0.0203, 0.0447, 681.2, effects={"coulomb_friction": {"level": 1.0}})
+    at_once, singly = (World(platform, start_s=0.0, step_s=1e-4) for _ in range(2))
+    for world in (at_once, singly):
+        for time_s, torque_nm in ((0.33e-3, 4.0), (0.7e-3, -3.0), (0.75e-3, 8.0), (1.2e-3, 0.0)):
+            world.change_torque(time_s, torque_nm)
+    rates = at_once.advance(20)
+    assert len(rates) == 20
+    assert rates == [rate for _ in range(20) for rate in singly.advance(1)]
 
 
 @pytest.mark.parametrize("late_s", [0.0, 1.3e-5, 5e-5, 8e-5])
