@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Sequence
+from typing import Protocol, runtime_checkable
 
 
 class Clock(Protocol):
@@ -19,6 +19,46 @@ class Clock(Protocol):
 
         A deadline that has passed returns at once: lateness is the caller's to count.
         """
+        ...
+
+
+class HostClock(Clock, Protocol):
+    """The clock of the computer that a bench hangs on: its bytes are stamped by it, its time-outs pass on it."""
+
+    def pause(self, duration_s: float) -> None:
+        """Let so much time pass."""
+        ...
+
+
+class SteppedLine(Protocol):
+    """A port whose bytes are stamped by a clock in step."""
+
+    @property
+    def name(self) -> str:
+        """Name of the port."""
+        ...
+
+    @property
+    def written_bytes(self) -> int:
+        """Bytes that were written to it since it was opened."""
+        ...
+
+    def stamp(self, arrivals: Sequence[tuple[float, int]], vanished: bool, patience_s: float) -> None:
+        """Wait, at most so long of the computer's time, for bytes that were sent, and stamp them.
+
+        ``arrivals`` are instants, each with the number of bytes sent until then since the port was opened;
+        ``vanished`` says that the other end is gone behind them. Raises DeviceFault where they do not come.
+        """
+        ...
+
+
+@runtime_checkable
+class SteppedClock(HostClock, Protocol):
+    """Time that passes only while it is waited for, and in which whatever is at the other end of the lines passes it
+    too. What these send is stamped with the instant at which they sent it, however late the computer hands it on."""
+
+    def join(self, line: SteppedLine) -> None:
+        """From here on the bytes of this line are stamped; it has just been opened."""
         ...
 
 
@@ -50,6 +90,10 @@ class MonotonicClock:
         while now < deadline_s:
             now = time.monotonic()
         return now
+
+    def pause(self, duration_s: float) -> None:
+        """Sleep."""
+        time.sleep(duration_s)
 
 
 class VirtualClock:

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.clock import Clock, VirtualClock
+from rig.clock import Clock, HostClock, VirtualClock
 from rig.config.load import LoadedConfig
 from rig.config.root import Config
 from rig.errors import ConfigError, UsageError
@@ -79,7 +79,7 @@ def emulated(loaded: LoadedConfig, raw_folder: Path) -> Iterator[Stage]:
 
     with started(config) as emulators:
         section = _bench_section(on_emulated_ports(config, emulators))
-        stage = _bench_stage(section, Torque.EMULATED, raw_folder)
+        stage = _bench_stage(section, Torque.EMULATED, raw_folder, emulators.clock)
         yield Stage(stage.rig, stage.clock, lambda: stage.account() | {"emulated_drive": emulators.events()})
 
 
@@ -153,10 +153,10 @@ def _replayed(path: Path, section: BenchConfig) -> Stage:
     return Stage(rig, rig.clock, lambda: {"replay_of": str(path)})
 
 
-def _bench_stage(section: BenchConfig, torque: Torque, raw_folder: Path) -> Stage:
+def _bench_stage(section: BenchConfig, torque: Torque, raw_folder: Path, clock: HostClock | None = None) -> Stage:
     from drivers.bench import BenchRig
 
-    rig = BenchRig(section, torque, raw_folder)
+    rig = BenchRig(section, torque, raw_folder, clock)
     return Stage(rig, rig.clock, lambda: _account(rig))
 
 

@@ -71,7 +71,9 @@ def play(
             f"backend: {backend} reads recordings and plays nothing: add --dry-run, or set backend: simulated or bench."
         )
     if backend == EMULATED:
-        context.terminal.show("Starting the emulated devices ...")
+        is_in_step = config.bench is not None and config.bench.emulator.clock == "in_step"
+        how = " in step with the bench, so that no tick is late" if is_in_step else ""
+        context.terminal.show(f"Starting the emulated devices{how} ...")
     with BACKENDS[backend](loaded, folder.path / part.raw) as stage:
         every = (part.plan or planned_sets)(stage.rig, loaded)
         loaded = _resting(loaded, part.rest_s())

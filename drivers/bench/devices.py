@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import select
-import time
-from collections.abc import Callable
 
 from drivers.amplifiers.base import Amplifier
 from drivers.capture.wire_capture import Capture
 from drivers.gyroscopes.base import Gyroscope
 from drivers.gyroscopes.gyro_line import GyroLine
 from drivers.transport.can_link import CanLink, open_bus
-from drivers.transport.listening import ListeningPort
+from drivers.transport.in_step import listening
 from drivers.transport.socket_port import open_port
+from rig.clock import HostClock
 from rig.config.bench import BenchConfig
 from rig.errors import Aborted, ConfigError, DeviceFault, RigError
 from rig.interface import GyroSample
@@ -34,7 +33,7 @@ class BenchDevices:
     capture
         Where all that crosses the wire is kept, or None.
     clock
-        Host time in seconds.
+        The host's.
     """
 
     def __init__(
@@ -43,9 +42,9 @@ class BenchDevices:
         gyroscope: Gyroscope,
         amplifier: Amplifier,
         capture: Capture | None,
-        clock: Callable[[], float],
+        clock: HostClock,
     ) -> None:
-        self._config, self._time = config, clock
+        self._config, self._clock, self._time = config, clock, clock.now_s
         self.gyroscope, self.amplifier, self.capture = gyroscope, amplifier, capture
         self.line: GyroLine | None = None
         self.link: CanLink | None = None
@@ -60,7 +59,7 @@ class BenchDevices:
         faults = [fault for fault in (self._open_gyro(), self._open_drive()) if fault is not None]
         if self.line is not None:
             while self._time() - begin_s < self._config.settle_s:
-                time.sleep(CONTACT_TIME_S)
+                self._clock.pause(CONTACT_TIME_S)
                 self.gather()
                 self._settle_drive(faults)
             self.line.note_noise()
@@ -75,7 +74,7 @@ class BenchDevices:
                 "bench.gyroscope.port is empty: name its serial port (`rig devices` lists them) or run with --emulate"
             )
         try:
-            serial = ListeningPort(open_port(port, self.gyroscope.baud), self._time)
+            serial = listening(open_port(port, self.gyroscope.baud), self._clock)
             self.line = GyroLine(self.gyroscope, serial, self.capture, self._time)
             self.line.request_identification()
         except Aborted:
@@ -86,7 +85,7 @@ class BenchDevices:
 
     def _open_drive(self) -> RigError | None:
         try:
-            self.link = CanLink(open_bus(self._config.amplifier.can), self._time)
+            self.link = CanLink(open_bus(self._config.amplifier.can, self._clock), self._time, self._clock.pause)
             self.link.idle = self.gather
             self.link.on_sent = self.amplifier.note_sent
             self.link.record = self.capture.can if self.capture is not None else None

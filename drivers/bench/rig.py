@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import sys
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +23,7 @@ from drivers.gyroscopes.gyro_line import GyroReport
 from drivers.timing.bench_clock import BenchClock
 from drivers.transport.can_link import CanLink
 from rig import realtime
+from rig.clock import HostClock, MonotonicClock
 from rig.config.bench import BenchConfig, ProbeConfig
 from rig.errors import DeviceFault, RigError
 from rig.interface import (
@@ -59,7 +58,7 @@ class BenchRig(DeviceRig):
     raw_folder
         Where the raw capture goes, or None for none.
     clock
-        Host time in seconds.
+        The host's; its monotonic one where left out.
 
     Raises
     ------
@@ -72,12 +71,13 @@ class BenchRig(DeviceRig):
         config: BenchConfig,
         torque: Torque,
         raw_folder: Path | None = None,
-        clock: Callable[[], float] = time.monotonic,
+        clock: HostClock | None = None,
     ) -> None:
         self._config = config
         self._torque = torque
         self._raw_folder = raw_folder if config.raw_capture else None
-        self._time = clock
+        spin_s = config.real_time.spin_us * 1e-6
+        self._host = clock or MonotonicClock(spin_s)
         self.gyroscope = make_gyroscope(config.gyroscope)
         self.amplifier: Amplifier = make_amplifier(config.amplifier)
         self._retiming = BenchRetiming(config.amplifier, self.gyroscope, self.amplifier)
@@ -85,7 +85,7 @@ class BenchRig(DeviceRig):
         self._devices: BenchDevices | None = None
         self._armed = False
         self._grant: realtime.RealTimeGrant | None = None
-        self.clock = BenchClock(self._listen, config.real_time.spin_us * 1e-6, self._note_clock, clock)
+        self.clock = BenchClock(self._listen, self._host, spin_s, self._note_clock)
 
     def statement(self) -> Statement:
         """Both devices with their ports."""
@@ -124,7 +124,7 @@ class BenchRig(DeviceRig):
             self._capture = Capture(self._raw_folder)
             self._capture.start()
             self._mark("config", {"bench": self._config.model_dump(mode="json")})
-        self._devices = BenchDevices(self._config, self.gyroscope, self.amplifier, self._capture, self._time)
+        self._devices = BenchDevices(self._config, self.gyroscope, self.amplifier, self._capture, self._host)
         self._devices.contact()
         self._mark("opened")
 
@@ -243,7 +243,7 @@ class BenchRig(DeviceRig):
 
     def _mark(self, what: str, values: dict[str, object] | None = None) -> None:
         if self._capture is not None:
-            self._capture.mark(self._time(), what, values)
+            self._capture.mark(self._host.now_s(), what, values)
 
     def _note_clock(self, time_s: float) -> None:
         if self._capture is not None:

@@ -16,10 +16,11 @@ from typing import Any, NamedTuple
 import can
 
 from drivers.codecs.lawicel import BIT_RATE_CODES, CanFrame
-from drivers.transport.listening import ListeningPort
+from drivers.transport.in_step import listening
 from drivers.transport.ports import url_fault
 from drivers.transport.slcan import SlcanBulkBus
 from drivers.transport.socket_port import open_port
+from rig.clock import HostClock, MonotonicClock
 from rig.config.bench import CanConfig
 from rig.errors import ConfigError, DeviceFault
 
@@ -55,13 +56,21 @@ class CanLink:
         An open python-can bus.
     clock
         Host time in seconds.
+    pause
+        Lets so many seconds of it pass; sleeps where left out.
     """
 
-    def __init__(self, bus: can.BusABC, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        bus: can.BusABC,
+        clock: Callable[[], float] = time.monotonic,
+        pause: Callable[[float], None] | None = None,
+    ) -> None:
         self._bus = bus
         # Elsewhere the identifier of an error frame means something else, or nothing.
         self._tells_error_class = type(bus).__module__.startswith("can.interfaces.socketcan")
         self.clock = clock
+        self._pause = pause or MonotonicClock().pause
         # Our own bus sends a tick in one write and hands frames over without a message object each.
         own = bus if isinstance(bus, SlcanBulkBus) else None
         if own is not None:
@@ -161,7 +170,7 @@ class CanLink:
             self.idle()
             if every is not None:
                 every()
-            time.sleep(POLL_INTERVAL_S)
+            self._pause(POLL_INTERVAL_S)
 
     def close(self) -> None:
         """Shut the bus down; safe twice."""
@@ -224,8 +233,8 @@ def _unsafe_options(config: CanConfig) -> Iterator[tuple[str, str]]:
             yield f"options.{key}", f"is not allowed: {config.interface} would run the code in that file"
 
 
-def open_bus(config: CanConfig) -> can.BusABC:
-    """The bus that the configuration names.
+def open_bus(config: CanConfig, clock: HostClock | None = None) -> can.BusABC:
+    """The bus that the configuration names; our own stamps frames by the clock and waits for answers on it.
 
     Raises
     ------
@@ -245,7 +254,8 @@ def open_bus(config: CanConfig) -> can.BusABC:
     try:
         if config.interface == OWN_INTERFACE:
             baud = options.pop("tty_baudrate", config.tty_baud)
-            return SlcanBulkBus(ListeningPort(open_port(config.channel, baud)), **options)
+            clock = clock or MonotonicClock()
+            return SlcanBulkBus(listening(open_port(config.channel, baud), clock), clock=clock.now_s, **options)
         return can.Bus(channel=config.channel, interface=config.interface, **options)
     except can.CanInterfaceNotImplementedError as problem:
         raise ConfigError(f"bench.amplifier.can.interface: {config.interface!r}: {problem}") from None

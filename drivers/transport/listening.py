@@ -45,12 +45,20 @@ class ListeningPort:
         try:
             while not self._closing:
                 if self._port.wait_readable(LISTEN_S) and (data := self._port.read()):
-                    self._chunks.append((self._clock(), data))
-                    self._something.set()
+                    self._take_in(data)
+                    self._wake()
         except DeviceFault as fault:
             self._fault = fault
         except (OSError, ValueError) as problem:  # the port was taken away under a waiting read
             self._fault = DeviceFault(f"{self._port.name}: {problem}")
+        self._wake()
+
+    def _take_in(self, data: bytes) -> None:
+        """Stamp and keep what was read; called by the listening thread."""
+        self._chunks.append((self._clock(), data))
+
+    def _wake(self) -> None:
+        """Tell whoever waits that there is something to look at; called by the listening thread."""
         self._something.set()
 
     @property

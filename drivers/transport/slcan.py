@@ -46,6 +46,8 @@ class SlcanBulkBus(can.BusABC):
         Ask for the adapter's millisecond time stamps (Z1) and put them on the host's clock.
     answer_timeout_s
         How long a command, or a run of sent frames, may stay unanswered.
+    clock
+        Host time in seconds.
     """
 
     def __init__(
@@ -56,6 +58,7 @@ class SlcanBulkBus(can.BusABC):
         listen_only: bool = False,
         timestamps: bool = False,
         answer_timeout_s: float = 0.5,
+        clock: Callable[[], float] = time.monotonic,
         **kwargs: Any,
     ) -> None:
         if bitrate not in lawicel.BIT_RATE_CODES:
@@ -64,7 +67,7 @@ class SlcanBulkBus(can.BusABC):
         self._answer_timeout_s = answer_timeout_s
         self._decoder = LawicelDecoder()
         self._frames: deque[tuple[float, CanFrame]] = deque()  # with the time of their arrival
-        self.clock: Callable[[], float] = time.monotonic
+        self.clock = clock
         self._unanswered: deque[float] = deque()  # when each was sent
         self._looked_s = 0.0
         self._answers_frames: bool | None = None
@@ -90,10 +93,10 @@ class SlcanBulkBus(can.BusABC):
         # Ends whatever half a command an earlier program left behind, and closes the channel if it is open;
         # the answers to that mean nothing and are waited out.
         self._port.write(b"\r\r\rC\r")
-        talks_until_s = time.monotonic() + LONGEST_FLUSH_S
+        talks_until_s = self.clock() + LONGEST_FLUSH_S
         while self._port.wait_readable(QUIET_S):
             self._port.read()
-            if time.monotonic() > talks_until_s:
+            if self.clock() > talks_until_s:
                 raise DeviceFault(
                     f"{self._port.name} is still sending {LONGEST_FLUSH_S:g} s after the command to close its channel: "
                     "it is not a Lawicel adapter, or its baud rate differs. Check whether the ports of gyroscope and "
@@ -107,7 +110,7 @@ class SlcanBulkBus(can.BusABC):
         """Send a command and return the adapter's answer; frames that come in between are kept."""
         self._answers.clear()
         self._port.write(command.encode("ascii") + lawicel.ANSWER_OK)
-        deadline = time.monotonic() + self._answer_timeout_s
+        deadline = self.clock() + self._answer_timeout_s
         while True:
             while self._answers:
                 answer = self._answers.popleft()
@@ -117,7 +120,7 @@ class SlcanBulkBus(can.BusABC):
                     if may_refuse:
                         return answer
                     raise CanOperationError(f"{self._port.name}: the adapter refused the command {command!r}")
-            left = deadline - time.monotonic()
+            left = deadline - self.clock()
             if left <= 0 or not self._port.wait_readable(left):
                 raise CanOperationError(
                     f"{self._port.name}: no answer to {command!r} within {self._answer_timeout_s} s. "
@@ -208,7 +211,7 @@ class SlcanBulkBus(can.BusABC):
 
         What is urgent is sent all the same; and answers that nobody fetched meanwhile are not the adapter's fault.
         """
-        now, waiting = time.monotonic(), self._unanswered
+        now, waiting = self.clock(), self._unanswered
         late = bool(waiting) and now - waiting[0] > MAX_ANSWER_S and now - self._looked_s < MAX_ANSWER_S
         if late and self._answers_frames and not urgent:
             raise CanOperationError(
@@ -250,9 +253,9 @@ class SlcanBulkBus(can.BusABC):
         return frames
 
     def _wait_for_frame(self, timeout: float | None) -> None:
-        deadline = None if timeout is None else time.monotonic() + timeout
+        deadline = None if timeout is None else self.clock() + timeout
         while not self._frames:
-            left = 1.0 if deadline is None else deadline - time.monotonic()
+            left = 1.0 if deadline is None else deadline - self.clock()
             if left <= 0:
                 return
             if self._port.wait_readable(left):

@@ -121,7 +121,8 @@ class EmulatorConfig(Section):
 
     The platform, its undeclared effects and the gyro's noise are those of the `simulated` section. ``ports`` are
     pseudo terminals, as other programs can open them, or local sockets, which do not stall on a busy machine;
-    where left out, `rig emulate` makes the former and `--emulate` the latter.
+    where left out, `rig emulate` makes the former and `--emulate` the latter. ``clock`` in_step gives bench and
+    emulators a time of their own, which passes as fast as both get on: no tick is late because this computer is.
     """
 
     gyro_drift_ppm: Annotated[float, Field(ge=-500, le=500)] = 20.0
@@ -138,8 +139,16 @@ class EmulatorConfig(Section):
     """Delay from the CAN frame to the torque, ms."""
     ports: Literal["terminal", "socket"] | None = None
     """terminal: pseudo terminals; socket: local sockets, which do not stall on a busy machine."""
+    clock: Literal["real", "in_step"] = "real"
+    """real: that of this computer; in_step: one that bench and emulated devices share, so that no tick is late."""
     faults: tuple[InjectedFault, ...] = ()
     """Faults to inject."""
+
+    @model_validator(mode="after")
+    def _in_step_on_sockets(self) -> Self:
+        if self.clock == "in_step" and self.ports == "terminal":
+            raise ValueError("clock: in_step needs ports: socket: nobody can tell what a pseudo terminal has passed on")
+        return self
 
 
 class BenchConfig(Section):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import select
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import numpy as np
 
@@ -68,7 +68,8 @@ def _make_odrive(config: Config) -> EmulatedDrive:
     return OdriveAxis(amplifier.node, peak, constant, amplifier.watchdog_ms * 1e-3)
 
 
-PORTS: dict[str, Callable[[], PtyPort | SocketListener]] = {"terminal": PtyPort, "socket": SocketListener}
+Port = PtyPort | SocketListener
+PORTS: dict[str, Callable[[], Port]] = {"terminal": PtyPort, "socket": SocketListener}
 """What the devices are reached through, by `bench.emulator.ports`."""
 
 DRIVES: dict[str, Callable[[Config], EmulatedDrive]] = {"cia402": _make_cia402, "odrive": _make_odrive}
@@ -93,7 +94,9 @@ class EmulatedBench:
     on_event
         Called with every event of the drive, as it happens.
     clock
-        The host's monotonic clock in seconds.
+        Seconds: the host's monotonic clock, or time that the bench lets pass (``sim_backend.emulators.in_step``).
+    new_port
+        Makes the ports; those that `bench.emulator.ports` names where left out.
 
     Raises
     ------
@@ -106,11 +109,12 @@ class EmulatedBench:
         config: Config,
         on_event: Callable[[Event], None],
         clock: Callable[[], float] = time.monotonic,
+        new_port: Callable[[], Port] | None = None,
     ) -> None:
         if config.bench is None:
             raise ConfigError("there is no `bench` section to emulate: add one that names the devices")
         self._gyro, self.drive = _make_gyro(config), _make_drive(config)
-        self._faults = FaultSchedule(config.bench.emulator.faults, self._report_fault, config.simulated.seed)
+        self._faults = FaultSchedule(config.bench.emulator.faults, self._report_fault, config.simulated.seed, clock)
         emulator = config.bench.emulator
         rate_hz = config.bench.gyroscope.sample_rate_hz or DEFAULT_RATE_HZ
         self._period_s = 1.0 / rate_hz / (1.0 + emulator.gyro_drift_ppm * 1e-6)
@@ -123,8 +127,8 @@ class EmulatedBench:
         self._slot = 0
         self._adapter = LawicelAdapter(self._from_host, clock)
         self._arrivals = ArrivalTimes()
-        self._port = PORTS[emulator.ports or "terminal"]
-        self.gyro_port, self.can_port = self._port(), self._port()
+        self._new_port = new_port or PORTS[emulator.ports or "terminal"]
+        self.gyro_port, self.can_port = self._new_port(), self._new_port()
         self._now_s = self._start_s = clock() + 0.05
         self._world = World(config.simulated.platform.platform(), self._start_s, step_s)
         self._samples = 0
@@ -150,12 +154,12 @@ class EmulatedBench:
 
     def replug_gyro(self) -> None:
         """Its port is there again, under another name, which is told."""
-        self.gyro_port = self._port()
+        self.gyro_port = self._new_port()
         self._report_fault(self._now_s, f"the gyro is plugged in again: {self.gyro_port.path}")
 
     def replug_adapter(self) -> None:
         """As ``replug_gyro``."""
-        self.can_port = self._port()
+        self.can_port = self._new_port()
         self._report_fault(self._now_s, f"the CAN adapter is plugged in again: {self.can_port.path}")
 
     def flag_gyro(self, status: int) -> None:
@@ -177,21 +181,26 @@ class EmulatedBench:
             wait_s = min(max(self.next_sample_s() - self._clock(), 0.0), LONGEST_SLEEP_S)
             ports = [port for port in (self.can_port, self.gyro_port) if port.plugged_in]
             readable = select.select(ports, [], [], wait_s)[0]
-            before_s, self._now_s = self._now_s, self._clock()
+            before_s = self._now_s
+            self.pass_time(readable)
             if self._now_s - before_s > REPORTED_PAUSE_S:
                 self._report_pause(self._now_s - before_s)
-            self._faults.pass_time(self, self._now_s)
-            if self.can_port in readable and self.can_port.plugged_in:
-                self._receive_from_host(before_s)
-            self._serve_drive(b"")
-            if self.gyro_port in readable and self.gyro_port.plugged_in:
-                self._gyro.command(self.gyro_port.read())
-            self._send_samples()
 
     def next_sample_s(self) -> float:
         """When the last bit of the gyro's next datagram is out."""
         lag_s = self._gyro.latency_s + self._gyro.transmission_s
         return self._start_s + (self._samples + 1) * self._period_s + lag_s
+
+    def pass_time(self, readable: Collection[Port] = ()) -> None:
+        """Whatever is due by now: faults, what the host has sent to these ports, the drive, the gyro's datagrams."""
+        before_s, self._now_s = self._now_s, self._clock()
+        self._faults.pass_time(self, self._now_s)
+        if self.can_port in readable and self.can_port.plugged_in:
+            self._receive_from_host(before_s)
+        self._serve_drive(b"")
+        if self.gyro_port in readable and self.gyro_port.plugged_in:
+            self._gyro.command(self.gyro_port.read())
+        self._send_samples()
 
     def _report_pause(self, paused_s: float) -> None:
         nm = self.drive.torque_nm

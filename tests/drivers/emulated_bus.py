@@ -20,6 +20,21 @@ class FakeTime:
         return self.now_s
 
 
+class LookedAt:
+    """That time as a host's clock: whoever waits looks at it until the time has come."""
+
+    def __init__(self, time: FakeTime) -> None:
+        self.now_s = time
+
+    def wait_until(self, deadline_s: float) -> float:
+        while (now_s := self.now_s()) < deadline_s:
+            pass
+        return now_s
+
+    def pause(self, duration_s: float) -> None:
+        """None passes but by looking."""
+
+
 class EmulatedBus(can.BusABC):
     """Frames go straight to an emulated drive and back."""
 

@@ -3,14 +3,13 @@
 import math
 
 import drivers.bench.devices
-import drivers.transport.can_link
 from drivers.bench import BenchRig
 from drivers.codecs import stim300
 from rig.config.bench import AmplifierConfig, BenchConfig, CanConfig, GyroscopeConfig, RealTimeConfig
 from rig.errors import DeviceFault
 from rig.interface import Torque
 from sim_backend.emulators.drive import Cia402Drive
-from tests.drivers.emulated_bus import EmulatedBus, FakeTime
+from tests.drivers.emulated_bus import EmulatedBus, FakeTime, LookedAt
 
 CONFIG = BenchConfig(
     gyroscope=GyroscopeConfig(port="wire", settings={"datagram": 0x90}),
@@ -59,11 +58,10 @@ class GyroPort:
 def wireless_bench(monkeypatch, folder):
     time = FakeTime()
     drive = Cia402Drive(1, 100.0, 150.0)
-    monkeypatch.setattr(drivers.transport.can_link.time, "sleep", lambda s: None)
-    monkeypatch.setattr(drivers.bench.devices, "open_bus", lambda config: EmulatedBus(drive, time))
-    monkeypatch.setattr(drivers.bench.devices, "ListeningPort", lambda port, clock: port)
+    monkeypatch.setattr(drivers.bench.devices, "open_bus", lambda config, clock: EmulatedBus(drive, time))
+    monkeypatch.setattr(drivers.bench.devices, "listening", lambda port, clock: port)
     monkeypatch.setattr(drivers.bench.devices, "open_port", lambda path, baud: GyroPort(time))
-    rig = BenchRig(CONFIG, Torque.EMULATED, folder / "raw", time)
+    rig = BenchRig(CONFIG, Torque.EMULATED, folder / "raw", LookedAt(time))
     rig.time, rig.drive = time, drive
     return rig
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import random
+import time
+from collections.abc import Callable
 from typing import Any, Protocol
 
 
 class Fault:
     """One fault while it lasts. A fault overrides the places at which it takes hold; elsewhere all passes."""
+
+    clock: Callable[[], float] = staticmethod(time.monotonic)
+    """Seconds of the emulated bench."""
 
     def __init__(self, value: float | None, random_bits: random.Random) -> None:
         self.value, self.random = value, random_bits

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import time
 
 from drivers.codecs import cia402
 from drivers.codecs.cia402 import encode_emergency
@@ -120,7 +119,7 @@ class AdapterSlow(Fault):
 
     def to_adapter(self, data: bytes) -> bytes:
         """What has waited long enough."""
-        now_s = time.monotonic()
+        now_s = self.clock()
         self._held.append((now_s, data))
         due_s = now_s - 1e-3 * (90.0 if self.value is None else self.value)
         due = [waiting for at_s, waiting in self._held if at_s <= due_s]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -27,6 +28,8 @@ class FaultSchedule:
         As the file asks for them.
     tell
         Called with (time, what happened) when one begins or ends.
+    clock
+        Seconds of the bench.
 
     Raises
     ------
@@ -34,13 +37,19 @@ class FaultSchedule:
         For a fault that does not exist.
     """
 
-    def __init__(self, planned: Sequence[InjectedFault], tell: Callable[[float, str], None], seed: int = 0) -> None:
+    def __init__(
+        self,
+        planned: Sequence[InjectedFault],
+        tell: Callable[[float, str], None],
+        seed: int = 0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         for item in planned:
             require_known(item.fault)
         self._waiting = list(planned)
         self._coming: list[_Planned] = []
         self._acting: list[tuple[float, str, Fault]] = []
-        self._tell = tell
+        self._tell, self._clock = tell, clock
         self._random = random.Random(seed)
 
     def enabled(self, now_s: float) -> None:
@@ -62,6 +71,7 @@ class FaultSchedule:
             self._coming.remove(planned)
             what = planned.what
             fault = FAULTS[what.fault](what.value, self._random)
+            fault.clock = self._clock
             self._acting.append((planned.begins_s + what.lasts_s, what.fault, fault))
             self._tell(now_s, f"{what.fault} begins")
             fault.begin(bench, now_s)
