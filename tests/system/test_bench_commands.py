@@ -1,4 +1,7 @@
-"""`identify-run` on the emulated bench: stopped while it identifies, and replayed from its raw capture."""
+"""`identify-run` on the emulated bench: stopped while it identifies, and replayed from its raw capture.
+
+In step, for what is asserted is not how fast it was; in real time: test_bench.py, test_commands.py and test_safety.py.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,15 +24,12 @@ ROOT = Path(__file__).parents[2]
 BENCH = ROOT / "examples" / "bench.yaml"
 IDENTIFY_RUN = (sys.executable, "-c", "from commands.identify_run import main; main()")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="emulated devices need pseudo terminals")
-# Short, and patient with a machine that others use: what is asserted is never how fast it was.
 SHORT = (
     "excitation.sets=[{torque_nm: 40, frequency_hz: 3, duration_s: 1.5}, "
     "{torque_nm: 20, frequency_hz: 6, duration_s: 1.5}]",
-    "excitation.rest_s=0.5", "bench.settle_s=2", "limits.missed_ticks=200", "limits.stale_gyro_ms=500",
-    "limits.rate_deg_s=1000", "bench.amplifier.settings.drive_heartbeat_ms=1000",
+    "excitation.rest_s=0.5", "bench.settle_s=2", "bench.emulator.clock=in_step", "limits.rate_deg_s=1000",
     "identify.candidates=[coulomb_friction]", "identify.genetic.generations=5",
 )  # fmt: skip
-PLAYED_WITHOUT_A_STALL = 4  # attempts: a stall of 50 ms is rightly a trip, and not what is looked at here
 
 
 def identify_run(log: Path, out: Path, *more: str) -> subprocess.Popen[bytes]:
@@ -41,15 +40,16 @@ def identify_run(log: Path, out: Path, *more: str) -> subprocess.Popen[bytes]:
         return subprocess.Popen(line, stdout=stream, stderr=stream, stdin=subprocess.DEVNULL)
 
 
-def played(tmp_path: Path, then: Callable[[subprocess.Popen[bytes], Path], int]) -> tuple[int, Path, str]:
-    """Play on emulated devices until nothing stalls; the exit code, the results and what was said."""
-    for attempt in range(PLAYED_WITHOUT_A_STALL):
-        log, out = tmp_path / f"{attempt}.log", tmp_path / f"live{attempt}"
-        code = then(identify_run(log, out, "--emulate"), log)
-        said = log.read_text()
-        if "stall or clock jump" not in said:
-            break
-    return code, out, said
+def emulated(tmp_path: Path) -> tuple[subprocess.Popen[bytes], Path, Path]:
+    """A campaign that begins to play on emulated devices; what it says, and its results folder."""
+    log, out = tmp_path / "live.log", tmp_path / "live"
+    return identify_run(log, out, "--emulate"), log, out
+
+
+def played(tmp_path: Path) -> tuple[int, Path, str]:
+    """One that is played and identified; the exit code, the results and what was said."""
+    process, log, out = emulated(tmp_path)
+    return process.wait(120), out, log.read_text()
 
 
 def timeless(value: Any) -> Any:
@@ -61,7 +61,8 @@ def timeless(value: Any) -> Any:
 
 @pytest.mark.slow
 def test_a_raw_capture_replays_to_the_same_samples_and_the_same_result(tmp_path: Path) -> None:
-    code, live, said = played(tmp_path, lambda process, _: process.wait(120))
+    code, live, said = played(tmp_path)
+    assert "in step with the bench" in said
     assert code in (0, 1), said
     again = tmp_path / "again"
     assert identify_run(tmp_path / "again.log", again, "--set", f"bench.replay={live}").wait(120) == code
@@ -86,7 +87,7 @@ def test_a_raw_capture_replays_to_the_same_samples_and_the_same_result(tmp_path:
 
 @pytest.mark.slow
 def test_a_capture_of_another_campaign_is_refused(tmp_path: Path) -> None:
-    code, live, said = played(tmp_path, lambda process, _: process.wait(120))
+    code, live, said = played(tmp_path)
     assert code in (0, 1), said
     other = ("--set", f"bench.replay={live}", "--set", "limits.travel_deg=2")
     assert identify_run(tmp_path / "other.log", tmp_path / "other", *other).wait(60) == 2
@@ -95,13 +96,11 @@ def test_a_capture_of_another_campaign_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_ctrl_c_while_it_identifies_keeps_the_record_and_says_so(tmp_path: Path) -> None:
-    def stop_when_fitting(process: subprocess.Popen[bytes], log: Path) -> int:
-        while process.poll() is None and b"fitting the declared model" not in log.read_bytes():
-            time.sleep(0.02)
-        process.send_signal(signal.SIGINT)
-        return process.wait(60)
-
-    code, out, said = played(tmp_path, stop_when_fitting)
+    process, log, out = emulated(tmp_path)
+    while process.poll() is None and b"fitting the declared model" not in log.read_bytes():
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    code, said = process.wait(60), log.read_text()
     assert code == 130, said
     assert "Traceback" not in said
     recording = read_recording_h5(out / "recording.h5")
@@ -112,16 +111,13 @@ def test_ctrl_c_while_it_identifies_keeps_the_record_and_says_so(tmp_path: Path)
 @pytest.mark.slow
 def test_a_second_ctrl_c_leaves_no_torque_either(tmp_path: Path) -> None:
     """In one process, on a stage: test_play.py and test_stop_requests.py. One Ctrl-C on the bench: test_commands.py."""
-
-    def stop_twice(process: subprocess.Popen[bytes], log: Path) -> int:
-        journal = log.with_name(f"live{log.stem}") / "recording.journal"
-        while process.poll() is None and not (journal.exists() and journal.stat().st_size > 20_000):
-            time.sleep(0.01)
-        process.send_signal(signal.SIGINT)
-        process.send_signal(signal.SIGINT)
-        return process.wait(60)
-
-    code, out, said = played(tmp_path, stop_twice)
+    process, log, out = emulated(tmp_path)
+    journal = out / "recording.journal"
+    while process.poll() is None and not (journal.exists() and journal.stat().st_size > 20_000):
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    process.send_signal(signal.SIGINT)
+    code, said = process.wait(60), log.read_text()
     assert code == 130, said
     assert "Traceback" not in said
     assert (out / "raw" / "wire.cap").stat().st_size > 0
