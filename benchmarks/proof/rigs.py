@@ -8,7 +8,7 @@ that is asked for, right or wrong; its numbers are fitted to the campaign by the
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -138,9 +138,15 @@ def play(
     return campaign.recording, campaign.cause
 
 
-def campaign(config: Config, seed: int) -> Recording:
+Player = Callable[
+    [Config, Sequence[PlannedSet], Platform, int, float | None], tuple[Recording, RigError | None]
+]  # fmt: skip
+"""Plays sets on a rig as ``play`` does."""
+
+
+def campaign(config: Config, seed: int, player: Player = play) -> Recording:
     """The campaign from which models are fitted."""
-    recording, cause = play(config, plan(TRUE, config.excitation, config.limits), TRUE, seed)
+    recording, cause = player(config, plan(TRUE, config.excitation, config.limits), TRUE, seed, None)
     if cause is not None:
         raise cause
     return recording
@@ -165,8 +171,9 @@ def with_known_scale(model: Platform, scale: float) -> Platform:
 
 
 def proved(
-    config: Config, recording: Recording, model: Platform, seed: int, rivals: Mapping[str, Platform] | None = None
-) -> Outcome:
+    config: Config, recording: Recording, model: Platform, seed: int, rivals: Mapping[str, Platform] | None = None,
+    player: Player = play,
+) -> Outcome:  # fmt: skip
     """The proof of a model, played on the rig."""
     drive = Drive(TICK_S, "zero_order", resolution_of(recording))
     allowed = allowed_peaks(config.limits, config.excitation.margin)
@@ -178,7 +185,7 @@ def proved(
         )  # fmt: skip
     except RigError as error:
         return Outcome(model, None, f"refused: {str(error).splitlines()[0][:90]}")
-    played, cause = play(config, planned.sets, model, seed + 1000, planned.rest_s)
+    played, cause = player(config, planned.sets, model, seed + 1000, planned.rest_s)
     if cause is not None:
         return Outcome(model, None, f"stopped: {str(cause)[:90]}")
     return Outcome(model, judge(planned, played, model), most_travel=_travel(played) / config.limits.travel_deg)

@@ -1,6 +1,7 @@
 """What a proof says of right names, wrong names and rivals.
 
 python -m benchmarks.proof.run effects [--seeds 3] [--effect NAME ...]     every effect that is cancelled, at 2 to 5 %
+python -m benchmarks.proof.run emulated [--seeds 3] [--effect NAME ...]    the same on emulated devices in step
 python -m benchmarks.proof.run wrong [--campaigns 20]                      a wrong name forced in
 python -m benchmarks.proof.run rivals [--campaigns 20]                     a name and its rival, both played
 """
@@ -13,8 +14,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from benchmarks.proof import rigs
-from benchmarks.proof.rigs import SHAPES, SMOOTH, Outcome, campaign, config_of, fitted, proved, sized
+from benchmarks.proof import emulated, rigs
+from benchmarks.proof.rigs import SHAPES, SMOOTH, Outcome, Player, campaign, config_of, fitted, proved, sized
 from identify.proven import EffectProof, ProofSet
 from rig import effects
 from rig.errors import RigError
@@ -63,20 +64,21 @@ def row(hidden: str, model: str, seed: int, outcome: Outcome, one: EffectProof |
     )
 
 
-def one_proof(hidden: str, declared: str, seed: int) -> Outcome:
+def one_proof(hidden: str, declared: str, seed: int, player: Player = rigs.play) -> Outcome:
     """A campaign with ``hidden`` in it, a model with ``declared`` fitted to it, and its proof."""
     rng = np.random.default_rng([seed, *hidden.encode()])
     values = sized(hidden, float(rng.uniform(*SHARES)), rng)
     config = config_of({hidden: values}, seed)
     try:
-        recording = campaign(config, seed)
+        recording = campaign(config, seed, player)
     except RigError as error:
         return Outcome(None, None, f"campaign stopped: {str(error)[:70]}")
     start = _start(hidden, declared, values, rng)
     model = fitted(recording, declared, start).final.platform
     if model is None or declared not in model.effects:
         return Outcome(model, None, "dropped by the identification")
-    return proved(config, recording, rigs.with_known_scale(model, values.get("scale", 1.0)), seed)
+    model = rigs.with_known_scale(model, values.get("scale", 1.0))
+    return proved(config, recording, model, seed, player=player)
 
 
 def _start(hidden: str, declared: str, values: Mapping[str, float], rng: np.random.Generator) -> dict[str, float]:
@@ -85,13 +87,13 @@ def _start(hidden: str, declared: str, values: Mapping[str, float], rng: np.rand
     return {k: float(v) * float(rng.uniform(0.8, 1.2)) for k, v in begin.items()}
 
 
-def effects_table(names: list[str], seeds: int) -> None:
+def effects_table(names: list[str], seeds: int, player: Player) -> None:
     """Every effect, each under its own name."""
     print(HEAD, RULE, sep="\n")
     met, noise_met, counted, smooth = 0, 0, 0, 0
     for name in names:
         for seed in range(1, seeds + 1):
-            outcome = one_proof(name, name, seed)
+            outcome = one_proof(name, name, seed, player)
             print(row(name, name, seed, outcome), flush=True)
             if outcome.proof is None or outcome.proof.total.share is None:
                 continue
@@ -159,14 +161,16 @@ def _counts(said: list[str]) -> str:
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("table", choices=("effects", "wrong", "rivals"))
+    parser.add_argument("table", choices=("effects", "emulated", "wrong", "rivals"))
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--campaigns", type=int, default=20)
     parser.add_argument("--effect", action="append", choices=tuple(SHAPES), help="repeatable")
     asked = parser.parse_args()
     began = time.perf_counter()
-    if asked.table == "effects":
-        effects_table(asked.effect or [n for n in SHAPES if effects.get(n).cancelled_by_torque], asked.seeds)
+    if asked.table in ("effects", "emulated"):
+        player = rigs.play if asked.table == "effects" else emulated.play
+        names = asked.effect or [n for n in SHAPES if effects.get(n).cancelled_by_torque]
+        effects_table(names, asked.seeds, player)
     else:
         (wrong_table if asked.table == "wrong" else rivals_table)(asked.campaigns)
     print(f"{time.perf_counter() - began:.0f} s")
