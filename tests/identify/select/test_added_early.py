@@ -1,4 +1,4 @@
-"""What was added early in a search in torque is judged again beside what was found later, and what is sure by chance."""
+"""What was added early in a search in torque is judged again, and what was looked for has to be surer."""
 
 from __future__ import annotations
 
