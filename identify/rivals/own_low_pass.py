@@ -21,6 +21,7 @@ from identify.rivals.tone_origin import TONE
 from identify.runs.holdout import Split
 from identify.select.disturbance_lines import lines_left
 from identify.select.evidence import Evidence, inflation
+from identify.select.free_form_residual import ON
 from identify.select.search_state import Found
 from identify.select.stepwise import Stepwise
 from identify.select.trial_fits import FULL_ITERATIONS
@@ -28,6 +29,7 @@ from identify.signals.trace import Trace
 from identify.wording import number
 
 FORMS = ("sensor_lag_second_order", "sensor_lag")  # as data sheets have it; the likelier of the two
+MEMORY = "free_memory"  # the curve over what the motion was before
 BEGUN_SAMPLES = 0.2  # length of the low-pass that a fit begins from
 
 
@@ -36,26 +38,38 @@ def with_own_low_pass(
 ) -> tuple[Found, str]:
     """The same with its numbers as they are beside the gyro's low-pass, and a note; unchanged where none shows.
 
-    Where something is left over, a low-pass smooths that away and proves nothing, unless that is spectral lines that it
-    explains: what a lag makes of a sine that is not quite its own stands at the sine's frequency.
+    Where something is left over, a low-pass smooths that away and proves nothing, unless it explains that (see below).
     """
     depends = found.disturbance.depends_on
     if not isinstance(found.after.fit, Fit):
         return found, ""
-    if depends and not _explains_lines(found, search, traces):
+    if depends and not _explains_all(found, search, traces):
         return found, ""
     after, note = beside_own_low_pass(found.after, search, traces, split, say, scored=False)
     explained = replace(found.disturbance, depends_on=()) if note else found.disturbance
     return replace(found, after=after, disturbance=explained), note
 
 
-def _explains_lines(found: Found, search: Stepwise, traces: Sequence[Trace]) -> bool:
-    """Whether nothing but spectral lines is left, and none beside the likeliest low-pass."""
-    torque_nm = search.problem.torque_nm
-    if found.disturbance.depends_on != (lines_left(search.best, torque_nm),):
+def _explains_all(found: Found, search: Stepwise, traces: Sequence[Trace]) -> bool:
+    """Whether the likeliest low-pass explains all that is left.
+
+    That may be spectral lines, none of which is left beside it: what a lag makes of a sine that is not quite its own
+    stands at the sine's frequency. Or it depends on the past motion, which a low-pass remembers, too (behind a lag that
+    was named already): then the low-pass is believed more than that curve.
+    """
+    depends = found.disturbance.depends_on
+    lines = depends == (lines_left(search.best, search.problem.torque_nm),)
+    memories = [c for c in (search.left, *search.doubtful) if c is not None and c.is_there]
+    of_motion = all(d.on == ON[MEMORY] for d in depends) and all(c.form == MEMORY for c in memories)
+    if not lines and not (memories and of_motion):
         return False
     form = _form_for(found.after, search, traces, scored=False)
-    return form is not None and lines_left(_evidence(search, form).fit, torque_nm) is None
+    if form is None:
+        return False
+    there = _evidence(search, form)
+    if lines:
+        return lines_left(there.fit, search.problem.torque_nm) is None
+    return all(there.support > c.evidence.support for c in memories)
 
 
 def beside_own_low_pass(

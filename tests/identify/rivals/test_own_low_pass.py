@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
@@ -16,6 +17,7 @@ from identify.residual import Dependence, Disturbance
 from identify.rivals import open_line, own_low_pass
 from identify.rivals.own_low_pass import with_own_low_pass
 from identify.select.evidence import Evidence
+from identify.select.free_form_residual import ON, FreeFormFit
 from identify.select.search_state import Found
 from rig.dynamics.gains import Noise
 
@@ -72,12 +74,16 @@ def search_with(best: Fit, samples: int = 10_000, **scores: float) -> Any:
     """A search through whose last round looked at the best model, and what that scored."""
     last = SimpleNamespace(now=best, tried={}, scores=[SimpleNamespace(effect=e, gain=g) for e, g in scores.items()])
     return SimpleNamespace(
-        best=best, samples=samples, problem=SimpleNamespace(step_s=1e-3, torque_nm=10.0), rounds=[last]
-    )
+        best=best, samples=samples, problem=SimpleNamespace(step_s=1e-3, torque_nm=10.0), rounds=[last], left=None,
+        doubtful=[],
+    )  # fmt: skip
 
 
-def asked_of(found: Found, traces: Any = GYRO, samples: int = 10_000) -> tuple[Found, str]:
+def asked_of(
+    found: Found, traces: Any = GYRO, samples: int = 10_000, curves: Sequence[FreeFormFit] = ()
+) -> tuple[Found, str]:
     search = search_with(cast(Fit, found.after.fit), samples)
+    search.doubtful = list(curves)
     split: Any = SimpleNamespace(final=[], everything=[])
     return with_own_low_pass(found, search, traces, split, lambda text: None)
 
@@ -157,6 +163,27 @@ def test_spectral_lines_that_a_low_pass_explains_are_no_torque_that_is_left(
     assert bool(note) is taken
     assert less.disturbance.depends_on == (() if taken else (lines,))
     assert less.after.values["inertia",] == (0.9 if taken else 1.0)
+
+
+@pytest.mark.parametrize(
+    ("curve", "gain", "taken"),
+    [
+        ("free_memory", 90.0, True),  # with six parameters: believed less than the low-pass
+        ("free_memory", 140.0, False),
+        ("free_angle", 90.0, False),  # a low-pass remembers the motion, and nothing about the angle
+    ],
+)
+def test_what_goes_with_past_motion_behind_a_named_lag_is_its_second_stage(
+    asked: dict[str, Any], curve: str, gain: float, taken: bool
+) -> None:
+    left = Dependence(ON[curve], 0.1, 0.01, 1e-9, (), ())
+    found = found_with((FIRST,))
+    found = replace(found, disturbance=replace(found.disturbance, depends_on=(left,)))
+    best = cast(Fit, found.after.fit)
+    seen = FreeFormFit(best, Evidence(curve, fit_with((FIRST, curve), 0.0, 1.0), gain, 1.0, 70.0, 0.3), 0.3)
+    less, note = asked_of(found, curves=[seen])
+    assert bool(note) is taken
+    assert less.disturbance.depends_on == (() if taken else (left,))
 
 
 def test_of_two_forms_the_likelier_is_fitted(asked: dict[str, Any]) -> None:
