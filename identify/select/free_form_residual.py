@@ -174,7 +174,10 @@ def dependence_on(search: Stepwise, left: FreeFormFit) -> tuple[Dependence, dict
         here, there = left.now.values.get((term,)), fit.values.get((term,))
         if not here or there is None:
             continue
-        moved = there / (1.0 - scale) - here + _slope(form, term, at, shape)
+        # Beside dry friction a curve over the rate has any slope at rest; damping is what it grows by in sliding.
+        slides = form == "free_rate" and any(effects.get(e).place is Place.FRICTION for e in sized)
+        at_rest = _slope(form, term, at, shape)
+        moved = there / (1.0 - scale) - here + (float(as_terms[k]) if slides and at_rest else at_rest)
         if ON[form] == "torque":  # what passes on another share of the torque is another scale
             moved = float(as_terms[k])
         elif "gain" in form:  # so is a gain that changes, and nobody knows where along it the recorded torque is right

@@ -99,6 +99,33 @@ def test_what_a_spring_of_the_model_would_take_with_another_size_is_not_left_ove
     assert curve.torque_rms < 0.2 * float(np.std(taken))
 
 
+def moved_by_a_curve_that_jumps(friction: tuple[str, ...]) -> float:
+    """By how much a curve over the rate moves the damping, as a share of its slope at rest."""
+    problem = PredictionError(traces_of(Recording((sine_run(*SETS[1], duration_s=2.5),))))
+    start: dict[Name, float] = {(t,): v for t, v in zip(TERMS, TRUTH, strict=True)}
+    now = problem.fit(Structure(effects=friction), start)
+    most = max(float(np.max(np.abs(t.fine[1]))) for t in problem.traces)
+    names = [p.name for p in effects.get("free_rate").parameters]
+    places = np.linspace(-most, most, len(names) - 1)
+    taken = 0.5 * np.sign(places) * (1.0 - np.abs(places) / most)
+    shape = dict(zip(names, [-most, most, 0.0, *taken[1:-1]], strict=True))
+    values = {**now.values, **{("free_rate", n): v for n, v in shape.items()}}
+    beside = replace(
+        now, structure=now.structure.plus("free_rate"), names=tuple(values), vector=np.array(list(values.values())),
+        information=1e12 * np.eye(len(values)),
+    )  # fmt: skip
+    left = SimpleNamespace(now=now, evidence=SimpleNamespace(fit=beside), form="free_rate", chance_level=1e-9)
+    curve, moves = dependence_on(cast(Any, SimpleNamespace(problem=problem)), cast(Any, left))
+    at_rest = float(np.interp(0.0, curve.at, np.gradient(np.array(curve.shape_nm), np.array(curve.at))))
+    return moves["damping"] / 100.0 * now.values["damping",] / at_rest
+
+
+def test_beside_dry_friction_the_damping_is_that_of_sliding() -> None:
+    """There a curve over the rate may be as steep at rest as it likes: friction jumps there."""
+    assert moved_by_a_curve_that_jumps(()) == pytest.approx(1.0)
+    assert moved_by_a_curve_that_jumps(("coulomb_friction",)) < 0.6
+
+
 def test_a_gain_that_is_the_same_throughout_is_another_scale_and_no_torque_that_is_left() -> None:
     torque = np.sin(np.linspace(0.0, 60.0, 3000))
     beside, scale, swing = _without_scale(0.65 * torque, torque)
