@@ -30,6 +30,7 @@ SPRING_POWERS = 3  # of the angle, by which a spring is followed
 DRIFT_ROUNDS = (1, 1, *4 * (SPRING_POWERS,))  # the powers, of the angle that the round before has found
 KNOWN_SIGMAS = 10.0  # standard errors of the spring's stiffness: one that is known worse holds nothing
 DRIFT_BLOCKS = 20  # of each stretch; every other one is held out where degrees are compared
+LEAST_LOST, MOST_GAPS = 4.0, 20  # samples that a gap lasts at least, and gaps of a run at which the angle may step
 SPANNED_RCOND = 1e-9  # of the largest singular value: what a polynomial and its steps span
 WORTH_IT = 0.9  # of the power on held-out samples, that a higher degree leaves at most: a slow torque is no drift
 ROWS_A_PERIOD = 4.0  # of the low-pass
@@ -97,7 +98,7 @@ class _Run:
         slow = SLOW_SHARE * float(np.max(np.abs(self.rate))) + 1e-300
         counts = settled(trace.keep, trace.step_s, cutoff_hz) & (np.abs(self.rate) > slow)
         every = max(1, int(1.0 / (ROWS_A_PERIOD * cutoff_hz * trace.step_s)))
-        lost = np.array([0.5 * (a + b) for a, b in _lost(trace, GAP_PERIODS / cutoff_hz)])
+        lost = _gaps(trace, max(GAP_PERIODS / cutoff_hz, LEAST_LOST * trace.step_s))
         self.stretches, self.spans, self.gaps, rows = [], [], [], []
         for first, last in trace.stretches:
             here = np.arange(first, last + 1, every)
@@ -160,11 +161,13 @@ def drift_at(span: tuple[int, int], gaps: Array, drift: Array, at: Any) -> Array
     return np.asarray(legendre.legval(inside, bent) + (x - inside) * slope + steps_at(gaps, at) @ steps)
 
 
-def _lost(trace: Trace, longest_s: float) -> list[tuple[int, int]]:
-    """First sample of every gap between readings that lasts longer, and the first one behind it."""
+def _gaps(trace: Trace, longest_s: float) -> Array:
+    """The middle of every gap between readings that lasts longer, in samples; of many, the longest."""
     seen = np.flatnonzero(trace.keep)
-    ends = np.flatnonzero(np.diff(seen) * trace.step_s > longest_s)
-    return [(int(seen[k]), int(seen[k + 1])) for k in ends]
+    missed = np.diff(seen)
+    long = np.flatnonzero(missed * trace.step_s > longest_s)
+    long = np.sort(long[np.argsort(-missed[long], kind="stable")][:MOST_GAPS])
+    return np.asarray(0.5 * (seen[long] + seen[long + 1]))
 
 
 def _over(trace: Trace, run: _Run) -> Array:
@@ -237,12 +240,21 @@ def _projected(
     for i, (r, own) in enumerate(zip(runs, columns, strict=True)):
         for k, p in enumerate(r.polynomials):
             use = np.ones(len(p), dtype=bool) if without is None else ~without[i][k]
-            spanned, size, _ = np.linalg.svd(p[use], full_matrices=False)
-            q = spanned[:, size > SPANNED_RCOND * size[0]]  # between two gaps there may be nothing that counts
+            q = _spanned(p[use])
             mine, torque = r.by_stretch(own)[k][use], r.by_stretch(r.torque)[k][use]
             a.append(mine - q @ (q.T @ mine))
             y.append(torque - q @ (q.T @ torque))
     return a, y
+
+
+def _spanned(p: Array) -> Array:
+    """An orthonormal basis; between two gaps there may be nothing that counts, and a step is no direction of its own."""
+    q, upper = np.linalg.qr(p)
+    diagonal = np.abs(np.diag(upper))
+    if np.min(diagonal) > SPANNED_RCOND * np.max(diagonal):
+        return np.asarray(q)
+    all_of_it, size, _ = np.linalg.svd(p, full_matrices=False)
+    return np.asarray(all_of_it[:, size > SPANNED_RCOND * size[0]])
 
 
 def _least_squares(a: Array, y: Array) -> tuple[Array, Array]:
