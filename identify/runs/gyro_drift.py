@@ -248,7 +248,7 @@ def _projected(
 
 
 def _spanned(p: Array) -> Array:
-    """An orthonormal basis; between two gaps there may be nothing that counts, and a step is no direction of its own."""
+    """An orthonormal basis: where nothing counts between two gaps, their steps are one direction."""
     q, upper = np.linalg.qr(p)
     diagonal = np.abs(np.diag(upper))
     if np.min(diagonal) > SPANNED_RCOND * np.max(diagonal):
