@@ -11,7 +11,9 @@ from identify.results import GeneticRun, Identification, ModelResult
 from identify.runs.sign_convention import signs
 from identify.select.lags import PASSIVE_SIGMAS
 from identify.wording import SYMBOLS, joined, number, percent, plain, quantities_of
+from rig import effects
 from rig.config.identify import AcceptConfig
+from rig.effects.base import Place
 from rig.platform import TERMS
 
 INTERRUPTED = "the search was interrupted"
@@ -22,6 +24,7 @@ INTERRUPTED_NOTE = (
     "The search was interrupted; missing effects are not yet determined. Run identify-run on this recording again."
 )
 USUAL_CUTOFF_HZ = 50.0  # where the residual passed no low-pass
+AT_LIMIT = 0.999  # of the largest value that a fit gives a parameter: there it would have gone on
 
 
 def of_reported(left: Disturbance, model: ModelResult) -> Disturbance:
@@ -50,6 +53,7 @@ def reasons_against_fit(searched: Sequence[GeneticRun], final: ModelResult) -> l
         *above,
         *(f"{x.name} is not determined: {x.reason}" for x in final.not_determined),
         *_against_negative_damping(final),
+        *_against_ends(final),
     ]
 
 
@@ -61,6 +65,19 @@ def _against_negative_damping(final: ModelResult) -> list[str]:
     return [
         f"damping C is negative ({number(damping.value, 3)} {damping.unit}), and no passive platform's is: the model "
         "takes something else for damping, often a delay between torque and rate"
+    ]
+
+
+def _against_ends(final: ModelResult) -> list[str]:
+    """Parameters of the drive or the sensor that end where they are no longer looked for: J, C and K go with them."""
+    return [
+        f"{plain(effect)}: {p.meaning} ends at {number(found.value, 3)} {found.unit}, as far as is looked; check "
+        "the units and the time stamps of torque and rate, and a declared added_inertia_kg_m2"
+        for effect, values in final.effect_parameters.items()
+        if effects.get(effect).place in (Place.DRIVE, Place.SENSOR)
+        for p in effects.get(effect).parameters
+        if (found := values.get(p.name)) is not None
+        and (found.value >= AT_LIMIT * p.high or (p.low > 0.0 and found.value <= p.low / AT_LIMIT))
     ]
 
 

@@ -11,6 +11,7 @@ from identify.conclude.acceptance import of_reported, reasons_against_disturbanc
 from identify.conclude.verdict import residual_torque_sentence
 from identify.residual import Dependence, Disturbance
 from identify.results import ParameterEstimate
+from identify.wording import number
 from rig.config.identify import AcceptConfig
 
 RATE = Dependence("rate", 0.03, 0.03, 1e-9)
@@ -57,12 +58,30 @@ def test_within_all_limits_it_is_accepted_and_told_in_a_sentence() -> None:
 def test_a_negative_damping_is_a_reason_of_its_own() -> None:
     def of(damping: float) -> list[str]:
         parameters = {"damping": ParameterEstimate.normal(damping, 0.03, "N*m*s/rad")}
-        final = cast(Any, SimpleNamespace(parameters=parameters, not_determined=()))
+        final = cast(Any, SimpleNamespace(parameters=parameters, not_determined=(), effect_parameters={}))
         return reasons_against_fit((), final)
 
     assert of(0.05) == of(-0.05) == []
     assert len(of(-2.4)) == 1
     assert "damping C is negative (-2.40 N*m*s/rad)" in of(-2.4)[0]
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameter", "value", "ends"),
+    [
+        ("torque_scale", "scale", 50.0, True),
+        ("torque_scale", "scale", 0.02, True),
+        ("torque_scale", "scale", 1.2, False),
+        ("sensor_lag", "time", 0.5, True),
+        ("torque_delay", "delay", 0.0, False),  # none at all is a value like others
+        ("hysteresis", "exponent", 1.0, False),  # so is the end of a shape
+    ],
+)
+def test_what_ends_at_its_limit_is_a_reason(effect: str, parameter: str, value: float, ends: bool) -> None:
+    found = {effect: {parameter: ParameterEstimate.normal(value, 0.01, "1")}}
+    final = cast(Any, SimpleNamespace(parameters={}, not_determined=(), effect_parameters=found))
+    reasons = reasons_against_fit((), final)
+    assert [f"ends at {number(value, 3)}" in r for r in reasons] == ([True] if ends else [])
 
 
 def test_where_an_effect_that_may_be_missing_moves_a_parameter_the_result_is_not_accepted() -> None:
