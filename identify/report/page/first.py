@@ -30,6 +30,8 @@ from rig.arrays import Array
 SHOWN_PERIODS = 3.0  # of the excitation that are shown
 RUN_SHARE, MIN_SHOWN_SAMPLES = 0.05, 200  # of a run without a frequency, and samples
 ROOM = 1.35  # of the measured motion: a simulation that runs away leaves the plot
+AT_REST = 1.0  # of the mean power of what was measured, that counts where it is still: a model errs little there
+LEAST_RANGE = 0.1  # of the largest that was measured, which a plot shows at least
 
 
 def first_screen(found: Identification, gallery: Gallery) -> Markup:
@@ -91,7 +93,13 @@ def convincing_figure(found: Identification) -> Figure | None:
     places = [(_strongest(t, *shown), i) for i, (t, shown) in enumerate(several)]
     (_, start, end), at = max(places, key=lambda p: p[0][0])
     trace, channels = several[at]
-    return _figure(found, trace, [c[start:end] for c in channels], (start, end), by_torque)
+    range_ = ROOM * max(_largest(channels[0][start:end]), LEAST_RANGE * _largest(channels[0]))
+    return _figure(found, trace, [c[start:end] for c in channels], (start, end), by_torque, range_ or 1.0)
+
+
+def _largest(measured: Array) -> float:
+    """The largest finite size of what was measured; zero where there is none."""
+    return float(np.max(np.abs(measured[np.isfinite(measured)]), initial=0.0))
 
 
 def _channels(trace: RunTraces, by_torque: bool, lowpass_hz: float | None) -> tuple[Array, Array, Array] | None:
@@ -114,12 +122,12 @@ def _strongest(trace: RunTraces, measured: Array, before: Array, after: Array) -
     step = float(trace.time_s[-1] - trace.time_s[0]) / max(count - 1, 1)
     span = SHOWN_PERIODS / trace.frequency_hz / step if trace.frequency_hz else RUN_SHARE * count
     width = int(min(count, max(span, MIN_SHOWN_SAMPLES)))
-    size = np.nanmax(np.abs(measured)) if np.any(np.isfinite(measured)) else 1.0
+    size = _largest(measured) or 1.0
     same = np.array_equal(before, after)
     differ = np.clip(np.nan_to_num(before - (measured if same else after)), -size, size)
     differ, moved = np.where(trace.keep > 0.0, differ, 0.0), np.nan_to_num(measured)
     power, of_motion = (_moving_mean(x * x, width) for x in (differ, moved))
-    ratio = power / (of_motion + 0.01 * np.mean(moved**2) + 1e-300)
+    ratio = power / (of_motion + AT_REST * np.mean(moved**2) + 1e-300)
     first = int(np.argmax(ratio))
     return float(ratio[first]), first, first + width
 
@@ -130,8 +138,10 @@ def _moving_mean(x: Array, width: int) -> Array:
 
 
 def _figure(
-    found: Identification, trace: RunTraces, channels: list[Array], place: tuple[int, int], by_torque: bool
-) -> Figure:
+    found: Identification, trace: RunTraces, channels: list[Array], place: tuple[int, int], by_torque: bool,
+    range_: float,
+) -> Figure:  # fmt: skip
+    """The figure; ``range_`` is how far its first panel reaches to either side of zero."""
     q = QUANTITIES[found.axis]
     name, its_unit = (q.torque, q.torque_unit) if by_torque else q.measured(trace)
     time = (trace.time_s - trace.time_s[0])[slice(*place)]
@@ -147,9 +157,8 @@ def _figure(
             lines(time, after, "final model", AFTER, width=1.8),
             lines(time, measured - after, "final model", AFTER, 2, showlegend=False),
         ]
-    largest = ROOM * float(np.nanmax(np.abs(measured))) or 1.0
     panels = [
-        Panel("", axis(name, its_unit), extra_y={"range": [-largest, largest]}),
+        Panel("", axis(name, its_unit), extra_y={"range": [-range_, range_]}),
         Panel("time since the start of the run (s)", axis("error", its_unit), "measured minus model"),
     ]
     layout = grid(panels, shared_x=True, gap=0.16)
