@@ -30,7 +30,9 @@ from rig.arrays import Array
 SHOWN_PERIODS = 3.0  # of the excitation that are shown
 RUN_SHARE, MIN_SHOWN_SAMPLES = 0.05, 200  # of a run without a frequency, and samples
 ROOM = 1.35  # of the measured motion: a simulation that runs away leaves the plot
-STILL_SHARE = 1.0  # of the mean power of what was measured, that counts where it is still: a model errs little there
+POWER_WHEN_STILL = (
+    1.0  # of the mean power of what was measured, that counts where it is still: a model errs little there
+)
 LEAST_RANGE = 0.1  # of the largest that was measured, which a plot shows at least
 
 
@@ -127,7 +129,7 @@ def _strongest(trace: RunTraces, measured: Array, before: Array, after: Array) -
     differ = np.clip(np.nan_to_num(before - (measured if same else after)), -size, size)
     differ, moved = np.where(trace.keep > 0.0, differ, 0.0), np.nan_to_num(measured)
     power, of_motion = (_moving_mean(x * x, width) for x in (differ, moved))
-    ratio = power / (of_motion + STILL_SHARE * np.mean(moved**2) + 1e-300)
+    ratio = power / (of_motion + POWER_WHEN_STILL * np.mean(moved**2) + 1e-300)
     first = int(np.argmax(ratio))
     return float(ratio[first]), first, first + width
 
