@@ -99,29 +99,28 @@ class TorqueSearch:
         now = self.without_absorbing_stiffness(begin or self.base)
         before = {now.structure.parts}
         while True:
-            chosen, there = self._next(now) or self._in_place(now) or (None, now)
+            chosen = self._next(now) or self._in_place(now)
             if chosen is None:
                 break
             share = f"{100.0 * chosen.weight:.0f} % of the residual torque on held-out data"
             self.say(f"added {plain(chosen.effect)}: explains {share}")
-            now = self.backward_elimination(self.without_absorbing_stiffness(there))
+            now = self.backward_elimination(self.without_absorbing_stiffness(chosen.fit))
             if now.structure.parts in before:
                 break
             before.add(now.structure.parts)
             self.path.append(now)
         return now
 
-    def _next(self, now: TorqueFit) -> tuple[TorqueCandidate, TorqueFit] | None:
-        """The effect to add, and the model with it."""
+    def _next(self, now: TorqueFit) -> TorqueCandidate | None:
+        """The effect to add."""
         if len(now.structure.effects) >= MAX_EFFECTS + len(self.base.structure.effects):
             return None
         looks = self.candidates(now)
         self.rounds.append(tuple(looks))
-        chosen = self.best_candidate(looks)
-        return None if chosen is None else (chosen, chosen.fit)
+        return self.best_candidate(looks)
 
-    def _in_place(self, now: TorqueFit) -> tuple[TorqueCandidate, TorqueFit] | None:
-        """An effect that carries more in the place of one that follows almost anything, and the model with it.
+    def _in_place(self, now: TorqueFit) -> TorqueCandidate | None:
+        """An effect that carries more in the place of one that follows almost anything; its model is without that.
 
         What was added early was asked while the others were still missing, and may have followed part of theirs: in
         steady turning a tone stands for a wave over the angle. One with more parameters follows more freely, as a tone
@@ -138,7 +137,7 @@ class TorqueSearch:
             if chosen is not None and chosen.effect != name:
                 self.say(f"{plain(name)} is replaced: another effect carries its torque beside the others")
                 self.rounds.append(tuple(looks))
-                return chosen, chosen.fit
+                return chosen
         return None
 
     def left(self, fit: TorqueFit) -> float:

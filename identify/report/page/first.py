@@ -30,9 +30,7 @@ from rig.arrays import Array
 SHOWN_PERIODS = 3.0  # of the excitation that are shown
 RUN_SHARE, MIN_SHOWN_SAMPLES = 0.05, 200  # of a run without a frequency, and samples
 ROOM = 1.35  # of the measured motion: a simulation that runs away leaves the plot
-POWER_WHEN_STILL = (
-    1.0  # of the mean power of what was measured, that counts where it is still: a model errs little there
-)
+POWER_WHEN_STILL = 1.0  # of the mean power of what was measured: a moment at rest counts as one with that much
 LEAST_RANGE = 0.1  # of the largest that was measured, which a plot shows at least
 
 
