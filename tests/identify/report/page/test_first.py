@@ -38,7 +38,8 @@ def test_where_nothing_moved_the_plot_has_a_range_and_a_small_difference_convinc
     for t in FOUND.traces:
         rest, size = t.time_s < 1.0, np.max(np.abs(t.measured))
         off = np.where(rest, 0.05, 0.3) * size
-        changed.append(replace(t, measured=np.where(rest, 1e-300, t.measured), simulated_before=t.simulated_after + off))
+        measured = np.where(rest, 1e-300, t.measured)
+        changed.append(replace(t, measured=measured, simulated_before=t.simulated_after + off))
     figure = convincing_figure(replace(FOUND, traces=tuple(changed)))
     assert figure is not None
     assert values(figure.traces[0], "x")[0] > 0.9
