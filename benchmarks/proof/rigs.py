@@ -171,17 +171,20 @@ def with_known_scale(model: Platform, scale: float) -> Platform:
 
 
 def proved(
-    config: Config, recording: Recording, model: Platform, seed: int, rivals: Mapping[str, Platform] | None = None,
-    player: Player = play,
+    config: Config, recording: Recording, model: Platform, seed: int, noise: float,
+    rivals: Mapping[str, Platform] | None = None, player: Player = play,
 ) -> Outcome:  # fmt: skip
-    """The proof of a model, played on the rig."""
+    """The proof of a model, played on the rig; ``noise`` is what the identification takes for the sensor's.
+
+    The ring of a run has to be lost in that before the next one, as in a proof that the commands play.
+    """
     drive = Drive(TICK_S, "zero_order", resolution_of(recording))
     allowed = allowed_peaks(config.limits, config.excitation.margin)
     try:
         sets = plan(model, config.excitation, config.limits)
         planned: ProofPlan = plan_proof(
             model, sets, allowed, drive,
-            rivals=rivals, recorded=recording.runs, rest_s=config.excitation.rest_s, noise=recording.noise,
+            rivals=rivals, recorded=recording.runs, rest_s=config.excitation.rest_s, noise=noise,
         )  # fmt: skip
     except RigError as error:
         return Outcome(model, None, f"refused: {str(error).splitlines()[0][:90]}")

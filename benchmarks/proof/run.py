@@ -74,11 +74,12 @@ def one_proof(hidden: str, declared: str, seed: int, player: Player = rigs.play)
     except RigError as error:
         return Outcome(None, None, f"campaign stopped: {str(error)[:70]}")
     start = _start(hidden, declared, values, rng)
-    model = fitted(recording, declared, start).final.platform
+    found = fitted(recording, declared, start)
+    model = found.final.platform
     if model is None or declared not in model.effects:
         return Outcome(model, None, "dropped by the identification")
     model = rigs.with_known_scale(model, values.get("scale", 1.0))
-    return proved(config, recording, model, seed, player=player)
+    return proved(config, recording, model, seed, found.noise_floor.holdout_rate_rms, player=player)
 
 
 def _start(hidden: str, declared: str, values: Mapping[str, float], rng: np.random.Generator) -> dict[str, float]:
@@ -142,12 +143,15 @@ def one_pair(hidden: str, rival: str, seed: int) -> tuple[str, str, str]:
     except RigError as error:
         return "no proof", "no proof", str(error)[:60]
     models: list[Platform] = []
+    noise = 0.0
     for name in (hidden, rival):
-        model = fitted(recording, name, _start(hidden, name, values, rng)).final.platform
+        found = fitted(recording, name, _start(hidden, name, values, rng))
+        model = found.final.platform
         if model is None or name not in model.effects:
             return "no proof", "no proof", f"{name} was dropped by the identification"
         models.append(model)
-    outcome = proved(config, recording, models[0], seed, {f"{hidden} / {rival}": models[1]})
+        noise = noise or found.noise_floor.holdout_rate_rms  # of the model that is compensated
+    outcome = proved(config, recording, models[0], seed, noise, {f"{hidden} / {rival}": models[1]})
     if outcome.proof is None:
         return "no proof", "no proof", outcome.why
     one = outcome.proof.rivals[f"{hidden} / {rival}"]

@@ -27,7 +27,7 @@ from identify.estimate.covariance import orthogonal_part
 from identify.likelihood.fit import Columns, Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
-from identify.select.lags import KnownDelays, takes_damping
+from identify.select.lags import KnownDelays, lateness_s, takes_damping
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.gains import Noise
@@ -192,7 +192,7 @@ def torque_fit_of(regression: TorqueRegression, fit: Fit) -> TorqueFit:
     """
     seen = tuple(e for e in fit.structure.effects if effects.get(e).place is not Place.SENSOR)
     shapes = dict(fit.structure.shapes_of(fit.values))
-    if regression.by_gyro and (late_s := _late_s(fit)) > 0.0:
+    if regression.by_gyro and (late_s := lateness_s(fit)) > 0.0:
         shapes[DELAY] = (sum(shapes.get(DELAY, ())) + late_s,)
         seen = (*(e for e in seen if e != DELAY), DELAY)
     shaft = tuple(e for e in seen if effects.get(e).place is not Place.DRIVE)
@@ -202,12 +202,6 @@ def torque_fit_of(regression: TorqueRegression, fit: Fit) -> TorqueFit:
         if found.held_nm < regression.torque_nm:
             break
     return found
-
-
-def _late_s(fit: Fit) -> float:
-    """By how much a gyro's low-passes delay the motion that they show."""
-    shapes = fit.structure.shapes_of(fit.values)
-    return sum(lag(shapes[e])[0] for e in fit.structure.effects if (lag := effects.get(e).lag) is not None)
 
 
 def unfollowed_share(now: Fit, new: Fit) -> float:

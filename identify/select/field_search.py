@@ -18,12 +18,14 @@ from identify.estimate.initial_guess import Start, scale_of
 from identify.likelihood.by_prediction_error import as_final, fitted_on_all
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
+from identify.model.parameters import Name
 from identify.model.structure import Structure
 from identify.results import Dependence, Disturbance
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
 from identify.select.curve_rivals import not_as_strong
 from identify.select.evidence import MAX_TRUSTED_INFLATION, STRONG_SUPPORT, in_band, inflation, torque_fit_of
+from identify.select.lags import SensorPart
 from identify.select.likelihood_search import MAX_CUTOFF_SHARE
 from identify.select.preference import follows_nothing_freely, is_more_flexible, leaves_less
 from identify.select.search_state import Found, Search, describes
@@ -61,7 +63,7 @@ class Judged:
 def search_in_torque(
     traces: Sequence[Trace], split: Split, structure: Structure, shapes: dict[str, tuple[float, ...]], start: Start,
     allowed: Sequence[str], unit: str, say: Callable[[str], None], known: Judged, trusted: bool,
-    along_few: TorqueRegression, refutes: Callable[[TorqueFit], bool],
+    along_few: TorqueRegression, refutes: Callable[[Structure, Mapping[Name, float]], bool],
 ) -> Found:  # fmt: skip
     """Find what the declared model lacks, and fit both models with their disturbance.
 
@@ -86,14 +88,14 @@ def search_in_torque(
     refutes
         Whether that model is likelier than one found in torque: the search in torque proposes, the likelihood judges.
     """
-    few, parts = along_few.traces, along_few.split
+    few, parts, sensors = along_few.traces, along_few.split, SensorPart.of(known.fit, structure)
     scale = scale_of(few, start.platform, ())
     offered = [n for n in allowed if n not in structure.effects and can_show(n, traces)]
 
     def at(cutoff_hz: float) -> TorqueSearch:
         same = cutoff_hz == along_few.cutoff_hz
         regression = along_few if same else TorqueRegression(few, parts, cutoff_hz, scale)
-        base = regression.solve(structure, shapes)
+        base = sensors.begun(regression, shapes)
         floor = regression.noise_floor_nm(base.values)
         acceleration = float(np.sqrt(np.mean(regression.series()[2] ** 2)))
         return TorqueSearch(regression, base, floor, acceleration, offered, say)
@@ -105,35 +107,36 @@ def search_in_torque(
     best = trial
     size_nm = float(np.sqrt(in_band(known.fit.noise, search.regression.cutoff_hz) * known.fit.variance))
     unfollowed = trusted and bool(known.fit.structure.effects) and size_nm < UNFOLLOWED * trial.held_nm
-    filtered = any(effects.get(e).place is Place.SENSOR for e in known.fit.structure.effects)  # which no torque shows
-    if not unfollowed and not filtered:
+    if not unfollowed:
         say("looking at what is left as a torque")
         depends = bool(known.curves or disturbance_of(search.regression, trial, search.floor_nm, unit).depends_on)
         search.run()
 
         def is_better(proposed: TorqueFit) -> bool:
-            added = [e for e in proposed.structure.effects if e not in structure.effects]
+            added = [e for e in proposed.structure.effects if e not in search.base.structure.effects]
             if not leaves_less(search, proposed, trial, depends) or not_as_strong(proposed, added):
                 return False
             if trial.held_nm > A_MULTIPLE * proposed.held_nm and follows_nothing_freely(proposed, trial):
                 return True
-            return not (trusted and is_more_flexible(proposed, trial)) and not refutes(proposed)
+            return not (trusted and is_more_flexible(proposed, trial)) and not refutes(*sensors.put_back(proposed))
 
         # A lag at the end of the way is no reason to give away what was found before it.
         proposed = next(filter(is_better, reversed(search.path)), None)
         if proposed is not None:
             by_likelihood, best = None, proposed
     left = best.held_nm / search.regression.torque_nm
-    if by_likelihood is None and best.structure.effects == structure.effects and left > MUCH_LEFT:
+    if by_likelihood is None and best.structure.effects == search.base.structure.effects and left > MUCH_LEFT:
         wider = min(WIDER[few[0].channel] * start.cutoff_hz, highest)
         say(f"nothing found up to {start.cutoff_hz:.3g} Hz: looking up to {wider:.3g} Hz")
         search = at(wider)
         best = search.run()
     regression, base, floor, cutoff = search.regression, search.base, search.floor_nm, search.regression.cutoff_hz
-    final = by_likelihood.fit.structure if by_likelihood else best.structure
+    final, begin = (by_likelihood.fit.structure, {}) if by_likelihood else sensors.put_back(best)
     say(f"final fit with {joined([plain(e) for e in final.effects]) or 'fewer terms'}")
     # In torque the shapes of declared effects stay as they are declared: the likelihood has fitted them.
     shaped = by_likelihood is not None and known.fit.structure == structure and any(shapes.values())
+    if sensors.names:  # the declared model has no part in the sensor
+        base = regression.solve(structure, shapes)
     begun, like = (known.fit.values, known.fit) if shaped else (base.values, None)
     likely = fitted_on_all(traces, structure, begun, split.final, like)
     before = _final(regression, base, likely, traces, split, trusted=shaped)
@@ -143,7 +146,7 @@ def search_in_torque(
             return before
         found_by_it = by_likelihood is not None or final == known.fit.structure  # what torque had beside it was dropped
         its = known.fit if found_by_it else None
-        likely = fitted_on_all(traces, final, (its or best).values, split.final, its)
+        likely = fitted_on_all(traces, final, its.values if its else {**best.values, **begin}, split.final, its)
         return _final(regression, best, likely, traces, split, trusted=found_by_it)
 
     after, found_so_far = fitted(final), final
@@ -192,8 +195,12 @@ def search_in_torque(
         return (both[1].held_nm ** 2 - both[0].held_nm ** 2) / regression.torque_nm**2
 
     reported = search.as_search(best)
-    if by_likelihood:
-        reported = replace(by_likelihood.search, contribution=reported.contribution)
+    if by_likelihood is None and sensors.names:
+        reported.add_found(known.search, sensors.names)
+        reported.best = replace(best, structure=final)
+    elif by_likelihood is not None:
+        # Where the residual in torque is mostly errors of the measured motion, it says nothing of what a name takes.
+        reported = replace(by_likelihood.search, contribution={} if unfollowed else reported.contribution)
         if final != found_so_far:
             reported.drop(after.fit)
     return Found(reported, before, after, disturbance, (errors(base), errors(best)), lacking, share_of)

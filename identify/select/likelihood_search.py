@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.bounds.separation import support_difference
-from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.estimate.initial_guess import Start, scale_of
 from identify.estimate.starting_point import horizon_s
@@ -153,19 +152,19 @@ class LikelihoodSearch:
         out.best = best
         return out
 
-    def refutes(self, fit: TorqueFit) -> bool:
+    def refutes(self, structure: Structure, values: Mapping[Name, float]) -> bool:
         """Whether the best model is likelier than one found in torque, also where that has its own best numbers.
 
         A curve that is believed beside the best model belongs to it where all that was found is of the kind that the
         curve stands for: what it shows is not another effect of that kind.
         """
         search = self.stepwise
-        if fit.structure == search.best.structure:
+        if structure == search.best.structure:
             return False
-        left, added = search.left, [e for e in fit.structure.effects if e not in search.base.structure.effects]
+        left, added = search.left, [e for e in structure.effects if e not in search.base.structure.effects]
         beside = left is not None and all(is_part_of(e, left.form) for e in added)
         best = left.evidence.fit if left is not None and beside else search.best
-        there = search.problem.fit(fit.structure, fit.values)
+        there = search.problem.fit(structure, values)
         if drives(there) and not drives(best):  # it has taken for damping what is none
             return True
         return bool(np.isfinite(there.cost)) and support_difference(there, best) > STRONG_SUPPORT

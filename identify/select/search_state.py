@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -75,6 +75,12 @@ class Search:
         ]  # fmt: skip
         self.best, self.rivals, self.rival_models, self.dropped = self.base, {}, {}, []
         self.between_rivals = {}
+
+    def add_found(self, other: Search, names: Sequence[str]) -> None:
+        """Tell of effects what another search, which has found them, has to tell."""
+        self.candidates += [c for c in other.candidates if c.effect in names]
+        self.rivals |= {k: v for k, v in other.rivals.items() if k in names}
+        self.rival_models |= {k: v for k, v in other.rival_models.items() if k in names}
 
     def drop(self, without: ParameterFit, status: str = TAKEN_BACK) -> None:
         """Take back the effects that the final model does without; the report gives them this status."""

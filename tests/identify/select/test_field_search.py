@@ -20,6 +20,7 @@ from identify.results import Dependence, Disturbance, Identification
 from identify.runs.holdout import split
 from identify.select import field_search
 from identify.select.field_search import Judged, _final, search_in_torque
+from identify.select.search_state import Found, Search
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
 from tests.identify.servo import Servo
@@ -145,6 +146,41 @@ def test_what_is_left_of_a_model_found_in_torque_is_the_likelihoods_where_that_h
     search_in_torque(
         traces, parts, declared, {}, start, ("coulomb_friction", "torque_offset"),
         "N*m", lambda _: None, Judged(fit, search), False, regression,
-        lambda proposed: "torque_offset" not in proposed.structure.effects,
+        lambda structure, values: "torque_offset" not in structure.effects,
     )  # fmt: skip
     assert trusted[-1] == (("coulomb_friction",), True)
+
+
+def looked_in_torque(own: Structure, values: dict[Any, float], trusted: bool, better: bool) -> Found:
+    """What a search in torque makes of the likelihood's model of a tilted servo."""
+    traces = traces_of(TILTED.recording(2))
+    parts, declared = split(traces, "auto"), Structure(("inertia", "damping"))
+    regression = TorqueRegression(traces, parts, 20.0, scale_of(traces, (TILTED.inertia, 1e-3, 0.0), ()))
+    begin = {**regression.solve(declared, {}).values, **values}
+    _, fit = fitted_on_all(traces, own, begin, parts.final)
+    search = Search(regression.solve(declared, {}), fit, 1.0, 0.0, contribution={"coulomb_friction": 1.0})
+    return search_in_torque(
+        traces, parts, declared, {}, Start((TILTED.inertia, 1e-3, 0.0), 1.0, 20.0), FEW, "N*m", lambda _: None,
+        Judged(fit, search), trusted, regression, lambda structure, values: not better,
+    )  # fmt: skip
+
+
+def test_what_a_search_in_torque_finds_stands_beside_the_low_pass_that_the_likelihood_has_found() -> None:
+    """A low-pass of the sensor had kept everybody from looking in torque: friction and offset went unnamed."""
+    own = Structure(("inertia", "damping")).plus("sensor_lag")
+    found = looked_in_torque(own, {("sensor_lag", "time"): 0.002}, trusted=False, better=True)
+    assert set(found.named) == {"sensor_lag", "coulomb_friction", "torque_offset"}
+    assert set(found.search.best.structure.effects) == set(found.named)
+    assert found.after.values["coulomb_friction", "level"] == pytest.approx(0.02, rel=0.05)
+    assert set(found.before.structure.effects) == set()
+
+
+def test_where_torque_cannot_follow_a_model_it_says_nothing_of_what_its_effects_take(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Near a resonance with little damping the errors of the motion drown the torque: a true spring was taken back."""
+    monkeypatch.setattr(field_search, "in_band", lambda *_: 0.0)  # the likelihood leaves next to nothing
+    own = Structure(("inertia", "damping")).plus("coulomb_friction")
+    found = looked_in_torque(own, {("coulomb_friction", "level"): 0.02}, trusted=True, better=False)
+    assert found.named == ["coulomb_friction"]
+    assert found.search.contribution == {}

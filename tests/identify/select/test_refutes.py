@@ -40,7 +40,7 @@ def test_a_curve_refutes_only_effects_of_its_kind(
     search = LikelihoodSearch(
         cast(Any, SimpleNamespace(best=bare, base=bare, left=left, problem=problem)), [], Structure(), cast(Any, None)
     )
-    assert search.refutes(fit(found, 0.0)) is refuted
+    assert search.refutes(Structure(effects=found), {}) is refuted
 
 
 def test_a_model_that_takes_a_delay_for_a_negative_damping_is_refuted_however_likely(
@@ -53,4 +53,4 @@ def test_a_model_that_takes_a_delay_for_a_negative_damping_is_refuted_however_li
     search = LikelihoodSearch(
         cast(Any, SimpleNamespace(best=bare, base=bare, left=None, problem=problem)), [], Structure(), cast(Any, None)
     )
-    assert search.refutes(fit(("creep",), 0.0))
+    assert search.refutes(Structure(effects=("creep",)), {})
