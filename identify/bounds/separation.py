@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg import solve_toeplitz
 
 from identify.likelihood.fit import Fit
+from rig import effects
 from rig.arrays import Array
 
 EVIDENCE_BLOCKS = 30  # of all runs together, over which scores scatter: their ratio is then known to a quarter
 ROUNDING = 1e-9  # of a block's own scatter, that a line always leaves
 DIFFERENCE_VARIANCE = 4.0  # of a difference of two costs over its mean, where one of the models is right
+ORDER_PER_DECADE = 10  # of an autoregression, for every decade of samples (the usual rule)
 
 
 def support_difference(one: Fit, other: Fit) -> float:
@@ -19,7 +22,9 @@ def support_difference(one: Fit, other: Fit) -> float:
 
     The smaller of two numbers: the fall of the penalised cost, and the square of the standard errors by which blocks of
     the record agree on it. That asks nothing of either model but that blocks are alike; those of a decay are not: the
-    first ones tell nearly all.
+    first ones tell nearly all. Of two lags or delays, the fall is no more than is left of it once the innovations of
+    both are whitened: a low-pass shapes the noise as well, and where that has a colour no model of it has, the one with
+    the wrong form may come closer to it.
     """
     fall = one.penalised - other.penalised
     if fall <= 0.0:
@@ -27,6 +32,8 @@ def support_difference(one: Fit, other: Fit) -> float:
     if all(s.trace.torque is None for s in one.shots) or not np.isfinite(fall):  # the one runs away
         return fall
     price = (one.penalised - one.cost) - (other.penalised - other.cost)
+    if _lags(one) != _lags(other):
+        fall = min(fall, max(_whitened_cost(one) - _whitened_cost(other) + price, 0.0))
     return min(fall, agreement(block_costs(one) - block_costs(other), block_divergences(one, other), price) ** 2)
 
 
@@ -76,6 +83,32 @@ def block_divergences(one: Fit, other: Fit) -> Array:
         squares = (e - f) ** 2 * (1.0 + ratio) / (v * one.variance)
         apart.append(np.sum(0.5 * (squares + ratio + 1.0 / ratio - 2.0), axis=1))
     return _by_block(apart, one)
+
+
+def _lags(fit: Fit) -> set[str]:
+    """Its lags and delays, of sensor and drive."""
+    return {e for e in fit.structure.effects if effects.get(e).is_late}
+
+
+def _whitened_cost(fit: Fit) -> float:
+    """Minus twice the log-likelihood with innovations that follow an autoregression, up to a constant of the samples.
+
+    Both readings of a sample have an autoregression each (Yule-Walker).
+    """
+    total, p = 0.0, fit.prediction
+    count = sum(int(np.sum(s.weight)) for s in fit.shots)
+    order = int(ORDER_PER_DECADE * np.log10(max(count, 10)))
+    for m in range(p.innovations[0].shape[1]):
+        products = np.zeros(order + 1)
+        for e, v, s in zip(p.innovations, p.variance, fit.shots, strict=True):
+            scaled = np.where(s.weight, e[:, m] / np.sqrt(v[:, m]), 0.0)
+            for a, b in s.edges:
+                x = scaled[a:b]
+                products[: b - a] += [x[k:] @ x[: len(x) - k] for k in range(min(order + 1, b - a))]
+            total += float(np.sum(np.log(v[s.weight, m])))
+        left = products[0] - products[1:] @ solve_toeplitz(products[:-1], products[1:])
+        total += count * float(np.log(left / count))
+    return total
 
 
 def _by_block(each: Sequence[Array], fit: Fit) -> Array:

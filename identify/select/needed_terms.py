@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -124,3 +125,18 @@ def is_light(search: Stepwise, evidence: Evidence, without: Fit, now: Fit) -> bo
     if effect.place is Place.SENSOR or effect.delay_s is not None:
         return takes_damping(name, without, now)
     return evidence.weight < WEIGHT
+
+
+def needless(search: Stepwise, now: Fit, doubted: Sequence[str]) -> list[tuple[Evidence, bool]]:
+    """What speaks for each of those that the data do as well without, and whether it carries little torque."""
+    found = []
+    lags = any(effects.get(e).lag is not None for e in now.structure.effects)
+    for name, without in zip(doubted, search.all_without(now, doubted), strict=True):
+        if not np.isfinite(without.cost):  # it runs away without
+            continue
+        # Beside a lag of the gyro a residual in torque hides what was believed when it was added.
+        evidence = search.weigher.evidence(name, without, now, benefit_of_doubt=lags and name not in TERMS)
+        light = is_light(search, evidence, without, now)
+        if evidence.support <= STRONG_SUPPORT or light:
+            found.append((evidence, light))
+    return found

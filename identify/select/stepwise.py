@@ -27,7 +27,7 @@ from identify.select.evidence import ADDED_SUPPORT, STRONG_SUPPORT, WEIGHT, Evid
 from identify.select.forward_selection import Round, add_effects, begin_again_without, gone_on_without
 from identify.select.free_form_residual import FreeFormFit, fit_free_forms, redundant_given
 from identify.select.lags import drives
-from identify.select.needed_terms import is_in_doubt, is_light, replace_linear_terms, without_absorbing_stiffness
+from identify.select.needed_terms import is_in_doubt, needless, replace_linear_terms, without_absorbing_stiffness
 from identify.select.preference import explains_most, no_possible_gain, prefers_special_case, simplest
 from identify.select.trial_fits import FULL_ITERATIONS, TRIAL_ITERATIONS, TrialFits
 from identify.wording import plain
@@ -95,6 +95,8 @@ class Stepwise:
             before, self.best = self.best.structure, other(self.best)
             if self.best.structure.parts != before.parts:  # beside what was replaced, others may have shown nothing
                 add_effects(self)
+        if late := [n for n in self.trials.added(self.best) if effects.get(n).is_late and self._judged_beside_less(n)]:
+            self.best = self.re_evaluate(self.best, late)
         if why := not_as_strong(self.best, self.trials.added(self.best)):
             begin_again_without(self, why)
             return self.concluded()
@@ -157,10 +159,10 @@ class Stepwise:
         lower = [n for n in effects.get(chosen).lower_order if n in good]
         return lower[0] if lower else chosen
 
-    def re_evaluate(self, now: Fit) -> Fit:
-        """Every named effect against all others in its place, beside the finished rest."""
-        for name in self.trials.added(now):
-            if name not in now.structure.effects or name in self.settled:
+    def re_evaluate(self, now: Fit, names: Sequence[str] | None = None) -> Fit:
+        """Every named effect, or some of them, against all others in its place, beside the finished rest."""
+        for name in self.trials.added(now) if names is None else names:
+            if name not in now.structure.effects or (name in self.settled and names is None):
                 continue
             rest, others = self._others(now, name)
             gap = MIN_RIVAL_SHARE * (rest.cost - now.cost)
@@ -181,6 +183,11 @@ class Stepwise:
             self.rivals[chosen] = {n: fits[n] for n in alike if n != chosen}
             self.between_rivals[chosen] = (now.structure, self._between(chosen, fits))
         return now
+
+    def _judged_beside_less(self, name: str) -> bool:
+        """Whether an effect was held against the others before the last one was found: then a lag had another form."""
+        structure, _ = self.between_rivals.get(name, (self.base.structure, None))
+        return structure.parts != self.best.structure.parts
 
     def without(self, now: Fit, name: str, steps: int = TRIAL_ITERATIONS) -> Fit:
         """The same without a term or an effect."""
@@ -209,11 +216,11 @@ class Stepwise:
                         tried[special] = fit
                 return r.now, tried
         rest = self.without(now, name, FULL_ITERATIONS)
-        return rest, self.trials.alternatives_to(now, rest, name, self._promising())
+        return rest, self.trials.alternatives_to(now, rest, name, self._promising(name))
 
-    def _promising(self) -> set[str]:
-        """Effects whose score was not far behind what was added, in any round."""
-        out: set[str] = set()
+    def _promising(self, name: str) -> set[str]:
+        """Effects whose score was not far behind what was added, in any round; of a lag or a delay, all of these."""
+        out = {n for n in self.allowed if effects.get(n).is_late and effects.get(name).is_late}
         for r in self.rounds:
             own = next((s.gain for s in r.scores if s.effect == r.chosen), 0.0)
             out |= {s.effect for s in r.scores if s.gain > PROMISING * own} | set(r.tried)
@@ -230,7 +237,7 @@ class Stepwise:
             best = max((seen[n] for n in held), key=lambda e: e.support)
         alike = [
             n for n, e in seen.items()
-            if e is best or (e.weight > WEIGHT and max(
+            if e is best or ((e.weight > WEIGHT or best.weight <= WEIGHT) and max(
                 support_difference(e.fit, best.fit), support_difference(best.fit, e.fit)
             ) < STRONG_SUPPORT)
         ]  # fmt: skip
@@ -273,7 +280,7 @@ class Stepwise:
         """
         while len(now.structure.terms) + len(now.structure.effects) > 1:
             have = [n for n in names if n in (*now.structure.terms, *now.structure.effects)]
-            seen = self._needless(now, [n for n in have if is_in_doubt(self, now, n)])
+            seen = needless(self, now, [n for n in have if is_in_doubt(self, now, n)])
             if not seen:
                 break
             least, light = min(seen, key=lambda s: s[0].support)
@@ -283,17 +290,3 @@ class Stepwise:
             self.say(f"dropped {plain(least.effect)}")
             now = self.without(now, least.effect)  # fitted to ask
         return now
-
-    def _needless(self, now: Fit, doubted: Sequence[str]) -> list[tuple[Evidence, bool]]:
-        """What speaks for each of those that the data do as well without, and whether it carries little torque."""
-        found = []
-        lags = any(effects.get(e).lag is not None for e in now.structure.effects)
-        for name, without in zip(doubted, self.all_without(now, doubted), strict=True):
-            if not np.isfinite(without.cost):  # it runs away without
-                continue
-            # Beside a lag of the gyro a residual in torque hides what was believed when it was added.
-            evidence = self.weigher.evidence(name, without, now, benefit_of_doubt=lags and name not in TERMS)
-            light = is_light(self, evidence, without, now)
-            if evidence.support <= STRONG_SUPPORT or light:
-                found.append((evidence, light))
-        return found

@@ -204,6 +204,11 @@ class Effect:
             return self.lag(values)[0]
         return self.delay_s(values) if self.delay_s is not None else 0.0
 
+    @property
+    def is_late(self) -> bool:
+        """Whether it is a lag or a delay, wherever between torque and reading it acts."""
+        return self.lag is not None or self.delay_s is not None
+
     def per_inertia(self, parameter: Parameter) -> bool:
         """Whether a free decay determines only the ratio of a parameter to the inertia, as of every torque."""
         return self.place in (Place.LOAD, Place.FRICTION) and parameter.unit.startswith(("N", "kg"))

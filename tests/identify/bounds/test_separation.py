@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from identify.bounds.separation import agreement, block_divergences, support_difference
 from identify.likelihood.fit import Fit
@@ -117,3 +120,36 @@ def test_a_model_that_runs_away_is_behind_any_other(fits: dict[str, Fit]) -> Non
     astray = replace(fits["cubic_stiffness"], cost=np.inf)
     assert support_difference(astray, fits[""]) == np.inf
     assert support_difference(fits[""], astray) == 0.0
+
+
+def lagging(lag: str, innovations: Array) -> Any:
+    """A fit with a lag, as far as a comparison looks at it: one run of unit variance, its cost that of white noise."""
+    count, size = len(innovations), float(np.mean(innovations**2))
+    shots = SimpleNamespace(
+        weight=np.ones(count, dtype=bool), edges=[(0, count)], trace=SimpleNamespace(torque=np.zeros(1))
+    )
+    costs = innovations**2 / size + np.log(size) - 1.0
+    seen = SimpleNamespace(innovations=[innovations[:, None]], variance=[np.ones((count, 1))], costs=[costs])
+    return SimpleNamespace(
+        structure=Structure(effects=(lag,)), prediction=seen, shots=(shots,), variance=size,
+        cost=float(np.sum(costs)), penalised=float(np.sum(costs)),
+    )  # fmt: skip
+
+
+def test_a_lag_that_only_fits_the_colour_of_the_noise_better_is_no_likelier() -> None:
+    """Noise with a colour that no model has: a low-pass of the wrong form whitened some of it, and J was 0.07 % off."""
+    white = np.random.default_rng(1).standard_normal(20_000)
+    coloured = np.asarray(lfilter([1.0, 0.3], [1.0], white))
+    nearer = np.asarray(lfilter([1.0, 0.2], [1.0], white))
+    wrong, right = lagging("sensor_lag", nearer), lagging("sensor_lag_second_order", coloured)
+    assert right.cost - wrong.cost > 500.0
+    assert support_difference(right, wrong) < 1.0
+    same = lagging("sensor_lag", coloured)  # two other effects are compared as they stand
+    assert support_difference(same, wrong) > 100.0
+
+
+def test_a_lag_that_predicts_the_motion_better_is_likelier_whatever_the_noise() -> None:
+    rng = np.random.default_rng(2)
+    coloured = np.asarray(lfilter([1.0, 0.3], [1.0], rng.standard_normal(20_000)))
+    right, late = lagging("sensor_lag", coloured), lagging("torque_delay", coloured + 0.2 * rng.standard_normal(20_000))
+    assert support_difference(late, right) > 50.0
