@@ -235,9 +235,10 @@ class Stepwise:
                 best = other
         while held := [n for n in effects.get(best.effect).nests if n in seen and not self._has_more(best, seen[n])]:
             best = max((seen[n] for n in held), key=lambda e: e.support)
+        late = {n for n in seen if effects.get(n).is_late}  # of which torque shows little
         alike = [
             n for n, e in seen.items()
-            if e is best or ((e.weight > WEIGHT or best.weight <= WEIGHT) and max(
+            if e is best or ((e.weight > WEIGHT or {n, best.effect} <= late) and max(
                 support_difference(e.fit, best.fit), support_difference(best.fit, e.fit)
             ) < STRONG_SUPPORT)
         ]  # fmt: skip
