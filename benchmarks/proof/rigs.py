@@ -199,7 +199,8 @@ def _travel(recording: Recording) -> float:
     largest = 0.0
     for run in recording.runs:
         assert run.rate_rad_s is not None
-        largest = max(largest, float(np.max(np.abs(np.cumsum(run.rate_rad_s)))) * TICK_S)
+        step_s = float(np.median(np.diff(run.time_s)))  # the gyro's: it may give more samples than there are ticks
+        largest = max(largest, float(np.max(np.abs(np.cumsum(run.rate_rad_s)))) * step_s)
     return math.degrees(largest)
 
 
