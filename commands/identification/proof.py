@@ -106,11 +106,15 @@ def _part(now: Proved, rival: str | None, number: int) -> ProofPart:
 
 
 def _judged(now: Proved, more: PlayedCampaign, part: ProofPart) -> Proved:
-    """With what the runs say; a proof that was cut short is judged by its complete sets, or not at all."""
+    """With what the runs say; a proof that was cut short is judged by its complete sets, or not at all.
+
+    The verdict of an earlier proof that came to its end is not given away for that of one that did not.
+    """
     from identify.proof.verdict import judge
 
     found, info = now.found, more.recording.info
-    if part.plan is not None:
+    told = found.proof is not None and bool(found.proof.effects)
+    if part.plan is not None and not (told and more.cause is not None):
         try:
             proof = judge(part.plan, more.complete_runs, part.model)
             if found.proof is not None:

@@ -24,7 +24,8 @@ def _about(controller: Controller) -> list[str]:
         "Torque in N m to add to the command of a drive, so that the platform moves as J, C and K alone would.",
         f"Model {controller.version} (from a hash of its values). Identified up to "
         f"{controller.most_angle_rad:.4g} rad and {controller.most_rate_rad_s:.4g} rad/s;",
-        f"beyond, the value at that limit is used. The output is limited to {controller.most_torque_nm:.4g} N m.",
+        f"beyond, the value at that limit is used. The output is limited to {controller.most_torque_nm:.4g} N m,",
+        "and is zero where an input is not finite.",
         "In a closed loop, start with a part of the friction: overcompensation makes the loop oscillate.",
         "angle_rad is measured from the encoder's zero or, with a gyro alone, from the rest angle without torque;",
         "torque_nm is the torque on the shaft.",
@@ -72,6 +73,8 @@ double compensation_nm(double angle_rad, double rate_rad_s, double torque_nm)
 {{
     double direction, total = 0.0;
 
+    if (!(isfinite(angle_rad) && isfinite(rate_rad_s) && isfinite(torque_nm)))
+        return 0.0;
     angle_rad = within(angle_rad, MOST_ANGLE_RAD);
     rate_rad_s = within(rate_rad_s, MOST_RATE_RAD_S);
     direction = within(rate_rad_s / SOFT_RATE_RAD_S, 1.0);
@@ -96,7 +99,7 @@ def python_text(controller: Controller) -> str:
     terms = "\n".join(_python_term(term) for term in controller.terms)
     return f'''"""The compensation of model {controller.version}, as a class."""
 
-from math import cos, exp, fabs, sin
+from math import cos, exp, fabs, isfinite, sin
 
 fmin, fmax = min, max
 __all__ = ["Compensation", "cos", "exp", "fabs", "fmax", "fmin", "sin"]
@@ -114,6 +117,8 @@ class Compensation:
 
     def torque_nm(self, angle_rad: float, rate_rad_s: float, torque_nm: float = 0.0) -> float:
         """Torque in N m to add, from angle in rad, rate in rad/s and the torque on the shaft in N m."""
+        if not (isfinite(angle_rad) and isfinite(rate_rad_s) and isfinite(torque_nm)):
+            return 0.0
         angle_rad = min(max(angle_rad, -self.MOST_ANGLE_RAD), self.MOST_ANGLE_RAD)
         rate_rad_s = min(max(rate_rad_s, -self.MOST_RATE_RAD_S), self.MOST_RATE_RAD_S)
         direction = min(max(rate_rad_s / self.SOFT_RATE_RAD_S, -1.0), 1.0)

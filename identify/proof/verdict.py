@@ -61,8 +61,7 @@ def judge(plan: ProofPlan, recording: Recording, model: Platform) -> Proof:
     single = {name: _told_beforehand(name, with_late_ticks(one, late)) for name, one in single.items()}
     return Proof(
         with_late_ticks(total, late), single, rivals, not_cancelled(model),
-        plan.torque_scale, tuple(_lines(name, plan, found) for name in sets),
-        late=late,
+        plan.torque_scale, tuple(_lines(name, plan, found) for name in sets), late=late,
     )  # fmt: skip
 
 
@@ -113,7 +112,10 @@ def _effect(plan: ProofPlan, variant: str, sets: list[str], found: Found) -> Eff
                 *plan.announced[variant][name],
             )
         )  # fmt: skip
-    share = share_left(pairs) if pairs else None
+    if not pairs:
+        why = "the proof was stopped before a set of it was complete"
+        return EffectProof("cannot be told", why, None, 0.0, ())
+    share = share_left(pairs)
     announced = _announced(rows)
     times = _over_announced(rows) if pair_of(variant)[0] == PLAIN else 1.0
     status, why = status_of(share, announced, _reduced_chi_square(rows), times)
@@ -230,6 +232,9 @@ def _compared(
     single, out = dict(single), {}
     for pair, rival in rivals.items():
         effect, name = pair.split(" / ")
+        if not rival.sets:  # none was played to its end
+            out[pair] = rival
+            continue
         ratio, low, high = _ratio(plan, pair, sets, found)
         reason = (
             f"the error left by compensating {plain_words(name)} is {ratio:.2g} times that of {plain_words(effect)}"

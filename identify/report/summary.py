@@ -116,7 +116,7 @@ def _listed(heading: str, lines: Sequence[str], bullet: str = "- ") -> list[Rend
 def _outcome(identification: Identification) -> list[RenderableType]:
     lines = list(identification.reasons)
     if identification.aborted:
-        head = Text("ABORTED: these results use only the samples recorded before the stop.", style="bold red")
+        head = Text("ABORTED: stopped early; these results use what was complete by then.", style="bold red")
     elif identification.accepted:
         head = Text("ACCEPTED", style="bold green")
         lines = [accepted_or_not(identification).removeprefix("Accepted: ")]

@@ -63,7 +63,7 @@ def report_html(identification: Identification, recording: Recording, name: str)
 
 def _header(identification: Identification, name: str) -> Markup:
     if identification.aborted:
-        badge, state = "ABORTED: based on the samples recorded before the stop", "bad"
+        badge, state = "ABORTED: stopped early; based on what was complete by then", "bad"
     else:
         badge, state = ("ACCEPTED", "good") if identification.accepted else ("NOT ACCEPTED", "bad")
     return element(

@@ -234,6 +234,18 @@ def test_what_cuts_a_proof_short_keeps_every_sample_and_the_results(
     assert new["aborted"] is True and new["after"] == old["after"] and new["verdict"] == old["verdict"]
 
 
+def test_a_proof_that_is_cut_short_takes_nothing_from_the_verdict_of_an_earlier_one(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A verdict over all sets was replaced by one over the only set that was complete."""
+    assert command(app, "prove", folder).exit_code == 0
+    whole = result(folder)["proof"]
+    put_on_stage(monkeypatch, FailingRig(8.0, trips=True))
+    assert command(app, "prove", folder).exit_code == 4
+    assert result(folder)["proof"] == whole and whole["status"] == "confirmed"
+    assert len(names(folder)) > len([*SETS, *PROOF])  # what was recorded is kept even so
+
+
 def test_after_a_proof_that_was_cut_short_another_can_be_played(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as failing:
         put_on_stage(failing, FailingRig(0.9, trips=True))

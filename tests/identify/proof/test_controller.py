@@ -100,6 +100,9 @@ def test_c_compiles_without_a_warning_and_agrees_with_python(tmp_path: Path) -> 
     for angle, rate, torque in rng.uniform((-0.3, -4.0, -100.0), (0.3, 4.0, 100.0), (2000, 3)).tolist():
         assert abs(in_c(angle, rate, torque) - in_python.torque_nm(angle, rate, torque)) < 1e-9
         assert abs(in_python.torque_nm(angle, rate, torque) - value(known, angle, rate, torque)) < 1e-9
+    for bad in (np.nan, np.inf, -np.inf):  # a lost sample is no reason to push as hard as is allowed
+        for inputs in ((bad, 1.0, 1.0), (0.1, bad, 1.0), (0.1, 1.0, bad)):
+            assert in_c(*inputs) == in_python.torque_nm(*inputs) == 0.0
 
 
 def test_each_effect_alone_compiles_without_a_warning(tmp_path: Path) -> None:

@@ -184,6 +184,18 @@ def test_sets_that_are_not_complete_are_left_out_and_none_is_no_proof() -> None:
         judge(plan, replace(whole, runs=whole.runs[:1]), CUBIC)
 
 
+def test_of_a_variant_that_was_stopped_before_its_first_set_nothing_is_told() -> None:
+    """A rival whose runs were cut short had left "1 times" the error of the name."""
+    gravity = with_effects(unbalance={"sine": -60.0, "cosine": 0.0})
+    plan = plan_proof(CUBIC, SETS, ALLOWED, DRIVE, rivals={"cubic_stiffness / unbalance": gravity})
+    whole = recorded(CUBIC, plan)
+    rival = {one.planned.name for one in plan.runs if " / " in one.variant}
+    proof = judge(plan, replace(whole, runs=tuple(r for r in whole.runs if r.name not in rival)), CUBIC)
+    (told,) = proof.rivals.values()
+    assert told.status == "cannot be told" and "stopped before" in told.why and not told.sets
+    assert proof.effects["cubic_stiffness"].status == "confirmed"
+
+
 def test_the_share_takes_the_noise_off_and_its_interval_holds_the_truth() -> None:
     rng, held = np.random.default_rng(3), 0
     time_s = np.arange(0.0, 3.0, 1e-3)
