@@ -149,8 +149,8 @@ def _identified_without(context: CommandContext, now: Proved, refuted: tuple[str
     except (Aborted, KeyboardInterrupt, UsageError) as error:
         context.say_error(error)
         return None
-    told = dataclasses.replace(proof, excluded=excluded)
-    kept = dataclasses.replace(proof, excluded=excluded, earlier=tuple(lines(told)), effects={}, rivals={}, lines=())
+    told = tuple(lines(dataclasses.replace(proof, excluded=())))  # what is excluded is said behind it, once
+    kept = dataclasses.replace(proof, excluded=excluded, earlier=told, effects={}, rivals={}, lines=())
     newer = dataclasses.replace(newer, proof=kept, follow_up=now.found.follow_up)
     return Proved(loaded, now.played, newer, everything)
 

@@ -96,6 +96,7 @@ def test_a_refuted_name_is_excluded_and_the_search_runs_on_all_data(
     assert "cubic_stiffness" in settings.candidates
     proof = result(folder)["proof"]
     assert proof["excluded"] == ["quadratic_damping"] and proof["effects"]["cubic_stiffness"]["status"] == "confirmed"
+    assert sum("excluded; the search was repeated" in said for said in proof["sentences"]) == 1
     assert any("refuted" in said for said in proof["sentences"])
     second = [name.replace("proof", "proof 2", 1) for name in PROOF]
     assert names(folder) == SETS + PROOF + second and (folder / "proof_2.journal").exists()
