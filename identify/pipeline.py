@@ -43,7 +43,7 @@ from identify.runs.usable import runs_used
 from identify.select.curve_rivals import still_offered
 from identify.select.field_search import Judged, search_in_torque
 from identify.select.free_form_residual import curves_left, dependence_on
-from identify.select.likelihood_search import LikelihoodSearch, filtered_above, start_search
+from identify.select.likelihood_search import LikelihoodSearch, filtered, start_search
 from identify.select.search_state import Found, Search
 from identify.signals.prepare import channels_of, prepare
 from identify.signals.trace import Trace, release
@@ -111,7 +111,7 @@ class _Identifier:
         self.traces, self.left_out = runs_used(traces, recording.noise is not None, recording.axis, say)
         self.left_out += describe_reading(recording.runs, say)
         self.torque_free, self.search = free, cast(LikelihoodSearch | None, None)  # that runs, or has run
-        self.torque_noise_above_hz: float | None = None
+        self.torque_noise_nm: float | None = None  # that was filtered out of the recorded torque
         self.curve: tuple[Dependence, dict[str, float]] | None = None  # over what is left of a decay
         self.more_than_noise = False  # is left by all that was found, though nothing else seemed to limit the runs
         refuse_without_motion(self.traces, free)
@@ -140,7 +140,7 @@ class _Identifier:
             causes = AlternativeCauses(self.traces, fits, self.structure, self.recording.axis, self.say)
             both = all(t.beside is not None for t in self.traces)
             behind_a_lag = any(effects.get(e).lag is not None for e in found.best.structure.effects)
-            noisy = self.torque_noise_above_hz is not None  # some of it in the band of the motion
+            noisy = self.torque_noise_nm is not None  # some of it in the band of the motion
             white = at_noise and not (both or behind_a_lag or noisy)  # as output error takes the noise of one channel
             nothing_left = search.stepwise.left is None or self.colour is not None
             if self.torque_free:
@@ -160,19 +160,19 @@ class _Identifier:
 
     def _searched(self) -> tuple[LikelihoodSearch, bool]:
         """The search, and whether its model predicts to the noise; anew where clocks may pass for effects."""
-        given = self.traces
+        given, moved = self.traces, None
         for number in range(1, MOST_SEARCHES + 1):
             self.search = search = self._begun()
             at_noise = search.run() or self.colour is not None
-            filtered = self.torque_noise_above_hz is not None
-            moved = None if filtered else aligned(self.traces, self.split.final, search.stepwise.best)
+            before, moved = moved, aligned(self.traces, self.split.final, search.stepwise.best)
             if moved is None:
+                moved = before
                 break
             self.traces = moved.traces
             if number == MOST_SEARCHES or not moved.may_explain(search.stepwise):
                 break
             self.say("the clocks of torque and rate differ between runs: searching again with that corrected")
-        if self.traces is not given and not filtered:
+        if moved is not None:
             self.left_out = (*self.left_out, told(given, self.traces))
         return search, at_noise
 
@@ -185,12 +185,12 @@ class _Identifier:
                 self._allowed(), self.say,
             )  # fmt: skip
 
-        search, cutoff_hz = start_search(self.traces, begin)
-        if cutoff_hz is None:
+        search, noise_nm = start_search(self.traces, begin)
+        if noise_nm is None:
             return search
-        self.traces, self.torque_noise_above_hz = list(search.traces), cutoff_hz
+        self.traces, self.torque_noise_nm = list(search.traces), noise_nm
         self.start = replace(first_guess(self.traces, Structure(self.declared.terms)), cutoff_hz=self.start.cutoff_hz)
-        self.left_out = (*self.left_out, note := filtered_above(cutoff_hz, self.recording.axis))
+        self.left_out = (*self.left_out, note := filtered(noise_nm, self.recording.axis))
         self.say(note)
         return search
 

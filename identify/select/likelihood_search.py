@@ -218,25 +218,26 @@ def _weigher(problem: PredictionError, traces: Sequence[Trace], parts: Split, st
 def start_search(
     traces: Sequence[Trace], begin: Callable[[Sequence[Trace]], LikelihoodSearch]
 ) -> tuple[LikelihoodSearch, float | None]:
-    """The search on the runs whose declared model is likelier, and above which frequency their torque was filtered.
+    """The search on the runs whose declared model is likelier, and how large the noise was that their torque lost.
 
-    None where it was not.
+    None where it was not filtered.
     """
     search = begin(traces)
     less = None if all(t.torque is None for t in traces) else quieter(traces)
     if less is None:
         return search, None
-    filtered, cutoff_hz = less
-    other = begin(filtered)
+    quiet, noise_nm = less
+    other = begin(quiet)
     if other.stepwise.base.cost > search.stepwise.base.cost - STRONG_SUPPORT:
         return search, None
-    return other, cutoff_hz
+    return other, noise_nm
 
 
-def filtered_above(cutoff_hz: float, axis: str) -> str:
+def filtered(noise_nm: float, axis: str) -> str:
     """That the recorded torque was filtered, as the report says it."""
-    torque = "force" if axis == "linear" else "torque"
-    return f"the recorded {torque} is filtered: above {cutoff_hz:.3g} Hz it is noise that the platform does not follow"
+    torque, unit = ("force", "N") if axis == "linear" else ("torque", "N·m")
+    noise = f"{noise_nm:.2g} {unit} rms of it is noise that the platform does not follow"
+    return f"the recorded {torque} is filtered: {noise}"
 
 
 def _status(name: str, added: Sequence[str], named: Sequence[str], fit: Fit | None) -> str:

@@ -1,9 +1,12 @@
 """The recorded torque without what only its own measurement added: noise of a current sensor moves no platform.
 
-Prediction error takes the recorded torque for the one that acts. Noise in it, above the band of the motion, has no
-answer in the readings, and the likelihood, which looks at fast changes most, then takes the inertia for many times what
-it is (errors in variables: Soderstrom 2007). A torque whose spectrum ends in a flat floor is passed through a low-pass
-that leaves what stands above the floor. Whether that floor was noise or acted, the likelihood decides.
+Prediction error takes the recorded torque for the one that acts. Noise in it has no answer in the readings, and the
+likelihood, which looks at fast changes most, then takes the inertia for more than it is, and the gain that such noise
+seems to cost at high frequencies for the low-pass of a sensor (errors in variables: Soderstrom 2007). So the torque
+is cut into short overlapping pieces, and of the spectrum of each is kept what stands above the noise: a step of the
+torque keeps its edge, and the quiet time beside it loses its noise. What is kept so is a pilot, whose power says how
+much of every place is torque and how much noise (empirical Wiener filter: Ghael, Sayeed and Baraniuk 1997). Whether
+that was noise or acted, the likelihood decides.
 """
 
 from __future__ import annotations
@@ -13,61 +16,98 @@ from dataclasses import replace
 
 import numpy as np
 from scipy import signal
+from scipy.ndimage import uniform_filter
 
 from identify.signals.trace import Trace
+from rig.arrays import Array
 from rig.dynamics import TorqueSignal
 
-TORQUE_SEGMENT_SAMPLES = 1024  # samples of a stretch whose spectrum is averaged
+# Samples of a piece: that one is taken in which a run's torque is found in fewest places (best basis: Coifman and
+# Wickerhauser 1992). A tone wants long ones, a step short ones.
+PIECES_SAMPLES = (32, 64, 128, 256, 512, 1024)
+OVERLAP_SHARE = 0.75  # of a piece, with the one after it
 FLOOR_START_SHARE = 0.7  # of the Nyquist frequency: above it stands the floor
-SIGNAL_POWER_RATIO = 8.0  # times the floor's power: a torque that is no noise
-CUTOFF_RATIO = 1.5  # times the highest frequency of such a torque: above it there is none
-MAX_FLOOR_START_SHARE = 0.6  # of the Nyquist frequency: a floor that begins higher is no matter
 MIN_NOISE_RATIO = 1e-4  # of the torque: less noise is none
-DENSITY_SMOOTHING_BINS = 6  # of the spectrum to either side over which it is averaged
-SURELY = 3.0  # times the floor, below which a part counts as noise
+SURELY = 4.0  # times the noise's power, that the pilot has to have in the mean of a few neighbours
+NEIGHBOURS = 1  # in frequency and in time to either side, over which power is averaged: a single one is too uncertain
 
 
 def quieter(traces: Sequence[Trace]) -> tuple[list[Trace], float] | None:
-    """The same runs with a filtered torque, and the frequency above which it is noise; None where it has no such floor.
+    """The same runs with a filtered torque, and how large its noise was, N m rms; None where it shows none.
 
     A commanded torque that is held from sample to sample is known without noise.
     """
-    highest, nyquist = 0.0, np.inf
-    floors: list[float] = []
-    for t in traces:
-        if t.torque is None or t.torque.hold == "zero_order" or len(t.torque.torque_nm) < TORQUE_SEGMENT_SAMPLES // 4:
-            return None
-        half = 0.5 / t.torque.shortest_s
-        values = t.torque.torque_nm
-        f, power = signal.welch(values, fs=2.0 * half, nperseg=min(len(values), TORQUE_SEGMENT_SAMPLES))
-        floor = float(np.median(power[f > FLOOR_START_SHARE * half]))
-        if np.sqrt(floor * half) < MIN_NOISE_RATIO * float(np.std(values)):
-            return None
-        floors.append(floor)
-        over = f[power > SIGNAL_POWER_RATIO * floor]
-        highest, nyquist = max(highest, float(over[-1]) if len(over) else 0.0), min(nyquist, half)
-    cutoff_hz = CUTOFF_RATIO * highest
-    if not 0.0 < cutoff_hz < MAX_FLOOR_START_SHARE * nyquist:
+    torques = [t.torque for t in traces]
+    if any(t.torque_is_filtered for t in traces):
         return None
-    pairs = zip(traces, floors, strict=True)
-    quiet = ((t, _without_noise(t.torque, q)) for t, q in pairs)
-    return [replace(t, torque=q, torque_is_filtered=True, motion=None, _series={}) for t, q in quiet], cutoff_hz
+    known = [q for q in torques if q is not None and q.hold != "zero_order"]
+    values = [q.torque_nm for q in known if len(q.torque_nm) >= 2 * PIECES_SAMPLES[0]]
+    if len(values) < len(torques):
+        return None
+    noise_nm = float(np.median([_noise_nm(v) for v in values]))  # of one sensor, whatever the runs were
+    if noise_nm < MIN_NOISE_RATIO * float(np.std(np.concatenate(values))):
+        return None
+    quiet = [
+        replace(
+            t, torque=TorqueSignal(t.torque.time_s, _without_noise(t.torque.torque_nm, noise_nm), t.torque.hold),
+            torque_is_filtered=True, motion=None, _series={},
+        )
+        for t in traces if t.torque is not None
+    ]  # fmt: skip
+    return quiet, noise_nm
 
 
-def _without_noise(torque: TorqueSignal | None, floor: float) -> TorqueSignal:
-    """A torque with every part of its spectrum weighed by how much of it is no noise (Wiener 1949).
+def _noise_nm(values: Array) -> float:
+    """White noise that a torque, (n,), has at its highest frequencies in most pieces, root mean square."""
+    pieces = _Pieces(values, PIECES_SAMPLES[1] if len(values) >= 4 * PIECES_SAMPLES[1] else PIECES_SAMPLES[0])
+    power = pieces.power[round(FLOOR_START_SHARE * len(pieces.power)) : -1]
+    return float(np.sqrt(np.median(power) / np.log(2.0) / pieces.of_unit_noise))  # the median of an exponential
 
-    ``floor`` is the density of the noise, N^2 m^2 / Hz, one-sided. The run is mirrored at both ends, so that nothing
-    jumps where it begins and ends.
+
+def _without_noise(values: Array, noise_nm: float) -> Array:
+    """A torque, (n,), with every part of the spectrum of every piece weighed by how much of it is no noise."""
+    lengths = [m for m in PIECES_SAMPLES if 2 * m <= len(values)]
+    pieces = min((_Pieces(values, m) for m in lengths), key=lambda p: p.spread(noise_nm))
+    pilot = _Pieces(pieces.weighed(pieces.surely(noise_nm)), pieces.samples)
+    return pieces.weighed(pilot.power / (pilot.power + noise_nm**2 * pieces.of_unit_noise))
+
+
+class _Pieces:
+    """A signal, (n,), in overlapping pieces, mirrored at both ends so that nothing jumps where it begins and ends.
+
+    Attributes
+    ----------
+    spectra, power
+        Of every piece, (frequencies, pieces).
+    of_unit_noise
+        Power there of white noise with a variance of one.
     """
-    assert torque is not None
-    values = torque.torque_nm
-    n = len(values)
-    whole = np.concatenate([2.0 * values[0] - values[:0:-1], values, 2.0 * values[-1] - values[-2::-1]])
-    spectrum = np.fft.rfft(whole)
-    density = 2.0 * np.abs(spectrum) ** 2 * torque.shortest_s / len(whole)
-    width = 2 * DENSITY_SMOOTHING_BINS + 1
-    smooth = np.convolve(np.pad(density, DENSITY_SMOOTHING_BINS, mode="reflect"), np.ones(width) / width, "valid")
-    weight = np.maximum(1.0 - SURELY * floor / np.maximum(smooth, 1e-300), 0.0)
-    quiet = np.fft.irfft(weight * spectrum, len(whole))[n - 1 : 2 * n - 1]
-    return TorqueSignal(torque.time_s, quiet, torque.hold)
+
+    def __init__(self, values: Array, samples: int) -> None:
+        self._count, self.samples = len(values), samples
+        before, after = values[samples:0:-1], values[-2 : -samples - 2 : -1]
+        whole = np.concatenate([2.0 * values[0] - before, values, 2.0 * values[-1] - after])
+        window = signal.get_window("hann", samples)
+        self._overlap = round(OVERLAP_SHARE * samples)
+        self.spectra = signal.stft(whole, nperseg=samples, noverlap=self._overlap)[2]
+        self.power = np.abs(self.spectra) ** 2
+        self.of_unit_noise = float(np.sum(window**2) / np.sum(window) ** 2)
+
+    def spread(self, noise_nm: float) -> float:
+        """In how many places the signal is found: the mean of its power over the noise's, what is surely none alike."""
+        return float(np.mean(np.minimum(self._ratio(noise_nm), SURELY)))
+
+    def surely(self, noise_nm: float) -> Array:
+        """How much of every place is no noise, none where that is not sure."""
+        return np.maximum(1.0 - SURELY / np.maximum(self._ratio(noise_nm), SURELY), 0.0)
+
+    def weighed(self, weight: Array) -> Array:
+        """The signal with every place weighed, (n,)."""
+        weight = weight.copy()
+        weight[0] = 1.0  # what stays is no noise
+        whole = signal.istft(weight * self.spectra, nperseg=self.samples, noverlap=self._overlap)[1]
+        return np.asarray(whole[self.samples : self.samples + self._count])
+
+    def _ratio(self, noise_nm: float) -> Array:
+        near = uniform_filter(self.power, 2 * NEIGHBOURS + 1, mode="nearest")
+        return np.asarray(near / (noise_nm**2 * self.of_unit_noise))
