@@ -13,6 +13,10 @@ from identify.wording import number
 TIED = 0.95  # correlation beyond which two parameters are one
 OPEN_RAD = 0.5  # standard error of a phase beyond which it is open
 UNDETERMINED_RELATIVE_ERROR = 0.5  # of its value: a standard error that says nothing of a term
+BETWEEN_MODELS = (
+    "models that these data do not tell apart differ in it by more than half of its value; "
+    "add a set at another frequency"
+)
 
 
 def undetermined(fitted: FinalFit, runs: Set[int], alone: bool) -> dict[Name, str]:
@@ -24,13 +28,14 @@ def undetermined(fitted: FinalFit, runs: Set[int], alone: bool) -> dict[Name, st
     for i, name in enumerate(fitted.names):
         if of_another_run(name, runs):
             continue
-        value, error, term = fitted.values[name], fitted.std_error(name), len(name) == 1
+        value, error, term = fitted.values[name], fitted.reported_error(name), len(name) == 1
         tied = _undetermined_partner(fitted, i, alone) if term else ""
         wide = term and (not np.isfinite(error) or error > UNDETERMINED_RELATIVE_ERROR * abs(value))
         if tied:
             out[name] = f"only its combination with {tied} is determined; add a set at another frequency"
         elif not fitted.determined[i] or wide:
-            out[name] = _why(value, error, fitted.determined[i])
+            known = np.isfinite(error) and fitted.std_error(name) <= UNDETERMINED_RELATIVE_ERROR * abs(value)
+            out[name] = BETWEEN_MODELS if known and wide else _why(value, error, fitted.determined[i])
     return out
 
 

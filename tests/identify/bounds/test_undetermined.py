@@ -34,6 +34,14 @@ def test_an_error_beyond_half_of_the_value_is_said_with_both() -> None:
     assert "2" in why[("damping",)]
 
 
+def test_what_models_that_the_data_do_not_part_disagree_on_is_not_determined() -> None:
+    """An inertia of 1 +- 0.01 by its own model, and of 1.7 by another that is as likely, was accepted."""
+    apart = replace(fitted(np.array([0.01, 0.1, 0.1])), between_rivals={("inertia",): 0.7, ("damping",): 0.7})
+    why = undetermined(apart, {0}, alone=False)
+    assert list(why) == [("inertia",)]
+    assert "models that these data do not tell apart" in why[("inertia",)]
+
+
 def test_what_the_data_hold_nothing_of_is_said_even_where_its_error_looks_small() -> None:
     why = undetermined(fitted(np.array([0.01, 0.1, 0.1]), determined=(True, False, True)), {0}, alone=False)
     assert list(why) == [("damping",)]
