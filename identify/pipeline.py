@@ -24,7 +24,6 @@ from identify.genetic.per_set import each_set
 from identify.model.structure import Structure
 from identify.results import UNITS, Dependence, Identification, SetResult
 from identify.rivals.alternative_causes import AlternativeCauses
-from identify.rivals.coloured_noise import Colour, with_noise_known
 from identify.rivals.open_line import with_line_left_open
 from identify.rivals.own_low_pass import beside_own_low_pass, with_own_low_pass
 from identify.rivals.run_delays import aligned, told
@@ -81,13 +80,7 @@ def identify(
     """
     say = progress or (lambda text: None)
     with threadpool_limits(1):  # small matrices: a second BLAS thread only waits
-        found = (first := _Identifier(recording, declared, settings, say)).run()
-        no_other_noise = found.aborted or first.torque_free or recording.noise is not None
-        if no_other_noise or not (found.verdict.unexplained or first.more_than_noise):
-            return found
-        return with_noise_known(
-            found, lambda colour: _Identifier(recording, declared, settings, say, colour).run(), say
-        )
+        return _Identifier(recording, declared, settings, say).run()
 
 
 MOST_SEARCHES = 3  # each on runs whose clocks the one before has made to agree
@@ -96,24 +89,21 @@ MOST_SEARCHES = 3  # each on runs whose clocks the one before has made to agree
 class _Identifier:
     def __init__(
         self, recording: Recording, declared: Platform, settings: IdentifyConfig, say: Callable[[str], None],
-        colour: Colour | None = None,
     ) -> None:  # fmt: skip
-        self.recording, self.declared, self.settings, self.say, self.colour = recording, declared, settings, say, colour
+        self.recording, self.declared, self.settings, self.say = recording, declared, settings, say
         free = all(r.torque_nm is None or not np.any(r.torque_nm) for r in recording.runs)
         runs = with_causes(recording.runs, declared, settings.channels)
         runs = [replace(r, torque_nm=None, torque_time_s=None) if free else r for r in runs]
         beyond = full_scale_of(
             [r.rate_rad_s[r.valid & np.isfinite(r.rate_rad_s)] for r in runs if r.rate_rad_s is not None]
         )
-        noise = recording.noise if colour is None else colour.level
         channels = channels_of(runs)
-        traces = [prepare(r, i, noise, full_scale=beyond, channels=channels) for i, r in enumerate(runs)]
+        traces = [prepare(r, i, recording.noise, full_scale=beyond, channels=channels) for i, r in enumerate(runs)]
         self.traces, self.left_out = runs_used(traces, recording.noise is not None, recording.axis, say)
         self.left_out += describe_reading(recording.runs, say)
         self.torque_free, self.search = free, cast(LikelihoodSearch | None, None)  # that runs, or has run
         self.torque_noise_nm: float | None = None  # that was filtered out of the recorded torque
         self.curve: tuple[Dependence, dict[str, float]] | None = None  # over what is left of a decay
-        self.more_than_noise = False  # is left by all that was found, though nothing else seemed to limit the runs
         refuse_without_motion(self.traces, free)
         if free:
             refuse_added_inertia(self.traces)
@@ -142,7 +132,7 @@ class _Identifier:
             behind_a_lag = any(effects.get(e).lag is not None for e in found.best.structure.effects)
             noisy = self.torque_noise_nm is not None  # some of it in the band of the motion
             white = at_noise and not (both or behind_a_lag or noisy)  # as output error takes the noise of one channel
-            nothing_left = search.stepwise.left is None or self.colour is not None
+            nothing_left = search.stepwise.left is None
             if self.torque_free:
                 left = search.stepwise.left
                 self.curve = dependence_on(search.stepwise, left) if left is not None else None
@@ -163,7 +153,7 @@ class _Identifier:
         given, moved = self.traces, None
         for number in range(1, MOST_SEARCHES + 1):
             self.search = search = self._begun()
-            at_noise = search.run() or self.colour is not None
+            at_noise = search.run()
             before, moved = moved, aligned(self.traces, self.split.final, search.stepwise.best)
             if moved is None:
                 moved = before
@@ -202,7 +192,7 @@ class _Identifier:
         before = models.before(search)
         after = models.after(search) if changed else before
         taken_back = causes.mark_undetermined(search, after)
-        disturbed = not self.torque_free and self.colour is None and leaves_a_disturbance(after, self.traces)
+        disturbed = not self.torque_free and leaves_a_disturbance(after, self.traces)
         if not taken_back and (disturbed or fails_whiteness_test(after, self.structure.effects)):
             if not self.torque_free:
                 return in_torque()
@@ -236,7 +226,6 @@ class _Identifier:
     ) -> Identification:  # fmt: skip
         """The way for measured data: what the model lacks is told by the torque that it leaves."""
         self.say("the residual holds a torque that was not recorded, in addition to the sensor's noise")
-        self.more_than_noise = True
         step, axis = search.stepwise, self.recording.axis
         most = {t: getattr(self.settings.accept, f"{t}_percent") for t in TERMS}
         found = search_in_torque(
@@ -277,8 +266,6 @@ class _Identifier:
                 in_torque(m, e) for m, e in zip((measured_before, measured_after), measured.in_torque, strict=True)
             )
             floor = replace(floor, residual_rms_torque=measured.in_torque[1].floor_nm)
-        if self.colour is not None:
-            floor = replace(floor, holdout_rate_rms=self.colour.rms)
         per_set: tuple[SetResult, ...] = ()
         joint = None
         if in_full:
@@ -293,7 +280,7 @@ class _Identifier:
                 left = left.with_free_form(*self.curve)
         case = Case(
             self.recording, self.structure, self.settings, self.traces, self.split, self.offer, self.torque_free,
-            self.declared, self.left_out, self.colour, left,
+            self.declared, self.left_out, left,
             None if self.torque_free or self.search is None else self.search.stepwise.weigher.regression,
         )  # fmt: skip
         scale = self._models().torque_scale(after) if in_full else None

@@ -61,7 +61,7 @@ WITH_DEADLINES = (
 # The files that take longest: begun late, one worker would wait for the other.
 LONGEST = (
     "identify/rivals/test_tone_origin",
-    "identify/rivals/test_coloured_noise",
+    "identify/rivals/test_filtered_noise",
     "identify/test_pipeline",
     "identify/runs/test_measured_channels",
     "system/test_identify_campaigns",

@@ -10,7 +10,6 @@ import numpy as np
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.model.structure import Structure
 from identify.residual import Disturbance
-from identify.rivals.coloured_noise import Colour
 from identify.runs.holdout import Split
 from identify.runs.measured_channels import Offer
 from identify.signals.trace import Trace
@@ -32,7 +31,6 @@ class Case:
     torque_free: bool
     declared: Platform
     left_out: tuple[str, ...] = ()  # which runs, and why, in words
-    colour: Colour | None = None  # of the sensor's noise, where it is not white
     disturbance: Disturbance | None = None  # what is left, where that is a torque and not the sensor's noise
     regression: TorqueRegression | None = None  # the runs in torque; None without one
 

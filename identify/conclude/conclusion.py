@@ -38,7 +38,6 @@ from identify.results import (
     SetResult,
     Verdict,
 )
-from identify.rivals import coloured_noise
 from identify.rivals.whiteness_test import UNEXPLAINED_CHI_SQUARE
 from identify.runs import clipping
 from identify.runs.sign_convention import SENTENCE
@@ -166,26 +165,19 @@ def _note(case: Case, after: FinalFit) -> str:
     torn = glitches.describe([(t.run.name, t.glitches_s) for t in case.traces])
     beyond = clipping.describe([(t.run.name, *t.clipped) for t in case.traces], case.recording.axis)
     uneven = resampling.describe([(t.run.name, *t.scatter) for t in case.traces])
-    filtered = coloured_noise.describe_colour(case.colour, case.recording.axis, case.traces[0].channel)
-    return ". ".join(
-        capital(note) for note in (case.split.note, resting, filtered, *case.left_out, torn, beyond, uneven) if note
-    )
+    return ". ".join(capital(note) for note in (case.split.note, resting, *case.left_out, torn, beyond, uneven) if note)
 
 
 def _reduced_chi_square(case: Case, after: FinalFit, search: Search) -> float:
     """Of what is left: in free run where the model can run free, else over the horizon."""
-    noise = pooled_noise(case.traces) * _share_of_white(case)
+    noise = pooled_noise(case.traces)
     if after.free_run is not None and after.sensor_limited:
         return reduced_chi_square(after.fit.sigma, noise)
     free = reduced_chi_square(after.free_run.sigma, noise) if after.free_run is not None else np.inf
-    short = search.reduced_chi_square(search.best) / _share_of_white(case) ** 2
+    short = search.reduced_chi_square(search.best)
     frictions = [e for e in after.structure.effects if effects.get(e).place is Place.FRICTION]
     # One wrong standstill throws a free run off for good; else what a free run leaves is what is missing.
     return free if np.isfinite(free) and (free < DIVERGED or not frictions) else min(free, short)
-
-
-def _share_of_white(case: Case) -> float:
-    return 1.0 if case.colour is None else case.colour.rms / case.colour.level
 
 
 def _series(case: Case, before: Measured, after: Measured) -> tuple[RunTraces, ...]:

@@ -27,7 +27,7 @@ from identify.likelihood.normal_equations import (
     level_of,
     normal_equations,
 )
-from identify.likelihood.other_noise import noise_alone, other_noise, without_disturbance
+from identify.likelihood.other_noise import beside_another_noise, noise_alone, other_noise, without_disturbance
 from identify.model.parameters import Name, bounds_of, names_of, ordered
 from identify.model.structure import Structure
 from identify.simulate.all_runs import shots_for
@@ -82,8 +82,7 @@ class Descent:
         self.still = held_still(self.names, p.traces, p.use, still)
         self.scale = np.maximum(np.abs(self.x), [self._unit(n) for n in self.names])
         self.shots = list(carry or ()) if stays else self._runs()
-        # Start states are carried over only where they are fitted: where a driven run begins stuck is a matter of the
-        # friction that is tried.
+        # Start states only where they are fitted: where a driven run begins stuck is up to the friction that is tried.
         if carry and not stays:
             self.shots = [with_bias(s, earlier.bias) for s, earlier in zip(self.shots, carry, strict=True)]
         for s, earlier in zip(self.shots, carry or (), strict=bool(carry)):
@@ -145,9 +144,12 @@ class Descent:
             enough = 0.0 if against is None else COARSE_TOLERANCE * max(against - self.cost, 0.0)
             moved = self.step(enough)
             # Along a valley damping holds a step short; where it was right to be taken, the next one is longer.
-            lengthens = self.damping < damping
-            idle = 0 if before - self.cost > enough else idle + (not lengthens)
+            idle = 0 if before - self.cost > enough else idle + (not self.damping < damping)
             if moved and idle < STALLED_STEPS:
+                continue
+            early = steps - left < EARLY_STEPS and not (looked or thorough)
+            if early and self.cost <= least and beside_another_noise(self):
+                looked, idle = True, 0
                 continue
             if left == 1 or not thorough or not other_noise(self, lower=not looked):
                 return left - 1
@@ -244,8 +246,7 @@ class Descent:
 
     def try_step(self, of_noise: bool, enough: float = 0.0) -> bool:
         """One step of parameters, biases and, if asked for, the noise; False where none leads down by ``enough``."""
-        found = self._solvable(of_noise)
-        return step_down(self, found, of_noise, enough)
+        return step_down(self, self._solvable(of_noise), of_noise, enough)
 
     def room(self, kinds: int) -> tuple[Array, Array]:
         """How far parameters and numbers of the noise may be stepped down and up, (p + k,) each."""

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 
 from identify.likelihood.damped_step import begin_damping, step_down
 from identify.likelihood.normal_equations import COST_TOLERANCE
+from rig.arrays import Array
 from rig.dynamics.gains import Noise
 
 if TYPE_CHECKING:
     from identify.likelihood.descent import Descent
+    from identify.simulate.shots import Shots
 
 # Times the disturbance: how far below a model is looked at with parameters that follow.
 CONTINUATION_LEVELS = (1e-3, 1e-6, 1e-10)
@@ -84,14 +86,14 @@ def _take_if_likelier(descent: Descent, noise: Noise) -> None:
         descent.noise, descent.looks, descent.cost = noise, looks, cost
 
 
-def without_disturbance(descent: Descent) -> None:
-    """Far less of a disturbance, if that is likelier once the parameters have followed.
+def without_disturbance(descent: Descent) -> bool:
+    """Far less of a disturbance, if that is likelier once the parameters have followed; whether anything was.
 
     A model that is right may otherwise stay where the disturbance explains all that is left, and the sensor has no
     noise: between the two lies a ridge.
     """
     if descent.reduced_chi_square() < LARGE_DISTURBANCE:
-        return
+        return False
     here = descent.place()
     for factor in CONTINUATION_LEVELS:
         q = here[0]
@@ -109,5 +111,31 @@ def without_disturbance(descent: Descent) -> None:
             ):
                 break
         if descent.cost < here[-1] - COST_TOLERANCE:
-            return
+            return True
+        x, shots = descent.x, descent.shots
         descent.go(here)
+        if _goes_to(descent, x, shots):
+            return True
+    return False
+
+
+def beside_another_noise(descent: Descent) -> bool:
+    """Whether a model that leaves a large disturbance is likelier with less of it, or with another one.
+
+    A first step of parameters that are far off may lead the noise into a valley where all that is wrong is disturbance,
+    and no further step leads out: two models are compared where both have got out of it.
+    """
+    if descent.reduced_chi_square() < LARGE_DISTURBANCE:
+        return False
+    less = without_disturbance(descent)
+    return other_noise(descent, lower=False) or less
+
+
+def _goes_to(descent: Descent, x: Array, shots: list[Shots]) -> bool:
+    """Whether other parameters are likelier beside the noise as it stands; if so the descent goes on from there."""
+    looks = descent.looks_at(x, descent.noise, shots)
+    cost = descent.cost_of(looks)
+    if not cost < descent.cost - COST_TOLERANCE:
+        return False
+    descent.go((descent.noise, x, shots, looks, cost))
+    return True

@@ -16,6 +16,7 @@ from identify.estimate.final_fit import FinalFit
 from identify.model.parameter_fit import reduced_chi_square
 from identify.signals.trace import Trace, pooled_noise
 from rig import effects
+from rig.effects.base import Place
 
 MIN_EFFECTS_TESTED = 3  # effects beside those declared
 BANDS = (0.05, 0.1, 0.2, 0.4)  # of Nyquist: where a platform may move
@@ -41,8 +42,13 @@ def leaves_a_disturbance(fitted: FinalFit, traces: Sequence[Trace]) -> bool:
     """Whether a free run leaves more than the sensor's noise, though every next sample is predicted down to that.
 
     A small torque that nobody recorded adds up over a run. It is a disturbance, of which is told what it depends on.
+    Where dry friction acts one wrong standstill throws a free run off for good, and the fit's own horizon is asked.
     """
-    return reduced_chi_square(fitted.fit.held_out_error, pooled_noise(traces)) > UNEXPLAINED_CHI_SQUARE
+    error = fitted.fit.held_out_error
+    sticks = any(effects.get(e).place is Place.FRICTION for e in fitted.structure.effects)
+    if fitted.free_run is not None and not fitted.sensor_limited and not sticks and np.isfinite(fitted.free_run.sigma):
+        error = max(error, fitted.free_run.sigma)
+    return reduced_chi_square(error, pooled_noise(traces)) > UNEXPLAINED_CHI_SQUARE
 
 
 def coloured(fitted: FinalFit) -> float:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
+from scipy.ndimage import median_filter, percentile_filter
 from scipy.signal.windows import hann
 from scipy.stats import norm
 
@@ -22,6 +22,7 @@ from identify.signals.trace import UPSAMPLING
 from rig.arrays import Array
 
 FLOOR_BINS = 81  # of a spectrum, whose median is its level without lines
+NEAR_BINS, QUIET_SHARE = 21, 0.3  # of it nearest to a bin, and the share of those by which their level is read
 LOWEST_BIN = 3  # cycles in a stretch: what turns more slowly is a drift and no line
 MIN_LINE_SAMPLES = 4 * FLOOR_BINS  # samples: a shorter stretch shows no line
 
@@ -52,7 +53,7 @@ def lines_left(fit: Fit, torque_nm: float) -> Dependence | None:
     for own, disturbance, let_through in spectra:
         is_line = _stands_out(own, above)
         if let_through is not None:
-            is_line &= ~_stands_out(let_through, above)
+            is_line &= ~_stands_out(let_through, above) & (disturbance > let_through)
         both = np.stack([disturbance, own])
         at_lines += np.sum(both[:, is_line], axis=1)
         together += np.sum(both, axis=1)
@@ -65,15 +66,21 @@ def lines_left(fit: Fit, torque_nm: float) -> Dependence | None:
 
 
 def _stands_out(power: Array, above: float) -> NDArray[np.bool_]:
-    """Bins that are so many times what their neighbours have in the mean, as white noise would make these."""
-    return np.asarray(power > above * median_filter(power, FLOOR_BINS, mode="reflect") / np.log(2.0))
+    """Bins that are so many times what their neighbours have in the mean, as white noise would make these.
+
+    Of near ones the quieter half counts, for lines may lie close together. Noise that a sensor has filtered falls off
+    within the wider stretch, and where it is dense it is no line.
+    """
+    near = percentile_filter(power, 100.0 * QUIET_SHARE, NEAR_BINS, mode="reflect") / -np.log1p(-QUIET_SHARE)
+    wide = median_filter(power, FLOOR_BINS, mode="reflect") / np.log(2.0)
+    return np.asarray(power > above * np.maximum(near, wide))
 
 
 def _spectra(fit: Fit) -> Iterator[tuple[Array, Array, Array | None]]:
     """Power of innovations, of the disturbance and of a filtered torque in every bin of every stretch that counts.
 
     The filter of a noisy torque lets that noise through around the frequencies of the torque itself: it is left as a
-    disturbance there, and no effect. Nothing stands for a torque that was not filtered.
+    disturbance there, and no effect; so is a short burst of it. Nothing stands for a torque that was not filtered.
     """
     p = fit.prediction
     for innovations, variance, torque, shots in zip(

@@ -49,7 +49,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "rivals/whole_runs.py": "WHOLE_RUN_STEPS TOLERANCE",
     "select/curve_rivals.py": "MIN_EARLY_CURVE_SHARE",
     "select/forward_selection.py": "MOST_PASSES",
-    "select/disturbance_lines.py": "FLOOR_BINS LOWEST_BIN MIN_LINE_SAMPLES",
+    "select/disturbance_lines.py": "FLOOR_BINS LOWEST_BIN MIN_LINE_SAMPLES NEAR_BINS QUIET_SHARE",
     "select/evidence.py": "MIN_OWN_INFLUENCE_SHARE",
     "select/field_search.py": "NO_WORSE",
     "select/free_form_residual.py": "MIN_CURVE_SCORE CURVE_STEPS CURVES_TRIED",

@@ -13,14 +13,10 @@ from scipy import signal
 from identify.diagnose import torque_sensor_noise
 from identify.pipeline import identify
 from identify.results import Identification
-from identify.rivals import coloured_noise
-from identify.rivals.coloured_noise import Colour, colour_of
 from rig.config.identify import IdentifyConfig
-from rig.errors import RecordingError
 from rig.recording.run import Array, Recording, Run
 from tests.identify.simulated import DECLARED, NOISE_RAD_S, SETS, TRUTH, Effects, sine_run, white
 
-ONCE_MORE = "repeating with coloured noise"
 CUBIC = {"cubic_stiffness": {"factor": 300.0}}
 
 
@@ -46,32 +42,42 @@ def recorded(
     return Recording(tuple(runs))
 
 
-def found_in(recording: Recording, candidates: list[str]) -> tuple[Identification, list[str]]:
-    said: list[str] = []
-    settings = IdentifyConfig.model_validate({"candidates": candidates})
-    return identify(recording, DECLARED, settings, said.append), said
+def found_in(recording: Recording, candidates: list[str] | None) -> Identification:
+    """What is found among some candidates, or among all effects."""
+    return identify(recording, DECLARED, IdentifyConfig(candidates=None if candidates is None else tuple(candidates)))
 
 
 @cache
-def found_without_its_effect() -> tuple[Identification, list[str]]:
+def found_without_its_effect() -> Identification:
     """Such noise beside a stiffness that no candidate describes."""
     return found_in(recorded(passed(2, 100.0), CUBIC), [])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("order", "hertz"), [(2, 50.0), (1, 60.0)])
-def test_noise_that_the_gyro_filters_is_no_missing_effect(order: int, hertz: float) -> None:
-    found, said = found_in(recorded(passed(order, hertz), duration_s=4.0, sets=SETS[2:]), [])
-    assert found.accepted
-    assert any(ONCE_MORE in line for line in said)
-    colour = found.noise_floor.holdout_rate_rms
-    assert found.final.error.holdout_rate_rms == pytest.approx(colour, rel=0.06)
+def assert_right(found: Identification) -> None:
+    """Accepted, and J, C and K within three and a half standard errors."""
+    assert found.accepted, found.reasons
     for term, truth in zip(("inertia", "damping", "stiffness"), TRUTH, strict=True):
         estimate = found.final.parameters[term]
         assert abs(estimate.value - truth) < 3.5 * estimate.std_error
-    assert "What is left is noise" in found.holdout_note
-    dense = float(found.holdout_note.split("that of white noise of ")[1].split(" deg/s")[0])
-    assert dense == pytest.approx(0.05, rel=0.25)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("order", "hertz"), [(2, 50.0), (1, 60.0), (8, 100.0)])
+def test_noise_that_the_gyro_filters_is_no_missing_effect(order: int, hertz: float) -> None:
+    """Dense at the bottom of the spectrum, it had passed for lines: ``unexplained``."""
+    found = found_in(recorded(passed(order, hertz), duration_s=4.0, sets=SETS[2:]), [])
+    assert_right(found)
+    assert found.verdict.effects == ()
+    assert not found.verdict.unexplained
+
+
+@pytest.mark.slow
+def test_a_cubic_spring_beside_such_noise_is_found_among_all_effects() -> None:
+    """Its fit had stayed where all that is wrong is disturbance: gravity was named, and K 3.7 times too large."""
+    found = found_in(recorded(passed(2, 100.0), CUBIC), None)
+    assert_right(found)
+    assert found.verdict.effects == ("cubic_stiffness",)
+    assert not found.verdict.unexplained
 
 
 @pytest.mark.slow
@@ -84,9 +90,9 @@ def test_noise_that_the_gyro_filters_is_no_missing_effect(order: int, hertz: flo
     ],
 )
 def test_an_effect_beside_such_noise_is_named(order: int, hertz: float, name: str, hidden: dict[str, float]) -> None:
-    found, _ = found_in(recorded(passed(order, hertz), {name: hidden}, sets=SETS[2:]), [name, "quadratic_stiffness"])
+    found = found_in(recorded(passed(order, hertz), {name: hidden}, sets=SETS[2:]), [name, "quadratic_stiffness"])
     assert found.verdict.effects == (name,)
-    assert found.accepted
+    assert found.accepted and not found.verdict.unexplained
     assert found.final.effect_parameters[name][next(iter(hidden))].value == pytest.approx(
         hidden[next(iter(hidden))], rel=0.01
     )
@@ -94,79 +100,52 @@ def test_an_effect_beside_such_noise_is_named(order: int, hertz: float, name: st
 
 @pytest.mark.slow
 def test_an_effect_that_is_not_offered_is_no_noise() -> None:
-    found, said = found_without_its_effect()
+    found = found_without_its_effect()
     assert found.verdict.unexplained
     # What is left is 0.4 % of the torque; how far it moves J and K is how far these are off, start angle included.
     assert found.disturbance is not None
     for term, truth in zip(("inertia", "stiffness"), (TRUTH[0], TRUTH[2]), strict=True):
         off = 100.0 * abs(found.final.parameters[term].value / truth - 1.0)
         assert found.disturbance.moves_percent[term] == pytest.approx(off, rel=0.1)
-    assert colour_of(found) is None
-    assert not any("marks of noise" in line for line in said)
 
 
 @pytest.mark.slow
-def test_white_noise_needs_no_second_look() -> None:
-    found, said = found_in(recorded(None), [])
-    assert found.accepted
-    assert not any(ONCE_MORE in line for line in said)
-
-
-@pytest.mark.slow
-def test_noise_in_the_recorded_torque_swells_at_the_resonance_and_is_not_the_sensors() -> None:
+def test_noise_in_the_recorded_torque_is_told_as_a_torque() -> None:
     runs = recorded(None, duration_s=4.0).runs
     noisy = [
         replace(r, torque_nm=r.torque_nm + white(len(r.torque_nm), 3.0, i))
         for i, r in enumerate(runs)
         if r.torque_nm is not None
     ]
-    found, said = found_in(Recording(tuple(noisy)), [])
+    found = found_in(Recording(tuple(noisy)), [])
     assert found.disturbance is not None and found.disturbance.relative < 0.01, "most of it is filtered"
     assert found.disturbance.depends_on == ()
-    assert colour_of(found) is None
-    assert not any("marks of noise" in line for line in said)
     assert 0.1 < found.disturbance.torque_rms < 1.0  # of 3 N m a sample: what lies in the band of the motion
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("filtered", [True, False])
 def test_what_a_clean_torque_leaves_is_not_blamed_on_its_noise(filtered: bool) -> None:
-    found, _ = found_without_its_effect() if filtered else found_in(recorded(None, CUBIC), [])
+    found = found_without_its_effect() if filtered else found_in(recorded(None, CUBIC), [])
     assert found.verdict.unexplained
     assert torque_sensor_noise.describe(found) == ""
 
 
 @pytest.mark.slow
-def test_two_runs_of_different_noise_have_no_colour_in_common() -> None:
+def test_two_runs_of_different_noise_are_right() -> None:
     runs = recorded(passed(2, 100.0)).runs
     other = recorded(passed(2, 50.0), seed=1).runs[4]
-    found, _ = found_in(Recording((runs[2], runs[3], other)), [])
-    assert colour_of(found) is None
-
-
-@pytest.mark.slow
-def test_runs_under_one_and_the_same_sine_do_not_tell_noise_from_what_answers_to_it() -> None:
-    b = passed(2, 100.0)
-    runs = []
-    for seed in range(3):
-        run = sine_run(67.0, 6.0, noise=1e-9)
-        assert run.rate_rad_s is not None
-        noise = b(white(len(run.rate_rad_s) + 2000, NOISE_RAD_S, seed))[2000:]
-        runs.append(replace(run, name=f"run {seed}", rate_rad_s=run.rate_rad_s + noise))
-    found, said = found_in(Recording(tuple(runs)), [])
-    assert not any(ONCE_MORE in line for line in said)
-    assert "What is left is noise" not in found.holdout_note
+    assert_right(found_in(Recording((runs[2], runs[3], other)), []))
 
 
 @pytest.mark.slow
 def test_a_drive_whose_gain_goes_with_the_angle_is_no_noise_under_multisines() -> None:
     """All bins of a multisine as long as its run answer to it: on a damped platform that had passed for noise."""
     runs = [damped_multisine(seed) for seed in range(2)]
-    found, said = found_in(Recording(tuple(runs)), ["coulomb_friction"])
+    found = found_in(Recording(tuple(runs)), ["coulomb_friction"])
     assert found.verdict.effects == ()
     assert found.verdict.unexplained
     assert found.disturbance is not None and "angle" in {d.on for d in found.disturbance.depends_on}
-    assert not any(ONCE_MORE in line for line in said)
 
 
 def damped_multisine(seed: int) -> Run:
@@ -198,27 +177,3 @@ def damped_multisine(seed: int) -> Run:
         f"multisine {seed}", time[::2], np.ones(len(noisy), bool), rate_rad_s=noisy, torque_time_s=time[::2],
         torque_nm=torque[::2],
     )  # fmt: skip
-
-
-@pytest.mark.slow
-def test_a_second_look_that_sees_nothing_leaves_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    found, _ = found_without_its_effect()
-    monkeypatch.setattr(coloured_noise, "colour_of", lambda seen: Colour(1.0, 1.0, 100.0))
-
-    def refused(colour: Colour) -> Identification:
-        raise RecordingError("no run moves more than 2.2 times the sensor's noise")
-
-    assert coloured_noise.with_noise_known(found, refused, lambda text: None) is found
-
-
-@pytest.mark.slow
-def test_who_stops_the_second_look_keeps_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    found, _ = found_without_its_effect()
-    monkeypatch.setattr(coloured_noise, "colour_of", lambda seen: Colour(1.0, 1.0, 100.0))
-
-    def interrupted(colour: Colour) -> Identification:
-        raise KeyboardInterrupt
-
-    for again in (interrupted, lambda colour: replace(found, aborted=True, traces=())):
-        kept = coloured_noise.with_noise_known(found, again, lambda text: None)
-        assert kept == replace(found, aborted=True)
