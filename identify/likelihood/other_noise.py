@@ -86,11 +86,12 @@ def _take_if_likelier(descent: Descent, noise: Noise) -> None:
         descent.noise, descent.looks, descent.cost = noise, looks, cost
 
 
-def without_disturbance(descent: Descent) -> bool:
-    """Far less of a disturbance, if that is likelier once the parameters have followed; whether anything was.
+def without_disturbance(descent: Descent, keeps: bool = False) -> bool:
+    """Far less of a disturbance, if that is likelier once the parameters have followed; whether anything was likelier.
 
     A model that is right may otherwise stay where the disturbance explains all that is left, and the sensor has no
-    noise: between the two lies a ridge.
+    noise: between the two lies a ridge. Parameters that have followed in vain are tried beside the noise as it stood
+    where one ``keeps`` them: a wrong model's go astray.
     """
     if descent.reduced_chi_square() < LARGE_DISTURBANCE:
         return False
@@ -114,7 +115,7 @@ def without_disturbance(descent: Descent) -> bool:
             return True
         x, shots = descent.x, descent.shots
         descent.go(here)
-        if _goes_to(descent, x, shots):
+        if keeps and _goes_to(descent, x, shots):
             return True
     return False
 
@@ -127,7 +128,7 @@ def beside_another_noise(descent: Descent) -> bool:
     """
     if descent.reduced_chi_square() < LARGE_DISTURBANCE:
         return False
-    less = without_disturbance(descent)
+    less = without_disturbance(descent, keeps=True)
     return other_noise(descent, lower=False) or less
 
 

@@ -18,7 +18,7 @@ from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from identify.model.parameters import Name, gains_at_zero, in_order
 from identify.propose.shape_grids import grid_of
-from identify.runs.observability import shows_a_period
+from identify.runs.observability import runs_last_for
 from rig import effects
 from rig.effects.base import Place
 
@@ -74,7 +74,7 @@ def candidate_torques(
     for _, name, shape in sorted(found)[:most]:
         refined = beside.refined(name, shape)
         fit = regression.solve(now.structure.plus(name), {**now.shapes, name: refined})
-        whole = shows_a_period(name, fit.values, regression.traces)
+        whole = runs_last_for(name, fit.values, regression.traces)
         if whole and in_order(fit.values, name) and not gains_at_zero(fit.values, name):
             looks.append(CandidateTorque(name, fit))
     return sorted(looks, key=lambda w: w.left_nm)

@@ -16,6 +16,7 @@ from rig.effects.base import Place
 
 FAINT_LINE = 0.1  # of the amplitude in the loudest run: a run with less does not have what repeats in time
 MAX_STRENGTH_SCATTER = 0.3  # of its mean amplitude, from run to run: more than any pump or fan changes by
+MIN_RELAXED_SHARE = 0.1  # of the torque of an effect that relaxes, by which it does so in the longest run
 
 
 def why_unseen(name: str, traces: Sequence[Trace]) -> str:
@@ -33,13 +34,16 @@ def why_unseen(name: str, traces: Sequence[Trace]) -> str:
     return ""
 
 
-def shows_a_period(name: str, values: Mapping[Name, float], traces: Sequence[Trace]) -> bool:
-    """Whether a run is as long as a period of an effect that repeats: what is slower is a drift as well as a period."""
-    repeats = effects.get(name).repeats
-    if not repeats:
-        return True
-    longest_s = max(len(t.measured) * t.step_s for t in traces)
-    return values.get((name, repeats), 0.0) * longest_s >= 1.0
+def runs_last_for(name: str, values: Mapping[Name, float], traces: Sequence[Trace]) -> bool:
+    """Whether a run is as long as a period of an effect that repeats, or shows an effect relax.
+
+    What is slower is a drift as well as a period; and what does not relax is a spring from where the run began, which
+    takes the place of a constant torque.
+    """
+    effect, longest_s = effects.get(name), max(len(t.measured) * t.step_s for t in traces)
+    if effect.relaxes and values.get((name, effect.relaxes), 0.0) * MIN_RELAXED_SHARE > longest_s:
+        return False
+    return not effect.repeats or values.get((name, effect.repeats), 0.0) * longest_s >= 1.0
 
 
 def is_as_strong_in_all(name: str, values: Mapping[Name, float], std_error: Callable[[Name], float]) -> bool:

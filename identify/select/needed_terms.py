@@ -11,6 +11,7 @@ import numpy as np
 from identify.bounds.separation import support_difference
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
+from identify.model.parameters import Name
 from identify.select.evidence import PREDICTS_TO_NOISE, STRONG_SUPPORT, WEIGHT, Evidence
 from identify.select.lags import takes_damping
 from identify.select.preference import simplest
@@ -23,7 +24,13 @@ from rig.platform import TERMS
 if TYPE_CHECKING:
     from identify.select.stepwise import Stepwise
 
+OFFSET = "torque_offset"  # what gravity has besides, where it stands for a spring that bends
 NEEDED_TERM_SIGMAS = 30.0  # standard errors beyond which a term is needed, and no effect is tried in its place
+
+
+def with_others_in_place(search: Stepwise, now: Fit) -> Fit:
+    """With other effects in the place of a term, and of one that cancels a term."""
+    return without_cancelled_stiffness(search, replace_linear_terms(search, now))
 
 
 def replace_linear_terms(search: Stepwise, now: Fit) -> Fit:
@@ -54,6 +61,33 @@ def replace_linear_terms(search: Stepwise, now: Fit) -> Fit:
         search.dropped.append((term, f"{plain(name)} explains more in its place"))
         search.say(f"replaced {term} by {plain(name)}")
         now, search.inflation[name] = fits[name], evidence.inflation
+    return now
+
+
+def without_cancelled_stiffness(search: Stepwise, now: Fit) -> Fit:
+    """With another effect instead of one that cancels most of the spring, where that does as well without.
+
+    Within a small travel gravity is a spring that bends, and a constant. Against a spring several times too stiff it
+    stands for any cubic spring with an offset, as likely and with no more numbers; nobody builds such a rig.
+    """
+    for name in search.trials.added(now):
+        for rival, as_rival in (effects.get(name).as_rival or {}).items():
+            there = as_rival(tuple(now.values[(name, p.name)] for p in effects.get(name).parameters))
+            spring, added = now.values.get(("stiffness",), 0.0), there.terms.get("stiffness", 0.0)
+            cancelled = added * spring < 0.0 and abs(added) > abs(spring + added)
+            if not cancelled or rival in now.structure.effects or rival not in search.allowed:
+                continue
+            start: dict[Name, float] = {**now.without(name), ("stiffness",): spring + added}
+            start |= {(rival, own): value for own, value in there.own.items()}
+            less = now.structure.minus(name)
+            structures = [less.plus(rival)]
+            if OFFSET in search.allowed and OFFSET not in less.effects:
+                structures.append(less.plus(rival, OFFSET))
+            for structure in structures:
+                fit = search.problem.fit(structure, start, now.noise, FULL_ITERATIONS, carry=now.shots)
+                if np.isfinite(fit.cost) and support_difference(fit, now) < STRONG_SUPPORT:
+                    search.say(f"replaced {plain(name)} by {plain(rival)}: it does as well beside a weaker spring")
+                    return fit
     return now
 
 

@@ -27,7 +27,7 @@ from identify.select.evidence import ADDED_SUPPORT, STRONG_SUPPORT, WEIGHT, Evid
 from identify.select.forward_selection import Round, add_effects, begin_again_without, gone_on_without
 from identify.select.free_form_residual import FreeFormFit, fit_free_forms, redundant_given
 from identify.select.lags import drives
-from identify.select.needed_terms import is_in_doubt, needless, replace_linear_terms, without_absorbing_stiffness
+from identify.select.needed_terms import is_in_doubt, needless, with_others_in_place, without_absorbing_stiffness
 from identify.select.preference import explains_most, no_possible_gain, prefers_special_case, simplest
 from identify.select.trial_fits import FULL_ITERATIONS, TRIAL_ITERATIONS, TrialFits
 from identify.wording import plain
@@ -91,7 +91,7 @@ class Stepwise:
 
     def concluded(self) -> Stepwise:
         """The search to go on with, its best model judged again and compared with curves: this one or one without."""
-        for other in (partial(replace_linear_terms, self), self.re_evaluate):
+        for other in (partial(with_others_in_place, self), self.re_evaluate):
             before, self.best = self.best.structure, other(self.best)
             if self.best.structure.parts != before.parts:  # beside what was replaced, others may have shown nothing
                 add_effects(self)

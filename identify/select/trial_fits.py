@@ -20,7 +20,7 @@ from identify.propose.motion_scale import scale_at
 from identify.propose.starts import OTHER_START, about_a_sample, as_special_case, gain_of, is_small
 from identify.propose.torque_looks import CandidateTorque, candidate_torques
 from identify.runs.measured_channels import simplicity
-from identify.runs.observability import one_more, shows_a_period
+from identify.runs.observability import one_more, runs_last_for
 from identify.select.evidence import PREDICTS_TO_NOISE, WEIGHT, EvidenceModel
 from rig import effects
 from rig.effects.base import Place, Scale
@@ -212,7 +212,7 @@ class TrialFits:
             fits.append(begun_where_it_stands(own))
             best = min(fits, key=lambda f: f.cost)
         best = self._in_likelier_order(best, now)
-        shown = shows_a_period(name, best.values, self.problem.traces)
+        shown = runs_last_for(name, best.values, self.problem.traces)
         return best if np.isfinite(best.cost) and shown else None
 
     def _in_likelier_order(self, fit: Fit, now: Fit) -> Fit:

@@ -157,6 +157,7 @@ class Effect:
     never_separable: Mapping[str, Alike] | None = None  # rival -> why no data of torque and rate can tell them apart
     # By rival of never_separable, from its own values: the values of that rival, and what the change adds to J, C, K.
     as_rival: Mapping[str, Callable[[tuple[float, ...]], LargeStart]] | None = None
+    relaxes: str = ""  # its parameter that is a time constant: a run has to show it relax
     repeats: str = ""  # its parameter that is a frequency in time: a run has to show a period of it
     repeats_over_angle: str = ""  # one that is a frequency over the angle: more of it only if it is seen to repeat
     needs_added_inertia: bool = False  # determined only if some runs have a known inertia mounted

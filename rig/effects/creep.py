@@ -38,6 +38,7 @@ EFFECT = Effect(
     rest_state=lambda angle, rate: (angle,),
     fastest_rad_s=lambda values: 0.3 / values[4],
     is_flexible=True,
+    relaxes="time",
     goes_with=("history",),
     separated_by="from damping: excite at several frequencies; from stiffness drift: hold a constant torque",
 )

@@ -9,7 +9,7 @@ import pytest
 
 from identify.model.parameters import Name
 from identify.pipeline import identify
-from identify.runs.observability import is_as_strong_in_all, shows_a_period, why_unseen
+from identify.runs.observability import is_as_strong_in_all, runs_last_for, why_unseen
 from rig.config.identify import IdentifyConfig
 from rig.platform import Platform
 from rig.recording.run import Recording
@@ -53,8 +53,15 @@ def test_no_candidates_means_none() -> None:
 def test_what_repeats_needs_a_run_as_long_as_its_period(hertz: float, shown: bool) -> None:
     traces = traces_of(campaign(sets=TWO, duration_s=4.0))
     values = {("periodic_disturbance", "frequency"): hertz}
-    assert shows_a_period("periodic_disturbance", values, traces) is shown
-    assert shows_a_period("coulomb_friction", {("coulomb_friction", "level"): 1.0}, traces)
+    assert runs_last_for("periodic_disturbance", values, traces) is shown
+    assert runs_last_for("coulomb_friction", {("coulomb_friction", "level"): 1.0}, traces)
+
+
+@pytest.mark.parametrize(("time_s", "shown"), [(0.1, True), (30.0, True), (50.0, False), (1e4, False)])
+def test_what_relaxes_has_to_do_so_within_a_run(time_s: float, shown: bool) -> None:
+    """A creep of 10,000 s is a spring from where the run began: it had taken the place of a constant torque."""
+    traces = traces_of(campaign(sets=TWO, duration_s=4.0))
+    assert runs_last_for("creep", {("creep", "time"): time_s}, traces) is shown
 
 
 def tone(*amplitudes: float) -> dict[Name, float]:

@@ -1,4 +1,4 @@
-"""What replaces a damping may leave another effect that did its work: then the damping is back."""
+"""What stands in the place of a damping, or against a spring, goes where another model does as well without."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
 from identify.model.structure import Structure
-from identify.select.needed_terms import _needless_beside
+from identify.select.needed_terms import _needless_beside, without_cancelled_stiffness
 from identify.signals.prepare import one_noise, prepare
 from tests.identify.simulated import sine_run
 
@@ -49,3 +49,35 @@ def test_a_creep_that_is_there_stays() -> None:
     search, instead = without_damping({CREEP: {"stiffness": 60.0, "time": 0.05}, DELAY: {"delay": 7e-4}})
     found = _needless_beside(cast(Any, search), "damping", instead)
     assert found is None or CREEP in found.structure.effects
+
+
+UNBALANCE, CUBIC = "unbalance", "cubic_stiffness"
+
+
+def with_gravity(hidden: dict[str, dict[str, float]], spring: float, sine: float) -> tuple[Any, Any]:
+    """A search over runs with something hidden, and its model with gravity beside a spring."""
+    runs = [sine_run(60.0, f, effects=hidden, jck=JCK, duration_s=1.5) for f in (2.0, 9.0)]
+    problem = PredictionError(one_noise([prepare(r, i) for i, r in enumerate(runs)], False))
+    start: dict[Name, float] = {
+        ("inertia",): 0.02, ("damping",): 0.3, ("stiffness",): spring, (UNBALANCE, "sine"): sine,
+    }  # fmt: skip
+    fit = problem.fit(Structure(effects=(UNBALANCE,)), start, thorough=False)
+    said: list[str] = []
+    trials = SimpleNamespace(added=lambda fit: list(fit.structure.effects))
+    return SimpleNamespace(problem=problem, trials=trials, allowed=[CUBIC], say=said.append, said=said), fit
+
+
+def test_gravity_that_cancels_most_of_a_spring_is_a_spring_that_bends() -> None:
+    """A stiffness 3.7 times too large was accepted beside it, and named unbalance."""
+    search, fit = with_gravity({CUBIC: {"factor": 300.0}}, 2477.0, -1800.0)
+    assert fit.values[("stiffness",)] > 2.0 * JCK[2]
+    found = without_cancelled_stiffness(cast(Any, search), fit)
+    assert found.structure.effects == (CUBIC,)
+    assert found.values[("stiffness",)] == pytest.approx(JCK[2], rel=1e-4)
+    assert found.values[(CUBIC, "factor")] == pytest.approx(300.0, rel=0.01)
+    assert search.said == ["replaced unbalance by cubic stiffness: it does as well beside a weaker spring"]
+
+
+def test_gravity_that_is_there_stays() -> None:
+    search, fit = with_gravity({UNBALANCE: {"sine": 100.0, "cosine": 5.0}}, 677.0, 100.0)
+    assert without_cancelled_stiffness(cast(Any, search), fit) is fit

@@ -69,7 +69,7 @@ def test_a_wave_that_is_not_seen_twice_stays_where_nothing_else_explains_as_much
 
 def test_the_search_without_it_is_the_one_to_go_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
     search, instead = searched(of_periods(0.7)), searched(of_periods(2.1))
-    monkeypatch.setattr(stepwise, "replace_linear_terms", lambda search, now: now)
+    monkeypatch.setattr(stepwise, "with_others_in_place", lambda search, now: now)
     monkeypatch.setattr(Stepwise, "re_evaluate", lambda search, now: now)
     monkeypatch.setattr(stepwise, "not_as_strong", lambda fit, names: {})
     monkeypatch.setattr(stepwise, "gone_on_without", lambda search, why: instead)
