@@ -22,13 +22,14 @@ from identify.signals.trace import Trace
 from rig.arrays import Array
 from rig.dynamics import TorqueSignal
 
-# Samples of a piece: that one is taken in which a run's torque is found in fewest places (best basis: Coifman and
-# Wickerhauser 1992). A tone wants long ones, a step short ones.
+# Samples of a piece, beside the whole run as one: that length is taken with which a run's torque is found in fewest
+# places (best basis: Coifman and Wickerhauser 1992). A tone wants long ones, a step short ones.
 PIECES_SAMPLES = (32, 64, 128, 256, 512, 1024)
 OVERLAP_SHARE = 0.75  # of a piece, with the one after it
 FLOOR_START_SHARE = 0.7  # of the Nyquist frequency: above it stands the floor
 MIN_NOISE_RATIO = 1e-4  # of the torque: less noise is none
 SURELY = 4.0  # times the noise's power, that the pilot has to have in the mean of a few neighbours
+WHOLE_RUN_BINS = 13  # of the spectrum of a whole run, over which it is averaged
 NEIGHBOURS = 1  # in frequency and in time to either side, over which power is averaged: a single one is too uncertain
 
 
@@ -66,10 +67,28 @@ def _noise_nm(values: Array) -> float:
 
 def _without_noise(values: Array, noise_nm: float) -> Array:
     """A torque, (n,), with every part of the spectrum of every piece weighed by how much of it is no noise."""
-    lengths = [m for m in PIECES_SAMPLES if 2 * m <= len(values)]
-    pieces = min((_Pieces(values, m) for m in lengths), key=lambda p: p.spread(noise_nm))
-    pilot = _Pieces(pieces.weighed(pieces.surely(noise_nm)), pieces.samples)
-    return pieces.weighed(pilot.power / (pilot.power + noise_nm**2 * pieces.of_unit_noise))
+    ways: list[_Pieces | _WholeRun] = [_Pieces(values, m) for m in PIECES_SAMPLES if 2 * m <= len(values)]
+    return min((*ways, _WholeRun(values)), key=lambda way: way.spread(noise_nm)).without(noise_nm)
+
+
+class _WholeRun:
+    """The spectrum of a signal, (n,), as one piece, mirrored at both ends, its power averaged over near frequencies."""
+
+    def __init__(self, values: Array) -> None:
+        n = len(values)
+        whole = np.concatenate([2.0 * values[0] - values[:0:-1], values, 2.0 * values[-1] - values[-2::-1]])
+        self._spectrum, self._samples = np.fft.rfft(whole), len(whole)
+        self._near = uniform_filter(np.abs(self._spectrum) ** 2 / len(whole), WHOLE_RUN_BINS, mode="reflect")
+        self._middle = slice(n - 1, 2 * n - 1)
+
+    def spread(self, noise_nm: float) -> float:
+        """As that of pieces."""
+        return float(np.mean(np.minimum(self._near / noise_nm**2, SURELY)))
+
+    def without(self, noise_nm: float) -> Array:
+        """The signal without what is not surely above the noise, (n,)."""
+        weight = np.maximum(1.0 - SURELY / np.maximum(self._near / noise_nm**2, SURELY), 0.0)
+        return np.asarray(np.fft.irfft(weight * self._spectrum, self._samples)[self._middle])
 
 
 class _Pieces:
@@ -97,11 +116,13 @@ class _Pieces:
         """In how many places the signal is found: the mean of its power over the noise's, what is surely none alike."""
         return float(np.mean(np.minimum(self._ratio(noise_nm), SURELY)))
 
-    def surely(self, noise_nm: float) -> Array:
-        """How much of every place is no noise, none where that is not sure."""
-        return np.maximum(1.0 - SURELY / np.maximum(self._ratio(noise_nm), SURELY), 0.0)
+    def without(self, noise_nm: float) -> Array:
+        """The signal weighed by how much of every place a pilot has, which has nothing but what is surely no noise."""
+        surely = np.maximum(1.0 - SURELY / np.maximum(self._ratio(noise_nm), SURELY), 0.0)
+        pilot = _Pieces(self._weighed(surely), self.samples)
+        return self._weighed(pilot.power / (pilot.power + noise_nm**2 * self.of_unit_noise))
 
-    def weighed(self, weight: Array) -> Array:
+    def _weighed(self, weight: Array) -> Array:
         """The signal with every place weighed, (n,)."""
         weight = weight.copy()
         weight[0] = 1.0  # what stays is no noise
