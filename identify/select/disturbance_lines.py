@@ -68,7 +68,7 @@ def lines_left(fit: Fit, torque_nm: float) -> Dependence | None:
 def _stands_out(power: Array, above: float) -> NDArray[np.bool_]:
     """Bins that are so many times what their neighbours have in the mean, as white noise would make these.
 
-    Of near ones the quieter half counts, for lines may lie close together. Noise that a sensor has filtered falls off
+    Of near ones the quieter third counts, for lines may lie close together. Noise that a sensor has filtered falls off
     within the wider stretch, and where it is dense it is no line.
     """
     near = percentile_filter(power, 100.0 * QUIET_SHARE, NEAR_BINS, mode="reflect") / -np.log1p(-QUIET_SHARE)

@@ -46,7 +46,7 @@ def quieter(traces: Sequence[Trace]) -> tuple[list[Trace], float] | None:
     if len(values) < len(torques):
         return None
     noise_nm = float(np.median([_noise_nm(v) for v in values]))  # of one sensor, whatever the runs were
-    if noise_nm < MIN_NOISE_RATIO * float(np.std(np.concatenate(values))):
+    if noise_nm <= MIN_NOISE_RATIO * float(np.sqrt(np.mean(np.concatenate(values) ** 2))):
         return None
     quiet = [
         replace(

@@ -102,6 +102,12 @@ def test_a_torque_without_noise_stays_as_it_is() -> None:
     assert quieter(traces_of(Recording(noisy(0.0)))) is None
 
 
+def test_a_torque_that_never_changes_has_no_noise() -> None:
+    """Of nothing no share is noise: what was left of it had been not a number."""
+    still = tuple(replace(run, torque_nm=np.full(len(run.time_s), 5.0)) for run in noisy(0.0))
+    assert quieter(traces_of(Recording(still))) is None
+
+
 def test_a_commanded_torque_is_known_and_stays_as_it_is() -> None:
     held = tuple(replace(run, torque_hold="zero_order") for run in noisy(0.02))
     assert quieter(traces_of(Recording(held))) is None
