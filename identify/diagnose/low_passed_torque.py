@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from identify.diagnose.torque_residual import at_samples, motion
+from identify.diagnose.torque_residual import at_samples, lags_of, motion
 from identify.model.parameters import Name
 from identify.model.structure import UNIT, Shapes, Structure
 from identify.runs.holdout import Split
@@ -146,7 +146,9 @@ class LowPassedTorque:
         terms = {"inertia": acceleration, "damping": rate, "stiffness": angle}
         known = ("inertia",) if self.torque_free else ()
         out: dict[Name, Array] = {(k,): terms[k].copy() for k in TERMS if k in structure.terms and k not in known}
-        drive = tuple((n, tuple(shapes[n])) for n in structure.effects if effects.get(n).place is Place.DRIVE)
+        passes = [n for n in structure.effects if effects.get(n).place is Place.DRIVE]
+        passes += lags_of(structure.effects) if self.by_gyro else []
+        drive = tuple((n, tuple(shapes[n])) for n in passes)
         for name in structure.effects:
             effect = effects.get(name)
             if effect.place in (Place.DRIVE, Place.SENSOR):

@@ -28,6 +28,16 @@ MIN_BIN_SAMPLES = 20  # samples in a bin
 WANDER_DEGREE = 5  # of the polynomial in time that the integral of a gyro's bias is taken for
 
 
+def lags_of(names: Sequence[str]) -> list[str]:
+    """Low-passes of the sensor among effects.
+
+    They have no torque, but a gyro that has one shows all of the motion behind it, and the equation of motion holds
+    there for the torque behind the same low-pass. (The torque of an effect along that motion is nearly what the
+    low-pass makes of it.)
+    """
+    return [n for n in names if effects.get(n).lag is not None]
+
+
 def motion(trace: Trace, cutoff_hz: float) -> tuple[Array, Array, Array]:
     """Low-passed angle, rate and acceleration at the samples, each of shape (n,).
 
@@ -73,7 +83,8 @@ def torque_residual(
     if trace.torque is None:
         return None
     angle, rate, acceleration = motion(trace, cutoff_hz)
-    drive = []
+    drive: list[tuple[str, tuple[float, ...]]] = []
+    lags: list[tuple[str, tuple[float, ...]]] = []
     model = (
         (values.get(("inertia",), 0.0) + trace.run.added_inertia_kg_m2) * acceleration
         + values.get(("damping",), 0.0) * rate
@@ -87,6 +98,7 @@ def torque_residual(
             drive.append((name, tuple(given)))
             continue
         if effect.place is Place.SENSOR:
+            lags += [(n, tuple(given)) for n in lags_of([name]) if trace.channel == "rate"]
             continue
         shape = tuple(v for v, p in zip(given, effect.parameters, strict=True) if not p.linear)
         for i, (v, p) in enumerate(zip(given, effect.parameters, strict=True)):
@@ -96,7 +108,7 @@ def torque_residual(
             unit = {"inertia": -3, "damping": -2, "stiffness": -1}[term]
             pieces = trace.effect_pieces(effect, shape, unit)
             extra += values.get((term,), 0.0) * at_samples(pieces, len(angle))
-    asked = trace.torque_pieces(tuple(drive))
+    asked = trace.torque_pieces((*drive, *lags))
     assert asked is not None
     applied = at_samples(asked[0], len(angle), asked[1])
     torque = low_pass(applied, cutoff_hz, trace.step_s)

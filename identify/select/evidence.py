@@ -19,15 +19,15 @@ from functools import lru_cache
 import numpy as np
 from scipy.stats import chi2
 
-from identify.bounds.cramer_rao import DELAY
 from identify.bounds.separation import EVIDENCE_BLOCKS
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
+from identify.diagnose.torque_residual import lags_of
 from identify.estimate.covariance import orthogonal_part
 from identify.likelihood.fit import Columns, Fit
 from identify.likelihood.prediction_error import PredictionError
 from identify.model.parameters import Name
-from identify.select.lags import KnownDelays, lateness_s, takes_damping
+from identify.select.lags import KnownDelays, takes_damping
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics.gains import Noise
@@ -185,17 +185,12 @@ def likely_share(now: Fit, new: Fit, cutoff_hz: float) -> float:
 
 
 def torque_fit_of(regression: TorqueRegression, fit: Fit) -> TorqueFit:
-    """A model along the measured motion, in torque.
-
-    A gyro's low-pass has no torque, but the motion that it shows is late: as late as if the torque were, for all of the
-    model is a function of that motion. Below its corner a low-pass delays by the first coefficient of its denominator.
-    """
-    seen = tuple(e for e in fit.structure.effects if effects.get(e).place is not Place.SENSOR)
-    shapes = dict(fit.structure.shapes_of(fit.values))
-    if regression.by_gyro and (late_s := lateness_s(fit)) > 0.0:
-        shapes[DELAY] = (sum(shapes.get(DELAY, ())) + late_s,)
-        seen = (*(e for e in seen if e != DELAY), DELAY)
-    shaft = tuple(e for e in seen if effects.get(e).place is not Place.DRIVE)
+    """A model along the measured motion, in torque: of what is in the sensor, a gyro's low-passes."""
+    shapes = fit.structure.shapes_of(fit.values)
+    there = {place: [e for e in fit.structure.effects if effects.get(e).place is place] for place in Place}
+    lags = lags_of(there[Place.SENSOR]) if regression.by_gyro else []
+    seen = tuple(e for e in fit.structure.effects if effects.get(e).place is not Place.SENSOR or e in lags)
+    shaft = (*there[Place.LOAD], *there[Place.FRICTION])
     for kept in (seen, shaft, ()):
         # A drive that passes on nothing explains any torque, and a play run along a noisy motion may run away.
         found = regression.solve(replace(fit.structure, effects=kept), shapes)

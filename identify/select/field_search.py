@@ -169,7 +169,7 @@ def search_in_torque(
     in_torque: dict[tuple[object, ...], TorqueFit] = {(None,): best}  # by others, and by what was taken back
 
     def lacking(*several: str, others: str | None = None) -> tuple[FinalFit, TorqueErrors, Disturbance]:
-        less, there = final, best  # without a low-pass of the gyro, which no torque shows
+        less, there = final, best
         for name in several:
             less, there = less.minus(name), search.without(there, name)
         values = {k: v for k, v in after.values.items() if k[0] not in several}
@@ -236,7 +236,7 @@ def _final(
     """
     problem, found = likely
     fitted = as_final(problem, found, traces, split.everything)
-    if found.structure != fit.structure:  # a filter of the sensor, for which a delay of the drive stands in torque
+    if any(effects.get(e).place is Place.SENSOR for e in found.structure.effects):  # of which torque knows the less
         return fitted
     left = regression.left_by(fit.structure, fitted.values)
     trusted = trusted or inflation(problem.columns_at(found, with_variance=True), found, found.names) < (

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from identify.bounds.cramer_rao import DELAY
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
+from identify.diagnose.torque_residual import lags_of
 from identify.likelihood.fit import Fit
 from identify.model.parameters import Name
 from identify.model.structure import Structure
@@ -81,18 +82,12 @@ def _beside(effect: str, fit: Fit) -> frozenset[str]:
     return frozenset(fit.structure.effects) - {effect}
 
 
-def lateness_s(fit: Fit) -> float:
-    """By how much a gyro's low-passes delay the motion that they show."""
-    shapes = fit.structure.shapes_of(fit.values)
-    return sum(lag(shapes[e])[0] for e in fit.structure.effects if (lag := effects.get(e).lag) is not None)
-
-
 @dataclass(frozen=True)
 class SensorPart:
     """Effects in the sensor that the likeliest model has besides the declared ones, kept beside a search in torque.
 
-    No torque shows them, but a low-pass makes the motion late. Along a late motion the torque is taken as late as that,
-    where the sensor is a gyro; what is proposed in torque is judged with the sensor's part put back.
+    No torque shows them, but a gyro's low-pass is in the motion that it shows: there the torque is taken behind it,
+    as long as the likelihood has it.
 
     Attributes
     ----------
@@ -100,14 +95,11 @@ class SensorPart:
         The effects, and their parameters and that of a declared delay of the drive as the likelihood has them.
     declared
         The declared model.
-    late_s
-        By how much they delay the motion that a gyro shows.
     """
 
     names: tuple[str, ...]
     values: Mapping[Name, float]
     declared: Structure
-    late_s: float
 
     @classmethod
     def of(cls, likeliest: Fit, declared: Structure) -> SensorPart:
@@ -116,23 +108,15 @@ class SensorPart:
             e for e in likeliest.structure.effects
             if e not in declared.effects and effects.get(e).place is Place.SENSOR
         )  # fmt: skip
-        values = {k: v for k, v in likeliest.values.items() if k[0] in names or k[0] == DELAY}
-        return cls(names, values, declared, lateness_s(likeliest))
+        values = {k: v for k, v in likeliest.values.items() if k[0] in names or (names and k[0] == DELAY)}
+        return cls(names, values, declared)
 
     def begun(self, regression: TorqueRegression, shapes: Mapping[str, tuple[float, ...]]) -> TorqueFit:
-        """The declared model in torque, along a motion that is late."""
-        if not (self.names and regression.by_gyro and self.late_s > 0.0):
-            return regression.solve(self.declared, shapes)
-        late_s = sum(shapes.get(DELAY, ())) + self.late_s
-        structure = self.declared if DELAY in self.declared.effects else self.declared.plus(DELAY)
-        return regression.solve(structure, {**shapes, DELAY: (late_s,)})
+        """The declared model in torque, behind the low-passes of a gyro."""
+        lags = tuple(lags_of(self.names)) if regression.by_gyro else ()
+        return regression.solve(self.declared.plus(*lags), {**shapes, **Structure(effects=lags).shapes_of(self.values)})
 
     def put_back(self, fit: TorqueFit) -> tuple[Structure, dict[Name, float]]:
-        """A model found in torque with the sensor's part in place of the delay that stood for it, and its values."""
-        if not self.names:
-            return fit.structure, dict(fit.values)
-        stood_in = DELAY not in self.declared.effects
-        structure = (fit.structure.minus(DELAY) if stood_in else fit.structure).plus(*self.names)
-        kept = {k: v for k, v in fit.values.items() if k[0] != DELAY}
-        own = {k: v for k, v in self.values.items() if k[0] in structure.effects}
-        return structure, {**kept, **own}
+        """A model found in torque with the sensor's part, and its values."""
+        structure = fit.structure.plus(*(n for n in self.names if n not in fit.structure.effects))
+        return structure, {**fit.values, **{k: v for k, v in self.values.items() if k[0] in structure.effects}}

@@ -114,3 +114,22 @@ def test_the_low_pass_is_the_butterworth_that_its_name_says() -> None:
     x = np.random.default_rng(2).standard_normal(4001)
     sos = signal.butter(2, 15.0, fs=1000.0, output="sos")
     np.testing.assert_allclose(low_pass(x, 15.0, 1e-3)[500:-500], signal.sosfiltfilt(sos, x)[500:-500], atol=1e-3)
+
+
+@pytest.mark.parametrize(("lag", "late_s"), [("sensor_lag", 5e-3), ("sensor_lag_second_order", 5e-3)])
+def test_behind_a_gyros_low_pass_only_the_sensors_noise_is_left(lag: str, late_s: float) -> None:
+    """At 9 Hz a delay as long as the low-pass leaves a few percent of the torque: another amplitude, and phase."""
+    run = sine_run(42.0, 9.0, effects={lag: {"time": late_s}})
+    trace = prepare(run)
+    values = {**JCK, (lag, "time"): late_s, ("torque_delay", "delay"): late_s}
+    left = {}
+    for effect in (lag, "torque_delay", None):
+        part = torque_residual(trace, Structure(effects=(effect,) if effect else ()), values, 40.0)
+        assert part is not None
+        inside = slice(500, -500)
+        left[effect] = float(np.std(part.residual[inside]) / np.std(part.torque[inside]))
+    floor = torque_noise_floor([trace], JCK, 40.0, [trace.keep])
+    assert floor is not None
+    assert left[lag] < 1.1 * floor / float(np.std(part.torque[inside]))
+    assert left["torque_delay"] > 2.0 * left[lag]
+    assert left[None] > 3.0 * left["torque_delay"]
