@@ -31,21 +31,22 @@ class KeptGains:
 
     def of(
         self, trace: Trace, linear: LinearPart, noise: Noise, sensing: Sensing, spans: list[tuple[int, int]],
-        begun: StartVariance,
+        begun: StartVariance, in_motion: tuple[bool, ...] = (),
     ) -> Gains:  # fmt: skip
         """A run's gains; the last few are kept, because most looks change an effect and not the linear part.
 
-        ``begun`` is how well the start of a stretch is known.
+        ``begun`` is how well the start of a stretch is known, ``in_motion`` whether each begins in motion.
         """
-        keep, spans, group = self._same_sampling(trace, spans)
+        keep, spans, usable, group = self._same_sampling(trace, spans)
+        in_motion = tuple(in_motion[k] for k in usable) if linear.states else ()
         even = abs(trace.step_s / self.step_s - 1.0) < SAME_STEP
         step_s = self.step_s if even else trace.step_s
-        key = (linear, noise, sensing, step_s, begun, *spans)
+        key = (linear, noise, sensing, step_s, begun, in_motion, *spans)
         kept, lock = self._gains.setdefault(group, ({}, Lock()))
         with lock:
             found = kept.get(key)
             if found is None:
-                found = gains_of(linear, noise, step_s, sensing, keep, spans, begun)
+                found = gains_of(linear, noise, step_s, sensing, keep, spans, begun, in_motion)
                 for old in list(kept)[: max(0, len(kept) + 1 - GAIN_CACHE_SIZE)]:
                     kept.pop(old, None)
                 kept[key] = found
@@ -54,15 +55,15 @@ class KeptGains:
 
     def _same_sampling(
         self, trace: Trace, spans: list[tuple[int, int]]
-    ) -> tuple[Any, list[tuple[int, int]], tuple[object, ...]]:
-        """Samples, spans and a name for runs that have the same gains, as far as they go.
+    ) -> tuple[Any, list[tuple[int, int]], list[int], tuple[object, ...]]:
+        """Samples, spans, which of the run's these are, and a name for runs that have the same gains so far.
 
         Gains know nothing of what was measured: runs of one piece without a lost sample differ in their length alone.
         """
         keep = np.asarray(trace.keep, dtype=bool)
         seen = np.flatnonzero(keep)
-        usable = [(a, b) for a, b in spans if np.any(keep[a : b + 1])]
+        usable = [k for k, (a, b) in enumerate(spans) if np.any(keep[a : b + 1])]
         if len(usable) == 1 and seen[-1] - seen[0] + 1 == len(seen):
             n, lead = self.longest, int(seen[0])
-            return np.arange(n) >= lead, [(usable[0][0], n - 1)], (lead,)
-        return keep, spans, (keep.tobytes(),)
+            return np.arange(n) >= lead, [(spans[usable[0]][0], n - 1)], usable, (lead,)
+        return keep, spans, list(range(len(spans))), (keep.tobytes(),)

@@ -182,7 +182,13 @@ class PredictionError:
         spans = [(a, b - 1) for a, b in s.edges]
         sensing = self._sensing(trace, equations)
         gains = kept or self._gains.of(
-            s.trace, self._linear_part(equations), noise, sensing, spans, self._begun_of(structure, sensing.lag, noise)
+            s.trace,
+            self._linear_part(equations),
+            noise,
+            sensing,
+            spans,
+            self._begun_of(structure, sensing.lag, noise),
+            s.in_motion,
         )
         measured, low_pass = self._readings(trace), trace.low_pass
         smoothing = None if low_pass is None else s.grid.smoothing(equations, low_pass)
@@ -204,7 +210,7 @@ class PredictionError:
         spans = [(a, b - 1) for a, b in s.edges]
         linear, sensing = self._linear_part(equations), self._sensing(s.trace, equations)
         begun = self._begun_of(structure, sensing.lag, noise)
-        return self._gains.of(s.trace, linear, noise, sensing, spans, begun)
+        return self._gains.of(s.trace, linear, noise, sensing, spans, begun, s.in_motion)
 
     def _begun_of(self, structure: Structure, lag: tuple[float, float], noise: Noise) -> StartVariance:
         """How well the start of a stretch is known.
@@ -279,7 +285,8 @@ class PredictionError:
         noise = float(np.sqrt(np.mean([self._noises(t)[-1] ** 2 for t in self.traces]))) if known else 0.0
         angle = 4.0 * noise**2 + ((START_ANGLE if known else UNKNOWN_ANGLE) * self.angle_rad) ** 2
         jerk = _rms([np.gradient(np.gradient(t.fine[1], t.fine[2]), t.fine[2]) for t in self.traces])
-        return StartVariance(*(x / self.reading_variance for x in (angle, rate, self.acceleration**2, jerk**2)))
+        sizes = self.acceleration**2, jerk**2, self.rate_rad_s**2
+        return StartVariance(*(x / self.reading_variance for x in (angle, rate, *sizes)))
 
 
 def _rms(parts: Sequence[Array]) -> float:

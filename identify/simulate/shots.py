@@ -52,6 +52,12 @@ class Shots:
         return since if self.trace.drift_rad is None else np.zeros_like(since)
 
     @cached_property
+    def in_motion(self) -> tuple[bool, ...]:
+        """Whether each shot begins in motion: nobody knows what moves inside the platform there, (s,)."""
+        from_rest = self.trace.offset_s <= SENSOR_LEAD_S and begins_at_rest(self.trace)
+        return tuple(not (from_rest and k * self.trace.step_s <= LATEST_FIRST_STRETCH_S) for k in self.first.tolist())
+
+    @cached_property
     def active(self) -> Any:
         """Which shots hold samples that count; the others are not simulated."""
         return np.array([bool(np.any(self.weight[a:b])) for a, b in self.edges])

@@ -14,6 +14,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.linalg import solve_continuous_lyapunov
 
 from rig.arrays import Array
 from rig.dynamics.linear_part import LinearPart
@@ -110,12 +111,16 @@ class Sensing:
 
 
 class StartVariance(NamedTuple):
-    """Of the motion where a stretch begins, over the variance of one reading."""
+    """Of the motion where a stretch begins, over the variance of one reading.
+
+    Angle and rate are known as closely as that; of the others this is how large they are along the motion.
+    """
 
     angle: float = 0.0
     rate: float = 0.0
     acceleration: float = 0.0
     jerk: float = 0.0
+    moving_rate: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -187,9 +192,29 @@ def _discrete(linear: LinearPart, noise: Noise, lag: tuple[float, float], step_s
     return phi, q
 
 
+@lru_cache(maxsize=64)
+def _inside(linear: LinearPart, begun: StartVariance) -> Array:
+    """Covariance of what the states of linear effects are beside rest in a motion of that size, (s, s).
+
+    A payload on a soft mount swings against the shaft by what its acceleration has been, a spring has crept by what the
+    rate has been. Rate and acceleration are taken for noise that changes as fast as they do on average.
+    """
+    own, rest = np.array(linear.by_states), np.array(linear.at_rest)
+    by_rate = own @ rest[:, 1] + np.array(linear.by_motion)[:, 1] - rest[:, 0]
+    slow, fast = (
+        2.0 * size * np.sqrt(size / change) if change > 0.0 else 0.0
+        for size, change in ((begun.moving_rate, begun.acceleration), (begun.acceleration, begun.jerk))
+    )
+    driven = slow * np.outer(by_rate, by_rate) + fast * np.outer(rest[:, 1], rest[:, 1])
+    if not np.all(np.isfinite(own)) or np.max(np.linalg.eigvals(own).real) >= 0.0:
+        return np.zeros_like(own)  # what does not settle has no size
+    return np.asarray(solve_continuous_lyapunov(own, -driven))
+
+
 def gains_of(
     linear: LinearPart, noise: Noise, step_s: float, sensing: Sensing, keep: Any, spans: Sequence[tuple[int, int]],
     begun: StartVariance = StartVariance(),  # noqa: B008  immutable
+    in_motion: Sequence[bool] = (),
 ) -> Gains:  # fmt: skip
     """Kalman gains along a run.
 
@@ -206,6 +231,8 @@ def gains_of(
     begun
         How well the start of a stretch is known. It is read off what a low-pass has let through. What that holds back
         is its first coefficient times the acceleration and its second times the jerk, and nobody knows those.
+    in_motion
+        Whether each stretch begins in motion, (spans,); at rest where nothing is said.
     """
     phi, q = _discrete(linear, noise, sensing.lag, step_s)
     every = len(phi)
@@ -249,8 +276,11 @@ def gains_of(
     few, driven, seen = np.ascontiguousarray(phi[at]), np.ascontiguousarray(q[at]), np.array(reads)[:, there]
     m, n = len(reads), len(there)
     gain, variance = np.zeros((len(keep), m, n)), np.ones((len(keep), m))
-    for begin, last in spans:
-        riccati(few, driven, seen, np.array(noises), start[at].copy(), keep, begin, last, gain, variance)
+    for k, (begin, last) in enumerate(spans):
+        begins = start.copy()
+        if linear.states and k < len(in_motion) and in_motion[k]:
+            begins[STATES:, STATES:] += _inside(linear, begun)
+        riccati(few, driven, seen, np.array(noises), begins[at], keep, begin, last, gain, variance)
     whole = np.zeros((len(keep), m, every))
     whole[:, :, there] = gain
     return Gains(whole, variance, phi, np.array(reads), np.array(linear.states, dtype=np.int64))

@@ -96,7 +96,7 @@ def _rounded(motion, smooth, torque, rise, corner, table, reach_s, jck, z, spare
 
 @jit
 def _predict(  # type: ignore[no-untyped-def]
-    starts, spans, offset_s, z, h, ratio, torque, jck, kernels, loads, z_at, p, p_at, kinks,
+    starts, spans, offset_s, z, rests, h, ratio, torque, jck, kernels, loads, z_at, p, p_at, kinks,
     filters, fs, fs_at, fp, fp_at, lags, behind, measured, keep, gain, tracked, coloured, decay, walks, walk_decay,
     rate, bias, reads, smoothing, settled, corners, reach_s, steady, out, state,
 ):  # fmt: skip
@@ -117,6 +117,10 @@ def _predict(  # type: ignore[no-untyped-def]
     load, level = steady_torques(zp, spare, body) if steady else (0.0, 0.0)
     for k in range(len(spans)):
         first, last = spans[k, 0], spans[k, 1]
+        if k > 0:  # a stretch that was not measured was simulated; what is inside goes on from there beside the motion
+            for s in range(len(tracked)):
+                at = tracked[s]
+                z[at] += rests[0, at] * (starts[k, 0] - motion[0]) + rests[1, at] * (starts[k, 1] - motion[1])
         motion[0], motion[1], motion[2] = starts[k, 0], starts[k, 1], np.sign(starts[k, 1])
         motion[3] = offset_s + first * ratio * h
         slow, aim, held, slope, walked = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -258,10 +262,13 @@ def predict_ahead(
     corners, reach_s = (np.zeros(2), 1.0) if low_pass is None else (corner_table(*low_pass), low_pass[1])
     smoothing = Smoothing(np.zeros((0, 3)), np.zeros((0, 2))) if smoothing is None else smoothing
     out, state = np.zeros(measured.shape), np.zeros((len(measured), 5))
+    rests = np.zeros((2, equations.states))
+    if len(spans) > 1 and len(gains.of_effects):
+        rests = np.array([equations.rest_states(*unit) for unit in ((1.0, 0.0), (0.0, 1.0))])
     _predict(
         np.ascontiguousarray(starts), np.array(spans, dtype=np.int64).reshape(-1, 2), offset_s,
-        equations.rest_states(*starts[0]), step_s, ratio, torque, equations.jck, equations.kernels, equations.loads,
-        equations.z_at, p, equations.p_at, equations.kinks, filters, fs, fs_at, fp, fp_at,
+        equations.rest_states(*starts[0]), rests, step_s, ratio, torque, equations.jck, equations.kernels,
+        equations.loads, equations.z_at, p, equations.p_at, equations.kinks, filters, fs, fs_at, fp, fp_at,
         lags, np.zeros((len(lags), 2)),
         measured, keep, gains.gain, gains.of_effects, gains.coloured, gains.held,
         np.ascontiguousarray(gains.reads[:, BIAS]), gains.walk_decay, rate, bias, reads,

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete, lfilter
 
 from rig import effects
 from rig.arrays import Array
 from rig.dynamics import Equations, Grid, TorqueSignal
-from rig.dynamics.gains import Noise, Sensing, gains_of
+from rig.dynamics.gains import Noise, Sensing, StartVariance, _inside, gains_of
 from rig.dynamics.linear_part import LinearPart, _resisting, linear_part
 from rig.dynamics.predictor import predict_ahead
 from rig.effects.base import Place
@@ -85,3 +86,50 @@ def test_innovations_of_a_linear_effect_are_white_and_as_large_as_foretold(hidde
 
 def test_a_mode_whose_states_nobody_corrects_rings_on_in_the_innovations() -> None:
     assert _correlation(_innovations(MODE, 5.0, corrected=False)) > 10.0 / np.sqrt(len(TIME))
+
+
+def _behind_a_gap(hidden: dict[str, dict[str, float]], in_motion: tuple[bool, ...]) -> Array:
+    """Innovations over what is foretold, behind a gap in which something nobody recorded pushed the platform."""
+    rng = np.random.default_rng(2)
+    torque = np.sin(2.0 * np.pi * 1.3 * TIME) + 0.5 * np.sin(2.0 * np.pi * 4.1 * TIME)
+    gap = slice(1400, 1500)
+    pushed = torque.copy()
+    pushed[gap] += 3.0
+    equations = Equations(Platform(*JCK, hidden))
+    motion = Grid(TIME, TorqueSignal(TIME, pushed, "zero_order"), 8).simulate(equations, (0.0, 0.0))
+    read = motion.angle_rad + SIGMA * rng.standard_normal(len(TIME))
+    keep = np.ones(len(TIME), bool)
+    keep[gap] = False
+    grid, spans = Grid(TIME, TorqueSignal(TIME, torque, "zero_order"), 8), [(0, gap.stop - 1), (gap.stop, 2999)]
+    rate = motion.rate_rad_s
+    sizes = [np.mean(np.gradient(rate, STEP) ** 2), np.mean(np.gradient(np.gradient(rate, STEP), STEP) ** 2)]
+    begun = StartVariance(1.0, 0.0, *(float(x) / SIGMA**2 for x in (*sizes, np.mean(rate**2))))
+    part = linear_part(equations, JCK)
+    gains = gains_of(part, Noise(), STEP, Sensing(False, 1.0), keep, spans, begun, in_motion)
+    starts = np.array([[0.0, 0.0], [read[gap.stop], rate[gap.stop]]])
+    predicted, _ = predict_ahead(
+        equations, grid.shaft_torque(equations), grid.step_s, 8, spans, starts, read[:, None], keep, gains, False, 0.0,
+    )  # fmt: skip
+    return np.asarray((read[:, None] - predicted) / np.sqrt(gains.variance))[gap.stop :, 0] / SIGMA
+
+
+@pytest.mark.parametrize("hidden", [MODE, CREEP], ids=["flexible_mode", "creep"])
+def test_behind_a_gap_nobody_knows_what_moves_inside_the_platform(hidden: dict[str, dict[str, float]]) -> None:
+    left, taken_for_known = (_behind_a_gap(hidden, (False, unknown)) for unknown in (True, False))
+    assert np.mean(left[:200] ** 2) == pytest.approx(1.0, abs=0.3)
+    assert np.mean(left**2) == pytest.approx(1.0, abs=0.1)
+    assert np.mean(taken_for_known[:200] ** 2) > 10.0
+
+
+def test_how_far_a_payload_swings_is_known_from_the_acceleration() -> None:
+    """Shaken by noise of the same size and speed, a mode swings against the shaft as far as is foretold."""
+    natural, ratio, step_s, count = 2.0 * np.pi * 7.0, 0.03, 1e-4, 400_000
+    acceleration = lfilter([1.0], [1.0, -np.exp(-step_s / 2e-3)], np.random.default_rng(3).standard_normal(count))
+    jerk = np.gradient(acceleration, step_s)
+    b, a = cont2discrete(([1.0], [1.0, 2.0 * ratio * natural, natural**2]), step_s)[:2]
+    swing = lfilter(np.ravel(b), a, acceleration)
+    begun = StartVariance(0.0, 0.0, float(np.mean(acceleration**2)), float(np.mean(jerk**2)))
+    own = {"inertia": 0.008, "frequency": 7.0, "ratio": ratio}
+    found = _inside(linear_part(Equations(Platform(*JCK, {"flexible_mode": own})), JCK), begun)
+    assert 0.2 < found[0, 0] / np.mean(swing**2) < 5.0
+    assert found[1, 1] == pytest.approx(natural**2 * found[0, 0])
