@@ -109,7 +109,7 @@ class EvidenceModel:
             weight = 1.0  # two sensors of one motion show by themselves which is late
         else:
             weight = self.explained_share(now, new, benefit_of_doubt or is_trusted(inflated), torqueless)
-            weight = max(weight, self._delays.weight_of(effect, new)) if torqueless else weight
+            weight = max(weight, self._delays.weight_of(effect, now, new)) if torqueless else weight
         if effect not in TERMS and takes_damping(effect, now, new):
             weight = 0.0
         price = (new.penalised - new.cost) - (now.penalised - now.cost)
@@ -121,12 +121,12 @@ class EvidenceModel:
         out = {e.effect: replace(e, fit=fits[e.effect]) for e in found}
         for name, e in out.items():
             if name not in TERMS and effects.get(name).delay_s is not None:
-                self._delays.add(name, e.fit, e.weight)
+                self._delays.add(name, now, e.fit, e.weight)
         if self.problem.both or not self.regression.by_gyro:
             return out
         lags = [n for n in out if n not in TERMS and effects.get(n).lag is not None]
         return out | {
-            n: replace(out[n], weight=max(out[n].weight, self._delays.weight_of(n, out[n].fit))) for n in lags
+            n: replace(out[n], weight=max(out[n].weight, self._delays.weight_of(n, now, out[n].fit))) for n in lags
         }
 
     def explained_share(self, now: Fit, new: Fit, trusted: bool, torqueless: bool = False) -> float:

@@ -22,22 +22,24 @@ DAMPING: Name = ("damping",)
 
 
 class KnownDelays:
-    """Delays of the drive that were weighed: how long beside which effects, and their weight."""
+    """Delays of the drive that were weighed: how much later beside which effects, and their weight."""
 
     def __init__(self) -> None:
         self._known: dict[frozenset[str], list[tuple[float, float]]] = {}
 
-    def add(self, effect: str, fit: Fit, weight: float) -> None:
-        """Remember a delay of the drive."""
-        self._known.setdefault(_beside(effect, fit), []).append((_late_by(effect, fit), weight))
+    def add(self, effect: str, now: Fit, new: Fit, weight: float) -> None:
+        """Remember a delay of the drive, beside a model without it."""
+        self._known.setdefault(_beside(effect, new), []).append((_later_by(now, new), weight))
 
-    def weight_of(self, effect: str, fit: Fit) -> float:
-        """Weight of a delay of the drive that is as long as a lag of the gyro, beside the same; zero if none was tried.
+    def weight_of(self, effect: str, now: Fit, new: Fit) -> float:
+        """Weight of a delay of the drive that makes a model as late as a lag of the gyro does, beside the same effects;
+        zero if none was tried.
 
         What the residual in torque shows of the two is the same, and the weight is to say whether something is late.
-        Which of the two it is, the likelihood says.
+        Which of the two it is, the likelihood says. A lag that was there may have become another one beside it: so all
+        that is late counts, and how long one of them is does not.
         """
-        late_s, known = _late_by(effect, fit), self._known.get(_beside(effect, fit), [])
+        late_s, known = _later_by(now, new), self._known.get(_beside(effect, new), [])
         return max((weight for long, weight in known if abs(long - late_s) <= SAME_DELAY * late_s), default=0.0)
 
 
@@ -75,6 +77,12 @@ def exchanged(fit: Fit) -> dict[Name, float] | None:
 def _late_by(effect: str, fit: Fit) -> float:
     """By how much later slow motion is read because of an effect."""
     return effects.get(effect).late_s(fit.structure.shapes_of(fit.values)[effect])
+
+
+def _later_by(now: Fit, new: Fit) -> float:
+    """By how much later slow motion is read in one model than in another, whatever makes it so."""
+    late_s = [sum(_late_by(e, fit) for e in fit.structure.effects) for fit in (new, now)]
+    return late_s[0] - late_s[1]
 
 
 def _beside(effect: str, fit: Fit) -> frozenset[str]:

@@ -22,13 +22,28 @@ def fit(
 
 
 def test_only_a_delay_as_long_beside_the_same_effects_lends_its_weight() -> None:
-    known = KnownDelays()
-    known.add("torque_delay", fit("torque_delay", "delay", 2e-3), 0.7)
+    known, none = KnownDelays(), fit(None)
+    known.add("torque_delay", none, fit("torque_delay", "delay", 2e-3), 0.7)
     for late_s, expected in ((2e-3, 0.7), (2e-3 * (1.0 + 0.9 * SAME_DELAY), 0.7), (2.5e-3, 0.0)):
-        assert known.weight_of("sensor_lag", fit("sensor_lag", "time", late_s)) == expected
+        assert known.weight_of("sensor_lag", none, fit("sensor_lag", "time", late_s)) == expected
     other = fit("sensor_lag", "time", 2e-3, beside="coulomb_friction")
     other.values["coulomb_friction", "level"] = 1.0
-    assert known.weight_of("sensor_lag", other) == 0.0
+    assert known.weight_of("sensor_lag", none, other) == 0.0
+
+
+def test_a_lag_that_takes_over_part_of_another_is_as_late_as_the_two_together_are_later() -> None:
+    """A low-pass that stood for two of them becomes shorter where the second one is added."""
+    now = fit("sensor_lag_second_order", "time", 2.80e-3)
+
+    def beside(effect: str, parameter: str, value: float, low_pass: float) -> Any:
+        both = fit(effect, parameter, value, beside="sensor_lag_second_order")
+        both.values["sensor_lag_second_order", "time"] = low_pass
+        return both
+
+    known = KnownDelays()
+    known.add("actuator_lag", now, beside("actuator_lag", "time", 0.65e-3, 2.77e-3), 0.7)
+    assert known.weight_of("sensor_lag", now, beside("sensor_lag", "time", 1.0e-3, 2.43e-3)) == 0.7
+    assert known.weight_of("sensor_lag", now, beside("sensor_lag", "time", 1.0e-3, 2.80e-3)) == 0.0
 
 
 @pytest.mark.parametrize(
