@@ -48,10 +48,12 @@ def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callab
         depends = found.disturbance.depends_on
         less = _taken_back(found, stand_ins, axis)
         say(f"not named: {_listed(stand_ins)}; what is left then still depends on the {quantity_of(depends[0], axis)}")
-        left_beside += depends if set(less.named) < set(found.named) else ()
+        if less.in_torque[1].held_relative >= found.in_torque[1].held_relative:
+            left_beside += depends
+            if not set(less.named) <= set(found.named):  # others in their place, which nobody has asked about it yet
+                less = _with_left(less, depends)
         found = less
-    for dependence in left_beside:  # is left without them, too, even if it is not seen any more
-        found = replace(found, disturbance=found.disturbance.with_free_form(dependence, {}))
+    found = _with_left(found, left_beside)
     flexible = _in_doubt(found, traces)
     if not flexible:
         return found
@@ -60,6 +62,14 @@ def with_stand_ins(found: Found, traces: Sequence[Trace], axis: str, say: Callab
     for name in flexible:
         moves[effects.first_of(name)] = moved(found.after, found.without(name).after)
     return replace(found, disturbance=replace(found.disturbance, moves_without_percent=moves))
+
+
+def _with_left(found: Found, depends: Sequence[Dependence]) -> Found:
+    """The same with what a model has left that left less: it is left without some of that, too, even if not seen."""
+    disturbance = found.disturbance
+    for dependence in depends:
+        disturbance = disturbance.with_free_form(dependence, {})
+    return replace(found, disturbance=disturbance) if depends else found
 
 
 def _in_doubt(found: Found, traces: Sequence[Trace]) -> list[str]:

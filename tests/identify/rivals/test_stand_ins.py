@@ -49,7 +49,7 @@ def found(
     def lacking(*several: str, others: str | None = None) -> Any:
         asked.append((*several, "and others") if others is not None else several)
         left = cast(Any, SimpleNamespace(held_relative=without))
-        kept = [e for e in effects if e not in several] + list(in_place if others is not None else ())
+        kept = [e for e in (*effects, *(in_place if others is not None else ())) if e not in several]
         return final(inertia_without, 1e-3, *kept), left, Disturbance(0.05, "N*m", 0.05)
 
     def share_of(names: Sequence[str], *gone: str, others: str | None, part: Any = None) -> float:
@@ -87,12 +87,21 @@ def test_a_flexible_effect_beside_which_something_else_is_left_is_not_named() ->
 
 
 def test_what_a_stand_in_had_taken_up_may_be_that_of_another_effect_which_is_named_in_its_place() -> None:
-    begun, asked = found(("cogging", "coulomb_friction"), PAST, in_place=("torque_offset",))
+    begun, asked = found(("cogging", "coulomb_friction"), PAST, in_place=("torque_offset",), without=0.045)
     less = looked_at(begun)
     assert asked == [("cogging", "and others")]
     assert less.named == ["coulomb_friction", "torque_offset"]
     assert less.disturbance.depends_on == ()  # what was left beside cogging is not left beside the other
     assert less.disturbance.moves_without_percent == {"cogging": {"inertia": pytest.approx(100.0 * 0.06 / 1.06)}}
+
+
+def test_another_effect_in_its_place_that_leaves_more_has_not_taken_what_was_left() -> None:
+    """It is asked about that, too, though beside it nothing is seen to go with anything any more."""
+    begun, asked = found(("cogging", "coulomb_friction"), PAST, in_place=("directional_damping",))
+    less = looked_at(begun)
+    assert less.named == ["coulomb_friction"]
+    assert [d.on for d in less.disturbance.depends_on] == ["history"]
+    assert asked == [("cogging", "and others"), ("cogging", "directional_damping", "and others")]
 
 
 def test_more_of_its_own_kind_does_not_speak_against_a_name_but_how_far_j_hangs_on_it_is_noted() -> None:
