@@ -23,14 +23,15 @@ from identify.model.structure import Structure
 from identify.results import Dependence, Disturbance
 from identify.runs.holdout import Split
 from identify.runs.observability import can_show
+from identify.runs.reduced import reduced
 from identify.select.curve_rivals import not_as_strong
 from identify.select.evidence import MAX_TRUSTED_INFLATION, STRONG_SUPPORT, in_band, inflation, torque_fit_of
 from identify.select.lags import SensorPart
-from identify.select.likelihood_search import MAX_CUTOFF_SHARE
+from identify.select.likelihood_search import MAX_CUTOFF_SHARE, MIN_MORE_SAMPLES_RATIO
 from identify.select.preference import follows_nothing_freely, is_more_flexible, leaves_less
 from identify.select.search_state import Found, Search, describes
 from identify.select.torque_search import TorqueSearch
-from identify.signals.trace import Trace
+from identify.signals.trace import Trace, release
 from identify.wording import joined, plain
 from rig import effects
 from rig.effects.base import Place
@@ -40,6 +41,7 @@ MUCH_LEFT = 0.05  # of the torque: where nothing explains that, a wider band is 
 WIDER = {"angle": 10.0**0.4, "rate": 10.0 ** (2.0 / 3.0)}
 UNFOLLOWED = 0.5  # of the residual in torque, that the likelihood takes the disturbance for
 NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
+WHOLE_SAMPLES = 200_000  # in which what is left is looked at: memory is a gibibyte for so many
 A_MULTIPLE = 2.0  # of the residual in torque: four times its power is no disturbance, whatever the likelihood says
 
 
@@ -154,7 +156,7 @@ def search_in_torque(
         say(f"dropped {plain(name)}: in the final fit its size does not differ significantly from zero")
         final, best = final.minus(name), search.without(best, name)
         after = fitted(final)
-    disturbance = disturbance_of(regression, best, floor, unit)
+    disturbance = _with_whole(disturbance_of(regression, best, floor, unit), regression, best, traces, split, unit)
     lost = [e for e in final.effects if e not in best.structure.effects and effects.get(e).place is not Place.SENSOR]
     if by_likelihood and (unfollowed or lost):
         disturbance = Disturbance(size_nm, unit, size_nm / regression.torque_nm, (), {})
@@ -204,6 +206,24 @@ def search_in_torque(
         if final != found_so_far:
             reported.drop(after.fit)
     return Found(reported, before, after, disturbance, (errors(base), errors(best)), lacking, share_of)
+
+
+def _with_whole(
+    disturbance: Disturbance, regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split,
+    unit: str,
+) -> Disturbance:  # fmt: skip
+    """The same with what the whole recording shows of it: a part of a run does not show what changes along it."""
+    whole, parts = reduced(traces, split, WHOLE_SAMPLES)
+    if sum(t.count for t in whole) < MIN_MORE_SAMPLES_RATIO * sum(t.count for t in regression.traces):
+        return disturbance
+    wider = TorqueRegression(whole, parts, regression.cutoff_hz, regression.scale)
+    there = wider.solve(fit.structure, fit.shapes)
+    left = disturbance_of(wider, there, wider.noise_floor_nm(there.values), unit)
+    for part in left.depends_on:  # as a share of the same torque as the rest
+        alike = replace(part, relative=part.torque_rms / regression.torque_nm)
+        disturbance = disturbance.with_free_form(alike, left.moves_percent)
+    release(whole)
+    return disturbance
 
 
 def _unsupported(final: FinalFit, declared: Structure, by_likelihood: bool) -> str | None:

@@ -51,7 +51,7 @@ DECIDE_NOTHING: Mapping[str, str] = {
     "select/forward_selection.py": "MOST_PASSES",
     "select/disturbance_lines.py": "FLOOR_BINS LOWEST_BIN MIN_LINE_SAMPLES NEAR_BINS QUIET_SHARE",
     "select/evidence.py": "MIN_OWN_INFLUENCE_SHARE",
-    "select/field_search.py": "NO_WORSE",
+    "select/field_search.py": "NO_WORSE WHOLE_SAMPLES",
     "select/free_form_residual.py": "MIN_CURVE_SCORE CURVE_STEPS CURVES_TRIED",
     "select/likelihood_search.py": "RIVAL_SAMPLES BEYOND_SAMPLES DECLARED_WITHIN MIN_MORE_SAMPLES_RATIO SAMPLES",
     "select/search_state.py": "ANOTHER",

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.diagnose.terms.changing import with_load, with_time
-from identify.diagnose.terms.free_form import SHAPE_POINTS, FreeForm, free_splines, smooth_splines
+from identify.diagnose.terms.free_form import SHAPE_POINTS, FreeForm, smooth_splines
 from identify.diagnose.torque_fit import TorqueFit
 from identify.diagnose.torque_regression import TorqueRegression
 from rig.arrays import Array
@@ -63,9 +63,17 @@ def _spline(on: str, regression: TorqueRegression, series: Sequence[Array], with
 
 
 def _over_time(time: Array) -> FreeForm:
-    """The same of the time in a run."""
-    free, at = free_splines(time)
-    return FreeForm("time", np.zeros((len(time), 0)) if free is None else free(time), at, free(at) if free else at)
+    """The same of the time in a run, with its line: no model has that, but for a gyro's bias."""
+    free, at = smooth_splines(time)
+    if free is None:
+        return FreeForm("time", np.zeros((len(time), 0)), np.zeros(0), np.zeros((0, 0)))
+    middle, span = float(np.mean(time)), float(np.ptp(time))
+
+    def with_line(values: Array) -> Array:
+        return np.column_stack([free(values), (values - middle) / span])
+
+    rough = np.append(np.ones(free(at).shape[1], dtype=np.bool_), False)
+    return FreeForm("time", with_line(time), at, with_line(at), over=time, rough=rough)
 
 
 def _beyond(on: str, regression: TorqueRegression, series: Sequence[Array]) -> FreeForm:
