@@ -105,11 +105,13 @@ class InnovationScores:
         self.lost = not (np.all(np.isfinite(columns)) and np.all(np.isfinite(rest)))  # the model runs away
         if self.lost:
             return
-        size = np.sqrt(np.maximum(np.sum(columns**2, axis=0), 1e-300))
+        squares = np.sum(columns**2, axis=0)
+        shown, size = squares > 0.0, np.sqrt(np.maximum(squares, 1e-300))
         u, s, v = np.linalg.svd(columns / size, full_matrices=False)
         kept = s > 1e-7 * max(float(s[0]) if len(s) else 0.0, 1e-300)
         self.basis = u[:, kept]
-        self.follow = -(v[kept].T / s[kept]) / size[:, None]  # of the model's parameters, for what is projected out
+        # Of the model's parameters, for what is projected out; none of one that these runs know nothing of.
+        self.follow = np.where(shown[:, None], -(v[kept].T / s[kept]) / size[:, None], 0.0)
         self.residual = rest - self.basis @ (self.basis.T @ rest)
         self.square = float(self.residual @ self.residual)
         at = fit.structure, fit.names, fit.vector, self.noise
