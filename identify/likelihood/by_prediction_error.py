@@ -18,7 +18,7 @@ from identify.estimate.final_fit import FinalFit, free_run_of
 from identify.estimate.own_delays import beside_own_delay, freed, have_own_delays, position
 from identify.likelihood.fit import Fit
 from identify.likelihood.prediction_error import PredictionError
-from identify.model.parameter_fit import MIN_EIGENVALUE_RATIO, ZERO_INFORMATION
+from identify.model.parameter_fit import MIN_EIGENVALUE_RATIO, ZERO_INFORMATION, sizes
 from identify.model.parameters import Name, bounds_of, names_of
 from identify.model.structure import Structure
 from identify.runs.reduced import thinned
@@ -122,7 +122,7 @@ def _beside_shift(problem: PredictionError, fit: Fit) -> tuple[Array, Array]:
     pulled = float(np.sum([x[:, -2] @ x[:, -1] for x in whole]))  # the parameters are pulled by nothing: it is a fit
     if not (np.all(np.isfinite(matrix)) and matrix[-1, -1] > 0.0):
         return nothing
-    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))[:-1]
+    size = sizes(np.diag(matrix))[:-1]
     scaled = matrix[:-1, :-1] / np.outer(size, size)
     # What the parameters become for a unit of the shift.
     by_shift = -np.linalg.pinv(scaled, rcond=MIN_EIGENVALUE_RATIO, hermitian=True) @ (matrix[:-1, -1] / size) / size

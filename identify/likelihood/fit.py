@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify.model.parameter_fit import MIN_EIGENVALUE_RATIO, ParameterFit
+from identify.model.parameter_fit import MIN_EIGENVALUE_RATIO, ParameterFit, sizes
 from identify.model.parameters import Name, is_gain
 from identify.model.structure import Structure
 from identify.simulate.shots import Shots
@@ -108,8 +108,9 @@ class Fit(ParameterFit):
         gains = [i for i, n in enumerate(self.names) if len(n) == 1 or is_gain(n)]
         gone, rest = ([i for i in gains if (self.names[i][0] == name) is own] for own in (True, False))
         there = {n: float(v) for n, v in zip(self.names, self.vector, strict=True) if n[0] != name}
-        size = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
+        size = sizes(np.diag(self.information))
         scaled = self.information / np.outer(size, size)
+        gone = [i for i in gone if np.isfinite(size[i])]
         if not (gone and rest and np.all(np.isfinite(scaled))):
             return there
         inverse = np.linalg.pinv(scaled[np.ix_(rest, rest)], rcond=MIN_EIGENVALUE_RATIO, hermitian=True)

@@ -101,6 +101,14 @@ def std_error_of(name: Name, names: Sequence[Name], covariance: Array) -> float:
     return float(np.sqrt(max(covariance[i, i], 0.0)))
 
 
+def sizes(squares: Array) -> Array:
+    """Square roots, by which parameters are scaled; infinite where a square is zero.
+
+    What the data know nothing of is moved by nothing then: by a tiny size rounding would be carried to 1e132.
+    """
+    return np.where(squares > 0.0, np.sqrt(np.maximum(squares, 1e-300)), np.inf)
+
+
 def reduced_chi_square(error: float, noise: float) -> float:
     """Mean square of an error over that of the noise: one where nothing but the noise is left.
 

@@ -17,6 +17,7 @@ from identify.estimate.covariance import own_basis
 from identify.likelihood.fit import MAX_LINEAR_INERTIA_CHANGE, Fit
 from identify.likelihood.normal_equations import NORMAL_RCOND
 from identify.likelihood.prediction_error import PredictionError
+from identify.model.parameter_fit import sizes
 from identify.model.parameters import Name, bounds_of, names_of
 from identify.propose.shape_grids import grid_of
 from identify.propose.starts import stable_part
@@ -105,13 +106,11 @@ class InnovationScores:
         self.lost = not (np.all(np.isfinite(columns)) and np.all(np.isfinite(rest)))  # the model runs away
         if self.lost:
             return
-        squares = np.sum(columns**2, axis=0)
-        shown, size = squares > 0.0, np.sqrt(np.maximum(squares, 1e-300))
+        size = sizes(np.sum(columns**2, axis=0))
         u, s, v = np.linalg.svd(columns / size, full_matrices=False)
         kept = s > 1e-7 * max(float(s[0]) if len(s) else 0.0, 1e-300)
         self.basis = u[:, kept]
-        # Of the model's parameters, for what is projected out; none of one that these runs know nothing of.
-        self.follow = np.where(shown[:, None], -(v[kept].T / s[kept]) / size[:, None], 0.0)
+        self.follow = -(v[kept].T / s[kept]) / size[:, None]  # of the model's parameters, for what is projected out
         self.residual = rest - self.basis @ (self.basis.T @ rest)
         self.square = float(self.residual @ self.residual)
         at = fit.structure, fit.names, fit.vector, self.noise

@@ -55,3 +55,6 @@ def test_what_a_run_has_of_its_own_stays_where_the_runs_looked_at_know_nothing_o
     for score in scores:
         assert all(score[0].start.get(name, 0.0) == 0.0 for name in unknown)
         assert max(abs(v) for v in score[0].start.values()) < 1e4
+    rest = fit.without("damping")
+    assert all(rest.get(name, 0.0) == 0.0 for name in unknown)
+    assert max(abs(v) for v in rest.values()) < 1e4
