@@ -149,6 +149,8 @@ def search_in_torque(
         found_by_it = by_likelihood is not None or final == known.fit.structure  # what torque had beside it was dropped
         its = known.fit if found_by_it else None
         likely = fitted_on_all(traces, final, its.values if its else {**best.values, **begin}, split.final, its)
+        if unfollowed and found_by_it:  # what errors of the measured motion leave in torque says nothing against it
+            return as_final(*likely, traces, split.everything)
         return _final(regression, best, likely, traces, split, trusted=found_by_it)
 
     after, found_so_far = fitted(final), final

@@ -36,7 +36,9 @@ def curves(regression: TorqueRegression, fit: TorqueFit) -> list[FreeForm]:
         FreeForm("direction", regression.along(rates, lambda v: np.tanh(v / slow)[:, None]), ends, ends[:, None]),
     ]  # fmt: skip
     if float(np.max(time)) > 0.0:
-        out += [_over_time(time), *with_time(regression)]
+        # A spring turns what a gyro's bias makes of the angle into a torque that wanders.
+        drifts = regression.by_gyro and "stiffness" in fit.structure.terms and any(t.biased for t in regression.traces)
+        out += [*([] if drifts else [_over_time(time)]), *with_time(regression)]
     out += [_history(rate, run, regression), *([] if regression.torque_free else with_load(regression))]
     return [f for f in out if f.columns.shape[1] > 0 and np.all(np.isfinite(f.columns))]
 
