@@ -208,7 +208,10 @@ def _inside(linear: LinearPart, begun: StartVariance) -> Array:
     driven = slow * np.outer(by_rate, by_rate) + fast * np.outer(rest[:, 1], rest[:, 1])
     if not np.all(np.isfinite(own)) or np.max(np.linalg.eigvals(own).real) >= 0.0:
         return np.zeros_like(own)  # what does not settle has no size
-    return np.asarray(solve_continuous_lyapunov(own, -driven))
+    opens = np.flatnonzero(~np.array(linear.begin_at_rest))
+    out = np.zeros_like(own)
+    out[np.ix_(opens, opens)] = solve_continuous_lyapunov(own, -driven)[np.ix_(opens, opens)]
+    return out
 
 
 def gains_of(

@@ -34,6 +34,8 @@ class LinearPart:
         Resisting torque by each of them, (s,); what angle and rate add to it is in the stiffness and damping.
     at_rest
         What they are by angle and rate where a run begins, (s, 2).
+    begin_at_rest
+        Whether each begins so in motion, too, (s,): those of a curve, which would follow anything that settles.
     """
 
     inertia: float
@@ -44,6 +46,7 @@ class LinearPart:
     by_states: Rows = ()
     torque: tuple[float, ...] = ()
     at_rest: Rows = ()
+    begin_at_rest: tuple[bool, ...] = ()
 
 
 @jit
@@ -54,7 +57,7 @@ def _resisting(kernel, angle, rate, z, dz, p):  # type: ignore[no-untyped-def]
 def linear_part(equations: Equations, jck: Sequence[float]) -> LinearPart:
     """The linear part: ``jck`` (with the mean slopes of what is not linear), and all linear effects with states."""
     inertia, damping, stiffness = (float(x) for x in jck)
-    places, motion, own, pull, rest = [], [], [], [], []
+    places, motion, own, pull, rest, known = [], [], [], [], [], []
     for k, name in enumerate(equations.body):
         effect, at = effects.get(name), int(equations.z_at[k])
         if not effect.has_linear_states:
@@ -68,6 +71,7 @@ def linear_part(equations: Equations, jck: Sequence[float]) -> LinearPart:
             columns[1:, c] = rates
         stiffness, damping = stiffness + float(columns[0, 0]), damping + float(columns[0, 1])
         places += list(range(at, at + n))
+        known += [name in effects.free_forms()] * n
         motion.append(columns[1:, :2])
         own.append(columns[1:, 2:])
         pull += columns[0, 2:].tolist()
@@ -82,7 +86,7 @@ def linear_part(equations: Equations, jck: Sequence[float]) -> LinearPart:
         together[begin:end, begin:end], begin = block, end
     return LinearPart(
         inertia, damping, stiffness, tuple(places), _rows(np.vstack(motion)), _rows(together), tuple(pull),
-        _rows(np.vstack(rest)),
+        _rows(np.vstack(rest)), tuple(known),
     )  # fmt: skip
 
 

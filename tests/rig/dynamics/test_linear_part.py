@@ -133,3 +133,14 @@ def test_how_far_a_payload_swings_is_known_from_the_acceleration() -> None:
     found = _inside(linear_part(Equations(Platform(*JCK, {"flexible_mode": own})), JCK), begun)
     assert 0.2 < found[0, 0] / np.mean(swing**2) < 5.0
     assert found[1, 1] == pytest.approx(natural**2 * found[0, 0])
+
+
+def test_a_curve_of_memories_begins_at_rest_in_motion_too() -> None:
+    """With starts of its own it would follow anything that settles."""
+    begun = StartVariance(0.0, 0.0, 4.0, 9.0, 1.0)
+    curve = {"free_memory": {p.name: 1.0 for p in effects.free_forms()["free_memory"].parameters}}
+    both = linear_part(Equations(Platform(*JCK, {**CREEP, **curve})), JCK)
+    assert len(both.states) > 1
+    found = _inside(both, begun)
+    assert np.count_nonzero(np.diag(found)) == 1
+    assert found[both.begin_at_rest.index(False), both.begin_at_rest.index(False)] > 0.0
