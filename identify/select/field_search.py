@@ -41,7 +41,7 @@ MUCH_LEFT = 0.05  # of the torque: where nothing explains that, a wider band is 
 WIDER = {"angle": 10.0**0.4, "rate": 10.0 ** (2.0 / 3.0)}
 UNFOLLOWED = 0.5  # of the residual in torque, that the likelihood takes the disturbance for
 NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
-CHANGES = ("time", "run")  # what a part of the recording need not show; what goes with the motion shows in any
+ALONG_RUNS = ("time", "run")  # what a part of the recording need not show; what goes with the motion shows in any
 WHOLE_SAMPLES = 200_000  # in which what is left is looked at: memory is a gibibyte for so many
 A_MULTIPLE = 2.0  # of the residual in torque: four times its power is no disturbance, whatever the likelihood says
 
@@ -222,7 +222,7 @@ def _with_whole(
     wider = TorqueRegression(whole, parts, regression.cutoff_hz, regression.scale)
     there = wider.solve(fit.structure, fit.shapes)
     left = disturbance_of(wider, there, wider.noise_floor_nm(there.values), unit)
-    for part in (d for d in left.depends_on if d.on in CHANGES):  # as a share of the same torque as the rest
+    for part in (d for d in left.depends_on if d.on in ALONG_RUNS):  # as a share of the same torque as the rest
         alike = replace(part, relative=part.torque_rms / regression.torque_nm)
         disturbance = disturbance.with_free_form(alike, left.moves_percent)
     release(whole)
