@@ -33,7 +33,9 @@ ABOUT = 1.0 / 16.0  # of the angle's range, to either side of the start: the spr
 MISSING_IN_RUNS, MISSING_SHARE = 0.25, 0.25  # runs in which a wave may be missing: with less of its share in all
 
 
-def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float, unit: str) -> Disturbance:
+def disturbance_of(
+    regression: TorqueRegression, fit: TorqueFit, floor_nm: float, unit: str, on: str = ""
+) -> Disturbance:  # fmt: skip
     """What a model leaves of the torque.
 
     Parameters
@@ -42,6 +44,8 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
         The final model in torque.
     floor_nm
         What the sensor's noise alone leaves, root mean square.
+    on
+        Quantity that is asked about; every one where none is given.
     """
     left = float(np.sqrt(max(fit.held_nm**2 - floor_nm**2, 0.0)))
     relative = left / max(regression.torque_nm, 1e-300)
@@ -63,6 +67,7 @@ def disturbance_of(regression: TorqueRegression, fit: TorqueFit, floor_nm: float
     found += [f for f in _depends(regression, fit, pulsating(regression, fit)) if f[0].torque_rms > MOST_OF_IT * most]
     found.sort(key=lambda f: -f[0].torque_rms)
     found = [f for i, f in enumerate(found) if f[0].on not in [g[0].on for g in found[:i]]]
+    found = [f for f in found if on in ("", f[0].on)]
     moves = _moves(fit, [moved for _, moved in found])
     return Disturbance(left, unit, relative, tuple(d for d, _ in found), moves)
 

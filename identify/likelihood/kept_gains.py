@@ -56,7 +56,7 @@ class KeptGains:
     def _same_sampling(
         self, trace: Trace, spans: list[tuple[int, int]]
     ) -> tuple[Any, list[tuple[int, int]], list[int], tuple[object, ...]]:
-        """Samples, spans, which of the run's these are, and a name for runs that have the same gains so far.
+        """Samples, spans, which of the run's they are, and a name for runs of the same gains, as far as they go.
 
         Gains know nothing of what was measured: runs of one piece without a lost sample differ in their length alone.
         """

@@ -41,7 +41,6 @@ MUCH_LEFT = 0.05  # of the torque: where nothing explains that, a wider band is 
 WIDER = {"angle": 10.0**0.4, "rate": 10.0 ** (2.0 / 3.0)}
 UNFOLLOWED = 0.5  # of the residual in torque, that the likelihood takes the disturbance for
 NO_WORSE = 1.02  # times the residual in torque: prediction error leaves no more
-ALONG_RUNS = ("time", "run")  # what a part of the recording need not show; what goes with the motion shows in any
 WHOLE_SAMPLES = 200_000  # in which what is left is looked at: memory is a gibibyte for so many
 A_MULTIPLE = 2.0  # of the residual in torque: four times its power is no disturbance, whatever the likelihood says
 
@@ -150,9 +149,7 @@ def search_in_torque(
         found_by_it = by_likelihood is not None or final == known.fit.structure  # what torque had beside it was dropped
         its = known.fit if found_by_it else None
         likely = fitted_on_all(traces, final, its.values if its else {**best.values, **begin}, split.final, its)
-        if unfollowed and found_by_it:  # what errors of the measured motion leave in torque says nothing against it
-            return as_final(*likely, traces, split.everything)
-        return _final(regression, best, likely, traces, split, trusted=found_by_it)
+        return _final(regression, best, likely, traces, split, found_by_it, unfollowed)
 
     after, found_so_far = fitted(final), final
     while name := _unsupported(after, structure, bool(by_likelihood)):
@@ -184,7 +181,7 @@ def search_in_torque(
         if model.effects != structure.effects:
             like = after.fit if isinstance(after.fit, Fit) else None
             likely = fitted_on_all(traces, model, {**there.values, **values}, split.final, like)
-            fitted = _final(regression, there, likely, traces, split, trusted=like is not None)
+            fitted = _final(regression, there, likely, traces, split, like is not None, unfollowed)
         reported.candidates += [c for c in added if c not in reported.candidates]
         reported.contribution |= {c.effect: search.without(there, c.effect).held_nm / there.held_nm for c in added}
         in_torque[(others, *several)] = there
@@ -215,14 +212,17 @@ def _with_whole(
     disturbance: Disturbance, regression: TorqueRegression, fit: TorqueFit, traces: Sequence[Trace], split: Split,
     unit: str,
 ) -> Disturbance:  # fmt: skip
-    """The same with what the whole recording shows of it: a part of a run does not show what changes along it."""
+    """The same with what the whole recording shows to change along runs, or between them.
+
+    A part of it need not show that; what goes with the motion shows in any part.
+    """
     whole, parts = reduced(traces, split, WHOLE_SAMPLES)
     if sum(t.count for t in whole) < MIN_MORE_SAMPLES_RATIO * sum(t.count for t in regression.traces):
         return disturbance
     wider = TorqueRegression(whole, parts, regression.cutoff_hz, regression.scale)
     there = wider.solve(fit.structure, fit.shapes)
-    left = disturbance_of(wider, there, wider.noise_floor_nm(there.values), unit)
-    for part in (d for d in left.depends_on if d.on in ALONG_RUNS):  # as a share of the same torque as the rest
+    left = disturbance_of(wider, there, wider.noise_floor_nm(there.values), unit, "time")
+    for part in left.depends_on:  # as a share of the same torque as the rest
         alike = replace(part, relative=part.torque_rms / regression.torque_nm)
         disturbance = disturbance.with_free_form(alike, left.moves_percent)
     release(whole)
@@ -245,7 +245,7 @@ def _unsupported(final: FinalFit, declared: Structure, by_likelihood: bool) -> s
 
 def _final(
     regression: TorqueRegression, fit: TorqueFit, likely: tuple[PredictionError, Fit], traces: Sequence[Trace],
-    split: Split, trusted: bool = False,
+    split: Split, trusted: bool = False, unfollowed: bool = False,
 ) -> FinalFit:  # fmt: skip
     """The final fit by prediction error, or in torque where that leaves less and the likelihood is not to be believed.
 
@@ -255,10 +255,13 @@ def _final(
     happens to be right and gives the rest away; least squares in torque does the least harm to the parameters. The same
     where it leaves a multiple: a handful of parameters takes nothing of that kind away from a disturbance that is one.
     (A friction that is no step at a reversal has a small level there, and the rest of it passes for a slow torque.)
-    ``trusted``: the likelihood found the model.
+    ``trusted``: the likelihood found the model. ``unfollowed``: most of what that leaves in torque are errors of the
+    measured motion, which say nothing against it.
     """
     problem, found = likely
     fitted = as_final(problem, found, traces, split.everything)
+    if trusted and unfollowed:
+        return fitted
     if any(effects.get(e).place is Place.SENSOR for e in found.structure.effects):  # of which torque knows the less
         return fitted
     left = regression.left_by(fit.structure, fitted.values)

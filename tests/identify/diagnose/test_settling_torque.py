@@ -27,7 +27,9 @@ MODEL = Structure(("inertia", "damping"), ("torque_offset",))
 CUTOFF_HZ = 20.0
 
 
-def run(number: int, seconds: float, begins_s: float = 0.0, settling_nm: float = SETTLING_NM) -> Run:
+def run(
+    number: int, seconds: float, begins_s: float = 0.0, settling_nm: float = SETTLING_NM, drag: float = 0.0
+) -> Run:  # fmt: skip
     """A multisine, read by an encoder, from some time on."""
     time = np.arange(round(SECONDS / 1e-3) + 1) * 1e-3
     rng = np.random.default_rng(number)
@@ -35,7 +37,8 @@ def run(number: int, seconds: float, begins_s: float = 0.0, settling_nm: float =
         3.0 * np.sin(2 * np.pi * f * time + p) for f, p in zip((0.7, 1.9, 3.1), 6.0 * rng.random(3), strict=True)
     )
     felt = torque + settling_nm * np.exp(-time / SETTLING_S) + 0.05 * rng.standard_normal(len(time))
-    angle = simulate(Platform(*JCK), time, TorqueSignal(time, felt), start=(0.0, 0.0), substeps=4).angle_rad
+    platform = Platform(*JCK, {"quadratic_damping": {"factor": drag}} if drag else {})
+    angle = simulate(platform, time, TorqueSignal(time, felt), start=(0.0, 0.0), substeps=4).angle_rad
     angle = angle + 1e-5 * rng.standard_normal(len(time))
     part = slice(round(begins_s / 1e-3), round((begins_s + seconds) / 1e-3))
     t = time[part]
@@ -45,8 +48,10 @@ def run(number: int, seconds: float, begins_s: float = 0.0, settling_nm: float =
 
 
 @cache
-def traces(seconds: float = SECONDS, begins_s: float = 0.0, settling_nm: float = SETTLING_NM) -> list[Trace]:
-    return traces_of(Recording(tuple(run(k, seconds, begins_s, settling_nm) for k in range(2))))
+def traces(
+    seconds: float = SECONDS, begins_s: float = 0.0, settling_nm: float = SETTLING_NM, drag: float = 0.0
+) -> list[Trace]:  # fmt: skip
+    return traces_of(Recording(tuple(run(k, seconds, begins_s, settling_nm, drag) for k in range(2))))
 
 
 def left_in(some: list[Trace]) -> tuple[TorqueRegression, TorqueFit, Disturbance]:
@@ -79,3 +84,11 @@ def test_a_part_of_the_recording_does_not_speak_for_what_changes_along_it() -> N
     assert whole.depends_on[0].relative == pytest.approx(whole.depends_on[0].torque_rms / regression.torque_nm)
     assert whole.torque_rms >= whole.depends_on[0].torque_rms
     assert _with_whole(left, regression, fit, part, split(part, "auto"), "N*m") == left
+
+
+def test_how_far_the_numbers_move_with_what_is_not_asked_about_does_not_count() -> None:
+    regression, fit, left = left_in(traces(drag=0.002))
+    assert {"rate", "time"} <= {d.on for d in left.depends_on}
+    settles = disturbance_of(regression, fit, regression.noise_floor_nm(fit.values), "N*m", "time")
+    assert [d.on for d in settles.depends_on] == ["time"]
+    assert settles.moves_percent["damping"] < 0.2 * left.moves_percent["damping"]

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
+from identify.model.structure import Structure
 from identify.pipeline import identify
+from identify.select import field_search
 from rig.config.identify import IdentifyConfig
 from rig.dynamics import TorqueSignal, simulate
 from rig.platform import Platform
@@ -48,3 +53,24 @@ def test_what_errors_of_the_motion_leave_in_torque_says_nothing_against_the_like
     inertia = found.final.parameters["inertia"]
     assert inertia.value == pytest.approx(JCK[0], rel=5e-3)
     assert inertia.ci95[0] < JCK[0] < inertia.ci95[1]
+
+
+@pytest.mark.parametrize("trusted", [True, False])
+def test_no_final_fit_of_a_model_that_the_likelihood_found_asks_torque_where_that_shows_nothing(
+    trusted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither of the whole model nor of what stays of it where a name is taken back."""
+
+    def asked(*of: Any) -> float:
+        raise LookupError
+
+    model: Any = SimpleNamespace(structure=Structure(effects=("flexible_mode",)), sigma=1.0, values={})
+    split: Any = SimpleNamespace(everything=[])
+    regression: Any = SimpleNamespace(left_by=asked)
+    begun = (regression, model, (model, model), [], split, trusted, True)
+    monkeypatch.setattr(field_search, "as_final", lambda *of: SimpleNamespace(values={}))
+    if trusted:
+        assert field_search._final(*begun).values == {}
+    else:
+        with pytest.raises(LookupError):
+            field_search._final(*begun)
