@@ -149,7 +149,7 @@ def search_in_torque(
         found_by_it = by_likelihood is not None or final == known.fit.structure  # what torque had beside it was dropped
         its = known.fit if found_by_it else None
         likely = fitted_on_all(traces, final, its.values if its else {**best.values, **begin}, split.final, its)
-        return _final(regression, best, likely, traces, split, found_by_it, unfollowed)
+        return _final(regression, best, likely, traces, split, trusted=found_by_it, unfollowed=unfollowed)
 
     after, found_so_far = fitted(final), final
     while name := _unsupported(after, structure, bool(by_likelihood)):
@@ -181,7 +181,7 @@ def search_in_torque(
         if model.effects != structure.effects:
             like = after.fit if isinstance(after.fit, Fit) else None
             likely = fitted_on_all(traces, model, {**there.values, **values}, split.final, like)
-            fitted = _final(regression, there, likely, traces, split, like is not None, unfollowed)
+            fitted = _final(regression, there, likely, traces, split, trusted=like is not None, unfollowed=unfollowed)
         reported.candidates += [c for c in added if c not in reported.candidates]
         reported.contribution |= {c.effect: search.without(there, c.effect).held_nm / there.held_nm for c in added}
         in_torque[(others, *several)] = there
